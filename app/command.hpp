@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every subcommand shares: options of the whole program, the console, the stop request.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <stop_token>
+#include <string>
+
+#include "core/values/context.hpp"
+
+namespace ecorche::app {
+
+/// Options of the whole program and the way to speak: results on stdout, everything else on stderr.
+struct Program {
+  bool json = false;             ///< exactly one JSON object on stdout
+  int threads = 0;               ///< 0: all cores; main runs the command in one TBB arena of that size
+  std::stop_token stop;          ///< set by SIGINT and SIGTERM
+
+  /// A context for one stage that draws `label` with a bar and an ETA on a terminal, plain lines otherwise.
+  Context context(std::string label) const;
+  /// A line on stderr.
+  void note(std::string_view line) const;
+  /// The result: `object` on stdout under --json, else `text`.
+  void result(const std::string& text, const nlohmann::json& object) const;
+};
+
+/// Declares a subcommand on `app`; its callback stores what it must run into `chosen` and returns the exit code.
+using Run = std::function<int()>;
+using Declare = void (*)(CLI::App& app, Program& program, Run& chosen);
+
+// One file per subcommand: app/phantom.cpp, ...
+void declare_phantom(CLI::App& app, Program& program, Run& chosen);
+void declare_check(CLI::App& app, Program& program, Run& chosen);
+void declare_preprocess(CLI::App& app, Program& program, Run& chosen);
+void declare_info(CLI::App& app, Program& program, Run& chosen);
+void declare_verify(CLI::App& app, Program& program, Run& chosen);
+void declare_pose(CLI::App& app, Program& program, Run& chosen);
+void declare_serve(CLI::App& app, Program& program, Run& chosen);
+void declare_stream(CLI::App& app, Program& program, Run& chosen);
+
+}  // namespace ecorche::app

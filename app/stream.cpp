@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command.hpp"
+
+namespace ecorche::app {
+
+void declare_stream(CLI::App&, Program&, Run&) {}
+
+}  // namespace ecorche::app

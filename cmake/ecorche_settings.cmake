@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+# Language, warnings, optimisation and sanitizers, once for every target of ours.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+find_program(CCACHE ccache)
+if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+# A CGAL mesh unit takes about 4 GB to compile: one at a time.
+set_property(GLOBAL PROPERTY JOB_POOLS cgal_pool=1)
+
+add_library(ecorche_flags INTERFACE)
+target_include_directories(ecorche_flags INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(ecorche_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Werror)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # gcc 12 sees overlaps in std::string's own operator+ (its bug 105651).
+  target_compile_options(ecorche_flags INTERFACE -Wno-restrict)
+endif()
+
+add_library(ecorche_sanitizers INTERFACE)
+if(ECORCHE_SANITIZE)
+  string(REPLACE ";" "," _sanitizers "${ECORCHE_SANITIZE}")
+  target_compile_options(ecorche_sanitizers INTERFACE
+    -fsanitize=${_sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
+  # Linking needs the run-time library whoever links, also foreign units.
+  add_link_options(-fsanitize=${_sanitizers})
+endif()

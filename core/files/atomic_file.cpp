@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/files/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "core/values/error.hpp"
+
+namespace ecorche::files {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Flushes a file or a folder to the disk.
+bool flush(const fs::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool good = ::fsync(file) == 0;
+  ::close(file);
+  return good;
+}
+
+fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
+}  // namespace
+
+AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
+  const fs::path folder = folder_of(path_);
+  if (fs::is_directory(path_)) {
+    throw Error(ErrorKind::cannot_create, path_.string(), "is a folder", "name a file");
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw Error(ErrorKind::cannot_create, path_.string(), "cannot write here: " + std::string(std::strerror(errno)),
+                "make the folder, or name another one");
+  }
+  // Hidden, with the extension kept: some writers choose the format by it.
+  temporary_ = folder / ("." + path_.stem().string() + "." + std::to_string(::getpid()) + ".part" +
+                         path_.extension().string());
+}
+
+AtomicFile::~AtomicFile() {
+  if (committed_) return;
+  std::error_code ignored;
+  fs::remove(temporary_, ignored);
+}
+
+void AtomicFile::commit() {
+  if (!flush(temporary_)) {
+    throw Error(ErrorKind::io, path_.string(), "cannot flush: " + std::string(std::strerror(errno)),
+                "check the disk's free space");
+  }
+  std::error_code error;
+  fs::rename(temporary_, path_, error);
+  if (error) throw Error(ErrorKind::io, path_.string(), "cannot rename: " + error.message(), "check the folder's rights");
+  committed_ = true;
+  flush(folder_of(path_));  // the name itself; a file system that refuses still holds the data
+}
+
+void write_text(const fs::path& path, std::string_view text) {
+  AtomicFile file(path);
+  std::ofstream stream(file.temporary(), std::ios::binary);
+  if (!stream) {
+    throw Error(ErrorKind::cannot_create, path.string(), "cannot be opened for writing", "check the folder's rights");
+  }
+  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+  stream.close();
+  if (!stream) throw Error(ErrorKind::io, path.string(), "writing failed", "check the disk's free space");
+  file.commit();
+}
+
+std::string read_text(const fs::path& path, std::size_t limit) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    throw Error(ErrorKind::missing_input, path.string(), "is a folder", "name a file");
+  }
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) {
+    throw Error(ErrorKind::missing_input, path.string(), "cannot be opened: " + std::string(std::strerror(errno)),
+                "check the path and its rights");
+  }
+  std::string text;
+  char buffer[1 << 16];
+  while (stream.read(buffer, sizeof buffer) || stream.gcount() > 0) {
+    text.append(buffer, static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > limit) {
+      throw Error(ErrorKind::data, path.string(), "longer than " + std::to_string(limit) + " bytes",
+                  "this file is not what it should be");
+    }
+  }
+  if (stream.bad()) throw Error(ErrorKind::io, path.string(), "reading failed", "check the disk");
+  return text;
+}
+
+void make_folder(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error || !fs::is_directory(path)) {
+    throw Error(ErrorKind::cannot_create, path.string(),
+                "cannot make this folder" + (error ? ": " + error.message() : std::string()), "name another folder");
+  }
+}
+
+}  // namespace ecorche::files

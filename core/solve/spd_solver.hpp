@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Symmetric positive definite systems: factor once, solve for many right-hand sides as one block.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/values/context.hpp"
+
+namespace ecorche::solve {
+
+using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
+using Block = Eigen::MatrixXd;  ///< #unknowns by #right-hand sides
+
+/// A factored system. Backends: `eigen` (here), `cholmod` (preprocess/weights/cholmod, GPL); chosen by name.
+class SpdSolver {
+ public:
+  virtual ~SpdSolver() = default;
+  virtual std::string_view name() const = 0;
+  /// Factors `A`, of which the lower triangle is read. Throws Error{data} when A is not positive definite.
+  virtual void factor(const SparseMatrix& A, const Context& context) = 0;
+  /// Solves A X = B. Only after `factor`.
+  virtual Block solve(const Block& B, const Context& context) const = 0;
+};
+
+using SpdSolverFactory = std::function<std::unique_ptr<SpdSolver>()>;
+
+/// Simplicial LLT of Eigen: for small cases, tests and the build without GPL.
+std::unique_ptr<SpdSolver> make_eigen_solver();
+
+/// Largest over the columns of |A x - b| / |b|, A symmetric from its lower triangle.
+double relative_residual(const SparseMatrix& A, const Block& X, const Block& B);
+
+}  // namespace ecorche::solve

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// A case: one patient as it was scanned, everything in LPS mm (DESIGN 5).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/values/image.hpp"
+#include "core/values/mesh.hpp"
+#include "core/values/skeleton.hpp"
+
+namespace ecorche {
+
+enum class Group : std::uint8_t { skin, bone, muscle, organ, vessel, nerve, cartilage, ligament, fat, other };
+
+/// `skin`, `bone`, ... and back; throws Error{config} on an unknown word.
+std::string_view group_name(Group group);
+Group group_from_name(std::string_view name);
+
+struct CaseBone {
+  std::string name;
+  std::string segment;  ///< owner
+  SurfaceMesh surface;
+};
+
+struct CaseTissue {
+  std::string name;
+  Group group = Group::other;
+  SurfaceMesh surface;
+};
+
+struct CaseVolume {
+  std::string name;
+  Image image;
+  double background = 0;  ///< what lies outside the body
+};
+
+/// A label per voxel, and what the ids mean.
+struct CaseLabels {
+  Image image;                              ///< integer scalars, one component; 0 is nothing
+  std::map<std::int64_t, std::string> table;  ///< id -> name
+};
+
+struct Case {
+  std::string name;
+  Skeleton skeleton;
+  std::string skin_name = "skin";
+  SurfaceMesh skin;
+  std::vector<CaseBone> bones;
+  std::vector<CaseTissue> tissues;  ///< without skin and bones
+  std::vector<CaseVolume> volumes;
+  std::optional<CaseLabels> labels;
+  /// XXH64 of every file that was read, by path as written in the case: provenance of the model.
+  std::map<std::string, std::uint64_t> input_digests;
+};
+
+}  // namespace ecorche

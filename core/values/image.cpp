@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/values/image.hpp"
+
+#include "core/values/error.hpp"
+
+namespace ecorche {
+
+std::array<double, 3> ImageGrid::point(double i, double j, double k) const {
+  const std::array<double, 3> step{spacing[0] * i, spacing[1] * j, spacing[2] * k};
+  std::array<double, 3> p = origin;
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) p[r] += direction[3 * r + c] * step[c];
+  }
+  return p;
+}
+
+std::array<double, 3> ImageGrid::index(const std::array<double, 3>& point) const {
+  std::array<double, 3> index{0, 0, 0};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t r = 0; r < 3; ++r) index[c] += direction[3 * r + c] * (point[r] - origin[r]);
+    index[c] /= spacing[c];
+  }
+  return index;
+}
+
+std::size_t scalar_bytes(ScalarType type) {
+  return with_scalar_type(type, [](auto t) { return sizeof t; });
+}
+
+std::string_view scalar_name(ScalarType type) {
+  switch (type) {
+    case ScalarType::u8: return "u8";
+    case ScalarType::i8: return "i8";
+    case ScalarType::u16: return "u16";
+    case ScalarType::i16: return "i16";
+    case ScalarType::u32: return "u32";
+    case ScalarType::i32: return "i32";
+    case ScalarType::f32: return "f32";
+    case ScalarType::f64: break;
+  }
+  return "f64";
+}
+
+void Image::check_type(ScalarType asked) const {
+  if (asked != type) {
+    throw Error(ErrorKind::internal, "image",
+                "scalars are " + std::string(scalar_name(type)) + ", asked as " + std::string(scalar_name(asked)),
+                "report this");
+  }
+}
+
+}  // namespace ecorche

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rigid motions: a unit quaternion (w, x, y, z) and a translation; global = parent * local.
+#pragma once
+
+#include <Eigen/Geometry>
+
+namespace ecorche {
+
+/// x -> q x + t, mm. Double precision; run-time kernels narrow it.
+struct RigidTransform {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return q * x + t; }
+  RigidTransform operator*(const RigidTransform& local) const { return {q * local.q, q * local.t + t}; }
+  RigidTransform inverse() const { return {q.conjugate(), -(q.conjugate() * t)}; }
+};
+
+}  // namespace ecorche

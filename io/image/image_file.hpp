@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images as files, LPS mm; read and written by ITK behind plain values.
+#pragma once
+
+#include <filesystem>
+
+#include "core/values/image.hpp"
+
+namespace ecorche::io {
+
+/// Reads `.nrrd` and `.mha` (gzip too), 3-D, scalar type and direction kept whole, one or several components.
+/// Before any voxel is allocated the size that the header declares is held against 2^33 bytes and against the file's own size (raw
+/// data) or 1100 times it (gzip). Throws Error{missing_input} or Error{data}.
+Image read_image(const std::filesystem::path& path);
+
+/// Writes `.nrrd`, `.mha` or `.nii.gz`, atomically; compressed where `compress`.
+/// Throws Error{usage} for another extension, Error{cannot_create}, Error{io}.
+void write_image(const std::filesystem::path& path, const Image& image, bool compress = true);
+
+}  // namespace ecorche::io

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The built-in synthetic patient: every surface, volume, joint and motion from formulas.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/values/case.hpp"
+#include "core/values/context.hpp"
+#include "core/values/pose.hpp"
+
+namespace ecorche::phantom {
+
+enum class Size : std::uint8_t {
+  small,     ///< under 10 000 tissue vertices in all: tests
+  standard,  ///< about 150 000: the demo
+  paper,     ///< at least 1.28 M tissue vertices, image near 250 x 120 x 700: Sujar18's largest model
+};
+
+struct Phantom {
+  Case patient;               ///< as it would be scanned: its joints are rules or given centres
+  Skeleton truth;             ///< the same skeleton with every true centre and axis given
+  std::vector<Clip> clips;    ///< `walk` and `bend`, at 30 frames per second, at least 2 s, looping
+};
+
+/// Same size and seed, same bytes. `seed` draws the noise of the CT and the small variation of body proportions.
+Phantom make(Size size, std::uint64_t seed, const Context& context);
+
+/// The bar of Sujar18 figure 7: four bones in a row in a square bar, three joints.
+Phantom make_bar(Size size, const Context& context);
+
+}  // namespace ecorche::phantom

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tetrahedral meshers behind one interface, chosen by name (Sujar18 3.2).
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/values/case.hpp"
+#include "core/values/context.hpp"
+#include "core/values/image.hpp"
+#include "core/values/mesh.hpp"
+
+namespace ecorche::tet {
+
+struct Options {
+  std::int64_t max_tets = 3'500'000;
+  std::int64_t max_nodes = 800'000;
+  double seconds = 600;  ///< a mesher that takes longer is stopped (TetGen: in a child process)
+};
+
+/// What a mesher works from; it may use either.
+struct Input {
+  const Case& patient;
+  const Image& labels;  ///< of voxel::voxelize
+};
+
+class Mesher {
+ public:
+  virtual ~Mesher() = default;
+  virtual std::string_view name() const = 0;
+  /// Tets of the whole body, labelled as TetMesh says, with positive volume, no duplicate or unused node. Never more
+  /// than options.max_tets and max_nodes: sizes are coarsened, with a warning, until they hold.
+  /// Throws Error{data} when no mesh can be made, naming what stood in the way and another mesher to try.
+  virtual TetMesh mesh(const Input& input, const Options& options, const Context& context) const = 0;
+};
+
+std::unique_ptr<Mesher> make_lattice_mesher();  ///< tet/lattice, Apache-2.0
+std::unique_ptr<Mesher> make_cgal_mesher();     ///< tet/cgal, GPL
+std::unique_ptr<Mesher> make_tetgen_mesher();   ///< tet/tetgen, AGPL
+
+/// Names of the meshers in this build; the first is the default (`cgal` with GPL units, else `lattice`).
+std::vector<std::string_view> mesher_names();
+
+/// Throws Error{usage} for a name that this build does not have.
+std::unique_ptr<Mesher> make_mesher(std::string_view name);
+
+/// What every mesh passes before the next stage: nodes narrowed to float32 (the run-time precision; all later stages
+/// see exactly those coordinates), renumbered along a Morton curve, tets sorted along it, positive volume checked.
+void canonicalize(TetMesh& mesh);
+
+}  // namespace ecorche::tet

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Skin and bones into a labelled image (Sujar18 3.2).
+#pragma once
+
+#include <cstdint>
+
+#include "core/values/case.hpp"
+#include "core/values/context.hpp"
+#include "core/values/image.hpp"
+
+namespace ecorche::voxel {
+
+inline constexpr std::uint16_t outside = 0;
+inline constexpr std::uint16_t soft = 1;        ///< in the body, in no bone
+inline constexpr std::uint16_t first_bone = 2;  ///< bone i of the case is first_bone + i
+
+struct Options {
+  double voxel_mm = 0;  ///< edge; 0: the finest whose image stays within `largest` or its number of voxels
+  std::array<std::int32_t, 3> largest{250, 120, 700};  ///< along x, y, z; Sujar18's image
+};
+
+/// The u16 image of labels over the bounds of skin and bones, axis-parallel, with one empty voxel all round.
+/// Surface collision first (a voxel that a triangle touches counts, so that bones thinner than a voxel survive), then
+/// inside (exact parity of signed crossings, snapped to 1/256 voxel), then bones; a voxel claimed by several bones goes
+/// to the one whose surface is nearest to its centre, ties to the lower index. The body is skin together with bones.
+/// Throws Error{config} when voxel_mm gives more than 2^31 voxels, Error{data} for an empty skin.
+Image voxelize(const Case& patient, const Options& options, const Context& context);
+
+}  // namespace ecorche::voxel

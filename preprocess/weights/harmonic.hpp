@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Skinning weights as harmonic functions of the tets (Sujar18 3.3; BaranPopovic07 on surfaces).
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "core/solve/spd_solver.hpp"
+#include "core/values/case.hpp"
+#include "core/values/context.hpp"
+#include "core/values/mesh.hpp"
+#include "core/values/model.hpp"
+
+namespace ecorche::weights {
+
+/// Linear finite elements: L_ab = sum over tets of V grad_a . grad_b. Symmetric, rows sum to 0; lower triangle stored.
+/// #nodes by #nodes. `positive_offdiagonal_share` (may be null): share of the off-diagonals above 0.
+solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_offdiagonal_share);
+
+/// Laplace's equation with fixed nodes: value[n] = B(n, c) on nodes with fixed[n], zero flux elsewhere.
+/// Every connected part must hold a fixed node. Returns #nodes by #columns, and the relative residual.
+struct HarmonicResult {
+  Eigen::MatrixXd values;
+  double residual = 0;
+};
+HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
+                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver, const Context& context);
+
+/// The owning segment of every node that touches a bone, else -1. A node that touches several bones belongs to the
+/// bone whose surface is nearest, ties to the lower index.
+std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient, const std::vector<std::int32_t>& bone_segment);
+
+struct WeightsResult {
+  Weights weights;            ///< as stored: clamped to [0, 1], cut at 1e-6, rows renormalised
+  Eigen::MatrixXd solved;     ///< #nodes by #segments, before repair; kept only when asked
+  Certificate certificate;    ///< the solver's, weights' and off-diagonal members are filled
+};
+
+struct Options {
+  std::string_view solver = "auto";  ///< auto, cholmod, eigen
+  bool keep_solved = false;
+};
+
+/// One Laplacian, one factor, all segments as one block. A connected part of the mesh without any bone is named and
+/// attached to the nearest boned part (its nodes take the weights of the nearest node there). Rows beyond [0, 1] are
+/// clamped and renormalised, and counted; Error{data} when a repair would change a weight by more than 1e-2, or when
+/// solved weights leave [-1e-3, 1 + 1e-3], naming the worst node and its tets.
+WeightsResult solve_weights(const TetMesh& mesh, const Case& patient, const std::vector<std::int32_t>& bone_segment,
+                            std::size_t segments, const Options& options, const Context& context);
+
+/// `cholmod` (GPL builds) and `eigen`; the first is `auto`'s choice.
+std::vector<std::string_view> solver_names();
+std::unique_ptr<solve::SpdSolver> make_solver(std::string_view name);  ///< Error{usage} for an unknown name
+
+}  // namespace ecorche::weights

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a posed body can be believed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/values/model.hpp"
+#include "runtime/skin/body_poser.hpp"
+
+namespace ecorche::runtime {
+
+/// Thresholds of the verdict; printed with it.
+struct QualityThresholds {
+  double max_inverted_share = 1e-3;      ///< rest volume of inverted tets over that of the body
+  double max_volume_change = 0.10;       ///< of the whole body, either way
+  double max_bone_rigidity_mm = 1e-3;
+};
+
+struct TissueChange {
+  std::string name;
+  double rest_mm3 = 0, posed_mm3 = 0;
+  double share = 0;  ///< (posed - rest) / rest; enclosed volumes of the surfaces
+};
+
+struct PoseQuality {
+  std::uint64_t inverted_tets = 0;
+  double inverted_rest_mm3 = 0;
+  double inverted_share = 0;
+  double min_det_f = 1;
+  double volume_change = 0;  ///< of the tets, all together
+  std::vector<TissueChange> tissues;
+  double bone_rigidity_mm = 0;
+  std::vector<ClampedJoint> clamped;
+  QualityThresholds thresholds;
+  bool pass = true;  ///< the verdict: `pass` or `warn`
+};
+
+/// `tissues`: rows of Model::tissues that `body` holds. Sums run in a fixed order: same figures for any thread count.
+PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
+                    const QualityThresholds& thresholds = {});
+
+}  // namespace ecorche::runtime

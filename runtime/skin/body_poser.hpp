@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// A model made ready for posing, and the buffers of one posed body.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/values/error.hpp"
+#include "core/values/model.hpp"
+#include "core/values/pose.hpp"
+#include "core/values/transform.hpp"
+
+namespace ecorche::runtime {
+
+enum class Skinning : std::uint8_t {
+  lbs,  ///< linear blend skinning
+  dqs,  ///< dual quaternion skinning, Kavan08
+  cor,  ///< optimised centres of rotation, LeHodgins16; nodes without a centre by LBS
+};
+
+/// `lbs`, `dqs`, `cor` and back; throws Error{usage} on another word.
+std::string_view skinning_name(Skinning skinning);
+Skinning skinning_from_name(std::string_view name);
+
+/// One posed body. Allocated once by BodyPoser::make_frame, then only written.
+struct PosedBody {
+  std::vector<RigidTransform> segments;      ///< motion of every segment from rest
+  std::vector<float> nodes;                  ///< 3 * #nodes, LPS mm
+  std::vector<std::vector<float>> tissues;   ///< per tissue of the model, 3 * #V; not written when not asked for
+  std::vector<ClampedJoint> clamped;         ///< reserved for all joints; what limits took away
+};
+
+/// Shared and immutable: any number of threads may pose different frames at once. Work inside runs in the caller's TBB
+/// arena; results are the same bytes for any number of threads.
+class BodyPoser {
+ public:
+  /// Drops weights below 1e-4 and renormalises their rows (DESIGN 7).
+  explicit BodyPoser(std::shared_ptr<const Model> model);
+  ~BodyPoser();
+  BodyPoser(const BodyPoser&) = delete;
+  BodyPoser& operator=(const BodyPoser&) = delete;
+
+  const Model& model() const;
+  const std::shared_ptr<const Model>& shared_model() const;
+  PosedBody make_frame() const;
+
+  /// Constrains `pose` (limits, coupling), runs forward kinematics, skins the nodes, then moves the tissues whose rows
+  /// of Model::tissues are in `tissues` (ascending). Allocates nothing. invalid_argument when the pose has not one
+  /// rotation and one translation per joint, or holds a value that is not finite or a quaternion far from unit length.
+  Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues, PosedBody& out) const;
+
+  /// All tissues of the model.
+  std::span<const std::uint32_t> all_tissues() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ecorche::runtime
