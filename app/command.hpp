@@ -14,9 +14,9 @@ namespace ecorche::app {
 
 /// Options of the whole program and the way to speak: results on stdout, everything else on stderr.
 struct Program {
-  bool json = false;             ///< exactly one JSON object on stdout
-  int threads = 0;               ///< 0: all cores; main runs the command in one TBB arena of that size
-  std::stop_token stop;          ///< set by SIGINT and SIGTERM
+  bool json = false;     ///< exactly one JSON object on stdout
+  int threads = 0;       ///< 0: all cores; main runs the command in one TBB arena of that size
+  std::stop_token stop;  ///< set by SIGINT and SIGTERM
 
   /// A context for one stage that draws `label` with a bar and an ETA on a terminal, plain lines otherwise.
   Context context(std::string label) const;
@@ -26,7 +26,8 @@ struct Program {
   void result(const std::string& text, const nlohmann::json& object) const;
 };
 
-/// Declares a subcommand on `app`; its callback stores what it must run into `chosen` and returns the exit code.
+/// Declares a subcommand on `app`; its callback stores what it must run into `chosen` and returns the exit
+/// code.
 using Run = std::function<int()>;
 using Declare = void (*)(CLI::App& app, Program& program, Run& chosen);
 

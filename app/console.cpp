@@ -44,7 +44,8 @@ class Bar {
   void line(std::string_view kind, std::string_view text) {
     const std::lock_guard lock(mutex_);
     if (drawn_ && terminal_) std::fputs("\r\x1b[K", stderr);
-    std::fprintf(stderr, "%.*s%.*s\n", static_cast<int>(kind.size()), kind.data(), static_cast<int>(text.size()), text.data());
+    std::fprintf(stderr, "%.*s%.*s\n", static_cast<int>(kind.size()), kind.data(),
+                 static_cast<int>(text.size()), text.data());
   }
 
  private:

@@ -26,7 +26,9 @@ bool flush(const fs::path& path) {
   return good;
 }
 
-fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
 
 }  // namespace
 
@@ -36,7 +38,8 @@ AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
     throw Error(ErrorKind::cannot_create, path_.string(), "is a folder", "name a file");
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw Error(ErrorKind::cannot_create, path_.string(), "cannot write here: " + std::string(std::strerror(errno)),
+    throw Error(ErrorKind::cannot_create, path_.string(),
+                "cannot write here: " + std::string(std::strerror(errno)),
                 "make the folder, or name another one");
   }
   // Hidden, with the extension kept: some writers choose the format by it.
@@ -57,7 +60,9 @@ void AtomicFile::commit() {
   }
   std::error_code error;
   fs::rename(temporary_, path_, error);
-  if (error) throw Error(ErrorKind::io, path_.string(), "cannot rename: " + error.message(), "check the folder's rights");
+  if (error)
+    throw Error(ErrorKind::io, path_.string(), "cannot rename: " + error.message(),
+                "check the folder's rights");
   committed_ = true;
   flush(folder_of(path_));  // the name itself; a file system that refuses still holds the data
 }
@@ -66,7 +71,8 @@ void write_text(const fs::path& path, std::string_view text) {
   AtomicFile file(path);
   std::ofstream stream(file.temporary(), std::ios::binary);
   if (!stream) {
-    throw Error(ErrorKind::cannot_create, path.string(), "cannot be opened for writing", "check the folder's rights");
+    throw Error(ErrorKind::cannot_create, path.string(), "cannot be opened for writing",
+                "check the folder's rights");
   }
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
   stream.close();
@@ -81,8 +87,8 @@ std::string read_text(const fs::path& path, std::size_t limit) {
   }
   std::ifstream stream(path, std::ios::binary);
   if (!stream) {
-    throw Error(ErrorKind::missing_input, path.string(), "cannot be opened: " + std::string(std::strerror(errno)),
-                "check the path and its rights");
+    throw Error(ErrorKind::missing_input, path.string(),
+                "cannot be opened: " + std::string(std::strerror(errno)), "check the path and its rights");
   }
   std::string text;
   char buffer[1 << 16];
@@ -102,7 +108,8 @@ void make_folder(const fs::path& path) {
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path)) {
     throw Error(ErrorKind::cannot_create, path.string(),
-                "cannot make this folder" + (error ? ": " + error.message() : std::string()), "name another folder");
+                "cannot make this folder" + (error ? ": " + error.message() : std::string()),
+                "name another folder");
   }
 }
 

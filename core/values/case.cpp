@@ -12,7 +12,9 @@ constexpr std::array<std::string_view, 10> kGroups{"skin",  "bone",      "muscle
                                                    "nerve", "cartilage", "ligament", "fat",   "other"};
 }
 
-std::string_view group_name(Group group) { return kGroups.at(static_cast<std::size_t>(group)); }
+std::string_view group_name(Group group) {
+  return kGroups.at(static_cast<std::size_t>(group));
+}
 
 Group group_from_name(std::string_view name) {
   for (std::size_t i = 0; i < kGroups.size(); ++i) {

@@ -40,7 +40,7 @@ struct CaseVolume {
 
 /// A label per voxel, and what the ids mean.
 struct CaseLabels {
-  Image image;                              ///< integer scalars, one component; 0 is nothing
+  Image image;                                ///< integer scalars, one component; 0 is nothing
   std::map<std::int64_t, std::string> table;  ///< id -> name
 };
 

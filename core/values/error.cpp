@@ -7,17 +7,28 @@ namespace ecorche {
 
 int exit_code(ErrorKind kind) noexcept {
   switch (kind) {
-    case ErrorKind::usage: return 64;
-    case ErrorKind::data: return 65;
-    case ErrorKind::missing_input: return 66;
-    case ErrorKind::internal: return 70;
-    case ErrorKind::cannot_create: return 73;
-    case ErrorKind::io: return 74;
-    case ErrorKind::temporary: return 75;
-    case ErrorKind::protocol: return 76;
-    case ErrorKind::refused: return 77;
-    case ErrorKind::config: return 78;
-    case ErrorKind::interrupted: return 130;
+    case ErrorKind::usage:
+      return 64;
+    case ErrorKind::data:
+      return 65;
+    case ErrorKind::missing_input:
+      return 66;
+    case ErrorKind::internal:
+      return 70;
+    case ErrorKind::cannot_create:
+      return 73;
+    case ErrorKind::io:
+      return 74;
+    case ErrorKind::temporary:
+      return 75;
+    case ErrorKind::protocol:
+      return 76;
+    case ErrorKind::refused:
+      return 77;
+    case ErrorKind::config:
+      return 78;
+    case ErrorKind::interrupted:
+      return 130;
   }
   return 70;
 }
@@ -45,15 +56,22 @@ Status to_status(const Error& error) {
   switch (error.kind()) {
     case ErrorKind::usage:
     case ErrorKind::data:
-    case ErrorKind::config: return {StatusCode::invalid_argument, error.what()};
-    case ErrorKind::missing_input: return {StatusCode::not_found, error.what()};
-    case ErrorKind::temporary: return {StatusCode::unavailable, error.what()};
-    case ErrorKind::protocol: return {StatusCode::failed_precondition, error.what()};
-    case ErrorKind::refused: return {StatusCode::permission_denied, error.what()};
-    case ErrorKind::interrupted: return {StatusCode::cancelled, error.what()};
+    case ErrorKind::config:
+      return {StatusCode::invalid_argument, error.what()};
+    case ErrorKind::missing_input:
+      return {StatusCode::not_found, error.what()};
+    case ErrorKind::temporary:
+      return {StatusCode::unavailable, error.what()};
+    case ErrorKind::protocol:
+      return {StatusCode::failed_precondition, error.what()};
+    case ErrorKind::refused:
+      return {StatusCode::permission_denied, error.what()};
+    case ErrorKind::interrupted:
+      return {StatusCode::cancelled, error.what()};
     case ErrorKind::internal:
     case ErrorKind::cannot_create:
-    case ErrorKind::io: break;
+    case ErrorKind::io:
+      break;
   }
   return {StatusCode::internal, error.what()};
 }

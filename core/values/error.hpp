@@ -33,9 +33,9 @@ class Error : public std::exception {
   Error(ErrorKind kind, std::string where, std::string what, std::string mend);
 
   ErrorKind kind() const noexcept { return kind_; }
-  const std::string& where() const noexcept { return where_; }    ///< file:line:key, option or address
+  const std::string& where() const noexcept { return where_; }      ///< file:line:key, option or address
   const std::string& problem() const noexcept { return problem_; }  ///< what is wrong, with the value met
-  const std::string& mend() const noexcept { return mend_; }      ///< what the reader can do about it
+  const std::string& mend() const noexcept { return mend_; }        ///< what the reader can do about it
   /// `WHERE: WHAT (HOW TO MEND)`, on one line.
   const char* what() const noexcept override { return line_.c_str(); }
 
@@ -46,9 +46,23 @@ class Error : public std::exception {
 
 /// Numbers of google.rpc.Code, which the wire uses.
 enum class StatusCode : std::uint8_t {
-  ok = 0, cancelled = 1, unknown = 2, invalid_argument = 3, deadline_exceeded = 4, not_found = 5,
-  already_exists = 6, permission_denied = 7, resource_exhausted = 8, failed_precondition = 9, aborted = 10,
-  out_of_range = 11, unimplemented = 12, internal = 13, unavailable = 14, data_loss = 15, unauthenticated = 16,
+  ok = 0,
+  cancelled = 1,
+  unknown = 2,
+  invalid_argument = 3,
+  deadline_exceeded = 4,
+  not_found = 5,
+  already_exists = 6,
+  permission_denied = 7,
+  resource_exhausted = 8,
+  failed_precondition = 9,
+  aborted = 10,
+  out_of_range = 11,
+  unimplemented = 12,
+  internal = 13,
+  unavailable = 14,
+  data_loss = 15,
+  unauthenticated = 16,
 };
 
 /// What runtime and wire edges return: nothing is thrown across a thread, a session or the C ABI.

@@ -29,23 +29,32 @@ std::size_t scalar_bytes(ScalarType type) {
 
 std::string_view scalar_name(ScalarType type) {
   switch (type) {
-    case ScalarType::u8: return "u8";
-    case ScalarType::i8: return "i8";
-    case ScalarType::u16: return "u16";
-    case ScalarType::i16: return "i16";
-    case ScalarType::u32: return "u32";
-    case ScalarType::i32: return "i32";
-    case ScalarType::f32: return "f32";
-    case ScalarType::f64: break;
+    case ScalarType::u8:
+      return "u8";
+    case ScalarType::i8:
+      return "i8";
+    case ScalarType::u16:
+      return "u16";
+    case ScalarType::i16:
+      return "i16";
+    case ScalarType::u32:
+      return "u32";
+    case ScalarType::i32:
+      return "i32";
+    case ScalarType::f32:
+      return "f32";
+    case ScalarType::f64:
+      break;
   }
   return "f64";
 }
 
 void Image::check_type(ScalarType asked) const {
   if (asked != type) {
-    throw Error(ErrorKind::internal, "image",
-                "scalars are " + std::string(scalar_name(type)) + ", asked as " + std::string(scalar_name(asked)),
-                "report this");
+    throw Error(
+        ErrorKind::internal, "image",
+        "scalars are " + std::string(scalar_name(type)) + ", asked as " + std::string(scalar_name(asked)),
+        "report this");
   }
 }
 

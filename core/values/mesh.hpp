@@ -8,10 +8,10 @@
 
 namespace ecorche {
 
-using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;      ///< #V by 3, mm
-using PointsF = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;      ///< #V by 3, mm, run time
+using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;           ///< #V by 3, mm
+using PointsF = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;           ///< #V by 3, mm, run time
 using Triangles = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;  ///< #F by 3, rows of V
-using Tets = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 4, Eigen::RowMajor>;  ///< #T by 4, rows of V
+using Tets = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 4, Eigen::RowMajor>;       ///< #T by 4, rows of V
 
 /// A triangle surface; triangles run counter-clockwise seen from outside.
 struct SurfaceMesh {
@@ -30,7 +30,8 @@ struct TetMesh {
 };
 
 /// Six times the signed volume of tet (a, b, c, d).
-template <class A> double tet_det(const A& a, const A& b, const A& c, const A& d) {
+template <class A>
+double tet_det(const A& a, const A& b, const A& c, const A& d) {
   const Eigen::Vector3d u = (b - a).template cast<double>().transpose();
   const Eigen::Vector3d v = (c - a).template cast<double>().transpose();
   const Eigen::Vector3d w = (d - a).template cast<double>().transpose();

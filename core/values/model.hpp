@@ -25,7 +25,7 @@ struct Weights {
 
 /// Centres of rotation of the nodes (LeHodgins16; Sujar18 eqs. 6-7).
 struct CorCentres {
-  PointsF centre;                   ///< #nodes by 3, LPS mm; the node itself where has_centre is 0
+  PointsF centre;                        ///< #nodes by 3, LPS mm; the node itself where has_centre is 0
   std::vector<std::uint8_t> has_centre;  ///< 0: no tet resembles the node, which is then skinned by LBS
   double sigma = 0.05;
 };
@@ -36,8 +36,8 @@ struct Tissue {
 
   std::string name;
   Group group = Group::other;
-  PointsF V;              ///< #V by 3, rest, LPS mm
-  Triangles F;            ///< #F by 3
+  PointsF V;                       ///< #V by 3, rest, LPS mm
+  Triangles F;                     ///< #F by 3
   std::int32_t segment = by_tets;  ///< owning segment of a bone
   std::vector<std::int32_t> tet;   ///< #V, nearest or containing tet; empty for bones
   /// #V by 4, barycentric coordinates in that tet; they sum to 1, and are signed outside the mesh.
@@ -56,7 +56,7 @@ struct ModelVolume {
 /// What was measured on the model when it was made; `verify` measures it again (DESIGN 7).
 struct Certificate {
   // As solved, in double precision, before repair.
-  double solver_residual = 0;      ///< largest relative residual over the right-hand sides
+  double solver_residual = 0;  ///< largest relative residual over the right-hand sides
   double solved_min_weight = 0;
   double solved_max_weight = 0;
   double solved_row_sum_error = 0;
@@ -83,15 +83,15 @@ struct Certificate {
 struct Model {
   std::string name;
   Rig rig;
-  PointsF nodes;                       ///< #nodes by 3, rest, LPS mm, Morton order
-  Tets tets;                           ///< #T by 4, positive volume in the float32 nodes
-  std::vector<std::uint16_t> tet_label;  ///< #T, see TetMesh
-  std::vector<std::string> bone_names;   ///< bone i has label i + 1
+  PointsF nodes;                           ///< #nodes by 3, rest, LPS mm, Morton order
+  Tets tets;                               ///< #T by 4, positive volume in the float32 nodes
+  std::vector<std::uint16_t> tet_label;    ///< #T, see TetMesh
+  std::vector<std::string> bone_names;     ///< bone i has label i + 1
   std::vector<std::int32_t> bone_segment;  ///< #bones, row of the owning segment
   Weights weights;
   CorCentres cor;
-  std::vector<Tissue> tissues;         ///< skin first, then bones, then the case's order
-  std::vector<ModelVolume> volumes;    ///< the case's order; the label map last, under the name "labels"
+  std::vector<Tissue> tissues;       ///< skin first, then bones, then the case's order
+  std::vector<ModelVolume> volumes;  ///< the case's order; the label map last, under the name "labels"
   Certificate certificate;
   std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
 

@@ -39,9 +39,9 @@ struct ClipJoint {
 struct Clip {
   std::string name;
   double frame_seconds = 1.0 / 30.0;
-  std::vector<ClipJoint> joints;                 ///< parents first
-  std::vector<Eigen::Vector3d> root_position;    ///< per frame, LPS mm
-  std::vector<Eigen::Quaterniond> rotation;      ///< frame * #joints + joint; local, axes parallel to LPS
+  std::vector<ClipJoint> joints;               ///< parents first
+  std::vector<Eigen::Vector3d> root_position;  ///< per frame, LPS mm
+  std::vector<Eigen::Quaterniond> rotation;    ///< frame * #joints + joint; local, axes parallel to LPS
   std::size_t frames() const { return root_position.size(); }
 };
 

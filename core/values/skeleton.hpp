@@ -29,10 +29,10 @@ enum class CenterRule : std::uint8_t {
 /// One anatomical angle: a turn about one axis of the joint frame. In `Joint::sequence` order the turns are
 /// intrinsic: R = R(first) R(second) R(third).
 struct AngleAxis {
-  std::string name;        ///< `flexion`, `adduction`, `rotation`: a pose file says `flexion_deg`
-  int axis = 0;            ///< 0 x, 1 y, 2 z of the joint frame
-  double sign = 1;         ///< -1 where the positive anatomical angle is the negative turn
-  double rest = 0;         ///< radians: the anatomical angle of the scanned rest pose
+  std::string name;  ///< `flexion`, `adduction`, `rotation`: a pose file says `flexion_deg`
+  int axis = 0;      ///< 0 x, 1 y, 2 z of the joint frame
+  double sign = 1;   ///< -1 where the positive anatomical angle is the negative turn
+  double rest = 0;   ///< radians: the anatomical angle of the scanned rest pose
   double min = -std::numeric_limits<double>::infinity();  ///< radians, anatomical; no limit by default
   double max = std::numeric_limits<double>::infinity();
 };
@@ -51,7 +51,8 @@ struct Joint {
   CenterRule rule = CenterRule::given;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< LPS mm, where rule is `given`
   std::string center_bone, facing_bone;              ///< where rule is `sphere_fit`
-  /// Columns are the x, y, z axes of the joint frame in the scanned rest pose, LPS; orthonormal, right-handed.
+  /// Columns are the x, y, z axes of the joint frame in the scanned rest pose, LPS; orthonormal,
+  /// right-handed.
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   std::vector<AngleAxis> sequence;  ///< three different axes; hinges use the first, universals the first two
   std::string limits_source;
