@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Holds the tree against the house rules of CONVENTIONS.md: arrows between folders, licences, file sizes.
+
+usage: check_house.py SOURCE_FOLDER [BUILD_FOLDER_OF_THE_APACHE_BUILD]
+"""
+import pathlib
+import re
+import subprocess
+import sys
+
+# What a folder may include. The longest matching prefix of a file's path decides; its own folder is always allowed.
+ARROWS = {
+    "core/values": [],
+    "core/files": ["core/values"],
+    "core/kinematics": ["core/values"],
+    "core/solve": ["core/values"],
+    "core/model_file": ["core/values", "core/files"],
+    "io/surface": ["core/values", "core/files"],
+    "io/image": ["core/values", "core/files"],
+    "io/motion": ["core/values", "core/files"],
+    "io/case": ["core/values", "core/files", "core/kinematics", "io/surface", "io/image"],
+    "phantom": ["core/values"],
+    "preprocess": ["core"],
+    "proto": [],
+    "runtime": ["core/values", "core/kinematics"],
+    "runtime/server": ["runtime", "core", "proto"],
+    "clients/cpp": ["proto", "core/values"],
+    "app": ["core", "io", "phantom", "preprocess", "runtime", "proto", "clients"],
+}
+# core/values knows the standard library and Eigen only; three of its headers not even Eigen (ITK brings its own).
+PLAIN_HEADERS = {"core/values/image.hpp", "core/values/error.hpp", "core/values/context.hpp"}
+FOREIGN_IN_VALUES = re.compile(r"#include <(hdf5|H5|yaml|tbb|spdlog|fmt|fstream|filesystem|thread|mutex)")
+# Units that link GPL or AGPL libraries carry that licence themselves; nothing else may include those libraries.
+GPL_UNITS = ("preprocess/tet/cgal/", "preprocess/tet/tetgen/", "preprocess/weights/cholmod/")
+GPL_INCLUDE = re.compile(r'#include [<"](CGAL/|tetgen|suitesparse/|cholmod)')
+GPL_LIBRARIES = re.compile(r"lib(tet|cholmod|CGAL|gmp|mpfr)[.\-]", re.I)
+SPDX = re.compile(r"SPDX-License-Identifier: (Apache-2\.0|AGPL-3\.0-or-later)")
+CODE = {".hpp", ".cpp", ".h", ".ts", ".py", ".proto", ".cmake", ".sh"}
+MAX_LINES = 500
+
+
+def tracked(root):
+    out = subprocess.run(["git", "-C", root, "ls-files", "--cached", "--others", "--exclude-standard"],
+                         check=True, capture_output=True, text=True).stdout
+    return [path for path in out.splitlines() if (root / path).is_file()]
+
+
+def folder_of(path):
+    matches = [folder for folder in ARROWS if path.startswith(folder + "/")]
+    return max(matches, key=len) if matches else None
+
+
+def check_arrows(path, text):
+    folder = folder_of(path)
+    if folder is None:
+        return
+    for number, line in enumerate(text.splitlines(), 1):
+        match = re.match(r'\s*#include "([^"]+)"', line)
+        if not match:
+            continue
+        target = match.group(1)
+        if target.endswith(".pb.h"):
+            target = "proto/" + target
+        own = folder_of(target)
+        allowed = own == folder or any(target.startswith(to + "/") for to in ARROWS[folder])
+        # `runtime` -> `runtime/server` would turn the arrow round, although the path starts alike.
+        if allowed and own and own != folder and own.startswith(folder + "/"):
+            allowed = False
+        if not allowed:
+            yield f"{path}:{number}: {folder} may not include {target}"
+
+
+def check_file(root, path):
+    text = (root / path).read_text(encoding="utf-8", errors="replace")
+    suffix = pathlib.Path(path).suffix
+    first = text.splitlines()[0] if text else ""
+    is_code = suffix in CODE or path.endswith("CMakeLists.txt") or first.startswith("#!")
+    if not is_code:
+        return
+    head = "\n".join(text.splitlines()[:4])
+    spdx = SPDX.search(head)
+    if not spdx:
+        yield f"{path}:1: no SPDX-License-Identifier line (Apache-2.0 or AGPL-3.0-or-later)"
+    if suffix in {".hpp", ".cpp"}:
+        yield from check_arrows(path, text)
+        gpl_unit = path.startswith(GPL_UNITS)
+        if GPL_INCLUDE.search(text) and not gpl_unit:
+            yield f"{path}: includes a GPL or AGPL library outside of {', '.join(GPL_UNITS)}"
+        if gpl_unit and GPL_INCLUDE.search(text) and spdx and spdx.group(1) != "AGPL-3.0-or-later":
+            yield f"{path}:1: uses a GPL or AGPL library: AGPL-3.0-or-later"
+        if path.startswith("core/values/") and FOREIGN_IN_VALUES.search(text):
+            yield f"{path}: core/values is plain data: no files, threads, HDF5, YAML or logs"
+        if path in PLAIN_HEADERS and "<Eigen" in text:
+            yield f"{path}: is seen by ITK, which brings its own Eigen: std::array and std::span only"
+    lines = text.count("\n")
+    if lines > MAX_LINES and suffix in {".hpp", ".cpp", ".py", ".ts"}:
+        yield f"{path}: {lines} lines, more than {MAX_LINES}: one idea a file"
+
+
+def check_linked(build):
+    """What the Apache build's command links, followed by the loader."""
+    binary = build / "bin" / "ecorche"
+    out = subprocess.run(["readelf", "-d", binary], check=True, capture_output=True, text=True).stdout
+    for needed in re.findall(r"\(NEEDED\).*\[(.+)\]", out):
+        if GPL_LIBRARIES.search(needed):
+            yield f"{binary.name}: the Apache build links {needed}"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    paths = tracked(root)
+    problems = [problem for path in paths for problem in check_file(root, path)]
+    if len(sys.argv) > 2:
+        problems += check_linked(pathlib.Path(sys.argv[2]))
+    print("\n".join(problems))
+    print(f"{len(paths)} files, {len(problems)} problems")
+    sys.exit(1 if problems else 0)
+
+
+if __name__ == "__main__":
+    main()
