@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,14 +12,22 @@
 
 namespace ecorche::io {
 
-/// Reads `.stl` (binary or text, told by content). Bit-identical vertices are merged, in order of first use; triangles
-/// with two equal corners are kept. Nothing is moved or scaled. Throws Error{missing_input} or Error{data}: not the format its name says,
-/// shorter than its counts, no triangle, a coordinate that is not finite.
+/// Reads `.stl` (binary or text, told by content). Bit-identical vertices are merged, in order of first use;
+/// triangles with two equal corners are kept. Nothing is moved or scaled. Throws Error{missing_input} or
+/// Error{data}: not the format its name says, shorter than its counts, no triangle, a coordinate that is not
+/// finite.
 SurfaceMesh read_surface(const std::filesystem::path& path);
 
-/// Writes `.stl` (binary), `.ply` (binary), `.vtp`, `.glb`; atomically. `.stl` and `.ply` carry `SPACE=LPS` in their
-/// header; `.glb` is in metres, turned to glTF's frame (x left, y superior, z anterior).
-/// Throws Error{usage} for another extension, Error{cannot_create}, Error{io}.
+/// A surface, and the frame that its own header names (`SPACE=RAS`), if any.
+struct TaggedSurface {
+  SurfaceMesh mesh;
+  std::optional<std::string> space;
+};
+TaggedSurface read_tagged_surface(const std::filesystem::path& path);
+
+/// Writes `.stl` (binary), `.ply` (binary), `.vtp`, `.glb`; atomically. `.stl` and `.ply` carry `SPACE=LPS`
+/// in their header; `.glb` is in metres, turned to glTF's frame (x left, y superior, z anterior). Throws
+/// Error{usage} for another extension, Error{cannot_create}, Error{io}.
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh);
 
 /// One array over the points or tets of a `.vtu`.
@@ -29,7 +38,7 @@ struct GridArray {
 };
 
 /// Writes a `.vtu`, atomically.
-void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T, const std::vector<GridArray>& point_data,
-                const std::vector<GridArray>& cell_data);
+void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T,
+                const std::vector<GridArray>& point_data, const std::vector<GridArray>& cell_data);
 
 }  // namespace ecorche::io
