@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/mapping/face_tree.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "preprocess/mapping/closest_point.hpp"
+#include "preprocess/mapping/morton.hpp"
+
+namespace ecorche::mapping {
+namespace {
+
+// A box is skipped only when it is farther than the best by more than rounding, so that every face at the
+// least distance is looked at and the lowest of them wins, in whatever order.
+constexpr double kSlack = 1 + 1e-12;
+
+}  // namespace
+
+FaceTree::FaceTree(const std::vector<Corners>& corners) {
+  Eigen::AlignedBox3d box;
+  for (const Corners& c : corners) box.extend(c[0]).extend(c[1]).extend(c[2]);
+  std::vector<std::uint64_t> code(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    code[i] = morton((corners[i][0] + corners[i][1] + corners[i][2]) / 3, box);
+  }
+  face_.resize(corners.size());
+  std::iota(face_.begin(), face_.end(), 0);
+  std::sort(face_.begin(), face_.end(), [&](std::int32_t a, std::int32_t b) {
+    const auto x = code[static_cast<std::size_t>(a)], y = code[static_cast<std::size_t>(b)];
+    return x != y ? x < y : a < b;
+  });
+  corners_.reserve(corners.size());
+  place_.resize(corners.size());
+  for (const std::int32_t f : face_) {
+    place_[static_cast<std::size_t>(f)] = static_cast<std::int32_t>(corners_.size());
+    corners_.push_back(corners[static_cast<std::size_t>(f)]);
+  }
+  std::vector<Eigen::AlignedBox3d> level((corners_.size() + kFan - 1) / kFan);
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    for (const Eigen::Vector3d& corner : corners_[i]) level[i / kFan].extend(corner);
+  }
+  while (!level.empty()) {
+    levels_.push_back(std::move(level));
+    if (levels_.back().size() == 1) break;
+    level.assign((levels_.back().size() + kFan - 1) / kFan, {});
+    for (std::size_t i = 0; i < levels_.back().size(); ++i) level[i / kFan].extend(levels_.back()[i]);
+  }
+}
+
+void FaceTree::try_leaf(std::size_t leaf, const Eigen::Vector3d& p, Hit& best) const {
+  for (std::size_t i = leaf * kFan; i < std::min((leaf + 1) * kFan, corners_.size()); ++i) {
+    const Eigen::Vector3d q = closest_on_triangle(p, corners_[i][0], corners_[i][1], corners_[i][2]);
+    const double squared = (p - q).squaredNorm();
+    if (squared < best.squared || (squared == best.squared && face_[i] < best.face)) {
+      best = {face_[i], squared, q};
+    }
+  }
+}
+
+FaceTree::Hit FaceTree::nearest(const Eigen::Vector3d& p, std::int32_t hint) const {
+  Hit best;
+  if (corners_.empty()) return best;
+  best.squared = std::numeric_limits<double>::infinity();
+  if (hint >= 0) try_leaf(static_cast<std::size_t>(place_[static_cast<std::size_t>(hint)]) / kFan, p, best);
+
+  struct Entry {
+    double squared;
+    std::size_t level, box;
+  };
+  std::array<Entry, 64> stack;  // at most three siblings wait on each of 16 levels
+  std::size_t depth = 0;
+  stack[depth++] = {levels_.back()[0].squaredExteriorDistance(p), levels_.size() - 1, 0};
+  while (depth > 0) {
+    const Entry top = stack[--depth];
+    if (top.squared > best.squared * kSlack) continue;
+    if (top.level == 0) {
+      try_leaf(top.box, p, best);
+      continue;
+    }
+    const auto& below = levels_[top.level - 1];
+    const std::size_t first = depth;
+    for (std::size_t b = top.box * kFan; b < std::min((top.box + 1) * kFan, below.size()); ++b) {
+      const double squared = below[b].squaredExteriorDistance(p);
+      if (squared <= best.squared * kSlack) stack[depth++] = {squared, top.level - 1, b};
+    }
+    std::sort(stack.begin() + static_cast<std::ptrdiff_t>(first),
+              stack.begin() + static_cast<std::ptrdiff_t>(depth),
+              [](const Entry& a, const Entry& b) { return a.squared > b.squared; });  // nearest on top
+  }
+  return best;
+}
+
+}  // namespace ecorche::mapping

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which tet holds a point.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/values/context.hpp"
+#include "core/values/mesh.hpp"
+
+namespace ecorche::mapping {
+
+/// A grid of cells of about a tet's size, each with the tets whose bounding box meets it, in ascending order:
+/// the tet that holds a point is the first of its cell that does, exactly as a search through all tets would
+/// answer. No walk, hence nothing to go wrong where the body is not convex. Refers to `nodes` and `tets`,
+/// which must outlive it.
+class TetGrid {
+ public:
+  TetGrid(const PointsF& nodes, const Tets& tets, const Context& context);
+
+  /// The tet of lowest index that holds p, faces included; -1 outside of all.
+  std::int32_t find(const Eigen::Vector3d& p) const;
+
+  std::array<Eigen::Vector3d, 4> corners(std::int32_t tet) const;
+  const Eigen::AlignedBox3d& box() const { return box_; }
+
+ private:
+  std::array<std::int64_t, 3> cell_of(const Eigen::Vector3d& p) const;
+  template <class F>
+  void for_cells(std::int64_t tet, F&& f) const;
+
+  const PointsF& nodes_;
+  const Tets& tets_;
+  Eigen::AlignedBox3d box_;
+  double edge_ = 1;
+  std::array<std::int64_t, 3> size_{1, 1, 1};
+  std::vector<std::uint32_t> begin_;  // #cells + 1
+  std::vector<std::int32_t> tet_;
+};
+
+}  // namespace ecorche::mapping
