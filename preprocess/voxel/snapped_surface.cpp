@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/voxel/snapped_surface.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace ecorche::voxel {
+namespace {
+
+std::uint64_t mix(std::uint64_t x) {  // splitmix64's finaliser
+  x ^= x >> 30;
+  x *= 0xbf58476d1ce4e5b9ULL;
+  x ^= x >> 27;
+  x *= 0x94d049bb133111ebULL;
+  return x ^ (x >> 31);
+}
+
+std::uint64_t place(const Vec3i& p) {
+  return static_cast<std::uint64_t>(p[0]) | static_cast<std::uint64_t>(p[1]) << 21 |
+         static_cast<std::uint64_t>(p[2]) << 42;
+}
+
+/// Antisymmetric: the two ways through an edge cancel.
+std::uint64_t directed_edge(std::uint64_t a, std::uint64_t b) {
+  if (a == b) return 0;
+  const std::uint64_t hash = mix(mix(std::min(a, b)) + std::max(a, b));
+  return a < b ? hash : 0 - hash;
+}
+
+}  // namespace
+
+SnappedSurface snap(const SurfaceMesh& surface, const ImageGrid& grid) {
+  SnappedSurface snapped;
+  snapped.F = &surface.F;
+  snapped.V.resize(static_cast<std::size_t>(surface.V.rows()));
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, snapped.V.size(), 4096), [&](const auto& range) {
+    for (std::size_t v = range.begin(); v < range.end(); ++v)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double voxels =
+            (surface.V(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(axis)) - grid.origin[axis]) /
+                grid.spacing[axis] +
+            0.5;
+        snapped.V[v][axis] = 2 * static_cast<std::int32_t>(std::floor(voxels * (units / 2))) + 1;
+      }
+  });
+  Vec3i low{INT32_MAX, INT32_MAX, INT32_MAX}, high{0, 0, 0};
+  for (Eigen::Index f = 0; f < surface.F.rows(); ++f)  // not over V: a vertex may be unused
+    for (Eigen::Index c = 0; c < 3; ++c)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::int32_t x = snapped.V[static_cast<std::size_t>(surface.F(f, c))][axis];
+        low[axis] = std::min(low[axis], x);
+        high[axis] = std::max(high[axis], x);
+      }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    snapped.low[axis] = low[axis] / units;
+    snapped.high[axis] = high[axis] / units;
+  }
+  return snapped;
+}
+
+bool is_closed(const SnappedSurface& surface) {
+  const Triangles& F = *surface.F;
+  const std::uint64_t boundary = tbb::parallel_reduce(
+      tbb::blocked_range<Eigen::Index>(0, F.rows(), 4096), std::uint64_t{0},
+      [&](const auto& range, std::uint64_t sum) {
+        for (Eigen::Index f = range.begin(); f < range.end(); ++f) {
+          const std::uint64_t a = place(surface.V[static_cast<std::size_t>(F(f, 0))]);
+          const std::uint64_t b = place(surface.V[static_cast<std::size_t>(F(f, 1))]);
+          const std::uint64_t c = place(surface.V[static_cast<std::size_t>(F(f, 2))]);
+          sum += directed_edge(a, b) + directed_edge(b, c) + directed_edge(c, a);
+        }
+        return sum;
+      },
+      [](std::uint64_t x, std::uint64_t y) { return x + y; });  // wraps: any order gives the same
+  return boundary == 0;
+}
+
+}  // namespace ecorche::voxel
