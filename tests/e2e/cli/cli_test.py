@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The command as its users meet it: exit codes, messages, --json, interruption, and that nothing is left half written."""
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+ECORCHE = os.environ["ECORCHE_BIN"]
+CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
+MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
+ERROR_LINE = re.compile(r"^error: .+: .+ \(.+\)$", re.M)
+
+
+def run(*words, **options):
+    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120, **options)
+
+
+class Cli(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def assert_error(self, result, code, *parts):
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, "", "a failed command prints no result")
+        self.assertRegex(result.stderr, ERROR_LINE)
+        for part in parts:
+            self.assertIn(part, result.stderr)
+
+    def test_help_and_version(self):
+        self.assertEqual(run("--version").returncode, 0)
+        out = run("--help").stdout
+        for word in ("phantom", "check", "preprocess", "info", "verify", "pose", "serve", "stream", "not for planning surgery"):
+            self.assertIn(word, out)
+        for word in ("phantom", "check", "preprocess", "info", "verify", "pose", "serve", "stream"):
+            self.assertEqual(run(word, "--help").returncode, 0)
+
+    def test_usage_errors(self):
+        self.assert_error(run(), 64, "subcommand")
+        self.assert_error(run("dance"), 64)
+        self.assert_error(run("preprocess"), 64)
+        self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.hdf", "--mesher", "magic"), 64, "magic")
+        self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.hdf", "--solver", "magic"), 64, "magic")
+        self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.hdf", "--cor-sigma", "0.2"), 64, "cor-sigma")
+        self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.vtk"), 64, ".hdf")
+        self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.hdf", "--max-tets", "-5"), 64, "max-tets")
+        self.assert_error(run("phantom", "-o", self.folder / "p", "--size", "huge"), 64, "huge")
+        self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--skinning", "fem"), 64, "fem")
+        self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--tissues", "nonsense"), 64, "nonsense")
+        self.assertEqual(list(self.folder.glob("**/*.hdf")), [])
+
+    def test_missing_inputs(self):
+        self.assert_error(run("preprocess", self.folder / "none", "-o", self.folder / "m.hdf"), 66, "none")
+        self.assert_error(run("verify", self.folder / "none.hdf"), 66, "none.hdf")
+        self.assert_error(run("info", self.folder / "none.hdf"), 66)
+        self.assert_error(run("pose", self.folder / "none.hdf", "-o", self.folder / "p"), 66)
+        self.assert_error(run("check", self.folder / "none"), 66)
+        self.assert_error(run("serve", self.folder / "none.hdf"), 66)
+        self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--pose", self.folder / "none.yaml"), 66)
+
+    def test_a_file_that_is_no_model(self):
+        wrong = self.folder / "wrong.hdf"
+        wrong.write_bytes(b"this is no HDF5 file" * 100)
+        for command in ("verify", "info"):
+            self.assert_error(run(command, wrong), 65, "wrong.hdf")
+        cut = self.folder / "cut.hdf"
+        cut.write_bytes(MODEL.read_bytes()[: MODEL.stat().st_size // 2])
+        self.assert_error(run("info", cut), 65, "cut.hdf")
+
+    def test_outputs_that_cannot_be_made(self):
+        blocker = self.folder / "file"
+        blocker.write_text("in the way")
+        self.assert_error(run("phantom", "-o", blocker / "deeper"), 73)
+        self.assert_error(run("pose", MODEL, "-o", blocker / "deeper"), 73)
+        self.assert_error(run("preprocess", CASE, "-o", self.folder / "absent" / "m.hdf"), 73, "m.hdf")
+        self.assertEqual(blocker.read_text(), "in the way")
+
+    def test_a_wrong_case_names_file_line_and_key(self):
+        case = self.folder / "case.yaml"
+        text = (CASE / "case.yaml").read_text()
+        case.write_text(text + "\nsurprise: 1\n")
+        self.assert_error(run("preprocess", case, "-o", self.folder / "m.hdf"), 78, "case.yaml:", "surprise")
+
+    def test_a_wrong_pose_is_refused(self):
+        pose = self.folder / "pose.yaml"
+        pose.write_text("ecorche_pose: 1\njoints: {third_elbow: {flexion_deg: 3}}\n")
+        self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--pose", pose), 78, "third_elbow")
+        self.assertFalse((self.folder / "p").exists() and any((self.folder / "p").iterdir()), "nothing may be written")
+
+    def test_json_is_one_object(self):
+        info = json.loads(run("--json", "info", MODEL).stdout)
+        self.assertGreater(info["nodes"], 100)
+        verify = run("--json", "verify", MODEL)
+        self.assertEqual(verify.returncode, 0, verify.stderr)
+        report = json.loads(verify.stdout)
+        self.assertTrue(report["ok"])
+        for key in ("nodes", "tets", "segments", "weights", "mesh", "tissues", "bones", "digests"):
+            self.assertIn(key, report)
+        self.assertEqual(report["digests"]["bad"], 0)
+
+    def test_a_flipped_byte_fails_verify(self):
+        bytes_ = bytearray(MODEL.read_bytes())
+        bytes_[len(bytes_) // 2] ^= 0x40
+        (self.folder / "flipped.hdf").write_bytes(bytes_)
+        result = run("verify", self.folder / "flipped.hdf")
+        self.assertEqual(result.returncode, 65, result.stderr)
+
+    def test_interrupted_at_many_points_leaves_nothing(self):
+        for wait in (0.05, 0.3, 0.8, 1.5, 2.5):
+            child = subprocess.Popen([ECORCHE, "preprocess", str(CASE), "-o", str(self.folder / "m.hdf")],
+                                     stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            time.sleep(wait)
+            child.send_signal(signal.SIGINT)
+            start = time.monotonic()
+            _, err = child.communicate(timeout=60)
+            if child.returncode == 0:  # it was done before the signal
+                (self.folder / "m.hdf").unlink()
+                continue
+            self.assertIn(child.returncode, (130, -signal.SIGINT), err)
+            self.assertLess(time.monotonic() - start, 5, f"slow to stop after {wait} s (a busy machine is allowed for)")
+            self.assertEqual(list(self.folder.iterdir()), [], f"something was left after {wait} s")
+
+    def test_killed_at_many_points_leaves_the_old_model_whole(self):
+        target = self.folder / "m.hdf"
+        shutil.copy(MODEL, target)
+        before = target.read_bytes()
+        for wait in (0.2, 0.9, 2.0):
+            child = subprocess.Popen([ECORCHE, "preprocess", str(CASE), "-o", str(target)],
+                                     stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(wait)
+            child.kill()
+            child.wait()
+            after = target.read_bytes()
+            if after != before:
+                self.assertEqual(run("verify", target).returncode, 0, "a new model that appeared must be whole")
+                before = after
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
