@@ -1,8 +1,170 @@
 // SPDX-License-Identifier: Apache-2.0
+// `ecorche preprocess`: a case in, a model out.
+#include "preprocess/pipeline.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <numeric>
+#include <sstream>
+
 #include "app/command.hpp"
+#include "app/model_report.hpp"
+#include "core/files/atomic_file.hpp"
+#include "core/model_file/model_file.hpp"
+#include "io/case/case_file.hpp"
+#include "preprocess/tet/mesher.hpp"
+#include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::app {
+namespace {
 
-void declare_preprocess(CLI::App&, Program&, Run&) {}
+namespace fs = std::filesystem;
+using preprocess::StageTime;
+
+struct Settings {
+  fs::path case_path, output;
+  io::CaseOptions input;
+  preprocess::Options options;
+};
+
+// Runs one step that is not the pipeline's, and times it alike.
+template <class F>
+void timed(std::vector<StageTime>& stages, const std::string& name, F&& step) {
+  const auto start = std::chrono::steady_clock::now();
+  step();
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  stages.push_back({name, spent.count(), preprocess::peak_rss_mib()});
+}
+
+std::string stage_table(const std::vector<StageTime>& stages) {
+  std::string out = "stage           seconds   peak MiB\n";
+  char line[80];
+  double seconds = 0, peak = 0;
+  for (const StageTime& s : stages) {
+    std::snprintf(line, sizeof line, "%-12s %10.2f %10.0f\n", s.name.c_str(), s.seconds, s.peak_rss_mib);
+    out += line;
+    seconds += s.seconds;
+    peak = std::max(peak, s.peak_rss_mib);
+  }
+  std::snprintf(line, sizeof line, "%-12s %10.2f %10.0f\n", "all", seconds, peak);
+  return out + line;
+}
+
+std::string text_report(const Model& model, const Settings& settings, const std::vector<StageTime>& stages) {
+  const Certificate& c = model.certificate;
+  std::ostringstream out;
+  out << settings.output.string() << ": " << model.tet_count() << " tets, " << model.node_count()
+      << " nodes, " << model.segment_count() << " segments, " << c.tissue_vertices << " tissue vertices\n\n"
+      << stage_table(stages) << "\nweights in [" << c.min_weight << ", " << c.max_weight
+      << "], rows sum to 1 within " << c.row_sum_error << ", " << c.repaired_rows
+      << " rows repaired by at most " << c.repaired_largest_change << "\ndihedral angles "
+      << c.min_dihedral_deg << " to " << c.max_dihedral_deg << " deg, positive off-diagonals "
+      << c.positive_offdiagonal_share * 100 << " %\n"
+      << c.outside_vertices << " tissue vertices outside the mesh, the farthest " << c.max_outside_mm
+      << " mm\n";
+  return out.str();
+}
+
+// What would fail only after minutes of work is refused first.
+void check_output(const fs::path& path) {
+  if (path.extension() != ".hdf") {
+    throw Error(ErrorKind::usage, "--output", "'" + path.string() + "' does not end in .hdf",
+                "name it so: ParaView opens VTKHDF files by that ending");
+  }
+  const files::AtomicFile probe(path);
+}
+
+int run(const Program& program, const Settings& settings) {
+  check_output(settings.output);
+  std::vector<StageTime> stages;
+  Case patient;
+  timed(stages, "read",
+        [&] { patient = io::read_case(settings.case_path, settings.input, program.context("read")); });
+
+  // The pipeline has one context for all stages; each stage has a bar of its own.
+  Context bar = program.context("preprocess");
+  Context context;
+  context.stop = program.stop;
+  context.progress = [&](double fraction) { bar.report(fraction); };
+  context.log = [&](LogLevel level, std::string_view line) { bar.log(level, line); };
+  preprocess::Result made =
+      preprocess::run(patient, settings.options, context, [&](std::string_view name, int index, int count) {
+        bar = program.context(std::to_string(index + 1) + "/" + std::to_string(count) + " " +
+                              std::string(name));
+      });
+  stages.insert(stages.end(), made.stages.begin(), made.stages.end());
+  timed(stages, "write", [&] { model_file::write(made.model, settings.output, program.context("write")); });
+
+  const auto digests = model_file::check_digests(settings.output, program.context("digests"));
+  nlohmann::json report = model_report(made.model, digests);
+  for (const StageTime& s : stages) {
+    report["stages"].push_back({{"name", s.name}, {"seconds", s.seconds}, {"peak_rss_mib", s.peak_rss_mib}});
+  }
+  report["peak_rss_mib"] = preprocess::peak_rss_mib();
+  program.result(text_report(made.model, settings, stages), report);
+  return 0;
+}
+
+// `cgal, lattice or ...` for help texts.
+std::string listed(const std::vector<std::string_view>& names) {
+  std::string out;
+  for (const std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
+  return out;
+}
+
+std::vector<std::string> strings(const std::vector<std::string_view>& names) {
+  return {names.begin(), names.end()};
+}
+
+}  // namespace
+
+void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
+  using preprocess::Options;
+  const auto settings = std::make_shared<Settings>();
+  CLI::App* command =
+      app.add_subcommand("preprocess", "prepare a case for posing: rig, tets, weights, centres, mapping");
+  command->add_option("CASE", settings->case_path, "a case.yaml, or the folder that holds one")->required();
+  command->add_option("-o,--output", settings->output, "the model to write, ending in .hdf")->required();
+
+  Options& o = settings->options;
+  const auto meshers = tet::mesher_names();
+  o.mesher = meshers.front();
+  command->add_option("--mesher", o.mesher, "who makes the tets: " + listed(meshers))
+      ->check(CLI::IsMember(strings(meshers)))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--voxel", o.voxel_mm,
+          "voxel edge, mm; 0: the finest whose image stays within 250 x 120 x 700 voxels or their number")
+      ->check(CLI::Range(0.0, 0.0) | CLI::Range(Options::voxel_range.low, Options::voxel_range.high))
+      ->capture_default_str();
+  command
+      ->add_option("--max-tets", o.max_tets, "never more tets than this: sizes are coarsened until it holds")
+      ->check(CLI::Range(Options::tets_range.low, Options::tets_range.high))
+      ->capture_default_str();
+  command->add_option("--max-nodes", o.max_nodes, "never more nodes than this")
+      ->check(CLI::Range(Options::nodes_range.low, Options::nodes_range.high))
+      ->capture_default_str();
+  std::vector<std::string> solvers = strings(weights::solver_names());
+  const std::string automatic = solvers.front();
+  solvers.insert(solvers.begin(), "auto");
+  command
+      ->add_option("--solver", o.solver,
+                   "who solves for the weights: auto (" + automatic + "), " + listed(weights::solver_names()))
+      ->check(CLI::IsMember(solvers))
+      ->capture_default_str();
+  command
+      ->add_option("--cor-sigma", o.cor_sigma,
+                   "width of the similarity of weights, LeHodgins16: above 0, below 0.1")
+      ->check(CLI::Range(Options::sigma_range.low, Options::sigma_range.high))
+      ->capture_default_str();
+  command->add_option("--data", settings->input.data,
+                      "the folder that `root: data` paths of the case are in");
+  command->add_option("--frame", settings->input.frame,
+                      "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+  command->callback(
+      [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
+}
 
 }  // namespace ecorche::app

@@ -1,1 +1,239 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "preprocess/pipeline.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <sstream>
+
+#include "preprocess/cor/centres.hpp"
+#include "preprocess/mapping/bind.hpp"
+#include "preprocess/provenance.hpp"
+#include "preprocess/rig/fit_rig.hpp"
+#include "preprocess/tet/mesher.hpp"
+#include "preprocess/voxel/voxelize.hpp"
+#include "preprocess/weights/harmonic.hpp"
+
+namespace ecorche::preprocess {
+namespace {
+
+constexpr std::array<std::string_view, 7> kStages{"rig", "voxelize", "mesh",       "weights",
+                                                  "cor", "mapping",  "certificate"};
+
+// A tissue this many voxels away from the body is probably in another frame.
+constexpr double kFarVoxels = 5;
+
+// Announces, times and measures the stages, in the order of kStages.
+class Stages {
+ public:
+  Stages(const Context& context, const StageCallback& on_stage, std::vector<StageTime>& times)
+      : context_(context), on_stage_(on_stage), times_(times) {}
+
+  template <class F>
+  auto operator()(F&& stage) {
+    const std::string_view name = kStages.at(times_.size());
+    if (on_stage_) on_stage_(name, static_cast<int>(times_.size()), static_cast<int>(kStages.size()));
+    context_.check_stop();
+    const auto start = std::chrono::steady_clock::now();
+    auto made = stage();
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    times_.push_back({std::string(name), spent.count(), peak_rss_mib()});
+    context_.check_stop();
+    return made;
+  }
+
+ private:
+  const Context& context_;
+  const StageCallback& on_stage_;
+  std::vector<StageTime>& times_;
+};
+
+template <class T>
+void check_range(std::string_view option, T value, const Options::Range<T>& range) {
+  if (value >= range.low && value <= range.high) return;  // false for NaN
+  std::ostringstream what, mend;
+  what << value << " is out of range";
+  mend << "give " << range.low << " to " << range.high;
+  throw Error(ErrorKind::usage, std::string(option), what.str(), mend.str());
+}
+
+// Before anything slow starts.
+void check_options(const Options& options) {
+  if (options.voxel_mm != 0) check_range("--voxel", options.voxel_mm, Options::voxel_range);
+  check_range("--max-tets", options.max_tets, Options::tets_range);
+  check_range("--max-nodes", options.max_nodes, Options::nodes_range);
+  check_range("--cor-sigma", options.cor_sigma, Options::sigma_range);
+}
+
+// The row of the segment that moves each bone.
+std::vector<std::int32_t> owners(const Case& patient, const Skeleton& skeleton) {
+  std::vector<std::int32_t> rows;
+  for (const CaseBone& bone : patient.bones) {
+    rows.push_back(skeleton.find_segment(bone.segment));
+    if (rows.back() < 0) {
+      throw Error(ErrorKind::config, "bone " + bone.name,
+                  "its segment '" + bone.segment + "' is not in the skeleton",
+                  "name one of the skeleton's segments");
+    }
+  }
+  return rows;
+}
+
+Tissue tissue_of(std::string name, Group group, const SurfaceMesh& surface) {
+  Tissue tissue;
+  tissue.name = std::move(name);
+  tissue.group = group;
+  tissue.V = surface.V.cast<float>();
+  tissue.F = surface.F;
+  return tissue;
+}
+
+// Skin first, then bones, then the others: the order of Model::tissues.
+std::vector<Tissue> gather_tissues(const Case& patient, const std::vector<std::int32_t>& bone_segment) {
+  std::vector<Tissue> tissues;
+  tissues.push_back(tissue_of(patient.skin_name, Group::skin, patient.skin));
+  for (std::size_t b = 0; b < patient.bones.size(); ++b) {
+    tissues.push_back(tissue_of(patient.bones[b].name, Group::bone, patient.bones[b].surface));
+    tissues.back().segment = bone_segment[b];
+  }
+  for (const CaseTissue& t : patient.tissues) tissues.push_back(tissue_of(t.name, t.group, t.surface));
+  return tissues;
+}
+
+void warn_far(const Tissue& tissue, const mapping::Binding& binding, double voxel_mm,
+              const Context& context) {
+  const auto far = static_cast<float>(kFarVoxels * voxel_mm);
+  const auto count =
+      std::count_if(binding.outside_mm.begin(), binding.outside_mm.end(), [&](float d) { return d > far; });
+  if (count == 0) return;
+  std::ostringstream line;
+  line.precision(3);
+  line << "tissue " << tissue.name << ": " << count << " of " << tissue.V.rows() << " vertices lie more than "
+       << far << " mm outside the body, the farthest " << binding.max_outside_mm
+       << " mm; they follow their nearest tet (is the frame right?)";
+  context.warn(line.str());
+}
+
+// Bones go with their segment; what is not bone is bound to the tets, from the float32 positions that are
+// stored.
+std::vector<Tissue> bind_tissues(std::vector<Tissue> tissues, const Model& model, double voxel_mm,
+                                 const Context& context) {
+  const mapping::Locator locator(model.nodes, model.tets, context);
+  for (std::size_t i = 0; i < tissues.size(); ++i) {
+    Tissue& tissue = tissues[i];
+    if (tissue.segment == Tissue::by_tets) {
+      mapping::Binding binding = locator.bind(tissue.V.cast<double>(), context);
+      warn_far(tissue, binding, voxel_mm, context);
+      tissue.tet = std::move(binding.tet);
+      tissue.barycentric = std::move(binding.barycentric);
+    }
+    context.report(static_cast<double>(i + 1) / static_cast<double>(tissues.size()));
+  }
+  return tissues;
+}
+
+std::vector<ModelVolume> gather_volumes(const Case& patient) {
+  std::vector<ModelVolume> volumes;
+  for (const CaseVolume& v : patient.volumes) volumes.push_back({v.name, v.image, v.background, false, {}});
+  if (patient.labels) volumes.push_back({"labels", patient.labels->image, 0, true, patient.labels->table});
+  return volumes;
+}
+
+// The members that only the solver knows go first; `measure` copies them.
+Certificate certify(const Model& model, const Context& context) {
+  const Certificate certificate = measure(model, context);
+  const std::vector<std::string> broken = broken_bounds(certificate);
+  if (!broken.empty()) {
+    std::string what = "the model breaks its bounds: " + broken[0];
+    for (std::size_t i = 1; i < std::min<std::size_t>(broken.size(), 3); ++i) what += "; " + broken[i];
+    throw Error(ErrorKind::data, "certificate", what,
+                "run ecorche check on the case, or try another --mesher or --voxel");
+  }
+  return certificate;
+}
+
+}  // namespace
+
+double peak_rss_mib() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    if (word != "VmHWM:") continue;
+    double kib = 0;
+    status >> kib;
+    return kib / 1024;
+  }
+  return 0;
+}
+
+Result run(const Case& patient, const Options& options, const Context& outer, const StageCallback& on_stage) {
+  check_options(options);
+  const std::string_view mesher_name = options.mesher.empty() ? tet::mesher_names().front() : options.mesher;
+  const std::string_view solver_name =
+      options.solver == "auto" ? weights::solver_names().front() : options.solver;
+  const std::unique_ptr<tet::Mesher> mesher = tet::make_mesher(mesher_name);
+  weights::make_solver(solver_name);  // refuses an unknown name now, not after the mesher
+
+  Result result;
+  Model& model = result.model;
+  std::mutex mutex;
+  Context context = outer;
+  context.log = [&](LogLevel level, std::string_view line) {
+    const std::lock_guard lock(mutex);
+    if (level == LogLevel::warning) result.warnings.emplace_back(line);
+    if (outer.log) outer.log(level, line);
+  };
+  Stages stage(context, on_stage, result.stages);
+
+  model.name = patient.name;
+  model.rig = stage([&] { return rig::fit(patient, context); });
+  model.bone_segment = owners(patient, model.rig.skeleton);
+  for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);
+
+  std::optional<Image> labels = stage([&] {
+    voxel::Options o;
+    o.voxel_mm = options.voxel_mm;
+    return std::optional(voxel::voxelize(patient, o, context));
+  });
+  const double voxel_mm = labels->grid.spacing[0];
+
+  std::optional<TetMesh> mesh = stage([&] {
+    tet::Options o;
+    o.max_tets = options.max_tets;
+    o.max_nodes = options.max_nodes;
+    TetMesh made = mesher->mesh({patient, *labels}, o, context);
+    tet::canonicalize(made);
+    return std::optional(std::move(made));
+  });
+  labels.reset();  // each value goes when its last reader is done
+
+  {
+    weights::Options o;
+    o.solver = solver_name;
+    weights::WeightsResult solved = stage([&] {
+      return weights::solve_weights(*mesh, patient, model.bone_segment, model.segment_count(), o, context);
+    });
+    model.weights = std::move(solved.weights);
+    model.certificate = solved.certificate;
+  }
+  model.nodes = mesh->V.cast<float>();
+  model.tets = std::move(mesh->T);
+  model.tet_label = std::move(mesh->label);
+  mesh.reset();
+
+  model.cor = stage([&] {
+    return cor::centres(model.nodes, model.tets, model.weights, model.segment_count(), {options.cor_sigma},
+                        context);
+  });
+  model.tissues = stage(
+      [&] { return bind_tissues(gather_tissues(patient, model.bone_segment), model, voxel_mm, context); });
+  model.volumes = gather_volumes(patient);
+  model.provenance = provenance(patient, options, mesher_name, solver_name, voxel_mm);
+  model.certificate = stage([&] { return certify(model, context); });
+  return result;
+}
+
+}  // namespace ecorche::preprocess
