@@ -42,9 +42,8 @@ AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
                 "cannot write here: " + std::string(std::strerror(errno)),
                 "make the folder, or name another one");
   }
-  // Hidden, with the extension kept: some writers choose the format by it.
-  temporary_ = folder / ("." + path_.stem().string() + "." + std::to_string(::getpid()) + ".part" +
-                         path_.extension().string());
+  // Hidden, with all extensions kept (.nii.gz): some writers choose the format by them.
+  temporary_ = folder / ("." + std::to_string(::getpid()) + ".part." + path_.filename().string());
 }
 
 AtomicFile::~AtomicFile() {

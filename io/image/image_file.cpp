@@ -1,1 +1,113 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "io/image/image_file.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/SVD>
+#include <cmath>
+#include <fstream>
+
+#include "core/files/atomic_file.hpp"
+#include "core/values/error.hpp"
+#include "io/image/header.hpp"
+#include "io/image/header_fields.hpp"
+#include "io/image/itk_images.hpp"
+
+namespace ecorche::io {
+namespace {
+
+using fields::refuse;
+using itk_images::Format;
+using Path = std::filesystem::path;
+using Direction = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+constexpr std::size_t kLargestHeader = std::size_t{1} << 20;
+
+bool ends_with(const Path& path, std::string_view ending) {
+  return fields::lower(path.filename().string()).ends_with(ending);
+}
+
+// The file's beginning: enough for any header.
+std::string read_head(const Path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw Error(ErrorKind::missing_input, path.string(), "cannot be opened", "check the path and its rights");
+  }
+  std::string head(kLargestHeader, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return head;
+}
+
+// Two readers, one header: where they disagree, neither is believed.
+void check_agreement(const ImageHeader& declared, const Image& seen, const Path& path) {
+  if (declared.size == seen.grid.size && declared.type == seen.type && declared.components == seen.components)
+    return;
+  refuse(path, "its header can be read in two ways", "write the image again");
+}
+
+void check_grid(ImageGrid& grid, const Path& path) {
+  for (const double spacing : grid.spacing) {
+    if (!(spacing > 0 && spacing < 1e6))
+      refuse(path, "its spacing is " + std::to_string(spacing), "it must be positive, mm");
+  }
+  for (const double origin : grid.origin) {
+    if (!(std::abs(origin) < 1e9))
+      refuse(path, "its origin is " + std::to_string(origin), "it must be finite, mm");
+  }
+  Eigen::Map<Direction> direction(grid.direction.data());
+  const double skew = (direction.transpose() * direction - Direction::Identity()).cwiseAbs().maxCoeff();
+  if (!(skew <= 1e-3)) {
+    refuse(path, "its axes are not orthonormal: off by " + std::to_string(skew),
+           "resample it onto a right-angled grid");
+  }
+  // Headers round to a few digits; everybody inverts by transposing.
+  if (skew > 1e-12) {
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    direction = svd.matrixU() * svd.matrixV().transpose();
+  }
+}
+
+}  // namespace
+
+Image read_image(const Path& path) {
+  const bool nrrd = ends_with(path, ".nrrd") || ends_with(path, ".nhdr");
+  const bool meta = ends_with(path, ".mha") || ends_with(path, ".mhd");
+  if (!nrrd && !meta) {
+    refuse(path, "'" + path.extension().string() + "' images cannot be read", "convert it to .nrrd or .mha");
+  }
+  const std::string head = read_head(path);
+  const ImageHeader declared = nrrd ? parse_nrrd_header(head, path) : parse_meta_header(head, path);
+  check_payload(declared, path);
+  const Format format = nrrd ? Format::nrrd : Format::meta;
+  Image image = itk_images::read_header(path, format);
+  check_agreement(declared, image, path);
+  check_grid(image.grid, path);
+  image.bytes.resize(declared.voxel_bytes());
+  itk_images::read_voxels(path, format, image);
+  return image;
+}
+
+void write_image(const Path& path, const Image& image, bool compress) {
+  Format format = Format::nrrd;
+  if (ends_with(path, ".mha")) {
+    format = Format::meta;
+  } else if (ends_with(path, ".nii.gz") || ends_with(path, ".nii")) {
+    format = Format::nifti;
+  } else if (!ends_with(path, ".nrrd")) {
+    throw Error(ErrorKind::usage, path.string(), "cannot write '" + path.extension().string() + "' images",
+                "use .nrrd, .mha or .nii.gz");
+  }
+  const std::size_t expected =
+      image.grid.voxels() * static_cast<std::size_t>(image.components) * scalar_bytes(image.type);
+  if (image.bytes.size() != expected || expected == 0) {
+    throw Error(ErrorKind::internal, path.string(),
+                "the image has " + std::to_string(image.bytes.size()) + " bytes, its grid takes " +
+                    std::to_string(expected),
+                "report this");
+  }
+  files::AtomicFile file(path);
+  itk_images::write(file.temporary(), format, image, compress);
+  file.commit();
+}
+
+}  // namespace ecorche::io

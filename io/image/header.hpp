@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the header of an image file declares, read by ourselves before ITK may allocate a byte for it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/values/image.hpp"
+
+namespace ecorche::io {
+
+/// Voxel bytes that a file may declare.
+inline constexpr std::uint64_t largest_image_bytes = std::uint64_t{1} << 33;
+/// Deflate cannot pack zeros tighter than about 1032 to 1.
+inline constexpr std::uint64_t largest_inflation = 1100;
+
+struct ImageHeader {
+  std::array<std::int32_t, 3> size{0, 0, 0};
+  ScalarType type = ScalarType::u8;
+  int components = 1;
+  bool gzip = false;
+  std::filesystem::path data_file;            ///< the file itself, or a plain name beside it
+  std::uint64_t data_offset = 0;              ///< of the first voxel byte in `data_file`
+  std::optional<std::uint64_t> packed_bytes;  ///< as the header declares, where it does
+
+  /// Bytes of all voxels; the parsers keep it at most `largest_image_bytes`.
+  std::uint64_t voxel_bytes() const;
+};
+
+/// The header of a `.nrrd` or `.nhdr`. `head` holds the file's beginning (the first MiB at least, or all of
+/// it). Throws Error{data} for anything but a 3-D image, raw or gzip, of a ScalarType, in mm.
+ImageHeader parse_nrrd_header(std::string_view head, const std::filesystem::path& path);
+
+/// The header of a `.mha` or `.mhd`.
+ImageHeader parse_meta_header(std::string_view head, const std::filesystem::path& path);
+
+/// Holds the declared bytes against the data file: its length where raw, its whole inflated stream where gzip
+/// (counted without storing it: teem and MetaIO take a stream that ends early for a whole one). Throws
+/// Error{data}.
+void check_payload(const ImageHeader& header, const std::filesystem::path& path);
+
+}  // namespace ecorche::io

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the two header formats share: numbers out of text, and refusals.
+#pragma once
+
+#include <charconv>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/values/error.hpp"
+#include "io/image/header.hpp"
+
+namespace ecorche::io::fields {
+
+[[noreturn]] inline void refuse(const std::filesystem::path& path, std::string what,
+                                std::string mend = "write the image again") {
+  throw Error(ErrorKind::data, path.string(), std::move(what), std::move(mend));
+}
+
+inline std::string_view trim(std::string_view text) {
+  constexpr std::string_view spaces = " \t\r\n\v\f";
+  const std::size_t begin = text.find_first_not_of(spaces);
+  if (begin == text.npos) return {};
+  return text.substr(begin, text.find_last_not_of(spaces) - begin + 1);
+}
+
+inline std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return out;
+}
+
+inline std::vector<std::string_view> words(std::string_view text) {
+  std::vector<std::string_view> out;
+  for (text = trim(text); !text.empty(); text = trim(text)) {
+    const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
+    out.push_back(text.substr(0, end));
+    text.remove_prefix(end);
+  }
+  return out;
+}
+
+/// A whole number from `least` to `most`; `key` for the message.
+inline std::int64_t integer(std::string_view text, std::int64_t least, std::int64_t most,
+                            const std::string& key, const std::filesystem::path& path) {
+  std::int64_t value = 0;
+  text = trim(text);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+    refuse(path, key + " is '" + std::string(text.substr(0, 40)) + "'",
+           "it must be a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+  }
+  return value;
+}
+
+/// A data file named by a header: a plain name beside it. Anything else could read any file of the machine.
+inline std::filesystem::path beside(const std::filesystem::path& path, std::string_view name) {
+  const bool plain = !name.empty() && name != "." && name != ".." &&
+                     name.find_first_of("/\\%") == name.npos && words(name).size() == 1 &&
+                     fields::lower(name.substr(0, 4)) != "list" &&
+                     name.find_first_of(std::string_view("\0", 1)) == name.npos;
+  if (!plain) {
+    refuse(path, "its voxels are in '" + std::string(name.substr(0, 80)) + "'",
+           "put them in one file beside the header, named without folders, spaces or patterns");
+  }
+  return path.parent_path() / name;
+}
+
+/// Refuses what does not fit `largest_image_bytes`; sizes are at least 1 each.
+inline void check_size(const ImageHeader& header, const std::filesystem::path& path) {
+  // Each factor is below 2^31 and the product is checked as it grows: it cannot overflow.
+  std::uint64_t bytes = scalar_bytes(header.type);
+  for (const std::int64_t factor : {std::int64_t{header.components}, std::int64_t{header.size[0]},
+                                    std::int64_t{header.size[1]}, std::int64_t{header.size[2]}}) {
+    bytes *= static_cast<std::uint64_t>(factor);
+    if (bytes > largest_image_bytes) {
+      refuse(path,
+             "declares " + std::to_string(header.size[0]) + " x " + std::to_string(header.size[1]) + " x " +
+                 std::to_string(header.size[2]) + " voxels of " + std::to_string(header.components) + " " +
+                 std::string(scalar_name(header.type)),
+             "images may hold 2^33 bytes: crop it or make its voxels larger");
+    }
+  }
+}
+
+}  // namespace ecorche::io::fields

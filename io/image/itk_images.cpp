@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/image/itk_images.hpp"
+
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+
+#include "core/values/error.hpp"
+
+namespace ecorche::io::itk_images {
+namespace {
+
+using Component = itk::IOComponentEnum;
+
+// The image format objects themselves: no reader templates, no pixel conversion, no factories.
+itk::ImageIOBase::Pointer make(Format format, const std::filesystem::path& path) {
+  itk::Object::SetGlobalWarningDisplay(false);  // would go to stderr
+  itk::ImageIOBase::Pointer io;
+  switch (format) {
+    case Format::nrrd:
+      io = itk::NrrdImageIO::New();
+      break;
+    case Format::meta:
+      io = itk::MetaImageIO::New();
+      break;
+    case Format::nifti:
+      io = itk::NiftiImageIO::New();
+      break;
+  }
+  io->SetFileName(path.string());
+  return io;
+}
+
+template <class F>
+auto guarded(ErrorKind kind, const std::filesystem::path& path, F&& f) {
+  try {
+    return f();
+  } catch (const itk::ExceptionObject& error) {
+    throw Error(kind, path.string(), error.GetDescription(),
+                kind == ErrorKind::io ? "check the disk" : "write the image again");
+  }
+}
+
+ScalarType scalar_type(Component component, const std::filesystem::path& path) {
+  switch (component) {
+    case Component::UCHAR:
+      return ScalarType::u8;
+    case Component::CHAR:
+      return ScalarType::i8;
+    case Component::USHORT:
+      return ScalarType::u16;
+    case Component::SHORT:
+      return ScalarType::i16;
+    case Component::UINT:
+      return ScalarType::u32;
+    case Component::INT:
+      return ScalarType::i32;
+    case Component::FLOAT:
+      return ScalarType::f32;
+    case Component::DOUBLE:
+      return ScalarType::f64;
+    default:
+      break;
+  }
+  throw Error(ErrorKind::data, path.string(),
+              "ITK reads its voxels as " + itk::ImageIOBase::GetComponentTypeAsString(component),
+              "convert them to 8, 16 or 32-bit integers, float or double");
+}
+
+Component component_type(ScalarType type) {
+  switch (type) {
+    case ScalarType::u8:
+      return Component::UCHAR;
+    case ScalarType::i8:
+      return Component::CHAR;
+    case ScalarType::u16:
+      return Component::USHORT;
+    case ScalarType::i16:
+      return Component::SHORT;
+    case ScalarType::u32:
+      return Component::UINT;
+    case ScalarType::i32:
+      return Component::INT;
+    case ScalarType::f32:
+      return Component::FLOAT;
+    case ScalarType::f64:
+      break;
+  }
+  return Component::DOUBLE;
+}
+
+}  // namespace
+
+Image read_header(const std::filesystem::path& path, Format format) {
+  return guarded(ErrorKind::data, path, [&] {
+    const auto io = make(format, path);
+    io->ReadImageInformation();
+    if (io->GetNumberOfDimensions() != 3) {
+      throw Error(ErrorKind::data, path.string(),
+                  "ITK reads " + std::to_string(io->GetNumberOfDimensions()) + " axes", "save a 3-D image");
+    }
+    Image image;
+    image.type = scalar_type(io->GetComponentType(), path);
+    image.components = static_cast<int>(io->GetNumberOfComponents());
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      image.grid.size[axis] = static_cast<std::int32_t>(io->GetDimensions(axis));
+      image.grid.spacing[axis] = io->GetSpacing(axis);
+      image.grid.origin[axis] = io->GetOrigin(axis);
+      const std::vector<double> column = io->GetDirection(axis);
+      for (unsigned row = 0; row < 3; ++row) image.grid.direction[3 * row + axis] = column.at(row);
+    }
+    return image;
+  });
+}
+
+void read_voxels(const std::filesystem::path& path, Format format, Image& image) {
+  guarded(ErrorKind::data, path, [&] {
+    const auto io = make(format, path);
+    io->ReadImageInformation();
+    itk::ImageIORegion whole(3);
+    for (unsigned axis = 0; axis < 3; ++axis) whole.SetSize(axis, io->GetDimensions(axis));
+    io->SetIORegion(whole);
+    io->Read(image.bytes.data());
+    return 0;
+  });
+}
+
+void write(const std::filesystem::path& path, Format format, const Image& image, bool compress) {
+  guarded(ErrorKind::io, path, [&] {
+    const auto io = make(format, path);
+    io->SetNumberOfDimensions(3);
+    itk::ImageIORegion whole(3);
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      io->SetDimensions(axis, static_cast<itk::SizeValueType>(image.grid.size[axis]));
+      io->SetSpacing(axis, image.grid.spacing[axis]);
+      io->SetOrigin(axis, image.grid.origin[axis]);
+      std::vector<double> column(3);
+      for (unsigned row = 0; row < 3; ++row) column[row] = image.grid.direction[3 * row + axis];
+      io->SetDirection(axis, column);
+      whole.SetSize(axis, static_cast<itk::SizeValueType>(image.grid.size[axis]));
+    }
+    io->SetComponentType(component_type(image.type));
+    io->SetPixelType(image.components == 1 ? itk::IOPixelEnum::SCALAR : itk::IOPixelEnum::VECTOR);
+    io->SetNumberOfComponents(static_cast<unsigned>(image.components));
+    io->SetUseCompression(compress);
+    io->SetIORegion(whole);
+    io->Write(image.bytes.data());
+    return 0;
+  });
+}
+
+}  // namespace ecorche::io::itk_images

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// ITK's image formats behind plain values. The only unit that sees ITK, which brings its own Eigen.
+#pragma once
+
+#include <filesystem>
+
+#include "core/values/image.hpp"
+
+namespace ecorche::io::itk_images {
+
+enum class Format { nrrd, meta, nifti };
+
+/// What ITK makes of the header: compared with what we made of it before any voxel is read.
+/// Throws Error{data} for what ITK refuses.
+Image read_header(const std::filesystem::path& path, Format format);
+
+/// Fills `image`, which `read_header` made and the caller has given its bytes.
+void read_voxels(const std::filesystem::path& path, Format format, Image& image);
+
+/// Throws Error{io}.
+void write(const std::filesystem::path& path, Format format, const Image& image, bool compress);
+
+}  // namespace ecorche::io::itk_images

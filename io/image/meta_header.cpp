@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// https://itk.org/Wiki/ITK/MetaIO/Documentation
+#include <map>
+
+#include "io/image/header.hpp"
+#include "io/image/header_fields.hpp"
+
+namespace ecorche::io {
+namespace {
+
+using fields::refuse;
+using Path = std::filesystem::path;
+using Fields = std::map<std::string, std::string, std::less<>>;
+
+ScalarType type_from(const std::string& name, const Path& path) {
+  static const std::map<std::string, ScalarType, std::less<>> types{
+      {"MET_CHAR", ScalarType::i8},    {"MET_UCHAR", ScalarType::u8},  {"MET_SHORT", ScalarType::i16},
+      {"MET_USHORT", ScalarType::u16}, {"MET_INT", ScalarType::i32},   {"MET_UINT", ScalarType::u32},
+      {"MET_FLOAT", ScalarType::f32},  {"MET_DOUBLE", ScalarType::f64}};
+  const auto found = types.find(name);
+  if (found == types.end()) {
+    refuse(path, "voxels of type '" + name + "' cannot be read",
+           "convert them to 8, 16 or 32-bit integers, float or double");
+  }
+  return found->second;
+}
+
+// Reads the lines up to ElementDataFile, which ends the header; `offset` becomes the byte after it.
+Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
+  Fields fields;
+  std::size_t at = 0;
+  for (int line = 1; at < head.size(); ++line) {
+    const std::size_t end = head.find('\n', at);
+    if (end == head.npos) break;
+    const std::string_view text = head.substr(at, end - at);
+    at = end + 1;
+    const std::size_t equals = text.find('=');
+    const std::string key(fields::trim(text.substr(0, std::min(equals, text.size()))));
+    const bool named =
+        equals != text.npos && !key.empty() &&
+        key.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == key.npos;
+    if (!named) {
+      refuse(path,
+             "line " + std::to_string(line) + " of its header is no 'Key = value': '" +
+                 std::string(text.substr(0, 60)) + "'",
+             "it must be a MetaImage");
+    }
+    if (!fields.emplace(key, fields::trim(text.substr(equals + 1))).second) {
+      refuse(path, "its header gives '" + key + "' twice");
+    }
+    if (key == "ElementDataFile") {
+      offset = at;
+      return fields;
+    }
+  }
+  refuse(path, "its header has no line 'ElementDataFile = ...'", "it must be a MetaImage");
+}
+
+std::string value_of(const Fields& fields, std::string_view key, const std::string& otherwise) {
+  const auto found = fields.find(key);
+  return found == fields.end() ? otherwise : found->second;
+}
+
+std::string needed(const Fields& fields, std::string_view key, const Path& path) {
+  const auto found = fields.find(key);
+  if (found == fields.end()) refuse(path, "its header lacks '" + std::string(key) + "'");
+  return found->second;
+}
+
+bool truth(const Fields& fields, std::string_view key, bool otherwise) {
+  const std::string value = value_of(fields, key, otherwise ? "True" : "False");
+  return value == "True" || value == "true" || value == "1";
+}
+
+}  // namespace
+
+ImageHeader parse_meta_header(std::string_view head, const Path& path) {
+  ImageHeader header;
+  const Fields fields = read_fields(head, path, header.data_offset);
+  if (value_of(fields, "ObjectType", "Image") != "Image") {
+    refuse(path, "holds a '" + fields.at("ObjectType") + "'", "it must be an image");
+  }
+  if (needed(fields, "NDims", path) != "3")
+    refuse(path, "has " + fields.at("NDims") + " axes", "save a 3-D image");
+  const std::string sizes = needed(fields, "DimSize", path);
+  const auto counts = fields::words(sizes);
+  if (counts.size() != 3) refuse(path, "its DimSize is '" + sizes + "'");
+  for (std::size_t i = 0; i < 3; ++i) {
+    header.size[i] = static_cast<std::int32_t>(
+        fields::integer(counts[i], 1, std::numeric_limits<std::int32_t>::max(), "DimSize", path));
+  }
+  header.components = static_cast<int>(fields::integer(value_of(fields, "ElementNumberOfChannels", "1"), 1,
+                                                       1 << 16, "ElementNumberOfChannels", path));
+  header.type = type_from(needed(fields, "ElementType", path), path);
+  fields::check_size(header, path);
+  if (!truth(fields, "BinaryData", false)) refuse(path, "its voxels are text", "save it as binary");
+  if (value_of(fields, "HeaderSize", "0") != "0") {
+    refuse(path, "its header asks to skip " + fields.at("HeaderSize") + " bytes",
+           "write it without HeaderSize");
+  }
+  header.gzip = truth(fields, "CompressedData", false);
+  if (header.gzip && fields.contains("CompressedDataSize")) {
+    header.packed_bytes = static_cast<std::uint64_t>(fields::integer(fields.at("CompressedDataSize"), 0,
+                                                                     std::numeric_limits<std::int64_t>::max(),
+                                                                     "CompressedDataSize", path));
+  }
+  const std::string data = needed(fields, "ElementDataFile", path);
+  header.data_file = path;
+  if (data != "LOCAL" && data != "Local" && data != "local") {
+    header.data_file = fields::beside(path, data);
+    header.data_offset = 0;
+  }
+  return header;
+}
+
+}  // namespace ecorche::io

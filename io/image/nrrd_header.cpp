@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// https://teem.sourceforge.net/nrrd/format.html
+#include <algorithm>
+#include <map>
+
+#include "io/image/header.hpp"
+#include "io/image/header_fields.hpp"
+
+namespace ecorche::io {
+namespace {
+
+using fields::refuse;
+using Path = std::filesystem::path;
+
+// Field names without spaces, in lower case: teem takes `data file` and `datafile` for the same.
+using Fields = std::map<std::string, std::string>;
+
+ScalarType type_from(const std::string& name, const Path& path) {
+  static const std::map<std::string, ScalarType, std::less<>> types{{"signed char", ScalarType::i8},
+                                                                    {"int8", ScalarType::i8},
+                                                                    {"int8_t", ScalarType::i8},
+                                                                    {"uchar", ScalarType::u8},
+                                                                    {"unsigned char", ScalarType::u8},
+                                                                    {"uint8", ScalarType::u8},
+                                                                    {"uint8_t", ScalarType::u8},
+                                                                    {"short", ScalarType::i16},
+                                                                    {"short int", ScalarType::i16},
+                                                                    {"signed short", ScalarType::i16},
+                                                                    {"signed short int", ScalarType::i16},
+                                                                    {"int16", ScalarType::i16},
+                                                                    {"int16_t", ScalarType::i16},
+                                                                    {"ushort", ScalarType::u16},
+                                                                    {"unsigned short", ScalarType::u16},
+                                                                    {"unsigned short int", ScalarType::u16},
+                                                                    {"uint16", ScalarType::u16},
+                                                                    {"uint16_t", ScalarType::u16},
+                                                                    {"int", ScalarType::i32},
+                                                                    {"signed int", ScalarType::i32},
+                                                                    {"int32", ScalarType::i32},
+                                                                    {"int32_t", ScalarType::i32},
+                                                                    {"uint", ScalarType::u32},
+                                                                    {"unsigned int", ScalarType::u32},
+                                                                    {"uint32", ScalarType::u32},
+                                                                    {"uint32_t", ScalarType::u32},
+                                                                    {"float", ScalarType::f32},
+                                                                    {"double", ScalarType::f64}};
+  const auto found = types.find(name);
+  if (found == types.end()) {
+    refuse(path, "voxels of type '" + name + "' cannot be read",
+           "convert them to 8, 16 or 32-bit integers, float or double");
+  }
+  return found->second;
+}
+
+// Reads the lines up to the empty one; `offset` becomes the byte after it.
+Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
+  Fields fields;
+  std::size_t at = 0;
+  bool ended = false;
+  for (int line = 1; at < head.size(); ++line) {
+    const std::size_t end = head.find('\n', at);
+    if (end == head.npos) break;
+    std::string_view text = head.substr(at, end - at);
+    at = end + 1;
+    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+    if (line == 1) {
+      if (text.size() != 8 || text.substr(0, 7) != "NRRD000" || text[7] < '1' || text[7] > '5') {
+        refuse(path, "is no NRRD: its first line is not NRRD0001 to NRRD0005");
+      }
+      continue;
+    }
+    if (text.empty()) {
+      ended = true;
+      break;
+    }
+    if (text.front() == '#' || text.find(":=") != text.npos) continue;  // a comment, a free key
+    const std::size_t colon = text.find(": ");
+    if (colon == text.npos) {
+      refuse(path, "line " + std::to_string(line) + " of its header is no field: '" +
+                       std::string(text.substr(0, 60)) + "'");
+    }
+    std::string key = fields::lower(text.substr(0, colon));
+    std::erase(key, ' ');
+    if (!fields.emplace(key, fields::trim(text.substr(colon + 2))).second) {
+      refuse(path, "its header gives '" + key + "' twice");
+    }
+  }
+  const bool detached = fields.contains("datafile");
+  if (!ended && !detached) refuse(path, "its header does not end");
+  offset = at;
+  return fields;
+}
+
+std::string needed(const Fields& fields, const char* key, const Path& path) {
+  const auto found = fields.find(key);
+  if (found == fields.end()) refuse(path, "its header lacks '" + std::string(key) + "'");
+  return found->second;
+}
+
+// Whether the first axis holds the components of a voxel: it has no direction in space.
+void check_axes(const Fields& fields, std::int64_t dimension, const Path& path) {
+  if (dimension == 3) return;
+  const auto found = fields.find("spacedirections");
+  const std::vector<std::string_view> axes =
+      found == fields.end() ? std::vector<std::string_view>() : fields::words(found->second);
+  const auto is_none = [](std::string_view axis) { return axis == "none"; };
+  if (axes.empty() || !is_none(axes.front()) || std::count_if(axes.begin(), axes.end(), is_none) != 1) {
+    refuse(path, "has 4 axes, and the first is not the only one with space direction 'none'",
+           "save one 3-D image; components of a voxel come first");
+  }
+}
+
+void check_unit(const Fields& fields, const Path& path) {
+  const auto found = fields.find("spaceunits");
+  if (found == fields.end()) return;
+  for (const std::string_view unit : fields::words(found->second)) {
+    if (unit != "\"mm\"" && unit != "\"\"" && unit != "mm") {
+      refuse(path, "its space units are " + found->second, "write it in mm");
+    }
+  }
+}
+
+}  // namespace
+
+ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
+  ImageHeader header;
+  const Fields fields = read_fields(head, path, header.data_offset);
+  const std::int64_t dimension = fields::integer(needed(fields, "dimension", path), 0, 16, "dimension", path);
+  if (dimension != 3 && dimension != 4) {
+    refuse(path, "has " + std::to_string(dimension) + " axes", "save a 3-D image");
+  }
+  check_axes(fields, dimension, path);
+  check_unit(fields, path);
+  const std::string sizes = needed(fields, "sizes", path);
+  const auto counts = fields::words(sizes);
+  if (counts.size() != static_cast<std::size_t>(dimension)) refuse(path, "its sizes are '" + sizes + "'");
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const std::int64_t count =
+        fields::integer(counts[i], 1, std::numeric_limits<std::int32_t>::max(), "sizes", path);
+    if (dimension == 4 && i == 0) {
+      header.components = static_cast<int>(count);
+    } else {
+      header.size[i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
+    }
+  }
+  header.type = type_from(fields::lower(needed(fields, "type", path)), path);
+  fields::check_size(header, path);
+  const std::string encoding = fields::lower(needed(fields, "encoding", path));
+  header.gzip = encoding == "gzip" || encoding == "gz";
+  if (!header.gzip && encoding != "raw") {
+    refuse(path, "its encoding is '" + encoding + "'", "save it as raw or gzip");
+  }
+  for (const char* skip : {"byteskip", "lineskip"}) {
+    const auto found = fields.find(skip);
+    if (found != fields.end() && found->second != "0") {
+      refuse(path, "its header asks to skip " + found->second + " bytes or lines", "write it without skips");
+    }
+  }
+  const auto detached = fields.find("datafile");
+  header.data_file = path;
+  if (detached != fields.end()) {
+    header.data_file = fields::beside(path, detached->second);
+    header.data_offset = 0;
+  }
+  return header;
+}
+
+}  // namespace ecorche::io
