@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The house check itself can fail: every rule is broken once in a scratch tree."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CHECK = pathlib.Path(__file__).with_name("check_house.py")
+SPDX = "// SPDX-License-Identifier: Apache-2.0\n"
+
+
+def problems(files):
+    with tempfile.TemporaryDirectory() as scratch:
+        root = pathlib.Path(scratch)
+        subprocess.run(["git", "init", "-q", root], check=True)
+        for path, text in files.items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text)
+        result = subprocess.run([sys.executable, CHECK, root], capture_output=True, text=True)
+        lines = result.stdout.splitlines()
+        assert (result.returncode == 0) == lines[-1].endswith(" 0 problems"), result.stdout + result.stderr
+        return lines[:-1]
+
+
+class House(unittest.TestCase):
+    def assert_refused(self, path, text, word):
+        found = [line for line in problems({path: text}) if word in line]
+        self.assertTrue(found, f"{path} should be refused with '{word}'")
+
+    def test_a_good_tree_passes(self):
+        self.assertEqual([line for line in problems({
+            "runtime/skin/a.cpp": SPDX + '#include "core/values/mesh.hpp"\n#include "runtime/skin/a.hpp"\n#include <vector>\n',
+            "runtime/server/b.cpp": SPDX + '#include "runtime/skin/a.hpp"\n#include "core/model_file/model_file.hpp"\n',
+            "README.md": "no licence line needed\n"}) if line], [])
+
+    def test_forbidden_arrows(self):
+        for path, include in [("runtime/skin/a.cpp", "preprocess/pipeline.hpp"), ("runtime/skin/a.cpp", "io/case/case_file.hpp"),
+                              ("runtime/skin/a.cpp", "runtime/server/server.hpp"), ("core/values/a.hpp", "core/files/atomic_file.hpp"),
+                              ("core/kinematics/a.cpp", "core/solve/spd_solver.hpp"), ("io/image/a.cpp", "preprocess/pipeline.hpp"),
+                              ("preprocess/cor/a.cpp", "runtime/skin/body_poser.hpp"), ("phantom/a.cpp", "io/case/case_file.hpp"),
+                              ("io/case/a.cpp", "app/command.hpp")]:
+            self.assert_refused(path, SPDX + f'#include "{include}"\n', "may not include")
+
+    def test_licences(self):
+        self.assert_refused("core/values/a.cpp", "int a;\n", "SPDX")
+        self.assert_refused("preprocess/cor/a.cpp", SPDX + "#include <CGAL/Mesh_3.h>\n", "outside of")
+        self.assert_refused("preprocess/tet/cgal/a.cpp", SPDX + "#include <CGAL/Mesh_3.h>\n", "AGPL-3.0-or-later")
+
+    def test_plain_values(self):
+        self.assert_refused("core/values/a.cpp", SPDX + "#include <fstream>\n", "plain data")
+        self.assert_refused("core/values/image.hpp", SPDX + "#include <Eigen/Core>\n", "brings its own Eigen")
+
+    def test_large_rooms(self):
+        self.assert_refused("app/a.cpp", SPDX + "int a;\n" * 501, "one idea a file")
+
+
+if __name__ == "__main__":
+    unittest.main()
