@@ -22,7 +22,7 @@ ARROWS = {
     "io/case": ["core/values", "core/files", "core/kinematics", "io/surface", "io/image"],
     "phantom": ["core/values"],
     "preprocess": ["core"],
-    "proto": [],
+    "proto": ["core/values"],
     "runtime": ["core/values", "core/kinematics"],
     "runtime/server": ["runtime", "core", "proto"],
     "clients/cpp": ["proto", "core/values"],
