@@ -14,9 +14,14 @@
 
 namespace ecorche::weights {
 
-/// Linear finite elements: L_ab = sum over tets of V grad_a . grad_b. Symmetric, rows sum to 0; lower triangle stored.
-/// #nodes by #nodes. `positive_offdiagonal_share` (may be null): share of the off-diagonals above 0.
-solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_offdiagonal_share);
+/// Linear finite elements: L_ab = sum over tets of V grad_a . grad_b, mm. Symmetric, rows sum to 0; lower triangle
+/// stored, compressed, rows ascending. #nodes by #nodes. `positive_share` may be null, see below. Throws Error{data} for
+/// a tet without a positive volume.
+solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_share);
+
+/// Share of the off-diagonals of a lower triangle that are positive (beyond rounding: 1e-12 of their diagonals). With
+/// none the matrix is an M-matrix, and weights stay in [0, 1] by construction.
+double positive_offdiagonal_share(const solve::SparseMatrix& L);
 
 /// Laplace's equation with fixed nodes: value[n] = B(n, c) on nodes with fixed[n], zero flux elsewhere.
 /// Every connected part must hold a fixed node. Returns #nodes by #columns, and the relative residual.

@@ -1,1 +1,142 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "preprocess/weights/cholmod/cholmod_solver.hpp"
+
+#include <cholmod.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "core/solve/abandonable.hpp"
+
+extern "C" void openblas_set_num_threads(int threads);
+
+namespace ecorche::weights {
+namespace {
+
+using solve::Block;
+using solve::SparseMatrix;
+
+[[noreturn]] void fail(ErrorKind kind, const std::string& what, const std::string& mend) {
+  throw Error(kind, "solver cholmod", what, mend);
+}
+
+/// CHOLMOD's workspace and the factor in it; shared with work that may outlive the solver (solve::run_abandonable).
+struct State {
+  cholmod_common common{};
+  cholmod_factor* factor = nullptr;
+
+  State() {
+    cholmod_start(&common);
+    common.print = 0;
+    common.supernodal = CHOLMOD_SUPERNODAL;
+    common.final_ll = 1;
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_METIS;
+  }
+  ~State() {
+    cholmod_free_factor(&factor, &common);
+    cholmod_finish(&common);
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  void check(Eigen::Index unknowns) const {
+    const std::string size = "the matrix of " + std::to_string(unknowns) + " unknowns ";
+    if (common.status == CHOLMOD_NOT_POSDEF || (factor != nullptr && factor->minor < factor->n)) {
+      fail(ErrorKind::data, size + "is not positive definite",
+           "look for degenerate tets and for parts of the mesh without a fixed node");
+    }
+    if (common.status == CHOLMOD_OUT_OF_MEMORY || common.status == CHOLMOD_TOO_LARGE) {
+      fail(ErrorKind::data, size + "has a factor that does not fit",
+           "prepare with fewer nodes: --max-nodes, --max-tets or --voxel");
+    }
+    if (common.status < CHOLMOD_OK) {
+      fail(ErrorKind::internal, "status " + std::to_string(common.status), "report it");
+    }
+  }
+};
+
+/// A view of `A`, lower triangle, without a copy.
+cholmod_sparse view(SparseMatrix& A) {
+  cholmod_sparse v{};
+  v.nrow = static_cast<std::size_t>(A.rows());
+  v.ncol = static_cast<std::size_t>(A.cols());
+  v.nzmax = static_cast<std::size_t>(A.nonZeros());
+  v.p = A.outerIndexPtr();
+  v.i = A.innerIndexPtr();
+  v.x = A.valuePtr();
+  v.stype = -1;
+  v.itype = CHOLMOD_INT;
+  v.xtype = CHOLMOD_REAL;
+  v.dtype = CHOLMOD_DOUBLE;
+  v.sorted = 1;
+  v.packed = 1;
+  return v;
+}
+
+class CholmodSolver final : public solve::SpdSolver {
+ public:
+  std::string_view name() const override { return "cholmod"; }
+
+  void factor(const SparseMatrix& A, const Context& context) override {
+    auto state = std::make_shared<State>();
+    auto matrix = std::make_shared<SparseMatrix>(A);
+    matrix->makeCompressed();
+    state_ = nullptr;
+    solve::run_abandonable(
+        [state, matrix] {
+          cholmod_sparse a = view(*matrix);
+          state->factor = cholmod_analyze(&a, &state->common);
+          if (state->common.status == CHOLMOD_NOT_INSTALLED) {
+            state->common.method[0].ordering = CHOLMOD_AMD;
+            state->factor = cholmod_analyze(&a, &state->common);
+          }
+        },
+        context);
+    state->check(A.rows());
+    solve::run_abandonable(
+        [state, matrix] {
+          openblas_set_num_threads(1);
+          cholmod_sparse a = view(*matrix);
+          cholmod_factorize(&a, state->factor, &state->common);
+        },
+        context);
+    state->check(A.rows());
+    state_ = std::move(state);
+  }
+
+  Block solve(const Block& B, const Context& context) const override {
+    if (!state_) fail(ErrorKind::internal, "solve before factor", "report it");
+    if (B.size() == 0) return B;
+    auto rhs = std::make_shared<Block>(B);
+    auto X = std::make_shared<Block>(B.rows(), B.cols());
+    solve::run_abandonable(
+        [state = state_, rhs, X] {
+          openblas_set_num_threads(1);
+          cholmod_dense b{};
+          b.nrow = b.d = static_cast<std::size_t>(rhs->rows());
+          b.ncol = static_cast<std::size_t>(rhs->cols());
+          b.nzmax = b.nrow * b.ncol;
+          b.x = rhs->data();
+          b.xtype = CHOLMOD_REAL;
+          b.dtype = CHOLMOD_DOUBLE;
+          cholmod_dense* x = cholmod_solve(CHOLMOD_A, state->factor, &b, &state->common);
+          if (x == nullptr) return;  // told by the status
+          std::copy_n(static_cast<const double*>(x->x), b.nzmax, X->data());
+          cholmod_free_dense(&x, &state->common);
+        },
+        context);
+    state_->check(B.rows());
+    return std::move(*X);
+  }
+
+ private:
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace
+
+std::unique_ptr<solve::SpdSolver> make_cholmod_solver() { return std::make_unique<CholmodSolver>(); }
+
+}  // namespace ecorche::weights

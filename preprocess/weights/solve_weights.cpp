@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "preprocess/weights/harmonic.hpp"
+#include "preprocess/weights/parts.hpp"
+#include "preprocess/weights/repair.hpp"
+
+namespace ecorche::weights {
+namespace {
+
+constexpr double kStored = 1e-6;         ///< smallest weight that is kept: the centres of rotation need them this small
+constexpr double kLargestChange = 1e-2;  ///< of a repair
+
+Context stop_only(const Context& context) {
+  Context inner;
+  inner.stop = context.stop;
+  return inner;
+}
+
+/// Segments that own at least one fixed node, ascending: the columns of the block.
+std::vector<std::int32_t> live_segments(const std::vector<std::int32_t>& owner, std::size_t segments) {
+  std::vector<std::uint8_t> live(segments, 0);
+  for (const std::int32_t s : owner) {
+    if (s >= 0) live.at(static_cast<std::size_t>(s)) = 1;
+  }
+  std::vector<std::int32_t> columns;
+  for (std::size_t s = 0; s < segments; ++s) {
+    if (live[s]) columns.push_back(static_cast<std::int32_t>(s));
+  }
+  return columns;
+}
+
+void warn_of_untouched_bones(const TetMesh& mesh, const Case& patient, const Context& context) {
+  std::vector<std::uint8_t> seen(patient.bones.size() + 1, 0);
+  for (const std::uint16_t label : mesh.label) seen[label] = 1;
+  for (std::size_t b = 0; b < patient.bones.size(); ++b) {
+    if (!seen[b + 1]) context.warn("bone '" + patient.bones[b].name + "' has no tet: nothing follows it through the mesh");
+  }
+}
+
+[[noreturn]] void refuse(const TetMesh& mesh, const Repair& repaired, std::int32_t segment) {
+  std::string tets;
+  int named = 0;
+  for (Eigen::Index t = 0; t < mesh.T.rows() && named < 8; ++t) {
+    if ((mesh.T.row(t).array() != repaired.worst_node).all()) continue;
+    tets += (named++ == 0 ? "" : ", ") + std::to_string(t);
+  }
+  const auto p = mesh.V.row(repaired.worst_node);
+  std::array<char, 400> what{};
+  std::snprintf(what.data(), what.size(),
+                "node %d at (%.2f, %.2f, %.2f) has the weight %.4g for segment %d, and a repair would change it by %.2g, "
+                "more than %g; its tets: %s",
+                repaired.worst_node, p(0), p(1), p(2), repaired.worst_solved, segment, repaired.largest_change, kLargestChange,
+                tets.c_str());
+  throw Error(ErrorKind::data, "weights", what.data(), "its tets are slivers: use another mesher or a finer --voxel");
+}
+
+/// Largest, smallest and row sums over the rows that were solved.
+void measure_solved(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& source, Certificate& certificate) {
+  certificate.solved_min_weight = 1;
+  certificate.solved_max_weight = 0;
+  for (std::size_t n = 0; n < source.size(); ++n) {
+    if (source[n] >= 0) continue;
+    const auto row = values.row(static_cast<Eigen::Index>(n));
+    certificate.solved_min_weight = std::min(certificate.solved_min_weight, row.minCoeff());
+    certificate.solved_max_weight = std::max(certificate.solved_max_weight, row.maxCoeff());
+    certificate.solved_row_sum_error = std::max(certificate.solved_row_sum_error, std::abs(row.sum() - 1));
+  }
+}
+
+/// Rows cut at kStored, divided by their sum and narrowed to float32; `source` as in attachments().
+Weights store(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& columns,
+              const std::vector<std::int32_t>& source, Certificate& certificate) {
+  Weights w;
+  w.offsets.reserve(source.size() + 1);
+  w.offsets.push_back(0);
+  certificate.min_weight = 1;
+  certificate.max_weight = 0;
+  for (std::size_t n = 0; n < source.size(); ++n) {
+    const auto row = values.row(source[n] >= 0 ? source[n] : static_cast<Eigen::Index>(n));
+    double kept = 0;
+    for (const double x : row) kept += x >= kStored ? x : 0;
+    double sum = 0;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double x = row(static_cast<Eigen::Index>(c));
+      const auto narrow = static_cast<float>(x / kept);
+      if (x < kStored || static_cast<double>(narrow) < kStored) continue;  // narrowing may round 1e-6 down
+      w.segment.push_back(static_cast<std::uint16_t>(columns[c]));
+      w.weight.push_back(narrow);
+      sum += narrow;
+      certificate.min_weight = std::min(certificate.min_weight, static_cast<double>(narrow));
+      certificate.max_weight = std::max(certificate.max_weight, static_cast<double>(narrow));
+    }
+    certificate.row_sum_error = std::max(certificate.row_sum_error, std::abs(sum - 1));
+    w.offsets.push_back(w.segment.size());
+  }
+  return w;
+}
+
+}  // namespace
+
+WeightsResult solve_weights(const TetMesh& mesh, const Case& patient, const std::vector<std::int32_t>& bone_segment,
+                            std::size_t segments, const Options& options, const Context& context) {
+  const auto solver = make_solver(options.solver);
+  const auto nodes = static_cast<std::size_t>(mesh.V.rows());
+  WeightsResult result;
+  Certificate& certificate = result.certificate;
+
+  warn_of_untouched_bones(mesh, patient, context);
+  const std::vector<std::int32_t> owner = bone_nodes(mesh, patient, bone_segment);
+  const std::vector<std::int32_t> columns = live_segments(owner, segments);
+  if (columns.empty()) {
+    throw Error(ErrorKind::data, "weights", "no tet lies in a bone", "use a finer --voxel, or check where the bones lie");
+  }
+  const Parts parts = connected_parts(mesh.V.rows(), mesh.T);
+  std::vector<std::uint8_t> boned(static_cast<std::size_t>(parts.count), 0);
+  for (std::size_t n = 0; n < nodes; ++n) {
+    if (owner[n] >= 0) boned[static_cast<std::size_t>(parts.of_node[n])] = 1;
+  }
+  const std::vector<std::int32_t> source = attachments(mesh.V, parts, boned, context);
+  context.report(0.1);
+  context.check_stop();
+
+  const solve::SparseMatrix L = laplacian(mesh.V, mesh.T, &certificate.positive_offdiagonal_share);
+  context.report(0.2);
+  context.check_stop();
+
+  // Nodes that touch a bone are fixed; so are those of boneless parts, which nothing else would hold.
+  std::vector<std::uint8_t> fixed(nodes, 0);
+  std::vector<Eigen::Index> column_of(segments, -1);
+  for (std::size_t c = 0; c < columns.size(); ++c) column_of[static_cast<std::size_t>(columns[c])] = static_cast<Eigen::Index>(c);
+  Eigen::MatrixXd boundary = Eigen::MatrixXd::Zero(mesh.V.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t n = 0; n < nodes; ++n) {
+    fixed[n] = owner[n] >= 0 || source[n] >= 0;
+    if (owner[n] >= 0) boundary(static_cast<Eigen::Index>(n), column_of[static_cast<std::size_t>(owner[n])]) = 1;
+  }
+  Context scaled = stop_only(context);
+  scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
+  HarmonicResult solved = solve_harmonic(L, fixed, boundary, *solver, scaled);
+  boundary.resize(0, 0);
+  certificate.solver_residual = solved.residual;
+  measure_solved(solved.values, source, certificate);
+  if (options.keep_solved) {
+    result.solved.setZero(mesh.V.rows(), static_cast<Eigen::Index>(segments));
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      result.solved.col(columns[c]) = solved.values.col(static_cast<Eigen::Index>(c));
+    }
+  }
+  context.report(0.9);
+
+  Eigen::MatrixXd& values = solved.values;
+  const Repair repaired = repair(L, fixed, values, context);
+  certificate.repaired_rows = repaired.rows;
+  certificate.repaired_largest_change = repaired.largest_change;
+  if (repaired.largest_change > kLargestChange) {
+    refuse(mesh, repaired, columns[static_cast<std::size_t>(repaired.worst_column)]);
+  }
+  context.check_stop();
+  result.weights = store(values, columns, source, certificate);
+  context.report(1);
+  return result;
+}
+
+}  // namespace ecorche::weights
