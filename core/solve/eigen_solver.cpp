@@ -45,6 +45,8 @@ class EigenSolver final : public SpdSolver {
 
 }  // namespace
 
-std::unique_ptr<SpdSolver> make_eigen_solver() { return std::make_unique<EigenSolver>(); }
+std::unique_ptr<SpdSolver> make_eigen_solver() {
+  return std::make_unique<EigenSolver>();
+}
 
 }  // namespace ecorche::solve

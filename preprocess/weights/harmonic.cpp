@@ -13,8 +13,8 @@ struct FreeSystem {
   solve::Block rhs;
 };
 
-FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_t>& free_row, std::int32_t free_count,
-                     const Eigen::MatrixXd& boundary) {
+FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_t>& free_row,
+                     std::int32_t free_count, const Eigen::MatrixXd& boundary) {
   FreeSystem system;
   system.A.resize(free_count, free_count);
   system.rhs.setZero(free_count, boundary.cols());
@@ -51,7 +51,8 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
 }  // namespace
 
 HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
-                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver, const Context& context) {
+                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver,
+                              const Context& context) {
   std::vector<std::int32_t> free_row(fixed.size(), -1);
   std::int32_t free_count = 0;
   for (std::size_t n = 0; n < fixed.size(); ++n) {

@@ -14,13 +14,13 @@
 
 namespace ecorche::weights {
 
-/// Linear finite elements: L_ab = sum over tets of V grad_a . grad_b, mm. Symmetric, rows sum to 0; lower triangle
-/// stored, compressed, rows ascending. #nodes by #nodes. `positive_share` may be null, see below. Throws Error{data} for
-/// a tet without a positive volume.
+/// Linear finite elements: L_ab = sum over tets of V grad_a . grad_b, mm. Symmetric, rows sum to 0; lower
+/// triangle stored, compressed, rows ascending. #nodes by #nodes. `positive_share` may be null, see below.
+/// Throws Error{data} for a tet without a positive volume.
 solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_share);
 
-/// Share of the off-diagonals of a lower triangle that are positive (beyond rounding: 1e-12 of their diagonals). With
-/// none the matrix is an M-matrix, and weights stay in [0, 1] by construction.
+/// Share of the off-diagonals of a lower triangle that are positive (beyond rounding: 1e-12 of their
+/// diagonals). With none the matrix is an M-matrix, and weights stay in [0, 1] by construction.
 double positive_offdiagonal_share(const solve::SparseMatrix& L);
 
 /// Laplace's equation with fixed nodes: value[n] = B(n, c) on nodes with fixed[n], zero flux elsewhere.
@@ -30,16 +30,18 @@ struct HarmonicResult {
   double residual = 0;
 };
 HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
-                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver, const Context& context);
+                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver,
+                              const Context& context);
 
-/// The owning segment of every node that touches a bone, else -1. A node that touches several bones belongs to the
-/// bone whose surface is nearest, ties to the lower index.
-std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient, const std::vector<std::int32_t>& bone_segment);
+/// The owning segment of every node that touches a bone, else -1. A node that touches several bones belongs
+/// to the bone whose surface is nearest, ties to the lower index.
+std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
+                                     const std::vector<std::int32_t>& bone_segment);
 
 struct WeightsResult {
-  Weights weights;            ///< as stored: clamped to [0, 1], cut at 1e-6, rows renormalised
-  Eigen::MatrixXd solved;     ///< #nodes by #segments, before repair; kept only when asked
-  Certificate certificate;    ///< the solver's, weights' and off-diagonal members are filled
+  Weights weights;          ///< as stored: clamped to [0, 1], cut at 1e-6, rows renormalised
+  Eigen::MatrixXd solved;   ///< #nodes by #segments, before repair; kept only when asked
+  Certificate certificate;  ///< the solver's, weights' and off-diagonal members are filled
 };
 
 struct Options {
@@ -47,12 +49,13 @@ struct Options {
   bool keep_solved = false;
 };
 
-/// One Laplacian, one factor, all segments as one block. A connected part of the mesh without any bone is named and
-/// attached to the nearest boned part (its nodes take the weights of the nearest node there). Rows beyond [0, 1] are
-/// clamped and renormalised, and counted; Error{data} when a repair would change a weight by more than 1e-2, or when
-/// solved weights leave [-1e-3, 1 + 1e-3], naming the worst node and its tets.
-WeightsResult solve_weights(const TetMesh& mesh, const Case& patient, const std::vector<std::int32_t>& bone_segment,
-                            std::size_t segments, const Options& options, const Context& context);
+/// One Laplacian, one factor, all segments as one block. A connected part of the mesh without any bone is
+/// named and attached to the nearest boned part (its nodes take the weights of the nearest node there). Rows
+/// beyond [0, 1] are clamped and renormalised, and counted; Error{data} when a repair would change a weight
+/// by more than 1e-2, or when solved weights leave [-1e-3, 1 + 1e-3], naming the worst node and its tets.
+WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
+                            const std::vector<std::int32_t>& bone_segment, std::size_t segments,
+                            const Options& options, const Context& context);
 
 /// `cholmod` (GPL builds) and `eigen`; the first is `auto`'s choice.
 std::vector<std::string_view> solver_names();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stiffness matrix of linear elements, straight into compressed columns: every node gathers its own tets, so
-// nothing is sorted and the sums have one order whatever the number of threads.
+// The stiffness matrix of linear elements, straight into compressed columns: every node gathers its own tets,
+// so nothing is sorted and the sums have one order whatever the number of threads.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -25,21 +25,24 @@ struct Incidence {
     for (std::size_t n = 1; n < offsets.size(); ++n) offsets[n] += offsets[n - 1];
     std::vector<std::int64_t> next(offsets.begin(), offsets.end() - 1);
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      corners[static_cast<std::size_t>(next[static_cast<std::size_t>(node[i])]++)] = static_cast<std::int64_t>(i);
+      corners[static_cast<std::size_t>(next[static_cast<std::size_t>(node[i])]++)] =
+          static_cast<std::int64_t>(i);
     }
   }
 };
 
 /// Place of the entry of corners a != b among a tet's six: 01 02 03 12 13 23.
-constexpr std::array<std::array<int, 4>, 4> kEdge{{{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}}};
+constexpr std::array<std::array<int, 4>, 4> kEdge{
+    {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}}};
 using EdgeTerms = std::array<double, 6>;
 
-/// V grad_a . grad_b of one tet: with n_a the inward normal of the face opposite a, twice its area long, grad_a is
-/// n_a / 6V, hence n_a . n_b / 36V.
+/// V grad_a . grad_b of one tet: with n_a the inward normal of the face opposite a, twice its area long,
+/// grad_a is n_a / 6V, hence n_a . n_b / 36V.
 EdgeTerms edge_terms(const Points& V, const Tets& T, Eigen::Index t) {
   const Eigen::Vector3d a = V.row(T(t, 0)), b = V.row(T(t, 1)), c = V.row(T(t, 2)), d = V.row(T(t, 3));
   const Eigen::Vector3d u = b - a, v = c - a, w = d - a;
-  const std::array<Eigen::Vector3d, 4> n{-(v.cross(w) + w.cross(u) + u.cross(v)), v.cross(w), w.cross(u), u.cross(v)};
+  const std::array<Eigen::Vector3d, 4> n{-(v.cross(w) + w.cross(u) + u.cross(v)), v.cross(w), w.cross(u),
+                                         u.cross(v)};
   const double det = n[1].dot(u);
   if (!(det > 0)) {
     throw Error(ErrorKind::data, "laplacian",
@@ -69,7 +72,8 @@ void gather(const Tets& T, const Incidence& incidence, const std::vector<EdgeTer
       if (other == corner) continue;
       const std::int32_t b = T(t, static_cast<Eigen::Index>(other));
       const double value = terms[static_cast<std::size_t>(t)][static_cast<std::size_t>(kEdge[corner][other])];
-      const auto found = std::find_if(row.begin(), row.end(), [b](const Neighbour& x) { return x.node == b; });
+      const auto found =
+          std::find_if(row.begin(), row.end(), [b](const Neighbour& x) { return x.node == b; });
       if (found == row.end()) {
         row.push_back({b, value});
       } else {
@@ -81,8 +85,9 @@ void gather(const Tets& T, const Incidence& incidence, const std::vector<EdgeTer
 }
 
 /// Calls `f(node, row)` for every node in parallel.
-template <class F> void for_each_row(const Tets& T, const Incidence& incidence, const std::vector<EdgeTerms>& terms,
-                                     std::int32_t nodes, const F& f) {
+template <class F>
+void for_each_row(const Tets& T, const Incidence& incidence, const std::vector<EdgeTerms>& terms,
+                  std::int32_t nodes, const F& f) {
   tbb::parallel_for(tbb::blocked_range<std::int32_t>(0, nodes, 1024), [&](const auto& range) {
     std::vector<Neighbour> row;
     for (std::int32_t n = range.begin(); n < range.end(); ++n) {

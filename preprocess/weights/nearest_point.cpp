@@ -40,8 +40,8 @@ std::int32_t NearestPoint::find(const Eigen::Vector3d& p, double& distance2) con
   std::int32_t best = -1;
   distance2 = std::numeric_limits<double>::infinity();
   for (int ring = 0; ring <= size_.maxCoeff(); ++ring) {
-    // The points of this ring are at least ring - 1 edges from the point, or from its projection onto the box, to which
-    // they are no farther.
+    // The points of this ring are at least ring - 1 edges from the point, or from its projection onto the
+    // box, to which they are no farther.
     const double nearest = std::max(0, ring - 1) * edge_;
     if (nearest * nearest > distance2) break;
     for (int k = std::max(0, centre[2] - ring); k <= std::min(size_[2] - 1, centre[2] + ring); ++k) {

@@ -15,7 +15,8 @@ class NearestPoint {
  public:
   /// Over the rows `subset` of V, of which there must be at least one.
   NearestPoint(const Points& V, std::vector<std::int32_t> subset);
-  /// Row of V of the point nearest to `p`, ties to the lower row; `distance2` receives the squared distance, mm^2.
+  /// Row of V of the point nearest to `p`, ties to the lower row; `distance2` receives the squared distance,
+  /// mm^2.
   std::int32_t find(const Eigen::Vector3d& p, double& distance2) const;
 
  private:
@@ -25,8 +26,8 @@ class NearestPoint {
   }
 
   const Points& V_;
-  std::vector<std::int32_t> rows_;      // by cell
-  std::vector<std::int32_t> offsets_;   // #cells + 1
+  std::vector<std::int32_t> rows_;     // by cell
+  std::vector<std::int32_t> offsets_;  // #cells + 1
   Eigen::AlignedBox3d box_;
   Eigen::Vector3i size_ = Eigen::Vector3i::Ones();
   double edge_ = 1;

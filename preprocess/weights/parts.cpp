@@ -41,8 +41,8 @@ Parts connected_parts(Eigen::Index nodes, const Tets& T) {
   return parts;
 }
 
-std::vector<std::int32_t> attachments(const Points& V, const Parts& parts, const std::vector<std::uint8_t>& boned,
-                                      const Context& context) {
+std::vector<std::int32_t> attachments(const Points& V, const Parts& parts,
+                                      const std::vector<std::uint8_t>& boned, const Context& context) {
   std::vector<std::int32_t> source(parts.of_node.size(), -1);
   if (std::find(boned.begin(), boned.end(), 0) == boned.end()) return source;
 
@@ -63,7 +63,8 @@ std::vector<std::int32_t> attachments(const Points& V, const Parts& parts, const
       const std::int32_t near = anywhere.find(V.row(n), d2);
       best = std::min(best, {d2, near});
     }
-    const NearestPoint there(V, nodes[static_cast<std::size_t>(parts.of_node[static_cast<std::size_t>(best.second)])]);
+    const NearestPoint there(
+        V, nodes[static_cast<std::size_t>(parts.of_node[static_cast<std::size_t>(best.second)])]);
     tbb::parallel_for(std::size_t{0}, nodes[part].size(), [&](std::size_t i) {
       const std::int32_t n = nodes[part][i];
       double d2 = 0;
@@ -71,9 +72,10 @@ std::vector<std::int32_t> attachments(const Points& V, const Parts& parts, const
     });
     const std::int32_t first = nodes[part].front();
     std::array<char, 200> line{};
-    std::snprintf(line.data(), line.size(),
-                  "a part of %zu nodes about (%.1f, %.1f, %.1f) touches no bone: it follows the part %.2f mm from it",
-                  nodes[part].size(), V(first, 0), V(first, 1), V(first, 2), std::sqrt(best.first));
+    std::snprintf(
+        line.data(), line.size(),
+        "a part of %zu nodes about (%.1f, %.1f, %.1f) touches no bone: it follows the part %.2f mm from it",
+        nodes[part].size(), V(first, 0), V(first, 1), V(first, 2), std::sqrt(best.first));
     context.warn(line.data());
   }
   return source;

@@ -41,8 +41,8 @@ void clamp_row(Eigen::MatrixXd& values, Eigen::Index n) {
 }
 
 /// Step 1 on the marked nodes.
-void solve_patches(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& inside, Eigen::MatrixXd& values,
-                   const Context& context) {
+void solve_patches(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& inside,
+                   Eigen::MatrixXd& values, const Context& context) {
   const Eigen::VectorXd diagonal = L.diagonal();
   std::vector<std::int32_t> local(inside.size(), -1);  // inner nodes, then the nodes around them
   std::vector<std::int32_t> global;
@@ -89,7 +89,8 @@ void solve_patches(const solve::SparseMatrix& L, const std::vector<std::uint8_t>
   Context quiet;
   quiet.stop = context.stop;
   const HarmonicResult mended = solve_harmonic(M, around, boundary, *solver, quiet);
-  for (std::size_t i = 0; i < inner; ++i) values.row(global[i]) = mended.values.row(static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < inner; ++i)
+    values.row(global[i]) = mended.values.row(static_cast<Eigen::Index>(i));
 }
 
 }  // namespace

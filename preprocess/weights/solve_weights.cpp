@@ -12,7 +12,8 @@
 namespace ecorche::weights {
 namespace {
 
-constexpr double kStored = 1e-6;         ///< smallest weight that is kept: the centres of rotation need them this small
+constexpr double kStored =
+    1e-6;  ///< smallest weight that is kept: the centres of rotation need them this small
 constexpr double kLargestChange = 1e-2;  ///< of a repair
 
 Context stop_only(const Context& context) {
@@ -38,7 +39,8 @@ void warn_of_untouched_bones(const TetMesh& mesh, const Case& patient, const Con
   std::vector<std::uint8_t> seen(patient.bones.size() + 1, 0);
   for (const std::uint16_t label : mesh.label) seen[label] = 1;
   for (std::size_t b = 0; b < patient.bones.size(); ++b) {
-    if (!seen[b + 1]) context.warn("bone '" + patient.bones[b].name + "' has no tet: nothing follows it through the mesh");
+    if (!seen[b + 1])
+      context.warn("bone '" + patient.bones[b].name + "' has no tet: nothing follows it through the mesh");
   }
 }
 
@@ -52,15 +54,18 @@ void warn_of_untouched_bones(const TetMesh& mesh, const Case& patient, const Con
   const auto p = mesh.V.row(repaired.worst_node);
   std::array<char, 400> what{};
   std::snprintf(what.data(), what.size(),
-                "node %d at (%.2f, %.2f, %.2f) has the weight %.4g for segment %d, and a repair would change it by %.2g, "
+                "node %d at (%.2f, %.2f, %.2f) has the weight %.4g for segment %d, and a repair would change "
+                "it by %.2g, "
                 "more than %g; its tets: %s",
-                repaired.worst_node, p(0), p(1), p(2), repaired.worst_solved, segment, repaired.largest_change, kLargestChange,
-                tets.c_str());
-  throw Error(ErrorKind::data, "weights", what.data(), "its tets are slivers: use another mesher or a finer --voxel");
+                repaired.worst_node, p(0), p(1), p(2), repaired.worst_solved, segment,
+                repaired.largest_change, kLargestChange, tets.c_str());
+  throw Error(ErrorKind::data, "weights", what.data(),
+              "its tets are slivers: use another mesher or a finer --voxel");
 }
 
 /// Largest, smallest and row sums over the rows that were solved.
-void measure_solved(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& source, Certificate& certificate) {
+void measure_solved(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& source,
+                    Certificate& certificate) {
   certificate.solved_min_weight = 1;
   certificate.solved_max_weight = 0;
   for (std::size_t n = 0; n < source.size(); ++n) {
@@ -103,8 +108,9 @@ Weights store(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& co
 
 }  // namespace
 
-WeightsResult solve_weights(const TetMesh& mesh, const Case& patient, const std::vector<std::int32_t>& bone_segment,
-                            std::size_t segments, const Options& options, const Context& context) {
+WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
+                            const std::vector<std::int32_t>& bone_segment, std::size_t segments,
+                            const Options& options, const Context& context) {
   const auto solver = make_solver(options.solver);
   const auto nodes = static_cast<std::size_t>(mesh.V.rows());
   WeightsResult result;
@@ -114,7 +120,8 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient, const std:
   const std::vector<std::int32_t> owner = bone_nodes(mesh, patient, bone_segment);
   const std::vector<std::int32_t> columns = live_segments(owner, segments);
   if (columns.empty()) {
-    throw Error(ErrorKind::data, "weights", "no tet lies in a bone", "use a finer --voxel, or check where the bones lie");
+    throw Error(ErrorKind::data, "weights", "no tet lies in a bone",
+                "use a finer --voxel, or check where the bones lie");
   }
   const Parts parts = connected_parts(mesh.V.rows(), mesh.T);
   std::vector<std::uint8_t> boned(static_cast<std::size_t>(parts.count), 0);
@@ -132,11 +139,13 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient, const std:
   // Nodes that touch a bone are fixed; so are those of boneless parts, which nothing else would hold.
   std::vector<std::uint8_t> fixed(nodes, 0);
   std::vector<Eigen::Index> column_of(segments, -1);
-  for (std::size_t c = 0; c < columns.size(); ++c) column_of[static_cast<std::size_t>(columns[c])] = static_cast<Eigen::Index>(c);
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    column_of[static_cast<std::size_t>(columns[c])] = static_cast<Eigen::Index>(c);
   Eigen::MatrixXd boundary = Eigen::MatrixXd::Zero(mesh.V.rows(), static_cast<Eigen::Index>(columns.size()));
   for (std::size_t n = 0; n < nodes; ++n) {
     fixed[n] = owner[n] >= 0 || source[n] >= 0;
-    if (owner[n] >= 0) boundary(static_cast<Eigen::Index>(n), column_of[static_cast<std::size_t>(owner[n])]) = 1;
+    if (owner[n] >= 0)
+      boundary(static_cast<Eigen::Index>(n), column_of[static_cast<std::size_t>(owner[n])]) = 1;
   }
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };

@@ -24,7 +24,8 @@ std::unique_ptr<solve::SpdSolver> make_solver(std::string_view name) {
   if (name == "eigen") return solve::make_eigen_solver();
   std::string known = "auto";
   for (const std::string_view each : solver_names()) known.append(", ").append(each);
-  throw Error(ErrorKind::usage, "--solver", "this build has no solver '" + std::string(name) + "'", "use one of " + known);
+  throw Error(ErrorKind::usage, "--solver", "this build has no solver '" + std::string(name) + "'",
+              "use one of " + known);
 }
 
 }  // namespace ecorche::weights

@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::int32_t kLeaf = 8;
 
-double squared_distance_to_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+double squared_distance_to_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b) {
   const Eigen::Vector3d e = b - a;
   const double length2 = e.squaredNorm();
   const double s = length2 > 0 ? std::clamp((p - a).dot(e) / length2, 0.0, 1.0) : 0.0;
@@ -19,11 +20,11 @@ double squared_distance_to_segment(const Eigen::Vector3d& p, const Eigen::Vector
 
 }  // namespace
 
-double squared_distance_to_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                    const Eigen::Vector3d& c) {
+double squared_distance_to_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d n = (b - a).cross(c - a);
-  const bool above = n.squaredNorm() > 0 && (b - a).cross(p - a).dot(n) >= 0 && (c - b).cross(p - b).dot(n) >= 0 &&
-                     (a - c).cross(p - c).dot(n) >= 0;
+  const bool above = n.squaredNorm() > 0 && (b - a).cross(p - a).dot(n) >= 0 &&
+                     (c - b).cross(p - b).dot(n) >= 0 && (a - c).cross(p - c).dot(n) >= 0;
   if (above) {
     const double h = (p - a).dot(n);
     return h * h / n.squaredNorm();
@@ -39,10 +40,14 @@ SurfaceDistance::SurfaceDistance(const SurfaceMesh& surface)
 }
 
 void SurfaceDistance::build(std::int32_t begin, std::int32_t end) {
-  const auto corner = [&](std::int32_t f, int k) -> Eigen::Vector3d { return surface_.V.row(surface_.F(f, k)); };
+  const auto corner = [&](std::int32_t f, int k) -> Eigen::Vector3d {
+    return surface_.V.row(surface_.F(f, k));
+  };
   Node node;
   Eigen::AlignedBox3d middles;
-  const auto middle = [&](std::int32_t f) -> Eigen::Vector3d { return (corner(f, 0) + corner(f, 1) + corner(f, 2)) / 3; };
+  const auto middle = [&](std::int32_t f) -> Eigen::Vector3d {
+    return (corner(f, 0) + corner(f, 1) + corner(f, 2)) / 3;
+  };
   for (std::int32_t i = begin; i < end; ++i) {
     const std::int32_t f = order_[static_cast<std::size_t>(i)];
     for (int k = 0; k < 3; ++k) node.box.extend(corner(f, k));
@@ -83,7 +88,9 @@ double SurfaceDistance::squared(const Eigen::Vector3d& p) const {
     }
     auto near = static_cast<std::int32_t>(at) + 1;
     std::int32_t far = node.right;
-    const auto distance = [&](std::int32_t n) { return nodes_[static_cast<std::size_t>(n)].box.squaredExteriorDistance(p); };
+    const auto distance = [&](std::int32_t n) {
+      return nodes_[static_cast<std::size_t>(n)].box.squaredExteriorDistance(p);
+    };
     if (distance(far) < distance(near)) std::swap(near, far);
     open.push_back(far);
     open.push_back(near);

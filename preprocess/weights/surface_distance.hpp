@@ -11,11 +11,11 @@
 namespace ecorche::weights {
 
 /// Squared distance, mm^2, from `p` to the triangle a, b, c (which may be degenerate).
-double squared_distance_to_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                    const Eigen::Vector3d& c);
+double squared_distance_to_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                    const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
-/// A tree of boxes over the triangles of a surface, which must outlive it. O(#F log #F) to build; a query visits the
-/// few boxes nearer than the best triangle so far.
+/// A tree of boxes over the triangles of a surface, which must outlive it. O(#F log #F) to build; a query
+/// visits the few boxes nearer than the best triangle so far.
 class SurfaceDistance {
  public:
   explicit SurfaceDistance(const SurfaceMesh& surface);

@@ -21,7 +21,8 @@ using solve::SparseMatrix;
   throw Error(kind, "solver cholmod", what, mend);
 }
 
-/// CHOLMOD's workspace and the factor in it; shared with work that may outlive the solver (solve::run_abandonable).
+/// CHOLMOD's workspace and the factor in it; shared with work that may outlive the solver
+/// (solve::run_abandonable).
 struct State {
   cholmod_common common{};
   cholmod_factor* factor = nullptr;
@@ -137,6 +138,8 @@ class CholmodSolver final : public solve::SpdSolver {
 
 }  // namespace
 
-std::unique_ptr<solve::SpdSolver> make_cholmod_solver() { return std::make_unique<CholmodSolver>(); }
+std::unique_ptr<solve::SpdSolver> make_cholmod_solver() {
+  return std::make_unique<CholmodSolver>();
+}
 
 }  // namespace ecorche::weights
