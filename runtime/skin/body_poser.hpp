@@ -12,6 +12,7 @@
 #include "core/values/model.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/transform.hpp"
+#include "runtime/skin/segment_motion.hpp"
 
 namespace ecorche::runtime {
 
@@ -27,17 +28,21 @@ Skinning skinning_from_name(std::string_view name);
 
 /// One posed body. Allocated once by BodyPoser::make_frame, then only written.
 struct PosedBody {
-  std::vector<RigidTransform> segments;      ///< motion of every segment from rest
-  std::vector<float> nodes;                  ///< 3 * #nodes, LPS mm
-  std::vector<std::vector<float>> tissues;   ///< per tissue of the model, 3 * #V; not written when not asked for
-  std::vector<ClampedJoint> clamped;         ///< reserved for all joints; what limits took away
+  Pose pose;                             ///< what was posed: as asked, within limits, coupled
+  std::vector<RigidTransform> segments;  ///< motion of every segment from rest
+  std::vector<float> nodes;              ///< 3 * #nodes, LPS mm
+  std::vector<std::vector<float>>
+      tissues;                         ///< per tissue of the model, 3 * #V; not written when not asked for
+  std::vector<ClampedJoint> clamped;   ///< reserved for all joints; what limits took away
+  std::vector<SegmentMotion> motions;  ///< scratch of `run`: the segments as the kernels read them
 };
 
-/// Shared and immutable: any number of threads may pose different frames at once. Work inside runs in the caller's TBB
-/// arena; results are the same bytes for any number of threads.
+/// Shared and immutable: any number of threads may pose different frames at once. Work inside runs in the
+/// caller's TBB arena; results are the same bytes for any number of threads.
 class BodyPoser {
  public:
-  /// Drops weights below 1e-4 and renormalises their rows (DESIGN 7).
+  /// Drops weights below 1e-4 and renormalises their rows (DESIGN 7). Throws Error{data} for a model whose
+  /// arrays do not fit together, Error{config} for a rig that cannot be constrained.
   explicit BodyPoser(std::shared_ptr<const Model> model);
   ~BodyPoser();
   BodyPoser(const BodyPoser&) = delete;
@@ -47,10 +52,14 @@ class BodyPoser {
   const std::shared_ptr<const Model>& shared_model() const;
   PosedBody make_frame() const;
 
-  /// Constrains `pose` (limits, coupling), runs forward kinematics, skins the nodes, then moves the tissues whose rows
-  /// of Model::tissues are in `tissues` (ascending). Allocates nothing. invalid_argument when the pose has not one
-  /// rotation and one translation per joint, or holds a value that is not finite or a quaternion far from unit length.
-  Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues, PosedBody& out) const;
+  /// Constrains `pose` (limits, coupling), runs forward kinematics, skins the nodes, then moves the tissues
+  /// whose rows of Model::tissues are in `tissues` (ascending). Allocates nothing. invalid_argument when the
+  /// pose has not one rotation and one translation per joint, or holds a value that is not finite or a
+  /// quaternion whose length is not 1 within 1 %, when a tissue is not of the model, or when `out` is no
+  /// frame of it. Positions keep 1e-3 mm at rest and under any rigid motion of the whole body within metres:
+  /// see segment_motion.hpp.
+  Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues,
+             PosedBody& out) const;
 
   /// All tissues of the model.
   std::span<const std::uint32_t> all_tissues() const;
