@@ -30,8 +30,8 @@ class Mesher {
  public:
   virtual ~Mesher() = default;
   virtual std::string_view name() const = 0;
-  /// Tets of the whole body, labelled as TetMesh says, with positive volume, no duplicate or unused node. Never more
-  /// than options.max_tets and max_nodes: sizes are coarsened, with a warning, until they hold.
+  /// Tets of the whole body, labelled as TetMesh says, with positive volume, no duplicate or unused node.
+  /// Never more than options.max_tets and max_nodes: sizes are coarsened, with a warning, until they hold.
   /// Throws Error{data} when no mesh can be made, naming what stood in the way and another mesher to try.
   virtual TetMesh mesh(const Input& input, const Options& options, const Context& context) const = 0;
 };
@@ -46,8 +46,11 @@ std::vector<std::string_view> mesher_names();
 /// Throws Error{usage} for a name that this build does not have.
 std::unique_ptr<Mesher> make_mesher(std::string_view name);
 
-/// What every mesh passes before the next stage: nodes narrowed to float32 (the run-time precision; all later stages
-/// see exactly those coordinates), renumbered along a Morton curve, tets sorted along it, positive volume checked.
+/// What every mesh passes before the next stage: nodes narrowed to float32 (the run-time precision; all later
+/// stages see exactly those coordinates), merged where equal, dropped where unused and renumbered along a
+/// Morton curve; tets sorted along it, each with its lowest node first. The result depends on the geometry
+/// alone, not on the order it came in. Throws Error{internal} for a tet that single precision makes flat or
+/// inverted, naming its place.
 void canonicalize(TetMesh& mesh);
 
 }  // namespace ecorche::tet

@@ -20,15 +20,16 @@ struct Options {
 };
 
 /// The u16 image of labels over the bounds of skin and bones, axis-parallel, with one empty voxel all round.
-/// Vertices are snapped to 1/256 voxel; from there everything is exact. Surface collision first (a voxel that a triangle
-/// touches counts, so that bones thinner than a voxel survive), then inside (non-zero winding number of the centre by
-/// signed crossings: overlapping shells count once, an inner shell turned inwards is a cavity), then bones; a voxel
-/// claimed by several bones goes to the one whose surface is nearest to its centre, ties to the lower index. The body is
-/// skin together with bones. A surface with open edges is flooded from outside instead and each part that the flood does
-/// not reach asks a generalized winding number, with a warning: slits up to a voxel are closed, wider holes leave only
-/// the touched voxels. Parallel over slabs; the same bytes for any number of threads.
-/// Throws Error{config} when voxel_mm gives more than 2^31 voxels or more than 2048 along an axis, Error{data} for an
-/// empty skin or a vertex that is not finite.
+/// Vertices are snapped to 1/256 voxel; from there everything is exact. Surface collision first (a voxel that
+/// a triangle touches counts, so that bones thinner than a voxel survive), then inside (non-zero winding
+/// number of the centre by signed crossings: overlapping shells count once, an inner shell turned inwards is
+/// a cavity), then bones; a voxel claimed by several bones goes to the one whose surface is nearest to its
+/// centre, ties to the lower index. The body is skin together with bones. A surface with open edges is
+/// flooded from outside instead and each part that the flood does not reach asks a generalized winding
+/// number, with a warning: slits up to a voxel are closed, wider holes leave only the touched voxels.
+/// Parallel over slabs; the same bytes for any number of threads. Throws Error{config} when voxel_mm gives
+/// more than 2^31 voxels or more than 2048 along an axis, Error{data} for an empty skin or a vertex that is
+/// not finite.
 Image voxelize(const Case& patient, const Options& options, const Context& context);
 
 }  // namespace ecorche::voxel
