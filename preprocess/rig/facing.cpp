@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/rig/facing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "preprocess/mapping/face_tree.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+constexpr std::size_t kFewest = 16;
+constexpr double kNearestShare = 0.02;
+constexpr double kReach = 2;
+constexpr double kFacingCosine = 0.5;
+
+Points vertex_normals(const SurfaceMesh& mesh) {
+  Points normal = Points::Zero(mesh.V.rows(), 3);
+  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
+    const Eigen::Vector3d a = mesh.V.row(mesh.F(f, 0)), b = mesh.V.row(mesh.F(f, 1)),
+                          c = mesh.V.row(mesh.F(f, 2));
+    const Eigen::RowVector3d area = (b - a).cross(c - a).transpose();
+    for (int i = 0; i < 3; ++i) normal.row(mesh.F(f, i)) += area;
+  }
+  normal.rowwise().normalize();
+  return normal;
+}
+
+double mean_edge(const SurfaceMesh& mesh) {
+  double sum = 0;
+  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
+    for (int i = 0; i < 3; ++i) sum += (mesh.V.row(mesh.F(f, i)) - mesh.V.row(mesh.F(f, (i + 1) % 3))).norm();
+  }
+  return mesh.F.rows() == 0 ? 0 : sum / (3.0 * static_cast<double>(mesh.F.rows()));
+}
+
+}  // namespace
+
+Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other) {
+  const auto count = static_cast<std::size_t>(bone.V.rows());
+  if (count == 0 || other.F.rows() == 0) return Points(0, 3);
+  std::vector<mapping::FaceTree::Corners> corners(static_cast<std::size_t>(other.F.rows()));
+  for (std::size_t f = 0; f < corners.size(); ++f) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      corners[f][c] = other.V.row(other.F(static_cast<Eigen::Index>(f), static_cast<int>(c))).transpose();
+    }
+  }
+  const mapping::FaceTree tree(corners);
+  const Points normal = vertex_normals(bone);
+
+  std::vector<double> distance(count);
+  std::vector<bool> looks(count);
+  std::int32_t hint = -1;
+  for (std::size_t v = 0; v < count; ++v) {
+    const Eigen::Vector3d p = bone.V.row(static_cast<Eigen::Index>(v)).transpose();
+    const mapping::FaceTree::Hit hit = tree.nearest(p, hint);
+    hint = hit.face;
+    distance[v] = std::sqrt(hit.squared);
+    looks[v] = (hit.point - p).dot(normal.row(static_cast<Eigen::Index>(v))) >= kFacingCosine * distance[v];
+  }
+  std::vector<double> sorted = distance;
+  const auto wanted = std::max(kFewest, static_cast<std::size_t>(kNearestShare * static_cast<double>(count)));
+  const std::size_t rank = std::min(wanted, count) - 1;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank), sorted.end());
+  const double reach = std::max(kReach * sorted[rank], mean_edge(bone));
+
+  const auto choose = [&](bool only_facing) {
+    std::vector<Eigen::Index> rows;
+    for (std::size_t v = 0; v < count; ++v) {
+      if (distance[v] <= reach && (looks[v] || !only_facing)) rows.push_back(static_cast<Eigen::Index>(v));
+    }
+    return rows;
+  };
+  std::vector<Eigen::Index> rows = choose(true);
+  if (rows.size() < kFewest) rows = choose(false);
+  Points out(static_cast<Eigen::Index>(rows.size()), 3);
+  for (std::size_t i = 0; i < rows.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = bone.V.row(rows[i]);
+  return out;
+}
+
+}  // namespace ecorche::rig

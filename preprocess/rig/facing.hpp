@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part of a bone that faces another: the joint's surface when nobody marked it.
+#pragma once
+
+#include "core/values/mesh.hpp"
+
+namespace ecorche::rig {
+
+/// Vertices of `bone` within reach of `other`, on the side that looks at it. The reach adapts to the gap:
+/// twice the distance of the nearest 2 % of the vertices (16 at least), and never less than the mean edge, so
+/// that neither the width of the cartilage nor the resolution must be known. A vertex looks at `other` when
+/// its normal is within 60 degrees of the way to the closest point there; where fewer than 16 do, as in bones
+/// that touch, reach alone counts.
+Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other);
+
+}  // namespace ecorche::rig
