@@ -1,1 +1,287 @@
 // SPDX-License-Identifier: Apache-2.0
+// Reading `case.yaml` and everything it names (DESIGN 5).
+#include "io/case/case_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+
+#include "core/values/error.hpp"
+#include "io/case/digest.hpp"
+#include "io/case/frame.hpp"
+#include "io/case/skeleton_file.hpp"
+#include "io/case/yaml_reader.hpp"
+#include "io/image/image_file.hpp"
+#include "io/surface/surface_file.hpp"
+
+namespace ecorche::io {
+namespace {
+
+namespace fs = std::filesystem;
+using yaml::Kind;
+using yaml::Value;
+
+constexpr std::array<std::string_view, 9> kCaseKeys{"name",  "frame",   "unit",   "skeleton", "skin",
+                                                    "bones", "tissues", "labels", "volumes"};
+constexpr std::array<std::string_view, 5> kSkinKeys{"file", "name", "frame", "unit", "root"};
+constexpr std::array<std::string_view, 6> kBoneKeys{"name", "file", "segment", "frame", "unit", "root"};
+constexpr std::array<std::string_view, 6> kTissueKeys{"name", "file", "group", "frame", "unit", "root"};
+constexpr std::array<std::string_view, 4> kVolumeKeys{"name", "file", "background", "root"};
+constexpr std::array<std::string_view, 3> kLabelKeys{"file", "table", "root"};
+constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
+
+Eigen::Matrix3d parse_axes(const Value& value) {
+  const auto axes = axes_from_code(value.text());
+  if (!axes)
+    value.fail("'" + value.text() + "' is no frame",
+               "use LPS, RAS, or three letters such as LSA: x Left, y Superior, z Anterior");
+  return *axes;
+}
+
+double parse_unit(const Value& value) {
+  const auto unit = unit_from_name(value.text());
+  if (!unit) value.fail("'" + value.text() + "' is no unit", "use mm, cm or m");
+  return *unit;
+}
+
+class CaseReader {
+ public:
+  CaseReader(const fs::path& file, const CaseOptions& options, const Context& context)
+      : folder_(file.parent_path()), options_(options), context_(context), root_(Value::read(file)) {
+    root_.allow(kCaseKeys);
+    digest(file, file.filename().string());
+  }
+
+  Case read() {
+    out_.name = root_.at("name").text();
+    read_frame();
+    steps_ = 2 + count("bones") + count("tissues") + count("volumes") + (root_.find("labels") ? 1 : 0);
+    const std::map<std::string, Value> rules = read_skeleton_entry(root_.at("skeleton"));
+    step();
+    read_skin(root_.at("skin"));
+    const Value bones = root_.at("bones");
+    for (const Value& entry : bones.items()) read_bone(entry);
+    if (out_.bones.empty()) bones.fail("is empty", "list at least one bone");
+    check_rules(rules);
+    if (const auto tissues = root_.find("tissues")) {
+      for (const Value& entry : tissues->items()) read_tissue(entry);
+    }
+    if (const auto volumes = root_.find("volumes")) {
+      for (const Value& entry : volumes->items()) read_volume(entry);
+    }
+    if (const auto labels = root_.find("labels")) read_labels(*labels);
+    return std::move(out_);
+  }
+
+ private:
+  std::size_t count(std::string_view key) const {
+    const auto list = root_.find(key);
+    return list ? list->items().size() : 0;
+  }
+  void step() {
+    context_.check_stop();
+    context_.report(static_cast<double>(++done_) / static_cast<double>(steps_));
+  }
+  void digest(const fs::path& path, const std::string& as_written) {
+    out_.input_digests[as_written] = file_digest(path, context_);
+  }
+
+  // Frame and unit of the whole case. `--frame` wins over the case; what neither says, a mesh may say itself.
+  void read_frame() {
+    if (const auto unit = root_.find("unit")) frame_.unit_mm = parse_unit(*unit);
+    if (const auto frame = root_.find("frame")) {
+      frame_.axes = parse_axes(*frame);
+      frame_given_ = true;
+    }
+    if (options_.frame.empty()) return;
+    const auto axes = axes_from_code(options_.frame);
+    if (!axes) {
+      throw Error(ErrorKind::usage, "--frame", "'" + options_.frame + "' is no frame",
+                  "use LPS, RAS, or three letters such as LSA: x Left, y Superior, z Anterior");
+    }
+    frame_.axes = *axes;
+    frame_given_ = true;
+  }
+
+  // Where an entry's file lies: beside the case, or in the data folder where the entry says `root: data`.
+  fs::path locate(const Value& entry, const Value& file) {
+    fs::path base = folder_;
+    if (const auto root = entry.kind() == Kind::map ? entry.find("root") : std::nullopt) {
+      if (root->text() != "data")
+        root->fail("'" + root->text() + "' is no root", "write root: data, or leave it out");
+      if (options_.data.empty()) root->fail("the data folder is not known", "name it with --data DIR");
+      base = options_.data;
+    }
+    const fs::path path = base / file.text();
+    std::error_code ignored;
+    if (!fs::is_regular_file(path, ignored)) {
+      throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");
+    }
+    digest(path, file.text());
+    return path;
+  }
+
+  const std::string& unique_name(const Value& value) {
+    const std::string& name = value.identifier();
+    const auto [first, fresh] = names_.emplace(name, value.where());
+    if (!fresh) value.fail("'" + name + "' is named already, at " + first->second, "give it another name");
+    return name;
+  }
+
+  std::map<std::string, Value> read_skeleton_entry(const Value& entry) {
+    if (entry.kind() == Kind::map) entry.allow(kFileKeys);
+    const Value file = entry.kind() == Kind::map ? entry.at("file") : entry;
+    const std::string ending = fs::path(file.text()).extension().string();
+    if (ending != ".yaml" && ending != ".yml") {
+      file.fail("no skeleton template is named '" + file.text() + "'", "name a .yaml file beside the case");
+    }
+    PlacedSkeleton placed = parse_skeleton(Value::read(locate(entry, file)), frame_);
+    out_.skeleton = std::move(placed.skeleton);
+    for (const Segment& segment : out_.skeleton.segments) segments_.push_back(segment.name);
+    return std::move(placed.rules);
+  }
+
+  SurfaceMesh read_mesh(const Value& entry) {
+    const bool is_map = entry.kind() == Kind::map;
+    const Value file = is_map ? entry.at("file") : entry;
+    Frame frame = frame_;
+    bool given = frame_given_;
+    if (is_map) {
+      if (const auto axes = entry.find("frame")) {
+        frame.axes = parse_axes(*axes);
+        given = true;
+      }
+      if (const auto unit = entry.find("unit")) frame.unit_mm = parse_unit(*unit);
+    }
+    TaggedSurface surface = read_tagged_surface(locate(entry, file));
+    if (const auto tagged = surface.space ? axes_from_code(*surface.space) : std::nullopt) {
+      if (!given) frame.axes = *tagged;
+      if (frame.axes != *tagged) {
+        context_.warn(file.where() + ": its header says SPACE=" + *surface.space +
+                      ", which the given frame overrides");
+      }
+    }
+    frame.apply(surface.mesh);
+    step();
+    return std::move(surface.mesh);
+  }
+
+  void read_skin(const Value& entry) {
+    if (entry.kind() == Kind::map) {
+      entry.allow(kSkinKeys);
+      if (const auto name = entry.find("name")) out_.skin_name = name->identifier();
+    }
+    names_.emplace(out_.skin_name, entry.where());
+    out_.skin = read_mesh(entry);
+  }
+
+  void read_bone(const Value& entry) {
+    entry.allow(kBoneKeys);
+    CaseBone bone;
+    bone.name = unique_name(entry.at("name"));
+    const Value segment = entry.at("segment");
+    bone.segment = segment.text();
+    if (out_.skeleton.find_segment(bone.segment) < 0)
+      segment.fail_unknown("segment", bone.segment, segments_);
+    bone.surface = read_mesh(entry);
+    out_.bones.push_back(std::move(bone));
+  }
+
+  void read_tissue(const Value& entry) {
+    entry.allow(kTissueKeys);
+    CaseTissue tissue;
+    tissue.name = unique_name(entry.at("name"));
+    if (const auto group = entry.find("group")) {
+      std::vector<std::string> known;
+      for (int g = static_cast<int>(Group::muscle); g <= static_cast<int>(Group::other); ++g) {
+        known.emplace_back(group_name(static_cast<Group>(g)));
+      }
+      if (group->text() == "skin" || group->text() == "bone") {
+        group->fail("'" + group->text() + "' is no group of tissues", "list it under skin or bones");
+      }
+      if (std::find(known.begin(), known.end(), group->text()) == known.end()) {
+        group->fail_unknown("group", group->text(), known);
+      }
+      tissue.group = group_from_name(group->text());
+    }
+    tissue.surface = read_mesh(entry);
+    out_.tissues.push_back(std::move(tissue));
+  }
+
+  void read_volume(const Value& entry) {
+    entry.allow(kVolumeKeys);
+    CaseVolume volume;
+    const Value name = entry.at("name");
+    volume.name = name.identifier();
+    if (volume.name == "labels") name.fail("'labels' is the label map's name", "give it another name");
+    for (const CaseVolume& other : out_.volumes) {
+      if (other.name == volume.name)
+        name.fail("another volume is named '" + volume.name + "'", "give it another name");
+    }
+    if (const auto background = entry.find("background")) volume.background = background->number();
+    volume.image = read_image(locate(entry, entry.at("file")));
+    out_.volumes.push_back(std::move(volume));
+    step();
+  }
+
+  void read_labels(const Value& entry) {
+    entry.allow(kLabelKeys);
+    CaseLabels labels;
+    for (const auto& [id, name] : entry.at("table").pairs()) {
+      std::int64_t number = 0;
+      const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number);
+      if (error != std::errc() || end != id.data() + id.size())
+        name.fail("'" + id + "' is no label id", "ids are whole numbers");
+      if (number == 0) name.fail("label 0 is nothing", "leave it out");
+      if (!labels.table.emplace(number, name.text()).second)
+        name.fail("label " + id + " stands twice", "keep one");
+    }
+    const Value file = entry.at("file");
+    labels.image = read_image(locate(entry, file));
+    const ScalarType type = labels.image.type;
+    if (type == ScalarType::f32 || type == ScalarType::f64 || labels.image.components != 1) {
+      file.fail(
+          "labels are " + std::string(scalar_name(type)) + " x " + std::to_string(labels.image.components),
+          "labels are whole numbers, one a voxel");
+    }
+    out_.labels = std::move(labels);
+    step();
+  }
+
+  // A sphere fit must find its bones, unless its segment is absent from this case.
+  void check_rules(const std::map<std::string, Value>& rules) const {
+    std::vector<std::string> bones;
+    for (const CaseBone& bone : out_.bones) bones.push_back(bone.name);
+    for (const auto& [segment, rule] : rules) {
+      const bool present = std::any_of(out_.bones.begin(), out_.bones.end(),
+                                       [&](const CaseBone& bone) { return bone.segment == segment; });
+      if (!present) continue;
+      for (const char* key : {"bone", "facing"}) {
+        const Value name = rule.at(key);
+        if (std::find(bones.begin(), bones.end(), name.text()) == bones.end())
+          name.fail_unknown("bone", name.text(), bones);
+      }
+    }
+  }
+
+  fs::path folder_;
+  const CaseOptions& options_;
+  const Context& context_;
+  Value root_;
+  Frame frame_;
+  bool frame_given_ = false;
+  Case out_;
+  std::map<std::string, std::string> names_;  // of skin, bones and tissues, and where they stand
+  std::vector<std::string> segments_;
+  std::size_t steps_ = 1, done_ = 0;
+};
+
+}  // namespace
+
+Case read_case(const fs::path& path, const CaseOptions& options, const Context& context) {
+  std::error_code ignored;
+  const fs::path file = fs::is_directory(path, ignored) ? path / "case.yaml" : path;
+  return CaseReader(file, options, context).read();
+}
+
+}  // namespace ecorche::io

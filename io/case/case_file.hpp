@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `case.yaml`, skeletons and poses as files (DESIGN 5, 6). Every mistake is Error{config} with file, line and key.
+// `case.yaml`, skeletons and poses as files (DESIGN 5, 6). Every mistake is Error{config} with file, line and
+// key.
 #pragma once
 
 #include <filesystem>
@@ -20,8 +21,8 @@ struct CaseOptions {
 /// Reads a case: `path` is a `case.yaml` or the folder that holds one. Surfaces and images come in LPS mm.
 Case read_case(const std::filesystem::path& path, const CaseOptions& options, const Context& context);
 
-/// Writes `patient` as an ordinary case under `folder` (made where absent): case.yaml, skeleton.yaml, skin.stl, bones/,
-/// tissues/, volumes/.
+/// Writes `patient` as an ordinary case under `folder` (made where absent): case.yaml, skeleton.yaml,
+/// skin.stl, bones/, tissues/, volumes/.
 void write_case(const std::filesystem::path& folder, const Case& patient, const Context& context);
 
 /// A skeleton file; `where` names it in messages.

@@ -3,6 +3,7 @@
 // text file that ends inside a facet for a whole one, and answers a bad token on stderr.
 #include "io/surface/stl.hpp"
 
+#include <Eigen/Geometry>
 #include <array>
 #include <bit>
 #include <charconv>
