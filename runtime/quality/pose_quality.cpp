@@ -1,1 +1,157 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "runtime/quality/pose_quality.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace ecorche::runtime {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::size_t kTetsPerBlock = 8192;
+
+Vector3d point(std::span<const float> points, std::size_t row) {
+  return {static_cast<double>(points[3 * row]), static_cast<double>(points[3 * row + 1]),
+          static_cast<double>(points[3 * row + 2])};
+}
+
+std::span<const float> floats(const PointsF& points) {
+  return {points.data(), static_cast<std::size_t>(points.size())};
+}
+
+double det_of(const Tets& tets, std::span<const float> nodes, std::size_t t) {
+  const auto node = [&](int c) {
+    return point(nodes, static_cast<std::size_t>(tets(static_cast<Eigen::Index>(t), c)));
+  };
+  const Vector3d a = node(0);
+  return (node(1) - a).cross(node(2) - a).dot(node(3) - a);
+}
+
+// Sums over a block of tets; blocks are added in order, so that threads change nothing.
+struct TetSums {
+  double rest = 0, posed = 0;  // determinants
+  double inverted_rest = 0;
+  std::uint64_t inverted = 0;
+  double min_det_f = 1;
+};
+
+TetSums sum_block(const Model& model, std::span<const float> posed, std::size_t begin, std::size_t end) {
+  TetSums sums;
+  for (std::size_t t = begin; t < end; ++t) {
+    const double before = det_of(model.tets, floats(model.nodes), t), after = det_of(model.tets, posed, t);
+    sums.rest += before;
+    sums.posed += after;
+    if (after <= 0) {
+      ++sums.inverted;
+      sums.inverted_rest += before;
+    }
+    sums.min_det_f = std::min(sums.min_det_f, after / before);
+  }
+  return sums;
+}
+
+TetSums sum_tets(const Model& model, std::span<const float> posed) {
+  const std::size_t count = model.tet_count();
+  std::vector<TetSums> blocks((count + kTetsPerBlock - 1) / kTetsPerBlock);
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+    blocks[b] = sum_block(model, posed, b * kTetsPerBlock, std::min(count, (b + 1) * kTetsPerBlock));
+  });
+  TetSums all;
+  for (const TetSums& block : blocks) {
+    all.rest += block.rest;
+    all.posed += block.posed;
+    all.inverted += block.inverted;
+    all.inverted_rest += block.inverted_rest;
+    all.min_det_f = std::min(all.min_det_f, block.min_det_f);
+  }
+  return all;
+}
+
+Vector3d mean_of(std::span<const float> points) {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t v = 0; v < points.size() / 3; ++v) sum += point(points, v);
+  return sum / static_cast<double>(points.size() / 3);
+}
+
+}  // namespace
+
+std::vector<float> tet_det_f(const Model& model, std::span<const float> nodes) {
+  std::vector<float> out(model.tet_count());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, out.size(), kTetsPerBlock), [&](const auto& range) {
+    for (std::size_t t = range.begin(); t < range.end(); ++t) {
+      out[t] = static_cast<float>(det_of(model.tets, nodes, t) / det_of(model.tets, floats(model.nodes), t));
+    }
+  });
+  return out;
+}
+
+double enclosed_volume(std::span<const float> vertices, const Triangles& F) {
+  if (F.rows() == 0) return 0;
+  const Vector3d origin = point(vertices, 0);
+  double sum = 0;
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    const auto corner = [&](int c) -> Vector3d {
+      return point(vertices, static_cast<std::size_t>(F(f, c))) - origin;
+    };
+    sum += corner(0).cross(corner(1)).dot(corner(2));
+  }
+  return sum / 6;
+}
+
+double rigid_residual(std::span<const float> rest, std::span<const float> posed) {
+  if (rest.empty()) return 0;
+  const Vector3d from = mean_of(rest), to = mean_of(posed);
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (std::size_t v = 0; v < rest.size() / 3; ++v) {
+    covariance += (point(posed, v) - to) * (point(rest, v) - from).transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double mirrored = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::Matrix3d turn =
+      svd.matrixU() * Vector3d(1, 1, mirrored).asDiagonal() * svd.matrixV().transpose();
+  double worst = 0;
+  for (std::size_t v = 0; v < rest.size() / 3; ++v) {
+    worst = std::max(worst, (turn * (point(rest, v) - from) + to - point(posed, v)).norm());
+  }
+  return worst;
+}
+
+PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
+                    const QualityThresholds& thresholds) {
+  PoseQuality out;
+  const TetSums sums = sum_tets(model, body.nodes);
+  out.inverted_tets = sums.inverted;
+  out.inverted_rest_mm3 = sums.inverted_rest / 6;
+  out.min_det_f = sums.min_det_f;
+  if (sums.rest > 0) {
+    out.inverted_share = sums.inverted_rest / sums.rest;
+    out.volume_change = sums.posed / sums.rest - 1;
+  }
+
+  out.tissues.resize(tissues.size());
+  std::vector<double> residuals(tissues.size(), 0);
+  tbb::parallel_for(std::size_t{0}, tissues.size(), [&](std::size_t i) {
+    const Tissue& tissue = model.tissues[tissues[i]];
+    const std::vector<float>& posed = body.tissues[tissues[i]];
+    TissueChange& change = out.tissues[i];
+    change.name = tissue.name;
+    change.rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
+    change.posed_mm3 = enclosed_volume(posed, tissue.F);
+    if (change.rest_mm3 != 0) change.share = (change.posed_mm3 - change.rest_mm3) / change.rest_mm3;
+    if (tissue.segment != Tissue::by_tets) residuals[i] = rigid_residual(floats(tissue.V), posed);
+  });
+  for (const double residual : residuals) out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, residual);
+
+  out.clamped = body.clamped;
+  out.thresholds = thresholds;
+  out.pass = out.inverted_share <= thresholds.max_inverted_share &&
+             std::abs(out.volume_change) <= thresholds.max_volume_change &&
+             out.bone_rigidity_mm <= thresholds.max_bone_rigidity_mm;
+  return out;
+}
+
+}  // namespace ecorche::runtime

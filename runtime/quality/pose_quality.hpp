@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,8 @@ namespace ecorche::runtime {
 
 /// Thresholds of the verdict; printed with it.
 struct QualityThresholds {
-  double max_inverted_share = 1e-3;      ///< rest volume of inverted tets over that of the body
-  double max_volume_change = 0.10;       ///< of the whole body, either way
+  double max_inverted_share = 1e-3;  ///< rest volume of inverted tets over that of the body
+  double max_volume_change = 0.10;   ///< of the whole body, either way
   double max_bone_rigidity_mm = 1e-3;
 };
 
@@ -25,20 +26,32 @@ struct TissueChange {
 };
 
 struct PoseQuality {
-  std::uint64_t inverted_tets = 0;
+  std::uint64_t inverted_tets = 0;  ///< of posed volume zero or less
   double inverted_rest_mm3 = 0;
   double inverted_share = 0;
-  double min_det_f = 1;
+  double min_det_f = 1;      ///< of F, the deformation gradient: posed over rest volume of a tet
   double volume_change = 0;  ///< of the tets, all together
   std::vector<TissueChange> tissues;
-  double bone_rigidity_mm = 0;
+  double bone_rigidity_mm = 0;  ///< largest distance of a bone vertex from its bone's best rigid fit
   std::vector<ClampedJoint> clamped;
   QualityThresholds thresholds;
   bool pass = true;  ///< the verdict: `pass` or `warn`
 };
 
-/// `tissues`: rows of Model::tissues that `body` holds. Sums run in a fixed order: same figures for any thread count.
+/// `tissues`: rows of Model::tissues that `body` holds. Sums run in a fixed order: same figures for any
+/// thread count.
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
                     const QualityThresholds& thresholds = {});
+
+/// Posed over rest volume of every tet, det F; #T. `nodes`: 3 * #nodes, posed, LPS mm.
+std::vector<float> tet_det_f(const Model& model, std::span<const float> nodes);
+
+/// Volume, mm^3, that a closed surface encloses (divergence theorem, about the surface's first vertex);
+/// positive where its triangles run counter-clockwise seen from outside. `vertices`: 3 * #V.
+double enclosed_volume(std::span<const float> vertices, const Triangles& F);
+
+/// Largest distance, mm, of a posed vertex from the best rigid motion of the rest vertices (Kabsch). Both 3 *
+/// #V.
+double rigid_residual(std::span<const float> rest, std::span<const float> posed);
 
 }  // namespace ecorche::runtime

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/values/context.hpp"
 #include "core/values/image.hpp"
 #include "core/values/model.hpp"
 
@@ -13,32 +14,41 @@ namespace ecorche::runtime {
 
 enum class Sampling : std::uint8_t { nearest, trilinear };
 
-/// Which tet holds each voxel centre of a posed grid. Filled once per pose, used for any number of volumes on that grid.
+/// Which tet holds each voxel centre of a posed grid. Filled once per pose, used for any number of volumes on
+/// that grid.
 struct InverseMap {
   static constexpr std::int32_t none = -1;
   ImageGrid grid;
   std::vector<std::int32_t> tet;  ///< grid.voxels(); `none` outside the posed body
 };
 
-/// The grid of `rest` (spacing, direction and lattice kept) grown or shrunk in whole voxels to the posed nodes, but
-/// never smaller than `rest`. Throws Error{data} beyond 2^31 voxels.
+/// The grid of `rest` (spacing, direction and lattice kept) grown in whole voxels to hold every posed node,
+/// never smaller than `rest`. `nodes`: 3 * #nodes, LPS mm. Throws Error{data} beyond 2^31 voxels, or for a
+/// node that is not finite.
 ImageGrid grow_to(const ImageGrid& rest, std::span<const float> nodes);
 
-/// Every voxel whose centre lies in a posed tet gets one: tets of positive posed volume before inverted ones, then the
-/// lowest index. No voxel is lost on a shared face, and the result is the same for any number of threads.
-void locate(const Model& model, std::span<const float> nodes, const ImageGrid& grid, InverseMap& out);
+/// Every voxel whose centre lies in a posed tet gets one: tets of positive posed volume before inverted ones,
+/// then the lowest index. Faces belong to both their tets, with a margin of about 1e-9 voxel that absorbs
+/// rounding: no voxel is lost on a shared face. Tets flatter than that margin hold nothing (their neighbours
+/// do). The result is the same for any number of threads, each of which fills slabs of the last axis.
+/// Error{interrupted} on a stop.
+void locate(const Model& model, std::span<const float> nodes, const ImageGrid& grid, InverseMap& out,
+            const Context& context = {});
 
-/// The rest point, LPS mm, of the centre of voxel `offset` = (i, j, k); only where out.tet is not `none`.
-/// `image` must be sampled on its rest grid; samples beyond it are `background`. Labels are always nearest.
-Image resample(const Model& model, std::span<const float> nodes, const InverseMap& map, const ModelVolume& volume,
-               Sampling sampling);
+/// `volume` carried along: each voxel of map.grid takes the sample at its rest point, or `background` where
+/// no tet holds it or the rest point's sample lies beyond the image. Scalar type and components are kept;
+/// integers are rounded and saturated. Labels are always sampled nearest. The volume's own grid may differ
+/// from map.grid.
+Image resample(const Model& model, std::span<const float> nodes, const InverseMap& map,
+               const ModelVolume& volume, Sampling sampling);
 
-/// Posed to rest: per voxel of map.grid the vector (rest point - posed point), f32, 3 components, LPS mm, zero outside;
-/// and the u8 mask of the voxels where it holds.
+/// Posed to rest: per voxel of map.grid the vector (rest point - posed point), f32, 3 components, LPS mm,
+/// zero outside; and the u8 mask of the voxels where it holds.
 struct DisplacementField {
   Image vectors;
   Image mask;
 };
-DisplacementField inverse_displacement(const Model& model, std::span<const float> nodes, const InverseMap& map);
+DisplacementField inverse_displacement(const Model& model, std::span<const float> nodes,
+                                       const InverseMap& map);
 
 }  // namespace ecorche::runtime
