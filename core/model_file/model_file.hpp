@@ -14,14 +14,15 @@ namespace ecorche::model_file {
 inline constexpr int format_major = 1;
 inline constexpr int format_minor = 0;
 
-/// Writes `model` to a temporary name beside `path`, flushes it to the disk and renames it; on failure or a stop
-/// nothing is left and an older file of that name stays whole. `path` must end in `.hdf` (ParaView asks for it).
-/// Throws Error{usage, cannot_create, io, interrupted}.
+/// Writes `model` to a temporary name beside `path`, flushes it to the disk and renames it; on failure or a
+/// stop nothing is left and an older file of that name stays whole. `path` must end in `.hdf` (ParaView asks
+/// for it). Throws Error{usage, cannot_create, io, interrupted}.
 void write(const Model& model, const std::filesystem::path& path, const Context& context);
 
-/// Reads a model, trusting nothing: the guard first checks that every dataset is contiguous, unfiltered, local, of the
-/// expected type and shape and inside its file; then digests, then invariants (indices in range, rows sorted and
-/// summing to 1, positive tets, parents first). Throws Error{missing_input, data}; the message names the dataset.
+/// Reads a model, trusting nothing: the guard first checks that every dataset is contiguous, unfiltered,
+/// local, of the expected type and shape and inside its file; then digests, then invariants (indices in
+/// range, rows sorted and summing to 1, positive tets, parents first). Throws Error{missing_input, data}; the
+/// message names the dataset.
 Model read(const std::filesystem::path& path, const Context& context);
 
 /// XXH64 of every dataset, as stored and as found.
@@ -32,6 +33,17 @@ struct DigestCheck {
 
 /// Digests only, without stopping at the first bad one.
 std::vector<DigestCheck> check_digests(const std::filesystem::path& path, const Context& context);
+
+/// A dataset as it stands in a file.
+struct DatasetSummary {
+  std::string path;                  ///< absolute in the file
+  std::string type;                  ///< u8, i32, f32, ..., text
+  std::vector<std::uint64_t> shape;  ///< slowest first
+  std::uint64_t bytes = 0;
+};
+
+/// Every dataset, sorted by path, after the guard's checks; nothing of their contents is read.
+std::vector<DatasetSummary> list(const std::filesystem::path& path);
 
 /// XXH64 over everything in the model but its provenance: two models with the same identity pose alike.
 std::uint64_t identity(const Model& model);

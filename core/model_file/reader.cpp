@@ -1,1 +1,284 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "core/model_file/figures.hpp"
+#include "core/model_file/guard.hpp"
+#include "core/model_file/invariants.hpp"
+#include "core/model_file/layout.hpp"
+#include "core/model_file/model_file.hpp"
+#include "core/model_file/source.hpp"
+
+namespace ecorche::model_file {
+namespace {
+
+// An enumeration stored as its number; `last` is its largest.
+template <class E>
+std::vector<E> read_codes(const Source& source, const std::string& path, std::uint64_t rows, E last) {
+  std::vector<E> values;
+  for (const std::uint8_t code : source.vector<std::uint8_t>(path, {rows})) {
+    if (code > static_cast<std::uint8_t>(last)) source.refuse(path, std::to_string(code) + " has no meaning");
+    values.push_back(static_cast<E>(code));
+  }
+  return values;
+}
+
+// The rows of a table that hangs off the segments: which segment each belongs to, in order.
+std::vector<std::size_t> read_owners(const Source& source, const std::string& path, std::size_t segments) {
+  std::vector<std::size_t> owners;
+  for (const std::int32_t owner : source.vector<std::int32_t>(path)) {
+    const auto row = static_cast<std::size_t>(owner);
+    if (owner < 0 || row >= segments) source.refuse(path, std::to_string(owner) + " is not a segment");
+    if (!owners.empty() && row < owners.back()) source.refuse(path, "is not sorted");
+    owners.push_back(row);
+  }
+  return owners;
+}
+
+std::vector<Segment> read_segments(const Source& source) {
+  const std::string at = "/ecorche/skeleton/";
+  const std::vector<std::string> names = source.texts(at + "segment");
+  const std::uint64_t n = names.size();
+  const auto parents = source.vector<std::int32_t>(at + "parent", {n});
+  const auto joints = source.texts(at + "joint", {n});
+  const auto kinds = read_codes(source, at + "kind", n, JointKind::free);
+  const auto rules = read_codes(source, at + "rule", n, CenterRule::sphere_fit);
+  const auto center_bones = source.texts(at + "center_bone", {n});
+  const auto facing_bones = source.texts(at + "facing_bone", {n});
+  const auto sources = source.texts(at + "limits_source", {n});
+  const auto centers = source.vector<double>(at + "center", {n, 3});
+  const auto axes = source.vector<double>(at + "axes", {n, 3, 3});
+  std::vector<Segment> segments(n);
+  for (std::size_t s = 0; s < n; ++s) {
+    segments[s].name = names[s];
+    segments[s].parent = parents[s];
+    Joint& joint = segments[s].joint;
+    joint.name = joints[s];
+    joint.kind = kinds[s];
+    joint.rule = rules[s];
+    joint.center = Eigen::Map<const Eigen::Vector3d>(&centers[3 * s]);
+    joint.center_bone = center_bones[s];
+    joint.facing_bone = facing_bones[s];
+    joint.axes = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&axes[9 * s]);
+    joint.limits_source = sources[s];
+  }
+  return segments;
+}
+
+void read_angles(const Source& source, std::vector<Segment>& segments) {
+  const std::string at = "/ecorche/skeleton/angle_";
+  const auto owners = read_owners(source, at + "joint", segments.size());
+  const std::uint64_t n = owners.size();
+  const auto names = source.texts(at + "name", {n});
+  const auto axes = source.vector<std::int32_t>(at + "axis", {n});
+  const auto signs = source.vector<double>(at + "sign", {n});
+  const auto rests = source.vector<double>(at + "rest", {n});
+  const auto mins = source.vector<double>(at + "min", {n});
+  const auto maxs = source.vector<double>(at + "max", {n});
+  for (std::size_t i = 0; i < n; ++i) {
+    segments[owners[i]].joint.sequence.push_back({names[i], axes[i], signs[i], rests[i], mins[i], maxs[i]});
+  }
+}
+
+void read_couplings(const Source& source, std::vector<Segment>& segments) {
+  const std::string at = "/ecorche/skeleton/coupling_";
+  const auto owners = read_owners(source, at + "joint", segments.size());
+  const std::uint64_t n = owners.size();
+  const auto leaders = source.texts(at + "leader", {n});
+  const auto angles = source.texts(at + "angle", {n});
+  const auto drives = source.texts(at + "drives", {n});
+  const auto ratios = source.vector<double>(at + "ratio", {n});
+  for (std::size_t i = 0; i < n; ++i) {
+    segments[owners[i]].joint.coupled.push_back({leaders[i], angles[i], drives[i], ratios[i]});
+  }
+}
+
+std::vector<JointFit> read_fits(const Source& source) {
+  const std::string at = "/ecorche/skeleton/fit_";
+  const auto joints = source.texts(at + "joint");
+  const std::uint64_t n = joints.size();
+  const auto rules = read_codes(source, at + "rule", n, CenterRule::sphere_fit);
+  const auto radii = source.vector<double>(at + "radius_mm", {n});
+  const auto residuals = source.vector<double>(at + "residual_mm", {n});
+  const auto shares = source.vector<double>(at + "inlier_share", {n});
+  const auto points = source.vector<std::int32_t>(at + "points", {n});
+  std::vector<JointFit> fits;
+  for (std::size_t i = 0; i < n; ++i) {
+    fits.push_back({joints[i], rules[i], radii[i], residuals[i], shares[i], points[i]});
+  }
+  return fits;
+}
+
+Rig read_rig(const Source& source) {
+  Rig rig;
+  rig.skeleton.name = source.text("/ecorche/skeleton/name");
+  std::vector<Segment>& segments = rig.skeleton.segments;
+  segments = read_segments(source);
+  read_angles(source, segments);
+  read_couplings(source, segments);
+  const auto owners = read_owners(source, "/ecorche/skeleton/alias_segment", segments.size());
+  const auto aliases = source.texts("/ecorche/skeleton/alias_name", {owners.size()});
+  for (std::size_t i = 0; i < owners.size(); ++i) segments[owners[i]].aliases.push_back(aliases[i]);
+  rig.fits = read_fits(source);
+  return rig;
+}
+
+// What only VTKHDF readers use must say the same as what ecorche reads.
+void check_vtk(const Source& source, const Model& model) {
+  const auto same = [&](const std::string& path, std::uint64_t count) {
+    const auto stored = source.scalar<std::int64_t>(path);
+    if (stored < 0 || static_cast<std::uint64_t>(stored) != count) {
+      source.refuse(path, "is " + std::to_string(stored) + ", not " + std::to_string(count));
+    }
+  };
+  const std::uint64_t tets = model.tet_count();
+  same("/VTKHDF/NumberOfPoints", model.node_count());
+  same("/VTKHDF/NumberOfCells", tets);
+  same("/VTKHDF/NumberOfConnectivityIds", 4 * tets);
+  const auto offsets = source.vector<std::int32_t>("/VTKHDF/Offsets", {tets + 1});
+  for (std::size_t t = 0; t < offsets.size(); ++t) {
+    if (offsets[t] < 0 || static_cast<std::size_t>(offsets[t]) != 4 * t) {
+      source.refuse("/VTKHDF/Offsets", "row " + std::to_string(t) + " is not " + std::to_string(4 * t));
+    }
+  }
+  const auto types = source.vector<std::uint8_t>("/VTKHDF/Types", {tets});
+  if (std::any_of(types.begin(), types.end(), [](std::uint8_t type) { return type != kVtkTetra; })) {
+    source.refuse("/VTKHDF/Types", "holds a cell that is not a tetrahedron");
+  }
+}
+
+Tissue read_tissue(const Source& source, const std::string& name) {
+  const std::string at = "/ecorche/tissues/" + name + "/";
+  Tissue tissue;
+  tissue.name = name;
+  const std::string group = source.text(at + "group");
+  try {
+    tissue.group = group_from_name(group);
+  } catch (const Error&) {
+    source.refuse(at + "group", "'" + group + "' is not a group");
+  }
+  tissue.segment = source.scalar<std::int32_t>(at + "segment");
+  tissue.V = source.matrix<PointsF>(at + "points");
+  tissue.F = source.matrix<Triangles>(at + "triangles");
+  tissue.tet = source.vector<std::int32_t>(at + "tet");
+  tissue.barycentric = source.matrix<decltype(tissue.barycentric)>(at + "barycentric");
+  return tissue;
+}
+
+ScalarType scalar_type(const Source& source, const std::string& path, ElementType stored) {
+  for (const ScalarType type : {ScalarType::u8, ScalarType::i8, ScalarType::u16, ScalarType::i16,
+                                ScalarType::u32, ScalarType::i32, ScalarType::f32, ScalarType::f64}) {
+    if (element_type(type) == stored) return type;
+  }
+  source.refuse(path, std::string(element_name(stored)) + " is not a type of voxels");
+}
+
+template <std::size_t N, class T>
+std::array<T, N> read_array(const Source& source, const std::string& path, const Source::Shape& shape) {
+  std::array<T, N> values{};
+  const std::vector<T> stored = source.vector<T>(path, shape);
+  std::copy(stored.begin(), stored.end(), values.begin());
+  return values;
+}
+
+ModelVolume read_volume(const Source& source, const std::string& name) {
+  const std::string at = "/ecorche/volumes/" + name + "/";
+  ModelVolume volume;
+  volume.name = name;
+  ImageGrid& grid = volume.image.grid;
+  grid.size = read_array<3, std::int32_t>(source, at + "size", {3});
+  grid.origin = read_array<3, double>(source, at + "origin", {3});
+  grid.spacing = read_array<3, double>(source, at + "spacing", {3});
+  grid.direction = read_array<9, double>(source, at + "direction", {3, 3});
+  volume.image.components = source.scalar<std::int32_t>(at + "components");
+  volume.background = source.scalar<double>(at + "background");
+  const auto labels = source.scalar<std::uint8_t>(at + "labels");
+  if (labels > 1) source.refuse(at + "labels", "is neither 0 nor 1");
+  volume.labels = labels == 1;
+  const auto ids = source.vector<std::int64_t>(at + "table_id");
+  const auto names = source.texts(at + "table_name", {ids.size()});
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (!volume.table.emplace(ids[i], names[i]).second) {
+      source.refuse(at + "table_id", std::to_string(ids[i]) + " stands twice");
+    }
+  }
+  const std::string voxels = at + "voxels";
+  Source::Shape shape;
+  for (const std::size_t axis : {2, 1, 0}) shape.push_back(static_cast<std::uint64_t>(grid.size[axis]));
+  if (volume.image.components > 1) shape.push_back(static_cast<std::uint64_t>(volume.image.components));
+  volume.image.type = scalar_type(source, voxels, source.find(voxels).type);
+  const StoredDataset& dataset = source.find(voxels, element_type(volume.image.type), shape);
+  volume.image.bytes.resize(dataset.bytes);
+  source.read(voxels, dataset, volume.image.bytes);
+  return volume;
+}
+
+Model read_model(const Source& source) {
+  Model model;
+  model.name = source.text("/ecorche/name");
+  model.rig = read_rig(source);
+  model.nodes = source.matrix<PointsF>("/VTKHDF/Points");
+  model.tets = source.matrix<Tets>("/VTKHDF/Connectivity", true);
+  model.tet_label = source.vector<std::uint16_t>("/VTKHDF/CellData/label");
+  check_vtk(source, model);
+  model.bone_names = source.texts("/ecorche/labels/bone");
+  model.bone_segment = source.vector<std::int32_t>("/ecorche/labels/segment");
+  model.weights.offsets = source.vector<std::uint64_t>("/ecorche/weights/offsets");
+  model.weights.segment = source.vector<std::uint16_t>("/ecorche/weights/segment");
+  model.weights.weight = source.vector<float>("/ecorche/weights/weight");
+  model.cor.centre = source.matrix<PointsF>("/ecorche/cor/centre");
+  model.cor.has_centre = source.vector<std::uint8_t>("/ecorche/cor/has_centre");
+  model.cor.sigma = source.scalar<double>("/ecorche/cor/sigma");
+  for (const std::string& name : source.ordered_members("/ecorche/tissues")) {
+    model.tissues.push_back(read_tissue(source, name));
+  }
+  for (const std::string& name : source.ordered_members("/ecorche/volumes")) {
+    model.volumes.push_back(read_volume(source, name));
+  }
+  for_each_figure(model.certificate, [&](std::string_view name, auto& value) {
+    value = source.scalar<std::decay_t<decltype(value)>>("/ecorche/quality/" + std::string(name));
+  });
+  const auto keys = source.texts("/ecorche/provenance/key");
+  const auto values = source.texts("/ecorche/provenance/value", {keys.size()});
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (!model.provenance.emplace(keys[i], values[i]).second) {
+      source.refuse("/ecorche/provenance/key", "'" + keys[i] + "' stands twice");
+    }
+  }
+  return model;
+}
+
+}  // namespace
+
+Model read(const std::filesystem::path& path, const Context& context) {
+  const Catalogue catalogue = inspect(path);
+  Model model = read_model(Source(catalogue, context));
+  check_invariants(model, catalogue.file.name(), ErrorKind::data, context);
+  return model;
+}
+
+std::vector<DigestCheck> check_digests(const std::filesystem::path& path, const Context& context) {
+  const Catalogue catalogue = inspect(path);
+  const Source source(catalogue, context);
+  std::vector<DigestCheck> checks;
+  for (const auto& [name, dataset] : catalogue.datasets) {
+    if (!name.starts_with("/ecorche/digests/")) checks.push_back({name, source.digest_is_good(name)});
+  }
+  // A digest whose dataset is gone; groups that this version does not look into are none of its business.
+  for (const auto& [name, digest] : source.digests()) {
+    const std::string group = name.substr(0, name.rfind('/'));
+    if (catalogue.groups.contains(group) && !catalogue.datasets.contains(name))
+      checks.push_back({name, false});
+  }
+  return checks;
+}
+
+std::vector<DatasetSummary> list(const std::filesystem::path& path) {
+  const Catalogue catalogue = inspect(path);
+  std::vector<DatasetSummary> all;
+  for (const auto& [name, dataset] : catalogue.datasets) {
+    all.push_back({name, std::string(element_name(dataset.type)), dataset.shape, dataset.bytes});
+  }
+  return all;
+}
+
+}  // namespace ecorche::model_file

@@ -1,1 +1,158 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "core/files/atomic_file.hpp"
+#include "core/model_file/digest.hpp"
+#include "core/model_file/hdf.hpp"
+#include "core/model_file/invariants.hpp"
+#include "core/model_file/layout.hpp"
+#include "core/model_file/model_file.hpp"
+
+namespace ecorche::model_file {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Large datasets begin on a page, so that a loader can map them; small ones stay together.
+constexpr hsize_t kAlignFrom = 65536, kAlignment = 4096;
+
+// One HDF5 file being made. The same datasets give the same bytes: no times, no filters, one order.
+class OutputFile {
+ public:
+  OutputFile(const fs::path& path, const fs::path& shown) : shown_(shown.string()) {
+    const hdf::Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose),
+        access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    H5Pset_obj_track_times(creation, false);
+    H5Pset_fapl_sec2(access);
+    H5Pset_file_locking(access, false, true);  // nobody else knows the temporary name
+    H5Pset_alignment(access, kAlignFrom, kAlignment);
+    H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);  // checksummed headers, read since 1.8
+    H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+    file_ = hdf::Id(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose);
+    if (!file_.good()) {
+      throw Error(ErrorKind::cannot_create, shown_, "cannot be made: " + hdf::last_error(),
+                  "check the folder's rights and the disk's free space");
+    }
+  }
+
+  void make_group(const std::string& path) { group_at(path); }
+
+  void add(const Entry& entry) {
+    const std::size_t slash = entry.path.rfind('/');
+    const hdf::Id& group = group_at(entry.path.substr(0, slash));
+    const hdf::Id type = hdf::file_type(entry.type, entry.width);
+    const std::vector<hsize_t> shape(entry.shape.begin(), entry.shape.end());
+    const hdf::Id space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
+    const hdf::Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    H5Pset_layout(creation, H5D_CONTIGUOUS);
+    H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY);
+    H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER);
+    H5Pset_obj_track_times(creation, false);
+    const hdf::Id dataset(
+        H5Dcreate2(group, entry.path.c_str() + slash + 1, type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+        H5Dclose);
+    if (!dataset.good()) fail(entry.path);
+    if (!entry.bytes.empty() &&
+        H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, entry.bytes.data()) < 0) {
+      fail(entry.path);
+    }
+  }
+
+  template <std::size_t N, class T>
+  void set_attribute(const std::string& group, const char* name, const std::array<T, N>& values) {
+    const hsize_t extent = N;
+    const hdf::Id space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
+    set_attribute(group, name, hdf::file_type(element_type_of<T>, sizeof(T)), space, values.data());
+  }
+  // ParaView asks for one fixed-length ASCII string.
+  void set_attribute(const std::string& group, const char* name, const std::string& ascii) {
+    const hdf::Id type(H5Tcopy(H5T_C_S1), H5Tclose), space(H5Screate(H5S_SCALAR), H5Sclose);
+    H5Tset_size(type, ascii.size());
+    H5Tset_strpad(type, H5T_STR_NULLPAD);
+    set_attribute(group, name, type, space, ascii.data());
+  }
+
+  void close() {
+    groups_.clear();
+    if (!file_.close()) fail("");
+  }
+
+ private:
+  const hdf::Id& group_at(const std::string& path) {
+    const auto known = groups_.find(path);
+    if (known != groups_.end()) return known->second;
+    if (path.empty()) {
+      return groups_.emplace(path, hdf::Id(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose)).first->second;
+    }
+    const std::size_t slash = path.rfind('/');
+    const hdf::Id& parent = group_at(path.substr(0, slash));
+    const hdf::Id creation(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+    H5Pset_obj_track_times(creation, false);
+    hdf::Id group(H5Gcreate2(parent, path.c_str() + slash + 1, H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose);
+    if (!group.good()) fail(path);
+    return groups_.emplace(path, std::move(group)).first->second;
+  }
+  void set_attribute(const std::string& group, const char* name, hid_t type, hid_t space,
+                     const void* values) {
+    const hdf::Id attribute(H5Acreate2(group_at(group), name, type, space, H5P_DEFAULT, H5P_DEFAULT),
+                            H5Aclose);
+    if (!attribute.good() || H5Awrite(attribute, type, values) < 0) fail(group + "/" + name);
+  }
+  [[noreturn]] void fail(const std::string& path) const {
+    throw Error(ErrorKind::io, shown_ + (path.empty() ? "" : ":" + path),
+                "writing failed: " + hdf::last_error(), "check the disk's free space");
+  }
+
+  std::string shown_;
+  hdf::Id file_;  // outlives the groups
+  std::map<std::string, hdf::Id> groups_;
+};
+
+}  // namespace
+
+void write(const Model& model, const fs::path& path, const Context& context) {
+  if (path.extension() != ".hdf") {
+    throw Error(ErrorKind::usage, path.string(), "does not end in .hdf, which ParaView asks for",
+                "name the model " + path.stem().string() + ".hdf");
+  }
+  check_invariants(model, path.string(), ErrorKind::internal, context);
+  const Layout body = lay_out(model), shown = lay_out_vtk(model);
+  std::vector<const Entry*> entries;
+  std::uint64_t total = 0, done = 0;
+  for (const Layout* layout : {&body, &shown}) {
+    for (const Entry& entry : layout->entries()) {
+      entries.push_back(&entry);
+      total += entry.bytes.size();
+    }
+  }
+
+  files::AtomicFile target(path);
+  {
+    const hdf::Session session;
+    OutputFile file(target.temporary(), path);
+    file.make_group("/ecorche/tissues");  // also where a body has none
+    file.make_group("/ecorche/volumes");
+    std::vector<std::string> digested;
+    std::vector<std::uint64_t> digests;
+    for (const Entry* entry : entries) {
+      context.check_stop();
+      file.add(*entry);
+      digested.push_back(entry->path);
+      digests.push_back(Digest().bytes(entry->bytes).value());
+      done += entry->bytes.size();
+      context.report(static_cast<double>(done) / static_cast<double>(total));
+    }
+    Layout table;
+    table.texts("/ecorche/digests/dataset", digested);
+    table.copy("/ecorche/digests/xxh64", digests);
+    for (const Entry& entry : table.entries()) file.add(entry);
+    file.set_attribute("/ecorche", "format", std::array<std::int32_t, 2>{format_major, format_minor});
+    file.set_attribute("/VTKHDF", "Version", std::array<std::int64_t, 2>{1, 0});
+    file.set_attribute("/VTKHDF", "Type", "UnstructuredGrid");
+    file.close();
+  }
+  context.check_stop();
+  target.commit();
+}
+
+}  // namespace ecorche::model_file

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a model file may hold before anything of it is read. HDF5 can point at any other file of the machine
+// and can declare terabytes: here its structure is looked at, and only then does the reader believe an offset
+// or a size.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/model_file/element_type.hpp"
+
+namespace ecorche::model_file {
+
+/// A regular file, open for reading.
+class InputFile {
+ public:
+  /// Throws Error{missing_input}.
+  explicit InputFile(const std::filesystem::path& path);
+  ~InputFile();
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&&) = delete;
+
+  std::uint64_t size() const { return size_; }
+  const std::string& name() const { return name_; }
+  /// Fills `bytes` from `offset`. Throws Error{io}.
+  void read(std::uint64_t offset, std::span<std::byte> bytes) const;
+  /// Whether `descriptor` is this very file.
+  bool is(int descriptor) const;
+
+ private:
+  std::string name_;
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+/// A dataset that passed: contiguous, unfiltered, local, of a known type, and wholly inside its file.
+struct StoredDataset {
+  ElementType type = ElementType::u8;
+  std::size_t width = 1;             ///< bytes of one element
+  std::vector<std::uint64_t> shape;  ///< slowest first
+  std::uint64_t offset = 0;          ///< in the file
+  std::uint64_t bytes = 0;
+};
+
+struct Catalogue {
+  InputFile file;
+  std::map<std::string, StoredDataset> datasets;  ///< by absolute path
+  std::set<std::string> groups;                   ///< looked into, by absolute path
+};
+
+/// Walks the groups that a model has and checks every link and dataset in them; groups that it does not know
+/// are left alone, unopened. Throws Error{missing_input, data}, naming the dataset, for whatever is not a
+/// plain dataset, for soft and external links, for more members or bytes than a file of this size can hold,
+/// and for another major version.
+Catalogue inspect(const std::filesystem::path& path);
+
+}  // namespace ecorche::model_file
