@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/client.hpp"
+
+#include <utility>
+
+namespace ecorche::client {
+namespace {
+
+// What this client takes from a server. Protobuf and the framing end at 2 and 4 GiB; a body stays far below.
+constexpr wire::FrameLimits kLimits{.envelope_bytes = 16U << 20, .payload_bytes = 2U << 30};
+
+ErrorKind kind_of(std::uint32_t code) {
+  switch (static_cast<StatusCode>(code)) {
+    case StatusCode::permission_denied:
+    case StatusCode::unauthenticated:
+      return ErrorKind::refused;
+    case StatusCode::resource_exhausted:
+    case StatusCode::unavailable:
+    case StatusCode::deadline_exceeded:
+      return ErrorKind::temporary;
+    case StatusCode::not_found:
+      return ErrorKind::usage;
+    default:
+      return ErrorKind::protocol;
+  }
+}
+
+}  // namespace
+
+Error to_error(const std::string& where, const v1::Status& status) {
+  return Error(kind_of(status.code()), where,
+               "status " + std::to_string(status.code()) + ": " + status.message(),
+               "this is the server's answer");
+}
+
+Client::Client(const wire::Address& address, const std::string& name)
+    : socket_(address, Clock::now() + std::chrono::seconds(5)), reader_(kLimits) {
+  v1::Envelope envelope;
+  v1::ClientHello& hello = *envelope.mutable_client_hello();
+  hello.set_protocol_min(1);
+  hello.set_protocol_max(1);
+  hello.set_client(name.substr(0, 64));
+  hello.add_encodings(v1::ENCODING_F32);
+  wire::Frame answer = call(std::move(envelope));
+  if (!answer.envelope.has_server_hello()) {
+    throw Error(ErrorKind::protocol, "hello", "the server answered with something else",
+                "check that it is ecorche serve");
+  }
+  hello_ = std::move(*answer.envelope.mutable_server_hello());
+}
+
+wire::Frame Client::call(v1::Envelope request) {
+  const std::uint64_t id = ++last_request_;
+  request.set_request_id(id);
+  send(request);
+  const auto until = Clock::now() + patience;
+  while (auto frame = read_frame(until)) {
+    if (frame->envelope.request_id() != id) {
+      waiting_.push_back(std::move(*frame));
+      continue;
+    }
+    if (frame->envelope.has_status() && frame->envelope.status().code() != 0)
+      throw to_error("server", frame->envelope.status());
+    return std::move(*frame);
+  }
+  throw Error(ErrorKind::temporary, "server", "no answer within " + std::to_string(patience.count()) + " s",
+              "try again");
+}
+
+void Client::send(const v1::Envelope& envelope) {
+  const wire::EncodedFrame frame = wire::encode(envelope);
+  socket_.write(std::as_bytes(std::span(frame.head)), Clock::now() + patience);
+}
+
+std::optional<wire::Frame> Client::receive(Clock::time_point until) {
+  if (waiting_.empty()) return read_frame(until);
+  wire::Frame frame = std::move(waiting_.front());
+  waiting_.pop_front();
+  return frame;
+}
+
+std::optional<wire::Frame> Client::read_frame(Clock::time_point until) {
+  while (!reader_.complete()) {
+    const std::size_t n = socket_.read(reader_.want(), until);
+    if (n == 0) return std::nullopt;
+    bytes_received_ += n;
+    if (const Status status = reader_.advance(n); !status.ok()) {
+      throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
+    }
+  }
+  wire::Frame frame = reader_.take();
+  attend(frame.envelope);
+  return frame;
+}
+
+// What the protocol asks of every client at once.
+void Client::attend(const v1::Envelope& envelope) {
+  v1::Envelope answer;
+  if (envelope.has_mesh_frame() || envelope.has_volume_frame()) {
+    const bool mesh = envelope.has_mesh_frame();
+    v1::FrameAck& ack = *answer.mutable_frame_ack();
+    ack.set_subscription(mesh ? envelope.mesh_frame().subscription()
+                              : envelope.volume_frame().subscription());
+    ack.set_frame(mesh ? envelope.mesh_frame().frame() : envelope.volume_frame().frame());
+    send(answer);
+  } else if (envelope.has_ping()) {
+    answer.set_request_id(envelope.request_id());
+    answer.mutable_pong()->set_data(envelope.ping().data());
+    send(answer);
+  } else if (envelope.has_goodbye()) {
+    throw to_error("server", envelope.goodbye().status());
+  } else if (envelope.has_status() && envelope.request_id() == 0) {
+    throw to_error("server", envelope.status());
+  }
+}
+
+}  // namespace ecorche::client

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/socket.hpp"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <limits>
+#include <memory>
+#include <system_error>
+
+namespace ecorche::client {
+namespace {
+
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
+
+}  // namespace
+
+Socket::Socket(const wire::Address& address, Clock::time_point until)
+    : where_(address.host + ":" + std::to_string(address.port)) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* list = nullptr;
+  if (const int error =
+          getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &list);
+      error != 0) {
+    fail(gai_strerror(error));
+  }
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(list, freeaddrinfo);
+  int error = EADDRNOTAVAIL;
+  for (const addrinfo* a = list; a && error != 0; a = a->ai_next) {
+    if (fd_ >= 0) close(fd_);
+    fd_ = socket(a->ai_family, a->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, a->ai_protocol);
+    if (fd_ < 0) {
+      error = errno;
+      continue;
+    }
+    error = connect(fd_, a->ai_addr, a->ai_addrlen) == 0 ? 0 : errno;
+    if (error != EINPROGRESS) continue;
+    error = ETIMEDOUT;
+    socklen_t size = sizeof error;
+    if (wait(POLLOUT, until)) getsockopt(fd_, SOL_SOCKET, SO_ERROR, &error, &size);
+  }
+  if (error != 0) {
+    if (fd_ >= 0) close(fd_);
+    fail("cannot be reached: " + reason(error));
+  }
+  const int on = 1;
+  setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+Socket::~Socket() {
+  close(fd_);
+}
+
+std::size_t Socket::read(std::span<std::byte> out, Clock::time_point until) {
+  while (true) {
+    const ssize_t n = recv(fd_, out.data(), out.size(), 0);
+    if (n > 0) return static_cast<std::size_t>(n);
+    if (n == 0) fail("the server hung up");
+    if (errno != EAGAIN && errno != EINTR) fail(reason(errno));
+    if (!wait(POLLIN, until)) return 0;
+  }
+}
+
+void Socket::write(std::span<const std::byte> bytes, Clock::time_point until) {
+  while (!bytes.empty()) {
+    const ssize_t n = send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (n > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(n));
+      continue;
+    }
+    if (errno != EAGAIN && errno != EINTR) fail(reason(errno));
+    if (!wait(POLLOUT, until)) fail("the server stopped reading");
+  }
+}
+
+bool Socket::wait(short events, Clock::time_point until) const {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
+  pollfd poll_fd{.fd = fd_, .events = events, .revents = 0};
+  constexpr std::int64_t longest = std::numeric_limits<int>::max();
+  const int ready = poll(&poll_fd, 1, static_cast<int>(std::clamp<std::int64_t>(left, 0, longest)));
+  // An interrupted wait is over early, like a ready one: the caller tries and comes back.
+  return ready > 0 || (ready < 0 && errno == EINTR);
+}
+
+void Socket::fail(const std::string& what) const {
+  throw Error(ErrorKind::temporary, where_, what, "start the server there, or try again");
+}
+
+}  // namespace ecorche::client

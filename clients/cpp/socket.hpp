@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// A TCP socket that waits no longer than it is told.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "proto/address.hpp"
+
+namespace ecorche::client {
+
+using Clock = std::chrono::steady_clock;
+
+/// Not for two threads at once.
+class Socket {
+ public:
+  /// Throws Error{temporary} when nobody answers there until `until`.
+  Socket(const wire::Address& address, Clock::time_point until);
+  ~Socket();
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+
+  /// Reads what is there, at least a byte; 0 when none came until `until`. Throws Error{temporary} when the
+  /// peer hung up.
+  std::size_t read(std::span<std::byte> out, Clock::time_point until);
+  /// Writes all. Throws Error{temporary} when the peer hung up, or did not take it until `until`.
+  void write(std::span<const std::byte> bytes, Clock::time_point until);
+
+ private:
+  bool wait(short events, Clock::time_point until) const;
+  [[noreturn]] void fail(const std::string& what) const;
+
+  int fd_ = -1;
+  std::string where_;
+};
+
+}  // namespace ecorche::client

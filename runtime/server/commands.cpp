@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each message of a client does.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "proto/convert.hpp"
+#include "runtime/server/connection.hpp"
+
+namespace ecorche::server {
+namespace {
+
+// The protocol of proto/ecorche/v1.
+constexpr std::uint32_t kProtocol = 1;
+constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY};
+
+void describe(const Limits& limits, v1::Limits& out) {
+  out.set_hello_bytes(limits.hello_bytes);
+  out.set_hello_seconds(limits.hello_seconds);
+  out.set_envelope_bytes(limits.envelope_bytes);
+  out.set_payload_bytes(limits.payload_bytes);
+  out.set_connections(limits.connections);
+  out.set_sessions(limits.sessions);
+  out.set_subscriptions(limits.subscriptions);
+  out.set_poses_per_second(limits.poses_per_second);
+  out.set_messages_per_second(limits.messages_per_second);
+  out.set_frames_in_flight(limits.frames_in_flight);
+  out.set_stall_seconds(limits.stall_seconds);
+  out.set_idle_seconds(limits.idle_seconds);
+  out.set_linger_seconds(limits.linger_seconds);
+  out.set_volume_voxels(limits.volume_voxels);
+}
+
+// Why this hello cannot be answered; ok when it can.
+Status check_hello(const v1::ClientHello& hello) {
+  if (hello.protocol_min() > kProtocol || hello.protocol_max() < kProtocol) {
+    return {StatusCode::failed_precondition,
+            "hello: the client speaks protocol " + std::to_string(hello.protocol_min()) + " to " +
+                std::to_string(hello.protocol_max()) + ", this server 1 to 1 (use another client)"};
+  }
+  if (!hello.resume_token().empty()) {
+    return {StatusCode::unimplemented, "hello: this server resumes nothing (connect without resume_token)"};
+  }
+  const auto& encodings = hello.encodings();
+  if (!encodings.empty() &&
+      std::find(encodings.begin(), encodings.end(), v1::ENCODING_F32) == encodings.end()) {
+    return {StatusCode::failed_precondition, "hello: this server writes ENCODING_F32 only (read it)"};
+  }
+  return {};
+}
+
+runtime::Skinning skinning_of(v1::Skinning skinning) {
+  if (skinning == v1::SKINNING_DQS) return runtime::Skinning::dqs;
+  if (skinning == v1::SKINNING_LBS) return runtime::Skinning::lbs;
+  return runtime::Skinning::cor;
+}
+
+}  // namespace
+
+void Connection::handle(const wire::Frame& frame) {
+  const v1::Envelope& request = frame.envelope;
+  const std::uint64_t id = request.request_id();
+  if (greeted_ == request.has_client_hello()) {
+    return end({StatusCode::failed_precondition, "hello: it comes first and once (send ClientHello first)"});
+  }
+  switch (request.message_case()) {
+    case v1::Envelope::kClientHello:
+      return handle_hello(request);
+    case v1::Envelope::kListModels:
+      return handle_list(request);
+    case v1::Envelope::kOpenModel:
+      return handle_open(request);
+    case v1::Envelope::kSubscribe:
+      return handle_subscribe(request);
+    case v1::Envelope::kUnsubscribe:
+      return handle_unsubscribe(request);
+    case v1::Envelope::kPoseUpdate:
+      return handle_pose(request.pose_update());
+    case v1::Envelope::kFrameAck:
+      outbox_.acknowledge(request.frame_ack().subscription(), request.frame_ack().frame());
+      wake_.cancel();
+      return;
+    case v1::Envelope::kPing: {
+      v1::Envelope pong;
+      // Cut, not refused: a ping is a question about the connection, not about its bytes.
+      pong.mutable_pong()->set_data(request.ping().data().substr(0, 64));
+      return answer(id, std::move(pong));
+    }
+    case v1::Envelope::kGoodbye:
+      return close("client said goodbye");
+    case v1::Envelope::kPong:
+    case v1::Envelope::kStatus:
+      return;  // an answer: nothing was asked, nothing is owed
+    default:
+      return answer_status(
+          id, {StatusCode::unimplemented, "message " + std::to_string(request.message_case()) +
+                                              ": this server cannot do it (see ServerHello.features)"});
+  }
+}
+
+void Connection::handle_hello(const v1::Envelope& request) {
+  if (const Status status = check_hello(request.client_hello()); !status.ok()) return end(status);
+  greeted_ = true;
+  reader_.set_limits(
+      {.envelope_bytes = house_.limits().envelope_bytes, .payload_bytes = house_.limits().payload_bytes});
+  v1::Envelope envelope;
+  v1::ServerHello& hello = *envelope.mutable_server_hello();
+  hello.set_protocol(kProtocol);
+  hello.set_server("ecorche " + house_.options().version);
+  for (const v1::Feature feature : kFeatures) hello.add_features(feature);
+  hello.add_encodings(v1::ENCODING_F32);
+  describe(house_.limits(), *hello.mutable_limits());
+  answer(request.request_id(), std::move(envelope));
+}
+
+void Connection::handle_list(const v1::Envelope& request) {
+  v1::Envelope envelope;
+  v1::ModelList& list = *envelope.mutable_model_list();
+  for (const auto& model : house_.models()) *list.add_models() = model->summary;
+  answer(request.request_id(), std::move(envelope));
+}
+
+void Connection::handle_open(const v1::Envelope& request) {
+  const v1::OpenModel& open = request.open_model();
+  if (session_) {
+    return answer_status(
+        request.request_id(),
+        {StatusCode::failed_precondition, "open: this connection has a model (open another connection)"});
+  }
+  if (const Status status = house_.open(open, session_); !status.ok())
+    return answer_status(request.request_id(), status);
+  role_ = session_->join(*this);
+  const ServedModel& model = *session_->model();
+  v1::Envelope envelope;
+  v1::ModelOpened& opened = *envelope.mutable_model_opened();
+  opened = model.opened;
+  opened.set_session(session_->name());
+  opened.set_role(role_);
+  if (open.without_triangles()) return answer(request.request_id(), std::move(envelope));
+  for (int i = 0; i < opened.tissues_size(); ++i) {
+    *opened.mutable_tissues(i)->mutable_triangles() = model.triangles[static_cast<std::size_t>(i)];
+  }
+  answer(request.request_id(), std::move(envelope), model.topology);
+}
+
+void Connection::handle_subscribe(const v1::Envelope& request) {
+  const std::uint64_t id = request.request_id();
+  if (!session_)
+    return answer_status(id,
+                         {StatusCode::failed_precondition, "subscribe: no model is open (OpenModel first)"});
+  Want want;
+  if (const Status status = read_want(request.subscribe(), session_->model()->model(), want); !status.ok()) {
+    return answer_status(id, status);
+  }
+  if (subscriptions_.size() >= house_.limits().subscriptions) {
+    return answer_status(
+        id, {StatusCode::resource_exhausted, "subscribe: " + std::to_string(subscriptions_.size()) +
+                                                 " subscriptions already (Unsubscribe one first)"});
+  }
+  v1::Envelope envelope;
+  const std::uint32_t subscription = session_->subscribe(*this, want);
+  subscriptions_.insert(subscription);
+  envelope.mutable_subscribed()->set_subscription(subscription);
+  answer(id, std::move(envelope));
+}
+
+void Connection::handle_unsubscribe(const v1::Envelope& request) {
+  const std::uint32_t subscription = request.unsubscribe().subscription();
+  if (!session_ || !session_->unsubscribe(*this, subscription)) {
+    return answer_status(request.request_id(),
+                         {StatusCode::not_found, "unsubscribe: no subscription " +
+                                                     std::to_string(subscription) + " (see Subscribed)"});
+  }
+  subscriptions_.erase(subscription);
+  outbox_.forget(subscription);
+  answer_status(request.request_id(), {});
+}
+
+void Connection::handle_pose(const v1::PoseUpdate& update) {
+  PoseRequest request;
+  if (const Status status = check_pose(update, request); !status.ok()) {
+    v1::Envelope envelope;
+    envelope.mutable_pose_ack()->set_sequence(update.sequence());
+    wire::to_proto(status, *envelope.mutable_pose_ack()->mutable_status());
+    return answer(0, std::move(envelope));
+  }
+  last_sequence_ = update.sequence();
+  session_->pose(std::move(request));
+}
+
+Status Connection::check_pose(const v1::PoseUpdate& update, PoseRequest& out) const {
+  if (!session_) return {StatusCode::failed_precondition, "pose: no model is open (OpenModel first)"};
+  if (role_ != v1::ROLE_CONTROLLER) {
+    return {StatusCode::permission_denied, "pose: another connection controls session '" + session_->name() +
+                                               "' (open a session of your own, or watch)"};
+  }
+  const ServedModel& model = *session_->model();
+  if (update.rig_digest() != model.opened.rig_digest()) {
+    return {StatusCode::invalid_argument, "pose: meant for another rig (send ModelOpened.rig_digest)"};
+  }
+  if (update.sequence() <= last_sequence_) {
+    return {StatusCode::out_of_range, "pose: sequence " + std::to_string(update.sequence()) + " after " +
+                                          std::to_string(last_sequence_) + " (let it grow)"};
+  }
+  out.sequence = update.sequence();
+  out.skinning = skinning_of(update.skinning());
+  return wire::from_proto(update, model.model().segment_count(), out.pose);
+}
+
+void Connection::pose_done(const PoseOutcome& outcome, const Skipped& skipped) {
+  if (closed_ || ending_) return;
+  v1::Envelope envelope;
+  v1::PoseAck& ack = *envelope.mutable_pose_ack();
+  ack.set_sequence(outcome.sequence);
+  wire::to_proto(outcome.status, *ack.mutable_status());
+  const auto& segments = session_->model()->model().rig.skeleton.segments;
+  for (const ClampedJoint& clamped : outcome.clamped) {
+    v1::ClampedJoint& joint = *ack.add_clamped();
+    joint.set_joint(static_cast<std::uint32_t>(clamped.joint));
+    joint.set_name(segments[static_cast<std::size_t>(clamped.joint)].joint.name);
+    joint.set_removed(clamped.removed);
+  }
+  ack.set_skipped(skipped.count);
+  ack.mutable_skipped_sequences()->Assign(skipped.newest.begin(), skipped.newest.end());
+  *ack.mutable_timings() = outcome.timings;
+  answer(0, std::move(envelope));
+}
+
+}  // namespace ecorche::server

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// One client.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "runtime/server/house.hpp"
+#include "runtime/server/outbox.hpp"
+
+namespace ecorche::server {
+
+/// Two coroutines on the I/O thread:
+///
+///   socket --> read_frames --> handle --> answers --> Outbox --> write_frames --> socket
+///                                |                      ^
+///                                +--> Session -- frames-+
+///
+/// Nothing that a client sends reaches beyond its own connection: a broken rule ends it with a Status and a
+/// second to read it. Its deadlines are points in time that the server looks at ten times a second (check),
+/// so that no read or write needs a timer of its own.
+class Connection final : public std::enable_shared_from_this<Connection>, private Member {
+ public:
+  Connection(tcp::socket socket, House& house);
+  ~Connection() override;
+
+  void start();
+  /// Starts only to say why not.
+  void start_refused(const Status& status);
+  /// First step of the shutdown: the last word is queued, what is queued may still leave.
+  void say_goodbye(const Status& status);
+  /// Second step: now.
+  void close(const char* why);
+
+  /// Drops the connection when it broke a deadline.
+  void check(Clock::time_point now);
+  bool closed() const { return closed_; }
+  bool ending() const { return ending_; }
+
+ private:
+  net::awaitable<void> read_frames();
+  net::awaitable<void> write_frames();
+  /// `n` bytes were read; a whole message is handled. Whatever goes wrong ends this connection alone.
+  void take_in(std::size_t n);
+  /// Waits while the client asks faster than it may or reads.
+  net::awaitable<void> hold_back();
+  net::awaitable<void> discard();
+
+  void deliver(const PosedFrame& frame) override;
+  void pose_done(const PoseOutcome& outcome, const Skipped& skipped) override;
+
+  void handle(const wire::Frame& frame);
+  void handle_hello(const v1::Envelope& request);
+  void handle_list(const v1::Envelope& request);
+  void handle_open(const v1::Envelope& request);
+  void handle_subscribe(const v1::Envelope& request);
+  void handle_unsubscribe(const v1::Envelope& request);
+  void handle_pose(const v1::PoseUpdate& update);
+  Status check_pose(const v1::PoseUpdate& update, PoseRequest& out) const;
+
+  void answer(std::uint64_t request_id, v1::Envelope envelope,
+              std::shared_ptr<const wire::Payload> payload = nullptr);
+  void answer_status(std::uint64_t request_id, const Status& status);
+  /// The last message, then the end.
+  void end(v1::Envelope last);
+  void end(const Status& status);
+
+  tcp::socket socket_;
+  House& house_;
+  wire::FrameReader reader_;
+  Outbox outbox_;
+  net::steady_timer wake_;   ///< the writer sleeps on it
+  net::steady_timer pause_;  ///< the reader sleeps on it
+  std::string peer_;
+
+  bool greeted_ = false;  ///< the hellos are exchanged
+  bool ending_ = false;   ///< the last message is queued
+  bool closed_ = false;
+  double allowance_;  ///< messages that may be read at once
+  Clock::time_point allowance_at_;
+
+  std::shared_ptr<Session> session_;
+  v1::Role role_ = v1::ROLE_UNSPECIFIED;
+  std::set<std::uint32_t> subscriptions_;
+  std::uint64_t last_sequence_ = 0;
+
+  const Clock::time_point born_ = Clock::now();
+  Clock::time_point heard_ = born_;                 ///< last byte read
+  std::optional<Clock::time_point> reading_since_;  ///< first byte of an unfinished message
+  std::optional<Clock::time_point> writing_since_;  ///< start of the present write
+  std::optional<Clock::time_point> ending_since_;
+};
+
+}  // namespace ecorche::server

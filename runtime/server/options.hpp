@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a server may be told, and the safe defaults (DESIGN 8).
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace ecorche::server {
+
+/// Field by field as in proto/ecorche/v1/hello.proto, which tells clients.
+struct Limits {
+  std::uint32_t hello_bytes = 4 << 10;
+  double hello_seconds = 5;
+  std::uint32_t envelope_bytes = 64 << 10;
+  std::uint32_t payload_bytes = 1 << 20;
+  std::uint32_t connections = 256;
+  std::uint32_t models = 8;
+  std::uint32_t sessions = 64;        ///< each holds one posed body
+  std::uint32_t subscriptions = 16;   ///< per connection
+  double poses_per_second = 240;      ///< per session
+  double messages_per_second = 2000;  ///< per connection; 90 Hz of poses and acknowledgements are 180
+  std::uint32_t frames_in_flight = 2;
+  double stall_seconds = 10;
+  double idle_seconds = 300;
+  double linger_seconds = 60;
+  std::uint64_t volume_voxels = std::uint64_t{256} << 20;
+};
+
+struct Options {
+  std::string host = "127.0.0.1";  ///< a numeric address, or localhost
+  std::uint16_t port = 7070;       ///< 0: any free one
+  bool insecure = false;           ///< listen beyond loopback although nothing is encrypted
+  std::string version;             ///< of the program, for ServerHello
+  Limits limits;
+};
+
+}  // namespace ecorche::server

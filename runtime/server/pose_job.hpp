@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// One pose of one session, on a worker: the body is posed, then a frame is written for every subscription.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "proto/framing.hpp"
+#include "runtime/server/asio.hpp"
+#include "runtime/server/served_model.hpp"
+#include "runtime/server/subscription.hpp"
+
+namespace ecorche::server {
+
+struct PoseRequest {
+  std::uint64_t sequence = 0;  ///< 0: the rest pose of a new session
+  Pose pose;
+  runtime::Skinning skinning = runtime::Skinning::cor;
+  Clock::time_point arrived = Clock::now();
+};
+
+/// How the posing went; frames follow only where `status` is ok.
+struct PoseOutcome {
+  std::uint64_t sequence = 0;
+  Status status;
+  std::vector<ClampedJoint> clamped;
+  v1::ServerTimings timings;
+};
+
+/// One frame, shared by every connection with that subscription.
+struct PosedFrame {
+  std::uint32_t subscription = 0;
+  std::uint64_t number = 0;
+  std::shared_ptr<const wire::EncodedFrame> bytes;
+};
+
+struct PoseJob {
+  std::shared_ptr<const ServedModel> model;
+  PoseRequest request;
+  std::uint64_t number = 0;  ///< of the frames
+  std::vector<Subscription> subscriptions;
+  std::uint64_t volume_voxels = 0;  ///< Limits
+  /// Called on the worker, in this order: the outcome once, then every frame, meshes before volumes (which
+  /// take longer).
+  std::function<void(PoseOutcome)> on_outcome;
+  std::function<void(PosedFrame)> on_frame;
+};
+
+/// Poses into `body`, which is made at the first call. Throws nothing. The status is that of the frames: the
+/// first that could not be made (out of memory) while the pose itself was good.
+Status run(const PoseJob& job, runtime::PosedBody& body);
+
+}  // namespace ecorche::server

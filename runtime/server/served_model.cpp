@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/server/served_model.hpp"
+
+#include <utility>
+
+#include "core/model_file/model_file.hpp"
+#include "proto/arrays.hpp"
+#include "proto/convert.hpp"
+
+namespace ecorche::server {
+namespace {
+
+v1::ModelSummary summarize(std::string name, const Model& model) {
+  v1::ModelSummary summary;
+  summary.set_name(std::move(name));
+  summary.set_identity(model_file::identity(model));
+  summary.set_segments(static_cast<std::uint32_t>(model.segment_count()));
+  summary.set_tissues(static_cast<std::uint32_t>(model.tissues.size()));
+  std::uint64_t vertices = 0;
+  for (const Tissue& tissue : model.tissues) vertices += static_cast<std::uint64_t>(tissue.V.rows());
+  summary.set_tissue_vertices(vertices);
+  summary.set_nodes(model.node_count());
+  summary.set_tets(model.tet_count());
+  for (const ModelVolume& volume : model.volumes) summary.add_volumes(volume.name);
+  return summary;
+}
+
+void describe(const Tissue& tissue, v1::Tissue& out) {
+  out.set_name(tissue.name);
+  out.set_group(std::string(group_name(tissue.group)));
+  out.set_segment(tissue.segment);
+  out.set_vertices(static_cast<std::uint64_t>(tissue.V.rows()));
+}
+
+void describe(const ModelVolume& volume, v1::Volume& out) {
+  out.set_name(volume.name);
+  wire::to_proto(volume.image.grid, *out.mutable_grid());
+  out.set_type(wire::to_proto(volume.image.type));
+  out.set_components(static_cast<std::uint32_t>(volume.image.components));
+  out.set_background(volume.background);
+  out.set_labels(volume.labels);
+  for (const auto& [id, name] : volume.table) (*out.mutable_table())[id] = name;
+}
+
+}  // namespace
+
+ServedModel::ServedModel(std::string name, std::shared_ptr<const Model> model)
+    : poser(model), summary(summarize(std::move(name), *model)) {
+  opened.set_model(summary.name());
+  opened.set_identity(summary.identity());
+  opened.set_rig_digest(model_file::rig_digest(model->rig));
+  opened.set_topology_digest(model_file::topology_digest(*model));
+  wire::to_proto(model->rig, *opened.mutable_skeleton());
+  auto payload = std::make_shared<wire::Payload>();
+  for (const Tissue& tissue : model->tissues) {
+    describe(tissue, *opened.add_tissues());
+    const std::span corners(tissue.F.data(), static_cast<std::size_t>(tissue.F.size()));
+    v1::Array array = wire::append(*payload, corners, 3);
+    array.set_type(v1::SCALAR_TYPE_U32);  // rows are never negative
+    triangles.push_back(std::move(array));
+  }
+  for (const ModelVolume& volume : model->volumes) describe(volume, *opened.add_volumes());
+  topology = std::move(payload);
+}
+
+}  // namespace ecorche::server

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// A model made ready for clients: its poser, its digests, and its description encoded once.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/values/model.hpp"
+#include "proto/framing.hpp"
+#include "runtime/skin/body_poser.hpp"
+
+namespace ecorche::server {
+
+/// Immutable after construction; shared by every thread.
+struct ServedModel {
+  /// `name` is what OpenModel asks for.
+  ServedModel(std::string name, std::shared_ptr<const Model> model);
+
+  const Model& model() const { return poser.model(); }
+
+  runtime::BodyPoser poser;
+  v1::ModelSummary summary;
+  v1::ModelOpened opened;                         ///< without session, role and triangles
+  std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`
+  std::shared_ptr<const wire::Payload> topology;  ///< the triangles of every tissue
+};
+
+}  // namespace ecorche::server

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The server: framed Protobuf over TCP (docs/protocol.md).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/values/model.hpp"
+#include "runtime/server/options.hpp"
+#include "runtime/server/workers.hpp"
+
+namespace ecorche::server {
+
+struct NamedModel {
+  std::string name;
+  std::shared_ptr<const Model> model;
+};
+
+/// One I/O thread holds every connection and session; workers pose.
+///
+///            I/O thread                                              workers
+///   client --> Connection --.                                    .--> PoseJob (skin, measure,
+///   client --> Connection ---+--> Session (one slot, newest wins)       resample, encode once)
+///   client --> Connection <-'        ^       one job in flight          |
+///        frames, shared              '---------- posted back -----------'
+///
+/// A frame is immutable once posted; every subscriber's socket writes the same bytes.
+class Server {
+ public:
+  /// Binds and listens. Throws Error{temporary} when the address is in use, Error{usage} for one that cannot
+  /// be, Error{refused} beyond loopback without Options::insecure, Error{config} for too many models or two
+  /// of one name.
+  Server(Options options, std::vector<NamedModel> models, Workers& workers);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  /// The port it listens on.
+  std::uint16_t port() const;
+
+  /// Serves on the calling thread until stop(), then says Goodbye to all, lets them read for up to a second,
+  /// and returns once the last job has ended.
+  void run();
+
+  /// From any thread, any number of times, also before run().
+  void stop();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ecorche::server

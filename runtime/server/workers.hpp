@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The threads that pose, so that the I/O thread never does.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace ecorche::server {
+
+using Job = std::function<void()>;
+
+/// Runs jobs in the order they come, `threads` at a time. The hand-over is one mutex: what was written before
+/// submit() is seen by the job. The destructor finishes every job submitted.
+class Workers {
+ public:
+  /// `within` calls its argument, e.g. inside the app's TBB arena.
+  Workers(int threads, std::function<void(const Job&)> within);
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  /// Jobs must not throw.
+  void submit(Job job);
+  /// Waits until no job is queued or running.
+  void drain();
+
+ private:
+  void work();
+
+  std::function<void(const Job&)> within_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::condition_variable idle_;
+  std::deque<Job> jobs_;
+  int running_ = 0;
+  bool stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace ecorche::server
