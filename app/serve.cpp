@@ -1,8 +1,122 @@
 // SPDX-License-Identifier: Apache-2.0
+// `ecorche serve`: models in memory, poses in, frames out.
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <tbb/task_arena.h>
+
+#include <filesystem>
+#include <memory>
+#include <stop_token>
+#include <vector>
+
 #include "app/command.hpp"
+#include "core/files/atomic_file.hpp"
+#include "core/model_file/model_file.hpp"
+#include "proto/address.hpp"
+#include "runtime/server/server.hpp"
 
 namespace ecorche::app {
+namespace {
 
-void declare_serve(CLI::App&, Program&, Run&) {}
+struct Settings {
+  std::vector<std::string> models;
+  std::string listen = "127.0.0.1:7070";
+  std::string port_file;
+  std::string log = "info";
+  server::Options options;
+};
+
+// `left_knee` for `/data/left_knee.hdf`.
+std::string model_name(const std::string& path) {
+  return std::filesystem::path(path).stem().string();
+}
+
+std::vector<server::NamedModel> read_models(const Settings& settings, const Program& program) {
+  std::vector<server::NamedModel> models;
+  for (const std::string& path : settings.models) {
+    Model model = model_file::read(path, program.context("read model"));
+    models.push_back({model_name(path), std::make_shared<const Model>(std::move(model))});
+  }
+  return models;
+}
+
+int run_serve(const Settings& settings, const Program& program) {
+  // stdout is for the result.
+  spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
+  spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
+  spdlog::set_level(spdlog::level::from_str(settings.log));
+
+  server::Options options = settings.options;
+  const wire::Address address = wire::parse_address(settings.listen);
+  options.host = address.host;
+  options.port = address.port;
+  options.version = ECORCHE_VERSION;
+
+  // The main thread serves; as many workers as threads take up poses, all of them inside one arena, which
+  // TBB's own threads join where a single pose leaves cores idle.
+  const int threads = program.threads > 0 ? program.threads : tbb::this_task_arena::max_concurrency();
+  tbb::task_arena arena(threads);
+  server::Workers workers(threads, [&arena](const server::Job& job) { arena.execute(job); });
+  server::Server server(std::move(options), read_models(settings, program), workers);
+
+  const std::string where = address.host + ":" + std::to_string(server.port());
+  if (!settings.port_file.empty())
+    files::write_text(settings.port_file, std::to_string(server.port()) + "\n");
+  program.result("listening on " + where,
+                 {{"address", where}, {"port", server.port()}, {"models", settings.models.size()}});
+
+  const std::stop_callback on_stop(program.stop, [&server] { server.stop(); });
+  server.run();
+  return 0;
+}
+
+}  // namespace
+
+void declare_serve(CLI::App& app, Program& program, Run& chosen) {
+  auto settings = std::make_shared<Settings>();
+  CLI::App* command = app.add_subcommand("serve", "serve models: poses in, meshes and volumes out, over TCP");
+  command
+      ->add_option("models", settings->models, "model files; clients ask for them by file name without .hdf")
+      ->required();
+  command->add_option("--listen", settings->listen, "HOST:PORT; port 0 picks a free one")
+      ->capture_default_str();
+  command->add_option("--port-file", settings->port_file, "write the port to this file once listening");
+  command->add_flag("--insecure", settings->options.insecure,
+                    "listen beyond loopback although nothing is encrypted");
+  command->add_option("--log", settings->log, "what to log on stderr")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+
+  server::Limits& limits = settings->options.limits;
+  const auto limit = [command](const char* name, auto& value, const char* help, auto min, auto max) {
+    command->add_option(name, value, help)
+        ->check(CLI::Range(min, max))
+        ->capture_default_str()
+        ->group("Limits");
+  };
+  limit("--max-hello-bytes", limits.hello_bytes, "of a client's first message", 64U, 1U << 20);
+  limit("--hello-seconds", limits.hello_seconds, "until a client's first message", 0.01, 3600.0);
+  limit("--max-envelope-bytes", limits.envelope_bytes, "of any other envelope of a client", 1024U, 1U << 30);
+  limit("--max-payload-bytes", limits.payload_bytes, "of a client's payload", 0U, 1U << 30);
+  limit("--max-connections", limits.connections, "at once", 1U, 65536U);
+  limit("--max-models", limits.models, "in memory", 1U, 1024U);
+  limit("--max-sessions", limits.sessions, "at once; each holds a posed body", 1U, 65536U);
+  limit("--max-subscriptions", limits.subscriptions, "per connection", 1U, 1024U);
+  limit("--pose-rate", limits.poses_per_second, "poses per second and session; faster ones are skipped", 0.1,
+        1e6);
+  limit("--message-rate", limits.messages_per_second, "messages per second and connection; faster ones wait",
+        1.0, 1e6);
+  limit("--frames-in-flight", limits.frames_in_flight, "unacknowledged, per subscription", 1U, 64U);
+  limit("--stall-seconds", limits.stall_seconds, "until a client that stopped reading is dropped", 0.01,
+        3600.0);
+  limit("--idle-seconds", limits.idle_seconds, "until a client that says nothing is dropped", 0.01, 1e6);
+  limit("--linger-seconds", limits.linger_seconds, "that a named session outlives its connections", 0.0, 1e6);
+  limit("--max-volume-voxels", limits.volume_voxels, "of a posed volume", std::uint64_t{1},
+        std::uint64_t{1} << 31);
+
+  command->callback([settings, &program, &chosen] {
+    chosen = [settings, &program] { return run_serve(*settings, program); };
+  });
+}
 
 }  // namespace ecorche::app
