@@ -1,8 +1,384 @@
 // SPDX-License-Identifier: Apache-2.0
+// `ecorche pose`: offline posing, from a pose file or frames of a motion clip, into files.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <numbers>
+#include <optional>
+
 #include "app/command.hpp"
+#include "core/files/atomic_file.hpp"
+#include "core/kinematics/retarget.hpp"
+#include "core/model_file/model_file.hpp"
+#include "io/case/case_file.hpp"
+#include "io/image/image_file.hpp"
+#include "io/motion/bvh.hpp"
+#include "io/surface/surface_file.hpp"
+#include "runtime/quality/pose_quality.hpp"
+#include "runtime/volume/resample.hpp"
 
 namespace ecorche::app {
+namespace {
 
-void declare_pose(CLI::App&, Program&, Run&) {}
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// As the command line says it.
+struct Settings {
+  fs::path model, output, pose, motion;
+  std::string frames;
+  std::string motion_unit = "cm";
+  std::string skinning = "cor";
+  std::vector<std::string> tissues, volumes;
+  std::vector<std::string> formats{"stl"};
+  std::string volume_format = "nrrd";
+  std::string sampling = "trilinear";
+  std::string grid = "posed";
+  bool tets = false, field = false;
+
+  bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
+};
+
+// What to write, in rows of the model.
+struct Plan {
+  std::vector<std::uint32_t> tissues, volumes;
+  bool tets = false, field = false;
+};
+
+struct Frame {
+  std::string name;  // empty for a single pose, which needs no folder of its own
+  Pose pose;
+};
+
+[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
+  throw Error(ErrorKind::usage, where, what, mend);
+}
+
+// `all`, `none` or names -> rows of `items`, ascending.
+template <class Items>
+std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::string>& names,
+                                   const std::string& option) {
+  std::vector<std::uint32_t> rows;
+  std::string known;
+  for (const auto& item : items) known += (known.empty() ? "" : ", ") + item.name;
+  for (const std::string& name : names) {
+    if (name == "none" && names.size() == 1) return {};
+    bool found = name == "all" && names.size() == 1;
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      if (name != "all" && items[i].name != name) continue;
+      rows.push_back(static_cast<std::uint32_t>(i));
+      found = true;
+    }
+    if (!found) {
+      usage(option, "the model has no '" + name + "'", "use all, none or names among: " + known);
+    }
+  }
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  return rows;
+}
+
+// What is not named is not written; naming nothing writes everything.
+Plan plan_of(const Settings& settings, const Model& model) {
+  const std::vector<std::string> all{"all"};
+  const bool everything = !settings.chooses();
+  Plan plan;
+  plan.tissues = rows_of(model.tissues, everything ? all : settings.tissues, "--tissues");
+  plan.volumes = rows_of(model.volumes, everything ? all : settings.volumes, "--volumes");
+  plan.tets = everything || settings.tets;
+  plan.field = everything || settings.field;
+  for (const std::uint32_t v : plan.volumes) {
+    const std::string& name = model.volumes[v].name;
+    if (plan.field && (name == "displacement" || name == "mask")) {
+      usage("--field", "volume '" + name + "' would be written over by the displacement field",
+            "name the other volumes by --volumes");
+    }
+  }
+  return plan;
+}
+
+// A, A:B or A:B:STEP -> frames A, A + STEP, ... below B.
+std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t frames) {
+  std::vector<std::size_t> parts;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (bool more = true; more;) {
+    std::size_t value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || parts.size() == 3 || (next != end && *next != ':')) {
+      usage("--frames", "'" + text + "' is not A, A:B or A:B:STEP", "for example --frames 0:60:30");
+    }
+    parts.push_back(value);
+    more = next != end;
+    at = more ? next + 1 : end;
+  }
+  const std::size_t first = parts[0];
+  const std::size_t past = parts.size() > 1 ? parts[1] : first + 1;
+  const std::size_t step = parts.size() > 2 ? parts[2] : 1;
+  if (first >= past || past > frames || step == 0) {
+    usage("--frames", "'" + text + "' names no frames of this clip",
+          "it has frames 0 to " + std::to_string(frames - 1) + "; B is one past the last");
+  }
+  std::vector<std::size_t> numbers;
+  for (std::size_t f = first; f < past; f += step) numbers.push_back(f);
+  return numbers;
+}
+
+std::vector<Frame> read_frames(const Program& program, const Settings& settings, const Rig& rig) {
+  if (settings.pose.empty() == settings.motion.empty()) {
+    usage("pose", settings.pose.empty() ? "nothing to pose" : "both --pose and --motion are given",
+          "give either --pose FILE, or --motion CLIP.bvh --frames A:B");
+  }
+  if (!settings.pose.empty()) return {{"", io::read_pose(settings.pose, rig)}};
+  if (settings.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
+  const double unit = settings.motion_unit == "mm" ? 1 : settings.motion_unit == "cm" ? 10 : 1000;
+  const Clip clip = io::read_bvh(settings.motion, unit);
+  const kinematics::Retarget match = kinematics::match(rig, clip);
+  for (const std::string& joint : match.unused_joints) {
+    program.note("warning: " + settings.motion.string() + ": joint '" + joint +
+                 "' moves nothing of this model");
+  }
+  std::vector<Frame> frames;
+  const std::vector<std::size_t> numbers = frame_numbers(settings.frames, clip.frames());
+  for (const std::size_t f : numbers) {
+    char name[32] = "";
+    if (numbers.size() > 1) std::snprintf(name, sizeof name, "frame_%04zu", f);
+    frames.push_back({name, kinematics::pose_at(rig, clip, match, f)});
+  }
+  return frames;
+}
+
+double degrees(double radians) {
+  return radians * 180 / std::numbers::pi;
+}
+
+json quality_json(const Model& model, const runtime::PoseQuality& quality) {
+  json tissues = json::array();
+  for (std::size_t t = 0; t < quality.tissues.size(); ++t) {
+    const runtime::TissueChange& change = quality.tissues[t];
+    tissues.push_back({{"name", change.name},
+                       {"group", group_name(model.tissues[t].group)},
+                       {"rest_mm3", change.rest_mm3},
+                       {"posed_mm3", change.posed_mm3},
+                       {"volume_change", change.share}});
+  }
+  json clamped = json::array();
+  for (const ClampedJoint& joint : quality.clamped) {
+    const auto row = static_cast<std::size_t>(joint.joint);
+    clamped.push_back(
+        {{"joint", model.rig.skeleton.segments[row].joint.name}, {"removed_deg", degrees(joint.removed)}});
+  }
+  return {{"verdict", quality.pass ? "pass" : "warn"},
+          {"inverted_tets", quality.inverted_tets},
+          {"inverted_rest_mm3", quality.inverted_rest_mm3},
+          {"inverted_share", quality.inverted_share},
+          {"min_det_f", quality.min_det_f},
+          {"volume_change", quality.volume_change},
+          {"bone_rigidity_mm", quality.bone_rigidity_mm},
+          {"tissues", tissues},
+          {"clamped", clamped},
+          {"thresholds",
+           {{"max_inverted_share", quality.thresholds.max_inverted_share},
+            {"max_volume_change", quality.thresholds.max_volume_change},
+            {"max_bone_rigidity_mm", quality.thresholds.max_bone_rigidity_mm}}},
+          {"purpose", "training and education, not planning of surgery"}};
+}
+
+// Writes one posed body. Every file is checked for a stop request before it is begun.
+class FrameWriter {
+ public:
+  FrameWriter(const Settings& settings, const Plan& plan, const Model& model, const runtime::PosedBody& body,
+              fs::path folder, const Context& context)
+      : settings_(settings),
+        plan_(plan),
+        model_(model),
+        body_(body),
+        folder_(std::move(folder)),
+        context_(context) {
+    files::make_folder(folder_);
+  }
+
+  json write(const runtime::PoseQuality& quality) {
+    for (const std::uint32_t row : plan_.tissues) write_tissue(row);
+    if (plan_.tets || plan_.field) write_tets();
+    for (const std::uint32_t row : plan_.volumes) write_volume(model_.volumes[row]);
+    if (plan_.field) write_field();
+    files::write_text(next("quality.json"), quality_json(model_, quality).dump(2) + "\n");
+    return written_;
+  }
+
+ private:
+  // The path of the next file, named in the result.
+  fs::path next(const std::string& name) {
+    context_.check_stop();
+    const std::size_t files = plan_.tissues.size() * settings_.formats.size() + plan_.volumes.size() +
+                              (plan_.tets || plan_.field ? 1 : 0) + (plan_.field ? 2 : 0) + 1;
+    context_.report(static_cast<double>(written_.size()) / static_cast<double>(files));
+    written_.push_back((folder_ / name).string());
+    return folder_ / name;
+  }
+
+  void write_tissue(std::uint32_t row) {
+    const std::vector<float>& posed = body_.tissues[row];
+    SurfaceMesh mesh;
+    mesh.V = Eigen::Map<const PointsF>(posed.data(), static_cast<Eigen::Index>(posed.size() / 3), 3)
+                 .cast<double>();
+    mesh.F = model_.tissues[row].F;
+    for (const std::string& format : settings_.formats) {
+      io::write_surface(next(model_.tissues[row].name + "." + format), mesh);
+    }
+  }
+
+  // The posed tets, with the way of every node from rest: the forward displacement field.
+  void write_tets() {
+    const PointsF posed = Eigen::Map<const PointsF>(body_.nodes.data(), model_.nodes.rows(), 3);
+    const PointsF moved = posed - model_.nodes;
+    io::write_tets(next("body.vtu"), posed, model_.tets,
+                   {{"displacement", 3, {moved.data(), moved.data() + moved.size()}}},
+                   {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}},
+                    {"det_f", 1, runtime::tet_det_f(model_, body_.nodes)}});
+  }
+
+  const runtime::InverseMap& map_on(const ImageGrid& rest) {
+    const ImageGrid grid = settings_.grid == "rest" ? rest : runtime::grow_to(rest, body_.nodes);
+    if (!(map_.grid == grid)) runtime::locate(model_, body_.nodes, grid, map_, context_);
+    return map_;
+  }
+
+  void write_volume(const ModelVolume& volume) {
+    const auto sampling =
+        settings_.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
+    const Image posed = runtime::resample(model_, body_.nodes, map_on(volume.image.grid), volume, sampling);
+    io::write_image(next(volume.name + "." + settings_.volume_format), posed);
+  }
+
+  void write_field() {
+    const auto field = runtime::inverse_displacement(model_, body_.nodes, map_on(field_grid()));
+    io::write_image(next("displacement." + settings_.volume_format), field.vectors);
+    io::write_image(next("mask." + settings_.volume_format), field.mask);
+  }
+
+  // The first volume's lattice; without volumes one around the rest body of at most about 4 million cubic
+  // voxels.
+  ImageGrid field_grid() const {
+    if (!model_.volumes.empty()) return model_.volumes.front().image.grid;
+    const Eigen::Vector3d low = model_.nodes.colwise().minCoeff().transpose().cast<double>();
+    const Eigen::Vector3d high = model_.nodes.colwise().maxCoeff().transpose().cast<double>();
+    const double edge = std::max(0.5, std::ceil(2 * std::cbrt((high - low).prod() / 4e6)) / 2);
+    ImageGrid grid;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      grid.origin[a] = low[axis];
+      grid.spacing[a] = edge;
+      grid.size[a] = static_cast<std::int32_t>(std::ceil((high[axis] - low[axis]) / edge)) + 1;
+    }
+    return grid;
+  }
+
+  const Settings& settings_;
+  const Plan& plan_;
+  const Model& model_;
+  const runtime::PosedBody& body_;
+  fs::path folder_;
+  const Context& context_;
+  runtime::InverseMap map_;
+  json written_ = json::array();
+};
+
+std::string line_of(const json& frame) {
+  char line[240];
+  std::snprintf(
+      line, sizeof line,
+      "%s: %s, %llu inverted tets, volume %+.2f %%, bones rigid within %.1e mm, %zu joints clamped, "
+      "%zu files\n",
+      frame["folder"].get<std::string>().c_str(), frame["quality"]["verdict"].get<std::string>().c_str(),
+      frame["quality"]["inverted_tets"].get<unsigned long long>(),
+      100 * frame["quality"]["volume_change"].get<double>(),
+      frame["quality"]["bone_rigidity_mm"].get<double>(), frame["quality"]["clamped"].size(),
+      frame["files"].size());
+  return line;
+}
+
+int run(const Program& program, const Settings& settings) {
+  const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
+  const Plan plan = plan_of(settings, *model);
+  const std::vector<Frame> frames = read_frames(program, settings, model->rig);
+  const runtime::BodyPoser poser(model);
+  const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
+  runtime::PosedBody body = poser.make_frame();
+
+  json result{{"ok", true}, {"model", settings.model.string()}, {"skinning", settings.skinning}};
+  std::string text;
+  for (const Frame& frame : frames) {
+    const Context context = program.context(frame.name.empty() ? "pose" : frame.name);
+    // Quality looks at every tissue, whichever are written.
+    const Status status = poser.run(frame.pose, skinning, poser.all_tissues(), body);
+    if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
+    const runtime::PoseQuality quality = runtime::measure(*model, body, poser.all_tissues());
+    const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
+    FrameWriter writer(settings, plan, *model, body, folder, context);
+    result["frames"].push_back({{"name", frame.name},
+                                {"folder", folder.string()},
+                                {"files", writer.write(quality)},
+                                {"quality", quality_json(*model, quality)}});
+    text += line_of(result["frames"].back());
+  }
+  program.result(text, result);
+  return 0;
+}
+
+}  // namespace
+
+void declare_pose(CLI::App& app, Program& program, Run& chosen) {
+  const auto s = std::make_shared<Settings>();
+  CLI::App* command = app.add_subcommand(
+      "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
+  command->add_option("MODEL", s->model, "a model that preprocess made")->required();
+  command->add_option("-o,--output", s->output, "folder to write into, made where absent")->required();
+  command->add_option("--pose", s->pose, "a pose file");
+  command->add_option("--motion", s->motion, "a motion clip, .bvh");
+  command->add_option(
+      "--frames", s->frames,
+      "frames of the clip from 0: A, A:B or A:B:STEP, B is one past the last; several go into "
+      "folders of their own");
+  command->add_option("--motion-unit", s->motion_unit, "length of one unit of the clip")
+      ->check(CLI::IsMember({"mm", "cm", "m"}))
+      ->capture_default_str();
+  command->add_option("--skinning", s->skinning, "how segments blend: cor, dqs or lbs")
+      ->check(CLI::IsMember({"cor", "dqs", "lbs"}))
+      ->capture_default_str();
+  const char* choice =
+      "What is not named is not written; without --tissues, --volumes, --tets and --field "
+      "everything is.";
+  command->footer(choice);
+  command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
+      ->delimiter(',');
+  command->add_option("--format", s->formats, "of the tissues: stl, ply, vtp, glb, or several")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"stl", "ply", "vtp", "glb"}))
+      ->capture_default_str();
+  command->add_option("--volumes", s->volumes, "volumes to write: all, none, or names with commas between")
+      ->delimiter(',');
+  command->add_option("--volume-format", s->volume_format, "of volumes and fields: nrrd, mha or nii.gz")
+      ->check(CLI::IsMember({"nrrd", "mha", "nii.gz"}))
+      ->capture_default_str();
+  command
+      ->add_option("--sampling", s->sampling, "of volumes: nearest or trilinear; labels are always nearest")
+      ->check(CLI::IsMember({"nearest", "trilinear"}))
+      ->capture_default_str();
+  command
+      ->add_option("--grid", s->grid, "of volumes: posed (the rest lattice grown to the posed body) or rest")
+      ->check(CLI::IsMember({"posed", "rest"}))
+      ->capture_default_str();
+  command->add_flag("--tets", s->tets, "write body.vtu: posed tets with displacement, label and det F");
+  command->add_flag(
+      "--field", s->field,
+      "write the displacement field: rest to posed on the nodes of body.vtu, posed to rest as an "
+      "image with a mask");
+  command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
+}
 
 }  // namespace ecorche::app

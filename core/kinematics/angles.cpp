@@ -42,9 +42,11 @@ Angles rest_angles(const Joint& joint) {
   return {joint.sequence[0].rest, joint.sequence[1].rest, joint.sequence[2].rest};
 }
 
-// The value of `angle + k turns` nearest to the range, moved into it.
-double into_range(const AngleAxis& range, double angle) {
-  const double low = std::min(range.min, range.rest), high = std::max(range.max, range.rest);
+// The value of `angle + k turns` nearest to the range, moved into it. An end without limit lies at `open`: if
+// it went on for ever, any angle would be within the range a few turns further.
+double into_range(const AngleAxis& range, double angle, double open) {
+  const double low = std::min(std::isfinite(range.min) ? range.min : -open, range.rest);
+  const double high = std::max(std::isfinite(range.max) ? range.max : open, range.rest);
   double best = angle, least = std::numeric_limits<double>::infinity();
   for (const double candidate : {angle, angle - kFullTurn, angle + kFullTurn}) {
     const double inside = std::clamp(candidate, low, high);
@@ -55,9 +57,12 @@ double into_range(const AngleAxis& range, double angle) {
   return best;
 }
 
+// Without a limit that says more, the middle angle stays within a quarter turn, as angles_from_rotation tells
+// it.
 Angles into_ranges(const Joint& joint, const Angles& angles) {
-  return {into_range(joint.sequence[0], angles[0]), into_range(joint.sequence[1], angles[1]),
-          into_range(joint.sequence[2], angles[2])};
+  const double pi = std::numbers::pi;
+  return {into_range(joint.sequence[0], angles[0], pi), into_range(joint.sequence[1], angles[1], pi / 2),
+          into_range(joint.sequence[2], angles[2], pi)};
 }
 
 // The same rotation by the other triple: R(a) R(b) R(c) = R(a + pi) R(pi - b) R(c + pi).
@@ -106,7 +111,8 @@ Quaterniond clamp_hinge(const Joint& joint, const Quaterniond& rotation) {
       turn(joint.sequence[1], joint.sequence[1].rest) * turn(joint.sequence[2], joint.sequence[2].rest);
   const Quaterniond about = others * rotation * others.conjugate();
   const double twist = 2 * std::atan2(about.vec()[hinge.axis], about.w());
-  const double angle = into_range(hinge, hinge.rest + hinge.sign * std::remainder(twist, kFullTurn));
+  const double angle =
+      into_range(hinge, hinge.rest + hinge.sign * std::remainder(twist, kFullTurn), std::numbers::pi);
   const Quaterniond done = others.conjugate() * turn(hinge, angle - hinge.rest) * others;
   return done.angularDistance(rotation) < 1e-12 ? rotation : done;
 }

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "core/kinematics/angles.hpp"
+#include "core/values/error.hpp"
+#include "tests/unit/kinematics/rigs.hpp"
+
+namespace ecorche::kinematics {
+namespace {
+
+using Eigen::Vector3d;
+using test::turn;
+
+TEST(Constrain, RestIsLeftAlone) {
+  const Rig rig = test::chain(4);
+  Pose pose = Pose::rest(4);
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  EXPECT_TRUE(clamped.empty());
+  for (const auto& q : pose.rotation) EXPECT_EQ(q.coeffs(), Eigen::Quaterniond::Identity().coeffs());
+}
+
+TEST(Constrain, ReportsWhatAHingeCannotDo) {
+  Rig rig = test::chain(3);
+  rig.skeleton.segments[1].joint.kind = JointKind::hinge;
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] = turn(Vector3d::UnitY(), 0.4);
+  pose.rotation[2] = turn(Vector3d::UnitY(), 0.4);
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  ASSERT_EQ(clamped.size(), 1u);
+  EXPECT_EQ(clamped[0].joint, 1);
+  EXPECT_NEAR(clamped[0].removed, 0.4, 1e-12);
+  EXPECT_LT(pose.rotation[1].angularDistance(Eigen::Quaterniond::Identity()), 1e-12);
+  EXPECT_NEAR(pose.rotation[2].angularDistance(Eigen::Quaterniond::Identity()), 0.4, 1e-12);
+}
+
+TEST(Constrain, TheRootIsThePlaceOfTheBody) {
+  Rig rig = test::chain(2);
+  rig.skeleton.segments[0].joint.kind = JointKind::fixed;
+  Pose pose = Pose::rest(2);
+  pose.rotation[0] = turn(Vector3d::UnitY(), 2);
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  EXPECT_TRUE(clamped.empty());
+  EXPECT_NEAR(pose.rotation[0].angularDistance(Eigen::Quaterniond::Identity()), 2, 1e-12);
+}
+
+TEST(Constrain, OnlyFreeJointsMoveAway) {
+  Rig rig = test::chain(3);
+  rig.skeleton.segments[2].joint.kind = JointKind::free;
+  Pose pose = Pose::rest(3);
+  pose.translation[1] = pose.translation[2] = {1, 2, 3};
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  EXPECT_EQ(pose.translation[1], Vector3d::Zero());
+  EXPECT_EQ(pose.translation[2], Vector3d(1, 2, 3));
+}
+
+TEST(Constrain, CoupledAnglesFollowTheirLeaderAboutRest) {
+  Rig rig = test::chain(4);
+  auto& segments = rig.skeleton.segments;
+  segments[1].joint.sequence[0].rest = 0.2;
+  segments[1].joint.sequence[0].max = 1;
+  segments[2].joint.sequence[1].rest = -0.1;
+  segments[2].joint.coupled = {{"j1", "flexion", "adduction", 0.5}};
+  segments[3].joint.coupled = {{"j2", "adduction", "rotation", -2}};
+  Pose pose = Pose::rest(4);
+  pose.rotation[1] = rotation_from_angles(segments[1].joint, {1.5, 0, 0});  // clamped to 1 before it leads
+  pose.rotation[2] = rotation_from_angles(segments[2].joint, {0.3, 0.9, 0});
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  const auto second = angles_from_rotation(segments[2].joint, pose.rotation[2]);
+  EXPECT_NEAR(second[0], 0.3, 1e-9) << "its own angle stays";
+  EXPECT_NEAR(second[1], -0.1 + 0.5 * 0.8, 1e-9);
+  EXPECT_NEAR(angles_from_rotation(segments[3].joint, pose.rotation[3])[2], -0.8, 1e-9);
+  ASSERT_EQ(clamped.size(), 1u) << "following is not a limit";
+  EXPECT_NEAR(clamped[0].removed, 0.5, 1e-9);
+
+  Pose again = pose;
+  clamped.clear();
+  constrain(rig.skeleton, again, clamped);
+  EXPECT_TRUE(clamped.empty()) << "what was constrained once stays";
+  for (std::size_t j = 0; j < 4; ++j) EXPECT_LT(again.rotation[j].angularDistance(pose.rotation[j]), 1e-9);
+}
+
+TEST(Constrain, ACoupledAngleKeepsItsOwnLimits) {
+  Rig rig = test::chain(3);
+  auto& segments = rig.skeleton.segments;
+  segments[2].joint.coupled = {{"j1", "flexion", "flexion", 1}};
+  segments[2].joint.sequence[0].max = 0.25;
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] = rotation_from_angles(segments[1].joint, {1, 0, 0});
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  EXPECT_NEAR(angles_from_rotation(segments[2].joint, pose.rotation[2])[0], 0.25, 1e-9);
+  ASSERT_EQ(clamped.size(), 1u);
+  EXPECT_EQ(clamped[0].joint, 2);
+  EXPECT_NEAR(clamped[0].removed, 0.75, 1e-9);
+}
+
+TEST(Constrain, NamesACouplingThatLeadsNowhere) {
+  Rig rig = test::chain(2);
+  rig.skeleton.segments[1].joint.coupled = {{"wing", "flexion", "flexion", 1}};
+  Pose pose = Pose::rest(2);
+  std::vector<ClampedJoint> clamped;
+  try {
+    constrain(rig.skeleton, pose, clamped);
+    FAIL() << "must throw";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::config);
+    EXPECT_NE(std::string(error.what()).find("wing"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::kinematics
