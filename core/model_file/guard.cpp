@@ -18,39 +18,18 @@ constexpr std::array<unsigned char, 8> kMagic{0x89, 'H', 'D', 'F', '\r', '\n', 0
 constexpr std::array<std::string_view, 9> kParts{"skeleton", "weights", "cor",        "tissues", "volumes",
                                                  "labels",   "quality", "provenance", "digests"};
 
-// What a member may be, by its place alone: groups nobody knows are not opened.
-enum class Expected { nothing, group, dataset };
-
-Expected expected_at(const std::string& group, const std::string& name) {
-  const auto among = [&](auto... names) { return ((name == names) || ...); };
-  if (group.empty()) return among("VTKHDF", "ecorche") ? Expected::group : Expected::nothing;
-  if (group == "/VTKHDF") {
-    if (among("CellData", "PointData")) return Expected::group;
-    return among("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds", "Points", "Connectivity",
-                 "Offsets", "Types")
-               ? Expected::dataset
-               : Expected::nothing;
+// Whether this version knows the group; datasets in other groups belong to a newer minor version.
+bool known_group(const std::string& path) {
+  if (path == "/VTKHDF" || path == "/VTKHDF/CellData" || path == "/VTKHDF/PointData" || path == "/ecorche")
+    return true;
+  for (const std::string_view part : kParts) {
+    const std::string group = "/ecorche/" + std::string(part);
+    if (path == group) return true;
+    if (part == "tissues" || part == "volumes") {
+      if (path.starts_with(group + "/") && is_identifier(path.substr(group.size() + 1))) return true;
+    }
   }
-  if (group == "/ecorche") {
-    if (name == "name") return Expected::dataset;
-    return std::find(kParts.begin(), kParts.end(), name) != kParts.end() ? Expected::group
-                                                                         : Expected::nothing;
-  }
-  return group == "/ecorche/tissues" || group == "/ecorche/volumes" ? Expected::group : Expected::dataset;
-}
-
-struct Link {
-  std::string name;
-  H5L_type_t type = H5L_TYPE_ERROR;
-};
-
-herr_t collect_link(hid_t, const char* name, const H5L_info_t* info, void* links) {
-  try {
-    static_cast<std::vector<Link>*>(links)->push_back({name, info->type});
-    return 0;
-  } catch (...) {  // nothing may be thrown through HDF5
-    return -1;
-  }
+  return false;
 }
 
 class Guard {
@@ -62,21 +41,22 @@ class Guard {
   }
 
   Catalogue run() && {
-    const hdf::Session session;
     const hdf::Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_fapl_sec2(access);
     H5Pset_file_locking(access, false, true);  // files are replaced by renaming, never changed
     H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-    const hdf::Id file(H5Fopen(found_.file.name().c_str(), H5F_ACC_RDONLY, access), H5Fclose);
-    if (!file.good()) refuse("", "cannot be read as HDF5: " + hdf::last_error());
+    file_ = hdf::Id(H5Fopen(found_.file.name().c_str(), H5F_ACC_RDONLY, access), H5Fclose);
+    if (!file_.good()) refuse("", "cannot be read as HDF5: " + hdf::last_error());
     void* descriptor = nullptr;
-    if (H5Fget_vfd_handle(file, access, &descriptor) < 0 || !found_.file.is(*static_cast<int*>(descriptor))) {
+    if (H5Fget_vfd_handle(file_, access, &descriptor) < 0 ||
+        !found_.file.is(*static_cast<int*>(descriptor))) {
       refuse("", "was replaced while it was opened");
     }
-    const hdf::Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose);
-    if (!root.good()) refuse("/", "cannot be opened: " + hdf::last_error());
-    check_format(root);
-    walk(root, "");
+    groups_.emplace("", hdf::Id(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose));
+    check_group(groups_.at(""), "/");
+    check_format();
+    for (const char* always : {"/ecorche/tissues", "/ecorche/volumes"}) group_at(always);
+    inspect_listed();
     return std::move(found_);
   }
 
@@ -89,14 +69,11 @@ class Guard {
   }
 
   // Attribute `format` of /ecorche: [major, minor], 32-bit.
-  void check_format(hid_t root) const {
-    H5L_info_t link;
-    const hdf::Id ecorche(H5Lget_info(root, "ecorche", &link, H5P_DEFAULT) >= 0 && link.type == H5L_TYPE_HARD
-                              ? H5Gopen2(root, "ecorche", H5P_DEFAULT)
-                              : H5I_INVALID_HID,
-                          H5Gclose);
-    if (!ecorche.good()) refuse("/ecorche", "is missing: this is not a model of ecorche");
-    const hdf::Id attribute(H5Aopen(ecorche, "format", H5P_DEFAULT), H5Aclose);
+  void check_format() {
+    if (H5Lexists(groups_.at(""), "ecorche", H5P_DEFAULT) <= 0) {
+      refuse("/ecorche", "is missing: this is not a model of ecorche");
+    }
+    const hdf::Id attribute(H5Aopen(group_at("/ecorche"), "format", H5P_DEFAULT), H5Aclose);
     if (!attribute.good()) refuse("/ecorche/format", "is missing: this is not a model of ecorche");
     const hdf::Id type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose);
     std::array<std::int32_t, 2> format{};
@@ -112,56 +89,70 @@ class Guard {
     }
   }
 
-  // Recursion is bounded by `expected_at`: four groups deep, whatever the links say.
-  void walk(hid_t group, const std::string& path) {
-    found_.groups.insert(path);
-    for (const Link& link : links_of(group, path)) {
-      const std::string member = path + "/" + link.name;
-      if (link.type != H5L_TYPE_HARD) refuse(member, "is a soft or external link");
-      switch (expected_at(path, link.name)) {
-        case Expected::nothing:
-          break;
-        case Expected::group: {
-          if ((path == "/ecorche/tissues" || path == "/ecorche/volumes") && !is_identifier(link.name)) {
-            refuse(member, "is not a name of [a-z0-9_]{1,64}");
-          }
-          const hdf::Id child(H5Gopen2(group, link.name.c_str(), H5P_DEFAULT), H5Gclose);
-          if (!child.good()) refuse(member, "cannot be opened as a group: " + hdf::last_error());
-          walk(child, member);
-          break;
-        }
-        case Expected::dataset:
-          if (!is_group(group, link.name, member)) inspect_dataset(group, link.name, member);
-          break;
-      }
+  // The contents page first, itself two datasets: paths, and the XXH64 of what they name.
+  void inspect_listed() {
+    const std::string names = "/ecorche/digests/dataset", values = "/ecorche/digests/xxh64";
+    const StoredDataset& paths = inspect_dataset(names);
+    const StoredDataset& digests = inspect_dataset(values);
+    if (paths.type != ElementType::text || paths.shape.size() != 1) refuse(names, "is not a list of text");
+    const std::uint64_t count = paths.shape[0];
+    if (digests.type != ElementType::u64 || digests.shape != paths.shape) {
+      refuse(values, "is not one u64 per dataset");
+    }
+    std::string text(paths.bytes, '\0');
+    std::vector<std::uint64_t> digest(count);
+    found_.file.read(paths.offset, std::as_writable_bytes(std::span(text)));
+    found_.file.read(digests.offset, std::as_writable_bytes(std::span(digest)));
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const std::string_view padded = std::string_view(text).substr(i * paths.width, paths.width);
+      const std::string path(padded.substr(0, padded.find('\0')));
+      if (!known_group(path.substr(0, path.rfind('/')))) continue;
+      if (found_.datasets.contains(path)) refuse(names, "names " + path + " twice");
+      inspect_dataset(path).digest = digest[i];
     }
   }
-  std::vector<Link> links_of(hid_t group, const std::string& path) const {
+
+  // Every link on the way must be hard. Only known groups are asked for, so the way is at most three long.
+  const hdf::Id& group_at(const std::string& path) {
+    const auto known = groups_.find(path);
+    if (known != groups_.end()) return known->second;
+    const std::size_t slash = path.rfind('/');
+    const hdf::Id& parent = group_at(path.substr(0, slash));
+    check_link(parent, path.c_str() + slash + 1, path);
+    hdf::Id group(H5Gopen2(parent, path.c_str() + slash + 1, H5P_DEFAULT), H5Gclose);
+    if (!group.good()) refuse(path, "cannot be opened as a group: " + hdf::last_error());
+    check_group(group, path);
+    found_.groups.insert(path);
+    return groups_.emplace(path, std::move(group)).first->second;
+  }
+  void check_link(hid_t group, const char* name, const std::string& path) const {
+    const htri_t exists = H5Lexists(group, name, H5P_DEFAULT);
+    if (exists == 0) refuse(path, "is missing");
+    H5L_info_t link;
+    if (exists < 0 || H5Lget_info(group, name, &link, H5P_DEFAULT) < 0) {
+      refuse(path, "cannot be found: " + hdf::last_error());
+    }
+    if (link.type != H5L_TYPE_HARD) refuse(path, "is a soft or external link");
+  }
+  void check_group(hid_t group, const std::string& path) const {
     H5G_info_t info;
-    if (H5Gget_info(group, &info) < 0) refuse(path, "cannot be listed: " + hdf::last_error());
+    if (group < 0 || H5Gget_info(group, &info) < 0) refuse(path, "cannot be opened: " + hdf::last_error());
+    if (info.storage_type != H5G_STORAGE_TYPE_COMPACT) {
+      refuse(path, "keeps its links outside of its header: this is not a model of ecorche");
+    }
     if (info.nlinks > kMaxMembers) {
       refuse(path,
              "has " + std::to_string(info.nlinks) + " members, more than " + std::to_string(kMaxMembers));
     }
-    std::vector<Link> links;
-    if (H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_link, &links) < 0) {
-      refuse(path, "cannot be listed: " + hdf::last_error());
-    }
-    return links;
-  }
-  // A group where this version has a dataset belongs to a newer minor version: left alone.
-  bool is_group(hid_t parent, const std::string& name, const std::string& path) const {
-    H5O_info_t info;
-    if (H5Oget_info_by_name2(parent, name.c_str(), &info, H5O_INFO_BASIC, H5P_DEFAULT) < 0) {
-      refuse(path, "cannot be opened: " + hdf::last_error());
-    }
-    if (info.type != H5O_TYPE_GROUP && info.type != H5O_TYPE_DATASET) refuse(path, "is not a dataset");
-    return info.type == H5O_TYPE_GROUP;
   }
 
   // The order matters: HDF5 may open other files when it is asked for the extent of a virtual dataset.
-  void inspect_dataset(hid_t parent, const std::string& name, const std::string& path) {
-    const hdf::Id dataset(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose);
+  StoredDataset& inspect_dataset(const std::string& path) {
+    const std::size_t slash = path.rfind('/');
+    const hdf::Id& group = group_at(path.substr(0, slash));
+    const char* name = path.c_str() + slash + 1;
+    check_link(group, name, path);
+    const hdf::Id dataset(H5Dopen2(group, name, H5P_DEFAULT), H5Dclose);
     if (!dataset.good()) refuse(path, "cannot be opened: " + hdf::last_error());
     const hdf::Id made(H5Dget_create_plist(dataset), H5Pclose);
     if (!made.good()) refuse(path, "cannot be opened: " + hdf::last_error());
@@ -191,7 +182,7 @@ class Guard {
       if (offset > found_.file.size() - stored.bytes) refuse(path, "reaches beyond the end of its file");
       stored.offset = offset;
     }
-    found_.datasets.emplace(path, std::move(stored));
+    return found_.datasets.emplace(path, std::move(stored)).first->second;
   }
   [[noreturn]] void refuse_size(const std::string& path) const {
     refuse(path, "declares more than its file of " + std::to_string(found_.file.size()) + " bytes can hold");
@@ -218,8 +209,11 @@ class Guard {
     return false;
   }
 
+  const hdf::Session session_;  // first in, last out
   Catalogue found_;
-  std::uint64_t total_bytes_ = 0;  // of all datasets together: two of them may not share their bytes
+  hdf::Id file_;
+  std::map<std::string, hdf::Id> groups_;  // open, by path
+  std::uint64_t total_bytes_ = 0;          // of all datasets together: two of them may not share their bytes
 };
 
 }  // namespace

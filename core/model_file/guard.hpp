@@ -45,6 +45,7 @@ struct StoredDataset {
   std::vector<std::uint64_t> shape;  ///< slowest first
   std::uint64_t offset = 0;          ///< in the file
   std::uint64_t bytes = 0;
+  std::uint64_t digest = 0;  ///< XXH64 as the file has it
 };
 
 struct Catalogue {
@@ -53,10 +54,11 @@ struct Catalogue {
   std::set<std::string> groups;                   ///< looked into, by absolute path
 };
 
-/// Walks the groups that a model has and checks every link and dataset in them; groups that it does not know
-/// are left alone, unopened. Throws Error{missing_input, data}, naming the dataset, for whatever is not a
-/// plain dataset, for soft and external links, for more members or bytes than a file of this size can hold,
-/// and for another major version.
+/// Opens what the table of digests lists, and nothing else: the table is the file's contents page, so that no
+/// group has to be listed (HDF5 1.10 can crash on listing a damaged group) and what others put beside a model
+/// is never touched. Throws Error{missing_input, data}, naming the dataset, for whatever is not a plain
+/// dataset, for soft and external links, for more members or bytes than a file of this size can hold, and for
+/// another major version.
 Catalogue inspect(const std::filesystem::path& path);
 
 }  // namespace ecorche::model_file

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -18,7 +17,7 @@ class Source {
   /// Any extent, in a shape that is asked for.
   static constexpr std::uint64_t any = ~std::uint64_t{0};
 
-  /// Reads the table of digests. `context` and `catalogue` must outlive the source.
+  /// `context` and `catalogue` must outlive the source.
   Source(const Catalogue& catalogue, const Context& context);
 
   const Catalogue& catalogue() const { return catalogue_; }
@@ -62,17 +61,14 @@ class Source {
   /// Throws Error{data} at `path`.
   [[noreturn]] void refuse(const std::string& path, const std::string& what) const;
 
-  /// Compares the stored digest without keeping the bytes; false also where none is stored.
+  /// Compares the stored digest without keeping the bytes.
   bool digest_is_good(const std::string& path) const;
-  /// The stored digests by path.
-  const std::map<std::string, std::uint64_t>& digests() const { return digests_; }
 
  private:
   std::uint64_t read_and_digest(const StoredDataset& dataset, std::span<std::byte> out) const;
 
   const Catalogue& catalogue_;
   const Context& context_;
-  std::map<std::string, std::uint64_t> digests_;
   std::uint64_t total_bytes_ = 0;
   mutable std::uint64_t read_bytes_ = 0;  // for the progress
 };

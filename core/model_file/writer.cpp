@@ -22,7 +22,7 @@ class OutputFile {
   OutputFile(const fs::path& path, const fs::path& shown) : shown_(shown.string()) {
     const hdf::Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose),
         access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    H5Pset_obj_track_times(creation, false);
+    set_up_group(creation);
     H5Pset_fapl_sec2(access);
     H5Pset_file_locking(access, false, true);  // nobody else knows the temporary name
     H5Pset_alignment(access, kAlignFrom, kAlignment);
@@ -78,6 +78,10 @@ class OutputFile {
   }
 
  private:
+  static void set_up_group(hid_t creation) {
+    H5Pset_obj_track_times(creation, false);
+    H5Pset_link_phase_change(creation, 0xffff, 0);  // links stay in the group's own, checksummed header
+  }
   const hdf::Id& group_at(const std::string& path) {
     const auto known = groups_.find(path);
     if (known != groups_.end()) return known->second;
@@ -87,7 +91,7 @@ class OutputFile {
     const std::size_t slash = path.rfind('/');
     const hdf::Id& parent = group_at(path.substr(0, slash));
     const hdf::Id creation(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
-    H5Pset_obj_track_times(creation, false);
+    set_up_group(creation);
     hdf::Id group(H5Gcreate2(parent, path.c_str() + slash + 1, H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose);
     if (!group.good()) fail(path);
     return groups_.emplace(path, std::move(group)).first->second;
