@@ -26,10 +26,16 @@ std::uint64_t spread(std::uint64_t x) {  // 21 bits to every third bit
 /// Places along a Morton curve through a cube of 2^21 cells a side.
 class Curve {
  public:
-  explicit Curve(const Points& V) {
-    if (V.rows() == 0) return;
-    low_ = V.colwise().minCoeff().transpose();
-    const double extent = (V.colwise().maxCoeff().transpose() - low_).maxCoeff();
+  /// Through the nodes that a tet uses.
+  explicit Curve(const TetMesh& mesh) {
+    if (mesh.T.rows() == 0) return;
+    Eigen::Vector3d high = low_ = mesh.V.row(mesh.T(0, 0)).transpose();
+    for (Eigen::Index t = 0; t < mesh.T.rows(); ++t)
+      for (Eigen::Index c = 0; c < 4; ++c) {
+        low_ = low_.cwiseMin(mesh.V.row(mesh.T(t, c)).transpose());
+        high = high.cwiseMax(mesh.V.row(mesh.T(t, c)).transpose());
+      }
+    const double extent = (high - low_).maxCoeff();
     if (extent > 0) scale_ = ((1 << 21) - 1) / extent;
   }
   std::uint64_t operator()(const Eigen::Vector3d& p) const {
@@ -63,7 +69,7 @@ void renumber_nodes(TetMesh& mesh) {
   std::vector<std::uint8_t> used(n, 0);
   for (Eigen::Index t = 0; t < mesh.T.rows(); ++t)
     for (Eigen::Index c = 0; c < 4; ++c) used[static_cast<std::size_t>(mesh.T(t, c))] = 1;
-  const Curve curve(mesh.V);
+  const Curve curve(mesh);
   struct Node {
     std::uint64_t code;
     std::int32_t old;
@@ -96,7 +102,7 @@ void renumber_nodes(TetMesh& mesh) {
 
 void sort_tets(TetMesh& mesh) {
   const auto n = static_cast<std::size_t>(mesh.T.rows());
-  const Curve curve(mesh.V);
+  const Curve curve(mesh);
   struct Tet {
     std::uint64_t code;
     Quad nodes;
