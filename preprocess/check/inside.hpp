@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a point lies inside a surface that need not be perfect.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/values/mesh.hpp"
+
+namespace ecorche::check {
+
+/// Counts signed crossings along one ray in each of +x, +y and +z, and lets the majority decide: a ray that
+/// leaves through a hole is outvoted. A ray that meets an edge or a corner counts each sheet once (half-open
+/// rule, the same intersection for both triangles of an edge). Memory and time to build O(#F); a query visits
+/// one column a ray.
+class Inside {
+ public:
+  explicit Inside(const SurfaceMesh& surface);  ///< `surface` must outlive it
+
+  bool operator()(const Eigen::Vector3d& p) const;
+  /// Sum of the signed crossings of the ray from `p` along +axis: 1 inside an outward surface, 0 outside.
+  int crossings(const Eigen::Vector3d& p, int axis) const;
+
+ private:
+  // Triangles by the cell that their shadow along one axis touches.
+  struct Columns {
+    Eigen::Vector2d low = Eigen::Vector2d::Zero();
+    double edge = 1;
+    std::array<int, 2> size{1, 1};
+    std::vector<std::int32_t> offsets, triangles;
+  };
+  Columns build(int axis) const;
+
+  const SurfaceMesh& surface_;
+  std::array<Columns, 3> columns_;
+};
+
+}  // namespace ecorche::check
