@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>  // tet_det uses cross
 #include <cstdint>
 #include <vector>
 
