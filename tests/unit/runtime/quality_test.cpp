@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <memory>
+#include <random>
+
+#include "runtime/quality/pose_quality.hpp"
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::runtime {
+namespace {
+
+using Eigen::Vector3d;
+
+struct Posed {
+  std::shared_ptr<const Model> model = std::make_shared<const Model>(test::toy_model());
+  BodyPoser poser{model};
+  PosedBody body = poser.make_frame();
+
+  PoseQuality measured(const QualityThresholds& thresholds = {}) const {
+    return measure(*model, body, poser.all_tissues(), thresholds);
+  }
+};
+
+// Every coordinate of nodes and tissues through `f`.
+template <class F>
+void deform(PosedBody& body, F f) {
+  const auto each = [&](std::vector<float>& points) {
+    for (std::size_t i = 0; i < points.size(); i += 3) {
+      const Vector3d p = f(Vector3d(static_cast<double>(points[i]), static_cast<double>(points[i + 1]),
+                                    static_cast<double>(points[i + 2])));
+      for (std::size_t c = 0; c < 3; ++c) points[i + c] = static_cast<float>(p[static_cast<Eigen::Index>(c)]);
+    }
+  };
+  each(body.nodes);
+  for (auto& tissue : body.tissues) each(tissue);
+}
+
+TEST(PoseQuality, RestIsPerfect) {
+  const Posed posed;
+  const PoseQuality q = posed.measured();
+  EXPECT_EQ(q.inverted_tets, 0u);
+  EXPECT_EQ(q.inverted_rest_mm3, 0);
+  EXPECT_EQ(q.min_det_f, 1);
+  EXPECT_EQ(q.volume_change, 0);
+  EXPECT_LT(q.bone_rigidity_mm, 1e-6);
+  ASSERT_EQ(q.tissues.size(), 5u);
+  EXPECT_EQ(q.tissues[0].name, "skin");
+  EXPECT_NEAR(q.tissues[0].rest_mm3, 42.0 * 42 * 302, 1);
+  for (const TissueChange& t : q.tissues) EXPECT_EQ(t.share, 0);
+  EXPECT_TRUE(q.pass);
+}
+
+TEST(PoseQuality, AStretchIsMeasuredAsWhatItIs) {
+  Posed posed;
+  deform(posed.body, [](const Vector3d& p) { return Vector3d(1.2 * p.x(), p.y(), p.z() + 5000); });
+  const PoseQuality q = posed.measured();
+  EXPECT_NEAR(q.volume_change, 0.2, 1e-4);
+  EXPECT_NEAR(q.tissues[0].share, 0.2, 1e-4);
+  EXPECT_NEAR(q.tissues[4].posed_mm3, 1.2 * 24 * 24 * 260, 100);
+  EXPECT_EQ(q.min_det_f, 1) << "nothing shrank";
+  // A bone of half width 6 grows by 1.2: the best rigid fit leaves 1.2 mm at its sides.
+  EXPECT_NEAR(q.bone_rigidity_mm, 1.2, 0.1);
+  EXPECT_FALSE(q.pass);
+  QualityThresholds loose;
+  loose.max_volume_change = 0.5;
+  loose.max_bone_rigidity_mm = 2;
+  EXPECT_TRUE(posed.measured(loose).pass);
+  EXPECT_EQ(posed.measured(loose).thresholds.max_volume_change, 0.5);
+}
+
+TEST(PoseQuality, AMirrorInvertsEverything) {
+  Posed posed;
+  deform(posed.body, [](const Vector3d& p) { return Vector3d(-p.x(), p.y(), p.z()); });
+  const PoseQuality q = posed.measured();
+  EXPECT_EQ(q.inverted_tets, posed.model->tet_count());
+  EXPECT_NEAR(q.inverted_rest_mm3, 40.0 * 40 * 300, 1);
+  EXPECT_NEAR(q.inverted_share, 1, 1e-12);
+  EXPECT_NEAR(q.min_det_f, -1, 1e-5);
+  EXPECT_NEAR(q.volume_change, -2, 1e-6);
+  EXPECT_FALSE(q.pass);
+}
+
+TEST(PoseQuality, OneInvertedTetIsCountedWithItsVolume) {
+  Posed posed;
+  // Push a node that only corner tets use through the opposite side.
+  posed.body.nodes[0] = 60;
+  posed.body.nodes[1] = 60;
+  const PoseQuality q = posed.measured();
+  std::uint64_t expected = 0;
+  const auto det_f = tet_det_f(*posed.model, posed.body.nodes);
+  for (const float d : det_f) expected += d <= 0;
+  EXPECT_GT(expected, 0u);
+  EXPECT_EQ(q.inverted_tets, expected);
+  EXPECT_NEAR(q.inverted_rest_mm3, static_cast<double>(expected) * 20 * 20 * (300.0 / 18) / 6, 1e-2);
+  EXPECT_NEAR(q.min_det_f, static_cast<double>(*std::min_element(det_f.begin(), det_f.end())), 1e-6);
+}
+
+TEST(PoseQuality, TellsOnlyOfTheTissuesAsked) {
+  const Posed posed;
+  const std::vector<std::uint32_t> rows{0, 4};
+  const PoseQuality q = measure(*posed.model, posed.body, rows);
+  ASSERT_EQ(q.tissues.size(), 2u);
+  EXPECT_EQ(q.tissues[1].name, "muscle");
+  EXPECT_EQ(q.bone_rigidity_mm, 0);
+}
+
+TEST(PoseQuality, RepeatsWhatLimitsTookAway) {
+  Posed posed;
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] = Eigen::AngleAxisd(2.9, Vector3d::UnitX());
+  ASSERT_TRUE(posed.poser.run(pose, Skinning::cor, posed.poser.all_tissues(), posed.body).ok());
+  const PoseQuality q = posed.measured();
+  ASSERT_EQ(q.clamped.size(), 1u);
+  EXPECT_EQ(q.clamped[0].joint, 1);
+  EXPECT_LT(q.bone_rigidity_mm, 1e-3);
+}
+
+TEST(PoseQuality, SameFiguresForAnyNumberOfThreads) {
+  Posed posed;
+  Pose pose = Pose::rest(3);
+  pose.rotation[2] = Eigen::AngleAxisd(1.5, Vector3d(1, 1, 1).normalized());
+  ASSERT_TRUE(posed.poser.run(pose, Skinning::dqs, posed.poser.all_tissues(), posed.body).ok());
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
+  PoseQuality one, four;
+  tbb::task_arena(1).execute([&] { one = posed.measured(); });
+  tbb::task_arena(4).execute([&] { four = posed.measured(); });
+  EXPECT_EQ(one.volume_change, four.volume_change);
+  EXPECT_EQ(one.bone_rigidity_mm, four.bone_rigidity_mm);
+  EXPECT_EQ(one.tissues[0].posed_mm3, four.tissues[0].posed_mm3);
+}
+
+TEST(RigidResidual, FindsTheMotionAndWhatIsLeft) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> side(-50, 50);
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.3, -0.5, 0.2, 0.7).normalized();
+  std::vector<float> rest, posed;
+  for (int v = 0; v < 200; ++v) {
+    const Vector3d x(static_cast<double>(side(random)), static_cast<double>(side(random)),
+                     static_cast<double>(side(random)));
+    const Vector3d y = turn * x + Vector3d(100, -900, 30);
+    for (int c = 0; c < 3; ++c) {
+      rest.push_back(static_cast<float>(x[c]));
+      posed.push_back(static_cast<float>(y[c]));
+    }
+  }
+  EXPECT_LT(rigid_residual(rest, posed), 1e-3);
+  posed[30] += 2;  // one vertex out of place takes the fit along by a 200th
+  EXPECT_NEAR(rigid_residual(rest, posed), 2, 0.05);
+}
+
+TEST(EnclosedVolume, OfABoxAnywhere) {
+  const Model model = test::toy_model();
+  const Tissue& bone = model.tissues[1];
+  std::vector<float> far(bone.V.data(), bone.V.data() + bone.V.size());
+  for (float& x : far) x += 4096;
+  EXPECT_NEAR(enclosed_volume(far, bone.F), 12.0 * 12 * 50, 0.1);
+  EXPECT_EQ(enclosed_volume({}, Triangles(0, 3)), 0);
+}
+
+}  // namespace
+}  // namespace ecorche::runtime

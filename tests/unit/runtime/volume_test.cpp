@@ -1,0 +1,396 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <random>
+
+#include "runtime/skin/body_poser.hpp"
+#include "runtime/volume/resample.hpp"
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::runtime {
+namespace {
+
+using Eigen::Vector3d;
+
+std::vector<float> rest_nodes(const Model& model) {
+  return {model.nodes.data(), model.nodes.data() + model.nodes.size()};
+}
+
+std::vector<float> bent_nodes(const Model& model, double flexion, double twist) {
+  const BodyPoser poser(std::make_shared<const Model>(model));
+  PosedBody body = poser.make_frame();
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] = Eigen::AngleAxisd(flexion, Vector3d::UnitX());
+  pose.rotation[2] = Eigen::AngleAxisd(twist, Vector3d::UnitZ());
+  EXPECT_TRUE(poser.run(pose, Skinning::cor, {}, body).ok());
+  return body.nodes;
+}
+
+// A lattice that nothing lines up with: turned, anisotropic, of either hand.
+ImageGrid skew_grid(bool left_handed) {
+  ImageGrid grid;
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.9, 0.2, -0.3, 0.1).normalized();
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = turn.toRotationMatrix();
+  if (left_handed) direction.col(2) *= -1;
+  std::copy_n(direction.data(), 9, grid.direction.begin());
+  grid.spacing = {7, 9, 12};
+  const Vector3d low = direction * Vector3d(-90, -90, left_handed ? -330 : -40);
+  grid.origin = {low.x(), low.y(), low.z()};
+  grid.size = {50, 39, 34};
+  return grid;
+}
+
+Vector3d node_of(const Model& model, const std::vector<float>& nodes, std::int64_t t, int c) {
+  const auto n = 3 * static_cast<std::size_t>(model.tets(t, c));
+  return {static_cast<double>(nodes[n]), static_cast<double>(nodes[n + 1]),
+          static_cast<double>(nodes[n + 2])};
+}
+
+double det_of(const Model& model, const std::vector<float>& nodes, std::int64_t t) {
+  const Vector3d a = node_of(model, nodes, t, 0);
+  return (node_of(model, nodes, t, 1) - a)
+      .cross(node_of(model, nodes, t, 2) - a)
+      .dot(node_of(model, nodes, t, 3) - a);
+}
+
+// The slow, obvious search: every centre against every tet, by its four barycentric coordinates in LPS mm.
+class Exhaustive {
+ public:
+  Exhaustive(const Model& model, const std::vector<float>& nodes) {
+    for (std::int64_t t = 0; t < model.tets.rows(); ++t) {
+      Eigen::Matrix4d corners;
+      for (int c = 0; c < 4; ++c) corners.col(c) << node_of(model, nodes, t, c), 1;
+      to_barycentric_.push_back(corners.fullPivLu().inverse());
+      positive_.push_back(det_of(model, nodes, t) > 0);
+    }
+  }
+
+  double smallest(std::size_t t, const Vector3d& p) const {
+    return (to_barycentric_[t] * p.homogeneous()).minCoeff();
+  }
+
+  std::int32_t find(const Vector3d& p) const {
+    for (const bool positive : {true, false}) {
+      for (std::size_t t = 0; t < positive_.size(); ++t) {
+        if (positive_[t] == positive && smallest(t, p) >= -1e-10) return static_cast<std::int32_t>(t);
+      }
+    }
+    return InverseMap::none;
+  }
+
+ private:
+  std::vector<Eigen::Matrix4d> to_barycentric_;
+  std::vector<bool> positive_;
+};
+
+// Where a centre lies on a face up to rounding, any tet that touches it will do.
+void expect_exhaustive(const Model& model, const std::vector<float>& nodes, const InverseMap& map) {
+  const Exhaustive search(model, nodes);
+  std::size_t held = 0;
+  for (int k = 0; k < map.grid.size[2]; ++k) {
+    for (int j = 0; j < map.grid.size[1]; ++j) {
+      for (int i = 0; i < map.grid.size[0]; ++i) {
+        const auto at = map.grid.point(i, j, k);
+        const Vector3d p(at[0], at[1], at[2]);
+        const std::int32_t found = map.tet[map.grid.offset(i, j, k)], expected = search.find(p);
+        held += found != InverseMap::none;
+        if (found == expected) continue;
+        for (const std::int32_t t : {found, expected}) {
+          if (t == InverseMap::none) continue;
+          EXPECT_NEAR(search.smallest(static_cast<std::size_t>(t), p), 0, 1e-8) << i << " " << j << " " << k;
+        }
+      }
+    }
+  }
+  EXPECT_GT(held, 100u);
+}
+
+TEST(Locate, AgreesWithAnExhaustiveSearch) {
+  const Model model = test::toy_model();
+  const auto rest = rest_nodes(model), bent = bent_nodes(model, 1.2, 0.8);
+  InverseMap map;
+  for (const bool left_handed : {false, true}) {
+    for (const auto& nodes : {rest, bent}) {
+      locate(model, nodes, skew_grid(left_handed), map);
+      expect_exhaustive(model, nodes, map);
+    }
+  }
+}
+
+TEST(Locate, FoldsGoToPositiveTetsThenToTheLowestIndex) {
+  const Model model = test::toy_model();
+  const auto folded = bent_nodes(model, 2.4, 2.4);
+  std::size_t inverted = 0;
+  for (std::int64_t t = 0; t < model.tets.rows(); ++t) inverted += det_of(model, folded, t) < 0;
+  ASSERT_GT(inverted, 5u) << "this pose was meant to fold";
+  InverseMap map;
+  locate(model, folded, skew_grid(false), map);
+  expect_exhaustive(model, folded, map);
+}
+
+// Voxel centres that lie exactly on nodes, edges and faces of the mesh.
+TEST(Locate, SharedFacesHoldEveryCentreOnce) {
+  const Model model = test::toy_model();
+  ImageGrid grid;
+  grid.spacing = {5, 5, 5};  // nodes lie 20 x 20 x 16.67 mm apart; cells are cut along diagonals
+  grid.size = {13, 13, 65};
+  grid.origin = {-30, -30, -10};
+  InverseMap map;
+  locate(model, rest_nodes(model), grid, map);
+  std::size_t expected = 0;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const auto p = grid.point(i, j, k);
+        const bool inside = std::abs(p[0]) <= 20 && std::abs(p[1]) <= 20 && p[2] >= 0 && p[2] <= 300;
+        expected += inside;
+        EXPECT_EQ(map.tet[grid.offset(i, j, k)] != InverseMap::none, inside)
+            << p[0] << " " << p[1] << " " << p[2];
+      }
+    }
+  }
+  EXPECT_EQ(expected, 9u * 9u * 61u);
+  expect_exhaustive(model, rest_nodes(model), map);
+}
+
+TEST(Locate, FlatAndBrokenTetsHoldNothing) {
+  const Model model = test::toy_model();
+  InverseMap map;
+  std::vector<float> flat = rest_nodes(model);
+  for (std::size_t n = 0; n < flat.size(); n += 3) flat[n] = 0;
+  locate(model, flat, skew_grid(false), map);
+  EXPECT_EQ(std::count(map.tet.begin(), map.tet.end(), InverseMap::none),
+            static_cast<std::ptrdiff_t>(map.tet.size()));
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 3e38F}) {
+    std::vector<float> broken = rest_nodes(model);
+    std::fill(broken.begin() + 30, broken.begin() + 60, bad);
+    locate(model, broken, skew_grid(false), map);  // must neither crash nor hang
+  }
+}
+
+TEST(Locate, SameForAnyNumberOfThreads) {
+  const Model model = test::toy_model();
+  const auto nodes = bent_nodes(model, 2.2, 1);
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
+  InverseMap one, four;
+  tbb::task_arena(1).execute([&] { locate(model, nodes, skew_grid(false), one); });
+  tbb::task_arena(4).execute([&] { locate(model, nodes, skew_grid(false), four); });
+  EXPECT_EQ(one.tet, four.tet);
+}
+
+TEST(Locate, StopsWhenAsked) {
+  const Model model = test::toy_model();
+  std::stop_source source;
+  source.request_stop();
+  Context context;
+  context.stop = source.get_token();
+  InverseMap map;
+  try {
+    locate(model, rest_nodes(model), skew_grid(false), map, context);
+    FAIL() << "must stop";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::interrupted);
+  }
+}
+
+TEST(GrowTo, KeepsTheLattice) {
+  const Model model = test::toy_model();
+  const ImageGrid rest = model.volumes[0].image.grid;
+  EXPECT_EQ(grow_to(rest, rest_nodes(model)), rest);
+  auto moved = rest_nodes(model);
+  for (std::size_t n = 0; n < moved.size(); n += 3) {
+    moved[n] -= 101;     // to x = -121: index (-121 + 25) / 10 = -9.6
+    moved[n + 2] += 98;  // to z = 398: index 40.3
+  }
+  const ImageGrid grown = grow_to(rest, moved);
+  EXPECT_EQ(grown.origin, (std::array<double, 3>{-125, -25, -5}));
+  EXPECT_EQ(grown.size, (std::array<std::int32_t, 3>{16, 6, 42}));
+  EXPECT_EQ(grown.spacing, rest.spacing);
+
+  const ImageGrid skew = skew_grid(true);
+  const ImageGrid big = grow_to(skew, moved);
+  for (std::size_t n = 0; n < moved.size(); n += 3) {
+    const auto index = big.index({static_cast<double>(moved[n]), static_cast<double>(moved[n + 1]),
+                                  static_cast<double>(moved[n + 2])});
+    for (std::size_t a = 0; a < 3; ++a) {
+      EXPECT_GE(index[a], -1e-5);
+      EXPECT_LE(index[a], big.size[a] - 1 + 1e-5);
+    }
+  }
+  const auto shift = skew.index(big.origin);
+  for (const double s : shift) EXPECT_NEAR(s, std::round(s), 1e-9) << "whole voxels";
+}
+
+TEST(GrowTo, RefusesTooManyVoxels) {
+  const Model model = test::toy_model();
+  auto far = rest_nodes(model);
+  far[0] = 1e6F;
+  far[1] = 1e6F;
+  far[2] = 1e6F;
+  EXPECT_THROW(grow_to(model.volumes[0].image.grid, far), Error);
+  far[0] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(grow_to(model.volumes[0].image.grid, far), Error);
+}
+
+TEST(Resample, RestWithNearestIsTheVolumeItself) {
+  const Model model = test::toy_model();
+  for (const ModelVolume& volume : model.volumes) {
+    InverseMap map;
+    locate(model, rest_nodes(model), volume.image.grid, map);
+    const Image posed = resample(model, rest_nodes(model), map, volume, Sampling::nearest);
+    ASSERT_EQ(posed.grid, volume.image.grid);
+    with_scalar_type(posed.type, [&](auto zero) {
+      using T = decltype(zero);
+      const auto before = volume.image.scalars<T>(), after = posed.scalars<T>();
+      for (std::size_t v = 0; v < after.size(); ++v) {
+        const bool held = map.tet[v] != InverseMap::none;
+        EXPECT_EQ(after[v], held ? before[v] : static_cast<T>(volume.background));
+      }
+    });
+  }
+}
+
+// A volume whose value is a linear function of the rest point, sampled trilinearly, tells the rest point
+// itself.
+ModelVolume linear_volume(const ImageGrid& grid, ScalarType type, int components) {
+  ModelVolume volume{"linear", Image(grid, type, components), -7, false, {}};
+  with_scalar_type(type, [&](auto zero) {
+    using T = decltype(zero);
+    const auto out = volume.image.scalars<T>();
+    for (int k = 0; k < grid.size[2]; ++k) {
+      for (int j = 0; j < grid.size[1]; ++j) {
+        for (int i = 0; i < grid.size[0]; ++i) {
+          const auto p = grid.point(i, j, k);
+          for (int c = 0; c < components; ++c) {
+            const double value = 60 + 0.1 * p[static_cast<std::size_t>(c % 3)] + c;
+            out[static_cast<std::size_t>(components) * grid.offset(i, j, k) + static_cast<std::size_t>(c)] =
+                static_cast<T>(std::is_integral_v<T> ? std::round(value) : value);
+          }
+        }
+      }
+    }
+  });
+  return volume;
+}
+
+TEST(Resample, EveryScalarTypeAndComponentFollowsTheInverseMap) {
+  const Model model = test::toy_model();
+  const auto nodes = bent_nodes(model, 1.0, 0.5);
+  ImageGrid source = skew_grid(true);
+  InverseMap map;
+  locate(model, nodes, skew_grid(false), map);
+  const DisplacementField field = inverse_displacement(model, nodes, map);
+  const auto vectors = field.vectors.scalars<float>();
+  const auto mask = field.mask.scalars<std::uint8_t>();
+  for (const ScalarType type : {ScalarType::u8, ScalarType::i8, ScalarType::u16, ScalarType::i16,
+                                ScalarType::u32, ScalarType::i32, ScalarType::f32, ScalarType::f64}) {
+    for (const int components : {1, 3}) {
+      const ModelVolume volume = linear_volume(source, type, components);
+      const Image posed = resample(model, nodes, map, volume, Sampling::trilinear);
+      ASSERT_EQ(posed.type, type);
+      ASSERT_EQ(posed.components, components);
+      with_scalar_type(type, [&](auto zero) {
+        using T = decltype(zero);
+        const auto values = posed.scalars<T>();
+        for (int k = 0; k < map.grid.size[2]; ++k) {
+          for (int j = 0; j < map.grid.size[1]; ++j) {
+            for (int i = 0; i < map.grid.size[0]; ++i) {
+              const std::size_t v = map.grid.offset(i, j, k);
+              for (int c = 0; c < components; ++c) {
+                const double found = static_cast<double>(
+                    values[static_cast<std::size_t>(components) * v + static_cast<std::size_t>(c)]);
+                if (mask[v] == 0) {
+                  EXPECT_EQ(found, static_cast<double>(static_cast<T>(std::is_unsigned_v<T> ? 0 : -7)));
+                  continue;
+                }
+                const auto axis = static_cast<std::size_t>(c % 3);
+                const double rest =
+                    map.grid.point(i, j, k)[axis] + static_cast<double>(vectors[3 * v + axis]);
+                // Integers were rounded twice.
+                EXPECT_NEAR(found, 60 + 0.1 * rest + c, std::is_integral_v<T> ? 1.001 : 1e-4);
+              }
+            }
+          }
+        }
+      });
+    }
+  }
+}
+
+TEST(Resample, BeyondTheImageIsBackground) {
+  const Model model = test::toy_model();
+  ImageGrid small;
+  small.size = {2, 2, 2};
+  small.spacing = {10, 10, 10};
+  small.origin = {-5, -5, 50};
+  ModelVolume volume{"ct", Image(small, ScalarType::i16), -1000, false, {}};
+  for (auto& v : volume.image.scalars<std::int16_t>()) v = 500;
+  ImageGrid fine = small;
+  fine.spacing = {2.5, 2.5, 2.5};
+  fine.size = {13, 13, 13};
+  fine.origin = {-15, -15, 40};
+  InverseMap map;
+  locate(model, rest_nodes(model), fine, map);
+  const auto value = [&](Sampling sampling, int i) {
+    const Image posed = resample(model, rest_nodes(model), map, volume, sampling);
+    return posed.scalars<std::int16_t>()[fine.offset(i, 5, 5)];  // y = -2.5, z = 52.5: inside
+  };
+  EXPECT_EQ(value(Sampling::nearest, 1), -1000);   // x = -12.5
+  EXPECT_EQ(value(Sampling::nearest, 2), 500);     // x = -10, half a voxel out
+  EXPECT_EQ(value(Sampling::nearest, 9), 500);     // x = 7.5
+  EXPECT_EQ(value(Sampling::nearest, 11), -1000);  // x = 12.5
+  EXPECT_EQ(value(Sampling::trilinear, 4), 500);   // x = -5, on a centre
+  EXPECT_EQ(value(Sampling::trilinear, 2), -250);  // half way to a sample beyond
+  EXPECT_EQ(value(Sampling::trilinear, 0), -1000);
+}
+
+TEST(Resample, LabelsAreNeverMixed) {
+  const Model model = test::toy_model();
+  const auto nodes = bent_nodes(model, 0.9, 0.9);
+  InverseMap map;
+  locate(model, nodes, skew_grid(false), map);
+  const Image posed = resample(model, nodes, map, model.volumes[1], Sampling::trilinear);
+  EXPECT_EQ(posed.bytes, resample(model, nodes, map, model.volumes[1], Sampling::nearest).bytes);
+}
+
+TEST(Resample, SaturatesIntegers) {
+  const Model model = test::toy_model();
+  ModelVolume volume{"ct", Image(model.volumes[0].image.grid, ScalarType::u8), 1e6, false, {}};
+  InverseMap map;
+  locate(model, rest_nodes(model), skew_grid(false), map);
+  const Image posed = resample(model, rest_nodes(model), map, volume, Sampling::trilinear);
+  const auto outside = std::find(map.tet.begin(), map.tet.end(), InverseMap::none) - map.tet.begin();
+  EXPECT_EQ(posed.scalars<std::uint8_t>()[static_cast<std::size_t>(outside)], 255);
+}
+
+TEST(InverseDisplacement, TakesPosedNodesBackToRest) {
+  const Model model = test::toy_model();
+  const auto nodes = bent_nodes(model, 0.5, 0.5);
+  // A lattice with a voxel centre on one posed node after the other.
+  for (Eigen::Index n = 0; n < model.nodes.rows(); n += 11) {
+    ImageGrid grid;
+    const auto at = static_cast<std::size_t>(3 * n);
+    grid.origin = {static_cast<double>(nodes[at]), static_cast<double>(nodes[at + 1]),
+                   static_cast<double>(nodes[at + 2])};
+    grid.size = {1, 1, 1};
+    InverseMap map;
+    locate(model, nodes, grid, map);
+    const DisplacementField field = inverse_displacement(model, nodes, map);
+    ASSERT_EQ(field.mask.scalars<std::uint8_t>()[0], 1) << "a node is of the body";
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double rest = static_cast<double>(nodes[at + c] + field.vectors.scalars<float>()[c]);
+      EXPECT_NEAR(rest, static_cast<double>(model.nodes(n, static_cast<Eigen::Index>(c))), 1e-4);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::runtime
