@@ -72,7 +72,7 @@ std::string text_report(const Report& report) {
   for (const Finding& finding : report.findings) {
     out += fmt::format("{}: {}: {}", check::severity_name(finding.severity), finding.where, finding.what);
     if (finding.at)
-      out += fmt::format(", first at [{:.2f}, {:.2f}, {:.2f}]", finding.at->x(), finding.at->y(),
+      out += fmt::format(", at [{:.2f}, {:.2f}, {:.2f}]", finding.at->x(), finding.at->y(),
                          finding.at->z());
     out += fmt::format(" ({})\n", finding.mend);
   }

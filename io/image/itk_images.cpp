@@ -5,6 +5,9 @@
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
+#include <iostream>
+#include <sstream>
+
 #include "core/values/error.hpp"
 
 namespace ecorche::io::itk_images {
@@ -31,8 +34,22 @@ itk::ImageIOBase::Pointer make(Format format, const std::filesystem::path& path)
   return io;
 }
 
+// MetaIO and teem write their complaints on std::cerr: kept here instead. Nothing of ours writes there.
+class Complaints {
+ public:
+  Complaints() : before_(std::cerr.rdbuf(&text_)) {}
+  ~Complaints() { std::cerr.rdbuf(before_); }
+  Complaints(const Complaints&) = delete;
+  Complaints& operator=(const Complaints&) = delete;
+
+ private:
+  std::stringbuf text_;
+  std::streambuf* before_;
+};
+
 template <class F>
 auto guarded(ErrorKind kind, const std::filesystem::path& path, F&& f) {
+  const Complaints kept;
   try {
     return f();
   } catch (const itk::ExceptionObject& error) {
