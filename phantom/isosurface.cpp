@@ -16,7 +16,7 @@ namespace ecorche::phantom {
 
 namespace {
 
-constexpr int kRelaxations = 4;
+constexpr std::array<double, 4> kPulls{0.6, 0.6, 0.4, 0};  // the last pass only puts vertices on the surface
 constexpr int kBlock = 8;  // samples along an edge of the blocks that are skipped or filled together
 
 /// Corner c of a cell has offsets (c & 1, c >> 1 & 1, c >> 2). Edge e = 4 * axis + (which of four, by the other axes).
@@ -100,8 +100,7 @@ class SurfaceNets {
     place_vertices();
     make_quads();
     context_.check_stop();
-    for (int i = 0; i < kRelaxations; ++i) relax();
-    for (int i = 0; i < 2; ++i) project_all();
+    for (const double pull : kPulls) relax(pull);
     return triangulate();
   }
 
@@ -246,7 +245,8 @@ class SurfaceNets {
     }
   }
 
-  void relax() {
+  /// Slides vertices by `pull` of the way to their neighbours' mean, then back onto the surface.
+  void relax(double pull) {
     std::vector<Vec> sum(vertices_.size(), Vec::Zero());
     std::vector<int> count(vertices_.size(), 0);
     for (const auto& quad : quads_) {
@@ -259,24 +259,16 @@ class SurfaceNets {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size(), 256), [&](const auto& range) {
       for (std::size_t v = range.begin(); v < range.end(); ++v) {
         const Vec step = sum[v] / count[v] - vertices_[v];
-        vertices_[v] = project(v, vertices_[v] + 0.6 * step);
+        vertices_[v] = project(v, vertices_[v] + pull * step);
       }
-    });
-    context_.check_stop();
-  }
-
-  void project_all() {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size(), 256), [&](const auto& range) {
-      for (std::size_t v = range.begin(); v < range.end(); ++v) vertices_[v] = project(v, vertices_[v]);
     });
     context_.check_stop();
   }
 
   /// A Newton step to the surface, no further than the vertex's own neighbourhood.
   Vec project(std::size_t v, const Vec& p) const {
-    const double d = shape_.distance(p);
-    const double step = std::clamp(d, -0.5 * h_, 0.5 * h_);
-    const Vec q = p - step * shape_.normal(p, 0.02 * h_);
+    const Shape::Sample at = shape_.sample(p, 0.01 * h_);
+    const Vec q = p - std::clamp(at.distance, -0.5 * h_, 0.5 * h_) * at.normal;
     const Vec reach = Vec::Constant(0.7 * h_);
     return q.cwiseMax(home_[v] - reach).cwiseMin(home_[v] + reach);
   }

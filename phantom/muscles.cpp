@@ -33,7 +33,7 @@ Shape wrapped(const std::vector<Vec>& line, double r0, double belly, double r1) 
     radii.push_back(spindle(static_cast<double>(i) / (kLinks - 1), r0, belly, r1));
     for (int step = 0; step < 4; ++step) {
       const double lacking = radii[i] + 6 - envelope.distance(path[i]);
-      if (lacking > 0) path[i] += lacking * envelope.normal(path[i]);
+      if (lacking > 0) path[i] += lacking * envelope.sample(path[i]).normal;
     }
   }
   return chain(path, radii);

@@ -46,7 +46,10 @@ SurfaceMesh mirror_image(const SurfaceMesh& mesh) {
 void put_on(const Shape& shape, SurfaceMesh& mesh) {
   for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
     Vec p = mesh.V.row(v).transpose();
-    for (int i = 0; i < 3; ++i) p -= std::clamp(shape.distance(p), -1.0, 1.0) * shape.normal(p);
+    for (int i = 0; i < 3; ++i) {
+      const Shape::Sample at = shape.sample(p);
+      p -= std::clamp(at.distance, -1.0, 1.0) * at.normal;
+    }
     mesh.V.row(v) = p.transpose();
   }
 }

@@ -10,6 +10,8 @@ namespace ecorche::phantom {
 
 namespace {
 
+constexpr double kFar = 24;  // mm; more than any blend or growth of a combined solid
+
 /// Quadratic smooth minimum: equals the minimum where the two differ by more than `k`.
 double smooth_min(double a, double b, double k) {
   if (k <= 0) return std::min(a, b);
@@ -45,7 +47,8 @@ class Ellipsoid final : public Shape::Node {
     const double k1 = u.cwiseProduct(inverse_).norm();
     if (k1 < 1e-12) return -smallest_;
     const double first_order = k0 * (k0 - 1) / k1;
-    return std::max(first_order, -smallest_);  // the estimate runs away near the centre
+    // Inside, the estimate runs away from the surface's nearest point; this is exact in the middle of the longest axis.
+    return k0 < 1 ? std::max(first_order, -smallest_ * std::sqrt(1 - k0 * k0)) : first_order;
   }
 
  private:
@@ -77,27 +80,40 @@ struct RoundCone {
 class Chain final : public Shape::Node {
  public:
   Chain(const std::vector<Vec>& points, const std::vector<double>& radii) : Node(Box()) {
-    for (std::size_t i = 0; i < points.size(); ++i) box_.add(points[i], radii[i]);
     for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+      if (i % kRun == 0) runs_.emplace_back();
+      for (const std::size_t end : {i, i + 1}) runs_.back().add(points[end], radii[end]);
       links_.emplace_back(points[i], radii[i], points[i + 1], radii[i + 1]);
-      centres_.emplace_back((points[i] + points[i + 1]) / 2);
-      reach_.push_back((points[i] - points[i + 1]).norm() / 2 + std::max(radii[i], radii[i + 1]));
     }
+    for (const Box& run : runs_) box_.add(run);
   }
   double distance(const Vec& p) const override {
-    double d = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < links_.size(); ++i) {
-      const double bound = d + reach_[i];  // the link lies within `reach` of its middle
-      if (bound > 0 && (p - centres_[i]).squaredNorm() >= bound * bound) continue;
-      d = std::min(d, links_[i].distance(p));
+    const double away = box_.distance(p);
+    if (away > kFar) return away;
+    std::size_t nearest = 0;
+    double nearest_away = std::numeric_limits<double>::infinity();
+    for (std::size_t run = 0; run < runs_.size(); ++run) {
+      const double run_away = runs_[run].distance(p);
+      if (run_away < nearest_away) nearest = run, nearest_away = run_away;
+    }
+    double d = run_distance(nearest, p);
+    for (std::size_t run = 0; run < runs_.size(); ++run) {
+      if (run != nearest && runs_[run].distance(p) < std::max(d, 1e-9)) d = std::min(d, run_distance(run, p));
     }
     return d;
   }
 
  private:
+  static constexpr std::size_t kRun = 4;  // links that share a box
+
+  double run_distance(std::size_t run, const Vec& p) const {
+    double d = std::numeric_limits<double>::infinity();
+    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, links_.size()); ++i) d = std::min(d, links_[i].distance(p));
+    return d;
+  }
+
   std::vector<RoundCone> links_;
-  std::vector<Vec> centres_;
-  std::vector<double> reach_;
+  std::vector<Box> runs_;
 };
 
 class RoundBox final : public Shape::Node {
@@ -171,7 +187,8 @@ class Difference final : public Shape::Node {
   Difference(const Shape& from, const Shape& what, double blend) : Node(from.box()), from_(from), what_(what), blend_(blend) {}
   double distance(const Vec& p) const override {
     const double d = from_.distance(p);
-    if (d >= blend_ - what_.box().distance(p)) return d;
+    // Far outside, the distance to what it was cut from is a good enough bound.
+    if (d >= kFar || d >= blend_ - what_.box().distance(p)) return d;
     return -smooth_min(-d, what_.distance(p), blend_);
   }
 
@@ -230,12 +247,18 @@ Shape make(A&&... arguments) {
 
 }  // namespace
 
-Vec Shape::normal(const Vec& p, double step) const {
-  const Vec k[4] = {{1, -1, -1}, {-1, -1, 1}, {-1, 1, -1}, {1, 1, 1}};
+Shape::Sample Shape::sample(const Vec& p, double step) const {
+  const Vec corners[4] = {{1, -1, -1}, {-1, -1, 1}, {-1, 1, -1}, {1, 1, 1}};
+  Sample sample;
   Vec g = Vec::Zero();
-  for (const Vec& corner : k) g += corner * distance(p + step * corner);
+  for (const Vec& corner : corners) {
+    const double d = distance(p + step * corner);
+    g += d * corner;
+    sample.distance += d / 4;
+  }
   const double length = g.norm();
-  return length > 0 ? Vec(g / length) : Vec(Vec::UnitZ());
+  if (length > 0) sample.normal = g / length;
+  return sample;
 }
 
 Shape sphere(const Vec& centre, double radius) { return make<Sphere>(centre, radius); }

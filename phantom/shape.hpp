@@ -31,7 +31,7 @@ struct Box {
 /// and a bound after blending; nowhere does it change faster than `lipschitz` mm per mm.
 class Shape {
  public:
-  static constexpr double lipschitz = 2;  ///< ellipsoids, deep inside; everything else has 1
+  static constexpr double lipschitz = 1.25;  ///< ellipsoids, inside; everything else has 1
 
   /// What a kind of solid implements.
   class Node {
@@ -48,10 +48,15 @@ class Shape {
   Shape() = default;
   explicit Shape(std::shared_ptr<const Node> node) : node_(std::move(node)) {}
 
+  /// Of a combined solid only a lower bound beyond 24 mm.
   double distance(const Vec& p) const { return node_->distance(p); }
   const Box& box() const { return node_->box(); }  ///< holds the whole solid
-  /// Unit direction in which the distance grows, by four samples `step` mm away.
-  Vec normal(const Vec& p, double step = 0.05) const;
+  struct Sample {
+    double distance = 0;
+    Vec normal = Vec::UnitZ();  ///< unit, the way in which the distance grows
+  };
+  /// Distance and normal together, from the corners of a small tetrahedron about `p` (`step` mm along each axis).
+  Sample sample(const Vec& p, double step = 0.05) const;
 
  private:
   std::shared_ptr<const Node> node_;

@@ -93,7 +93,7 @@ Part make_skin(const Landmarks& at, const std::vector<Part>& bones, const std::v
   for (const char* name : {"clavicle_left", "scapula_left", "humerus_left", "radius_left", "ulna_left", "patella_left", "tibia_left", "fibula_left"}) {
     parts.push_back(grow(left_bone(name), 5));
   }
-  for (const char* name : {"skull", "mandible", "pelvis", "rib_cage", "lumbar_spine"}) parts.push_back(grow(left_bone(name), 4.5));
+  for (const char* name : {"skull", "mandible", "pelvis"}) parts.push_back(grow(left_bone(name), 4.5));
   Part skin;
   skin.name = "skin";
   skin.group = Group::skin;

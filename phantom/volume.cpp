@@ -14,7 +14,7 @@ namespace ecorche::phantom {
 namespace {
 
 constexpr double kAir = -1024, kSkin = 40, kSpongy = 250, kNoise = 15;
-constexpr double kSkinThickness = 2, kCortex = 3.5;  // mm
+constexpr double kSkinThickness = 2, kCortex = 3.5, kFade = 3;  // mm
 constexpr int kTile = 8;                             // voxels along an edge of the tiles that are skipped together
 
 /// HU of a part at depth `d` (negative inside).
@@ -22,7 +22,7 @@ double hounsfield(const Part& part, double d) {
   if (part.group == Group::skin) return d > -kSkinThickness ? kSkin : part.hounsfield;
   if (part.group != Group::bone) return part.hounsfield;
   // A dense shell that fades into spongy bone.
-  const double t = std::clamp((-d - kCortex) / 3, 0.0, 1.0);
+  const double t = std::clamp((-d - kCortex) / kFade, 0.0, 1.0);
   return part.hounsfield + (kSpongy - part.hounsfield) * t;
 }
 
@@ -54,7 +54,7 @@ class Painter {
   void run(const Context& context) {
     tbb::parallel_for(0, tiles_[0] * tiles_[1] * tiles_[2], [&](int tile) {
       if (context.stop.stop_requested()) return;
-      paint({lo_[0] + tile % tiles_[0] * kTile, lo_[1] + tile / tiles_[0] % tiles_[1] * kTile, lo_[2] + tile / (tiles_[0] * tiles_[1]) * kTile});
+      paint({lo_[0] + tile % tiles_[0] * kTile, lo_[1] + tile / tiles_[0] % tiles_[1] * kTile, lo_[2] + tile / (tiles_[0] * tiles_[1]) * kTile}, kTile);
     });
     context.check_stop();
   }
@@ -65,24 +65,33 @@ class Painter {
     return {p[0], p[1], p[2]};
   }
 
-  void paint(const std::array<int, 3>& at) {
-    const double middle = (kTile - 1) / 2.0, reach = Shape::lipschitz * std::sqrt(3.0) * (middle + 0.5) * voxel_;
+  void paint(const std::array<int, 3>& at, int edge) {
+    const double middle = (edge - 1) / 2.0, reach = Shape::lipschitz * (std::sqrt(3.0) * middle + 0.5) * voxel_;
     const double d = part_.shape.distance(centre(at[0] + middle, at[1] + middle, at[2] + middle));
     if (d > reach) return;
-    // Deep inside only the part's own value is left; bones and skin still have their shells to pass.
-    const bool deep = d < -reach - kCortex - 3;
-    for (int k = at[2]; k < std::min(at[2] + kTile, hi_[2]); ++k) {
-      for (int j = at[1]; j < std::min(at[1] + kTile, hi_[1]); ++j) {
-        for (int i = at[0]; i < std::min(at[0] + kTile, hi_[0]); ++i) {
-          const double depth = deep ? d : part_.shape.distance(centre(i, j, k));
-          const double share = std::clamp(0.5 - depth / voxel_, 0.0, 1.0);
-          if (share <= 0) continue;
-          const std::size_t n = grid_.offset(i, j, k);
-          hu_[n] = static_cast<float>(hu_[n] + share * (hounsfield(part_, depth) - hu_[n]));
-          if (depth < 0) labels_[n] = label_;
+    // Deep inside only the part's own value is left; bones and skin have their shells to pass first.
+    const bool deep = d < -reach - kCortex - kFade;
+    if (!deep && edge > 2) {
+      const int half = edge / 2;
+      for (int q = 0; q < 8; ++q) {
+        const std::array<int, 3> child{at[0] + (q & 1) * half, at[1] + (q >> 1 & 1) * half, at[2] + (q >> 2) * half};
+        if (child[0] < hi_[0] && child[1] < hi_[1] && child[2] < hi_[2]) paint(child, half);
+      }
+      return;
+    }
+    for (int k = at[2]; k < std::min(at[2] + edge, hi_[2]); ++k) {
+      for (int j = at[1]; j < std::min(at[1] + edge, hi_[1]); ++j) {
+        for (int i = at[0]; i < std::min(at[0] + edge, hi_[0]); ++i) {
+          set(grid_.offset(i, j, k), deep ? d : part_.shape.distance(centre(i, j, k)));
         }
       }
     }
+  }
+
+  void set(std::size_t n, double depth) {
+    const double share = std::clamp(0.5 - depth / voxel_, 0.0, 1.0);
+    hu_[n] = static_cast<float>(hu_[n] + share * (hounsfield(part_, depth) - hu_[n]));
+    if (depth < 0) labels_[n] = label_;
   }
 
   const Part& part_;
