@@ -1,8 +1,196 @@
 // SPDX-License-Identifier: Apache-2.0
+// ecorche info MODEL: what a model holds.
+#include <cstdio>
+#include <filesystem>
+#include <numbers>
+
 #include "app/command.hpp"
+#include "core/model_file/figures.hpp"
+#include "core/model_file/model_file.hpp"
 
 namespace ecorche::app {
+namespace {
 
-void declare_info(CLI::App&, Program&, Run&) {}
+using Json = nlohmann::json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr const char* kKinds[] = {"ball", "hinge", "universal", "fixed", "free"};
+
+// Bytes on the disk by part: `/VTKHDF`, `/ecorche/weights`, ...
+std::map<std::string, std::uint64_t> sizes(const std::string& path) {
+  std::map<std::string, std::uint64_t> parts;
+  for (const model_file::DatasetSummary& dataset : model_file::list(path)) {
+    const std::size_t from = dataset.path.starts_with("/ecorche/") ? std::string("/ecorche/").size() : 1;
+    parts[dataset.path.substr(0, dataset.path.find('/', from))] += dataset.bytes;
+  }
+  return parts;
+}
+
+// Infinite limits are null in JSON: it has no word for them.
+Json limit(double radians) {
+  return std::isfinite(radians) ? Json(radians * kDegrees) : Json();
+}
+
+Json joint_json(const Rig& rig, std::size_t row) {
+  const Segment& segment = rig.skeleton.segments[row];
+  const Joint& joint = segment.joint;
+  const JointFit& fit = rig.fits[row];
+  Json angles = Json::array();
+  for (const AngleAxis& angle : joint.sequence) {
+    angles.push_back({{"name", angle.name},
+                      {"rest_deg", angle.rest * kDegrees},
+                      {"min_deg", limit(angle.min)},
+                      {"max_deg", limit(angle.max)}});
+  }
+  return {{"segment", segment.name},
+          {"parent", segment.parent < 0
+                         ? Json()
+                         : Json(rig.skeleton.segments[static_cast<std::size_t>(segment.parent)].name)},
+          {"joint", joint.name},
+          {"kind", kKinds[static_cast<std::size_t>(joint.kind)]},
+          {"center_mm", {joint.center[0], joint.center[1], joint.center[2]}},
+          {"angles", angles},
+          {"fit",
+           {{"rule", fit.rule == CenterRule::given ? "given" : "sphere_fit"},
+            {"radius_mm", fit.radius_mm},
+            {"residual_mm", fit.residual_mm},
+            {"inlier_share", fit.inlier_share},
+            {"points", fit.points}}}};
+}
+
+Json to_json(const std::string& path, const Model& model) {
+  Json out{{"name", model.name},
+           {"bytes", std::filesystem::file_size(path)},
+           {"nodes", model.node_count()},
+           {"tets", model.tet_count()},
+           {"segments", model.segment_count()},
+           {"bones", model.bone_names.size()},
+           {"weights", model.weights.weight.size()},
+           {"sizes", sizes(path)},
+           {"skeleton", model.rig.skeleton.name},
+           {"rig", Json::array()},
+           {"tissues", Json::array()},
+           {"volumes", Json::array()},
+           {"provenance", model.provenance}};
+  char identity[17];
+  std::snprintf(identity, sizeof identity, "%016llx",
+                static_cast<unsigned long long>(model_file::identity(model)));
+  out["identity"] = identity;
+  for (std::size_t row = 0; row < model.segment_count(); ++row)
+    out["rig"].push_back(joint_json(model.rig, row));
+  for (const Tissue& tissue : model.tissues) {
+    const bool rigid = tissue.segment != Tissue::by_tets;
+    out["tissues"].push_back(
+        {{"name", tissue.name},
+         {"group", group_name(tissue.group)},
+         {"vertices", tissue.V.rows()},
+         {"triangles", tissue.F.rows()},
+         {"segment", rigid ? Json(model.rig.skeleton.segments[static_cast<std::size_t>(tissue.segment)].name)
+                           : Json()}});
+  }
+  for (const ModelVolume& volume : model.volumes) {
+    out["volumes"].push_back({{"name", volume.name},
+                              {"size", volume.image.grid.size},
+                              {"spacing_mm", volume.image.grid.spacing},
+                              {"type", scalar_name(volume.image.type)},
+                              {"components", volume.image.components},
+                              {"background", volume.background},
+                              {"labels", volume.labels},
+                              {"names", volume.table.size()}});
+  }
+  model_file::for_each_figure(model.certificate, [&](std::string_view name, auto value) {
+    out["certificate"][std::string(name)] = value;
+  });
+  // Text of a file may be anything, but JSON is UTF-8.
+  return Json::parse(out.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+// Text of a file goes to a terminal: nothing in it may steer that terminal.
+std::string printable(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  return text;
+}
+
+template <class... Values>
+std::string line(const char* format, Values... values) {
+  char buffer[512];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return std::string(buffer) + "\n";
+}
+
+std::string range(const Json& angle) {
+  const auto word = [](const Json& limit_deg) {
+    char buffer[32];
+    if (limit_deg.is_null()) return std::string("free");
+    std::snprintf(buffer, sizeof buffer, "%.0f", limit_deg.get<double>());
+    return std::string(buffer);
+  };
+  return printable(angle["name"].get<std::string>()) + " " + word(angle["min_deg"]) + ".." +
+         word(angle["max_deg"]);
+}
+
+// The same facts as the JSON, as tables.
+std::string to_text(const Json& info) {
+  const auto text = [](const Json& value) { return printable(value.get<std::string>()); };
+  const auto count = [](const Json& value) { return value.get<unsigned long long>(); };
+  std::string out =
+      line("%s: %llu nodes, %llu tets, %llu segments, %llu bones, %llu weights, %.1f MiB, identity %s",
+           text(info["name"]).c_str(), count(info["nodes"]), count(info["tets"]), count(info["segments"]),
+           count(info["bones"]), count(info["weights"]), info["bytes"].get<double>() / (1 << 20),
+           text(info["identity"]).c_str());
+  out += "\non disk, KiB\n";
+  for (const auto& [part, bytes] : info["sizes"].items()) {
+    out += line("  %-24s %12.1f", part.c_str(), bytes.get<double>() / 1024);
+  }
+  out += "\nrig " + text(info["skeleton"]) +
+         ": segment, joint, kind, centre (mm LPS), fit residual (mm), limits (deg)\n";
+  for (const Json& row : info["rig"]) {
+    const Json& c = row["center_mm"];
+    std::string limits;
+    for (const Json& angle : row["angles"]) limits += (limits.empty() ? "" : ", ") + range(angle);
+    out += line("  %-20s %-20s %-10s %8.1f %8.1f %8.1f  %-10s %6.3f  %s", text(row["segment"]).c_str(),
+                text(row["joint"]).c_str(), text(row["kind"]).c_str(), c[0].get<double>(), c[1].get<double>(),
+                c[2].get<double>(), text(row["fit"]["rule"]).c_str(), row["fit"]["residual_mm"].get<double>(),
+                limits.c_str());
+  }
+  out += "\ntissues: name, group, vertices, triangles, follows\n";
+  for (const Json& row : info["tissues"]) {
+    out += line("  %-28s %-10s %10llu %10llu  %s", text(row["name"]).c_str(), text(row["group"]).c_str(),
+                count(row["vertices"]), count(row["triangles"]),
+                row["segment"].is_null() ? "the tets" : text(row["segment"]).c_str());
+  }
+  out += "\nvolumes: name, voxels, spacing (mm), type\n";
+  for (const Json& row : info["volumes"]) {
+    const Json &n = row["size"], &s = row["spacing_mm"];
+    out += line("  %-20s %5d x %5d x %5d  %.3f x %.3f x %.3f  %s%s", text(row["name"]).c_str(),
+                n[0].get<int>(), n[1].get<int>(), n[2].get<int>(), s[0].get<double>(), s[1].get<double>(),
+                s[2].get<double>(), text(row["type"]).c_str(), row["labels"].get<bool>() ? ", labels" : "");
+  }
+  out += "\ncertificate\n";
+  for (const auto& [name, value] : info["certificate"].items()) {
+    out += line("  %-28s %s", name.c_str(), value.dump().c_str());
+  }
+  out += "\nprovenance\n";
+  for (const auto& [key, value] : info["provenance"].items())
+    out += "  " + printable(key) + ": " + text(value) + "\n";
+  return out + "\nFor training and education, not for planning surgery.";
+}
+
+}  // namespace
+
+void declare_info(CLI::App& app, Program& program, Run& chosen) {
+  auto* command = app.add_subcommand("info", "what a model holds: counts, sizes, rig, tissues, certificate");
+  auto path = std::make_shared<std::string>();
+  command->add_option("model", *path, "the model, a .hdf file")->required();
+  command->callback([path, &program, &chosen] {
+    chosen = [path, &program] {
+      const Json info = to_json(*path, model_file::read(*path, program.context("reading")));
+      program.result(to_text(info), info);
+      return 0;
+    };
+  });
+}
 
 }  // namespace ecorche::app

@@ -1,8 +1,127 @@
 // SPDX-License-Identifier: Apache-2.0
+// ecorche verify MODEL: digests, invariants and the certificate, all measured again.
+#include <cmath>
+#include <string>
+#include <vector>
+
 #include "app/command.hpp"
+#include "core/model_file/figures.hpp"
+#include "core/model_file/model_file.hpp"
+#include "preprocess/pipeline.hpp"
 
 namespace ecorche::app {
+namespace {
 
-void declare_verify(CLI::App&, Program&, Run&) {}
+// Instruction sets may round sums differently; anything beyond that is another model.
+constexpr double kRelative = 1e-6, kAbsolute = 1e-9;
+
+struct Verdict {
+  std::vector<std::string> faults;  // empty: the model is good
+  std::size_t checked = 0, bad = 0;
+  Model model;  // read only when its digests are good
+  bool read = false;
+  Certificate found;
+};
+
+void check_digests(const std::string& path, const Program& program, Verdict& verdict) {
+  for (const model_file::DigestCheck& check : model_file::check_digests(path, program.context("digests"))) {
+    ++verdict.checked;
+    if (check.good) continue;
+    ++verdict.bad;
+    verdict.faults.push_back(path + ":" + check.dataset + ": XXH64 is not the stored one");
+  }
+}
+
+// A stored figure that measuring does not find again.
+void compare(const Certificate& stored, const Certificate& found, std::vector<std::string>& faults) {
+  std::vector<double> measured;
+  model_file::for_each_figure(found,
+                              [&](auto, auto value) { measured.push_back(static_cast<double>(value)); });
+  std::size_t i = 0;
+  model_file::for_each_figure(stored, [&](std::string_view name, auto value) {
+    const double was = static_cast<double>(value), is = measured[i++];
+    if (was == is || std::abs(was - is) <= kAbsolute + kRelative * std::abs(was)) return;
+    faults.push_back(std::string(name) + ": the certificate says " + std::to_string(was) + ", measured " +
+                     std::to_string(is));
+  });
+}
+
+Verdict verify(const std::string& path, const Program& program) {
+  Verdict verdict;
+  check_digests(path, program, verdict);
+  if (verdict.bad > 0) return verdict;
+  try {
+    verdict.model = model_file::read(path, program.context("invariants"));
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::data) throw;
+    verdict.faults.emplace_back(error.what());
+    return verdict;
+  }
+  verdict.read = true;
+  verdict.found = preprocess::measure(verdict.model, program.context("certificate"));
+  for (const std::string& broken : preprocess::broken_bounds(verdict.found)) verdict.faults.push_back(broken);
+  compare(verdict.model.certificate, verdict.found, verdict.faults);
+  return verdict;
+}
+
+// DESIGN 7. What a model that cannot be read would have said is null.
+nlohmann::json to_json(const Verdict& v) {
+  const auto known = [&](auto value) { return v.read ? nlohmann::json(value) : nlohmann::json(); };
+  const Certificate& c = v.found;
+  return {
+      {"ok", v.faults.empty()},
+      {"nodes", known(v.model.node_count())},
+      {"tets", known(v.model.tet_count())},
+      {"segments", known(v.model.segment_count())},
+      {"weights",
+       {{"min", known(c.min_weight)},
+        {"max", known(c.max_weight)},
+        {"row_sum_error", known(c.row_sum_error)},
+        {"repaired_rows", known(c.repaired_rows)}}},
+      {"mesh",
+       {{"min_dihedral_deg", known(c.min_dihedral_deg)},
+        {"max_dihedral_deg", known(c.max_dihedral_deg)},
+        {"inverted", known(c.inverted_tets)},
+        {"positive_offdiagonal_share", known(c.positive_offdiagonal_share)}}},
+      {"tissues",
+       {{"count", known(v.model.tissues.size())},
+        {"vertices", known(c.tissue_vertices)},
+        {"outside", known(c.outside_vertices)},
+        {"max_outside_mm", known(c.max_outside_mm)}}},
+      {"bones", {{"rigidity", known(c.bone_rigidity_mm)}}},
+      {"digests", {{"checked", v.checked}, {"bad", v.bad}}},
+  };
+}
+
+std::string to_text(const Verdict& v) {
+  std::string text = std::to_string(v.checked) + " datasets, " + std::to_string(v.bad) + " damaged\n";
+  if (v.read) {
+    text += std::to_string(v.model.node_count()) + " nodes, " + std::to_string(v.model.tet_count()) +
+            " tets, " + std::to_string(v.model.segment_count()) + " segments, " +
+            std::to_string(v.model.tissues.size()) + " tissues\n";
+    model_file::for_each_figure(v.found, [&](std::string_view name, auto value) {
+      text += "  " + std::string(name) + ": " + nlohmann::json(value).dump() + "\n";
+    });
+  }
+  return text + (v.faults.empty() ? "the model is good" : "the model is NOT good") +
+         "; for training and education, not for planning surgery";
+}
+
+}  // namespace
+
+void declare_verify(CLI::App& app, Program& program, Run& chosen) {
+  auto* command =
+      app.add_subcommand("verify", "measure digests, invariants and the certificate of a model again");
+  auto path = std::make_shared<std::string>();
+  command->add_option("model", *path, "the model, a .hdf file")->required();
+  command->callback([path, &program, &chosen] {
+    chosen = [path, &program] {
+      const Verdict verdict = verify(*path, program);
+      for (const std::string& fault : verdict.faults) program.note("fault: " + fault);
+      program.result(to_text(verdict), to_json(verdict));
+      return verdict.faults.empty() ? 0 : exit_code(ErrorKind::data);
+    };
+  });
+}
 
 }  // namespace ecorche::app

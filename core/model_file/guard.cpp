@@ -137,12 +137,12 @@ class Guard {
   void check_group(hid_t group, const std::string& path) const {
     H5G_info_t info;
     if (group < 0 || H5Gget_info(group, &info) < 0) refuse(path, "cannot be opened: " + hdf::last_error());
-    if (info.storage_type != H5G_STORAGE_TYPE_COMPACT) {
-      refuse(path, "keeps its links outside of its header: this is not a model of ecorche");
-    }
     if (info.nlinks > kMaxMembers) {
       refuse(path,
              "has " + std::to_string(info.nlinks) + " members, more than " + std::to_string(kMaxMembers));
+    }
+    if (info.storage_type != H5G_STORAGE_TYPE_COMPACT) {
+      refuse(path, "keeps its links outside of its header: this is not a model of ecorche");
     }
   }
 

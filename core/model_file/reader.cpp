@@ -253,6 +253,7 @@ Model read(const std::filesystem::path& path, const Context& context) {
   const Catalogue catalogue = inspect(path);
   Model model = read_model(Source(catalogue, context));
   check_invariants(model, catalogue.file.name(), ErrorKind::data, context);
+  context.report(1);
   return model;
 }
 

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <array>
+#include <cstring>
 
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/digest.hpp"
@@ -16,10 +20,32 @@ namespace fs = std::filesystem;
 // Large datasets begin on a page, so that a loader can map them; small ones stay together.
 constexpr hsize_t kAlignFrom = 65536, kAlignment = 4096;
 
+// HDF5 1.10 crashes at the end of a process in which the closing of a file failed. So the disk is asked for
+// all the space before HDF5 writes anything, while a full disk is still an ordinary error.
+void reserve(const fs::path& path, const std::string& shown, std::uint64_t bytes) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  const int error = file < 0 ? errno : ::posix_fallocate(file, 0, static_cast<off_t>(bytes));
+  if (file >= 0) ::close(file);
+  if (error != 0) {
+    throw Error(ErrorKind::io, shown,
+                "no room for " + std::to_string(bytes >> 10) + " KiB: " + std::string(std::strerror(error)),
+                "free space on the disk, or name another one");
+  }
+}
+
+// Bytes that surely suffice for these entries, their headers and their alignment.
+std::uint64_t bound(const std::vector<const Entry*>& entries) {
+  std::uint64_t bytes = 1 << 16;
+  for (const Entry* entry : entries) bytes += entry->bytes.size() + kAlignment + 2 * entry->path.size();
+  return bytes;
+}
+
 // One HDF5 file being made. The same datasets give the same bytes: no times, no filters, one order.
 class OutputFile {
  public:
-  OutputFile(const fs::path& path, const fs::path& shown) : shown_(shown.string()) {
+  OutputFile(const fs::path& path, const fs::path& shown, std::uint64_t bytes)
+      : path_(path), shown_(shown.string()) {
+    reserve(path, shown_, bytes);
     const hdf::Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose),
         access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     set_up_group(creation);
@@ -33,6 +59,7 @@ class OutputFile {
       throw Error(ErrorKind::cannot_create, shown_, "cannot be made: " + hdf::last_error(),
                   "check the folder's rights and the disk's free space");
     }
+    reserve(path, shown_, bytes);  // again: creating has truncated it
   }
 
   void make_group(const std::string& path) { group_at(path); }
@@ -74,7 +101,9 @@ class OutputFile {
 
   void close() {
     groups_.clear();
-    if (!file_.close()) fail("");
+    hsize_t size = 0;
+    if (H5Fflush(file_, H5F_SCOPE_LOCAL) < 0 || H5Fget_filesize(file_, &size) < 0 || !file_.close()) fail("");
+    if (fs::file_size(path_) > size) fs::resize_file(path_, size);  // gives back what was reserved beyond
   }
 
  private:
@@ -107,6 +136,7 @@ class OutputFile {
                 "writing failed: " + hdf::last_error(), "check the disk's free space");
   }
 
+  fs::path path_;
   std::string shown_;
   hdf::Id file_;  // outlives the groups
   std::map<std::string, hdf::Id> groups_;
@@ -133,7 +163,7 @@ void write(const Model& model, const fs::path& path, const Context& context) {
   files::AtomicFile target(path);
   {
     const hdf::Session session;
-    OutputFile file(target.temporary(), path);
+    OutputFile file(target.temporary(), path, bound(entries));
     file.make_group("/ecorche/tissues");  // also where a body has none
     file.make_group("/ecorche/volumes");
     std::vector<std::string> digested;

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/unit/model_file/test_files.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::test {
+
+namespace fs = std::filesystem;
+
+ModelFileTest::ModelFileTest() {
+  std::string pattern = (fs::temp_directory_path() / "ecorche-model-XXXXXX").string();
+  if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  folder_ = pattern;
+}
+
+ModelFileTest::~ModelFileTest() {
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+std::vector<std::string> ModelFileTest::names() const {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder_)) names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Bytes load(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void store(const fs::path& path, const Bytes& bytes) {
+  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+Model full_model() {
+  Model model = toy_model();
+  std::vector<Segment>& segments = model.rig.skeleton.segments;
+  segments[2].joint.coupled = {{"middle_joint", "flexion", "tilt", 0.5},
+                               {"base_joint", "twist", "twist", -0.25}};
+  segments[1].joint.rule = CenterRule::sphere_fit;
+  segments[1].joint.center_bone = "bone_base";
+  segments[1].joint.facing_bone = "bone_middle";
+  segments[1].joint.axes = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  segments[2].joint.kind = JointKind::free;
+  segments[0].aliases.clear();
+  segments[1].aliases = {"Toy1", "mixamorig:Hips", "H\u00fcfte"};
+  model.rig.fits[1] = {"middle_joint", CenterRule::sphere_fit, 12.5, 0.125, 0.75, 321};
+  ModelVolume field{"field", Image(model.volumes[0].image.grid, ScalarType::f32, 2), -1, false, {}};
+  const auto values = field.image.scalars<float>();
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i) / 7;
+  field.image.grid.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  model.volumes.insert(model.volumes.begin() + 1, field);
+  double figure = 1;
+  Certificate& c = model.certificate;
+  for (double* value :
+       {&c.solver_residual, &c.solved_min_weight, &c.solved_max_weight, &c.solved_row_sum_error,
+        &c.repaired_largest_change, &c.min_weight, &c.max_weight, &c.row_sum_error, &c.min_dihedral_deg,
+        &c.max_dihedral_deg, &c.positive_offdiagonal_share, &c.max_outside_mm, &c.bone_rigidity_mm}) {
+    *value = (figure += 1) / 3;
+  }
+  c.repaired_rows = 11;
+  c.inverted_tets = 12;
+  c.degenerate_tets = 13;
+  c.tissue_vertices = 14;
+  c.outside_vertices = 15;
+  model.provenance["input/k\u00f6rper.stl"] = "0123456789abcdef";
+  model.provenance["empty"] = "";
+  return model;
+}
+
+namespace {
+
+template <class M>
+bool same(const M& a, const M& b) {
+  return a.rows() == b.rows() && a.cols() == b.cols() &&
+         (a.size() == 0 ||
+          std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof *a.data()) == 0);
+}
+
+void expect_same(const Joint& a, const Joint& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.kind, b.kind);
+  EXPECT_EQ(a.rule, b.rule);
+  EXPECT_EQ(a.center, b.center);
+  EXPECT_EQ(a.center_bone, b.center_bone);
+  EXPECT_EQ(a.facing_bone, b.facing_bone);
+  EXPECT_EQ(a.axes, b.axes);
+  EXPECT_EQ(a.limits_source, b.limits_source);
+  ASSERT_EQ(a.sequence.size(), b.sequence.size());
+  for (std::size_t i = 0; i < a.sequence.size(); ++i) {
+    EXPECT_EQ(a.sequence[i].name, b.sequence[i].name);
+    EXPECT_EQ(a.sequence[i].axis, b.sequence[i].axis);
+    EXPECT_EQ(a.sequence[i].sign, b.sequence[i].sign);
+    EXPECT_EQ(a.sequence[i].rest, b.sequence[i].rest);
+    EXPECT_EQ(a.sequence[i].min, b.sequence[i].min);
+    EXPECT_EQ(a.sequence[i].max, b.sequence[i].max);
+  }
+  ASSERT_EQ(a.coupled.size(), b.coupled.size());
+  for (std::size_t i = 0; i < a.coupled.size(); ++i) {
+    EXPECT_EQ(a.coupled[i].joint, b.coupled[i].joint);
+    EXPECT_EQ(a.coupled[i].angle, b.coupled[i].angle);
+    EXPECT_EQ(a.coupled[i].drives, b.coupled[i].drives);
+    EXPECT_EQ(a.coupled[i].ratio, b.coupled[i].ratio);
+  }
+}
+
+void expect_same(const Rig& a, const Rig& b) {
+  EXPECT_EQ(a.skeleton.name, b.skeleton.name);
+  ASSERT_EQ(a.skeleton.segments.size(), b.skeleton.segments.size());
+  for (std::size_t i = 0; i < a.skeleton.segments.size(); ++i) {
+    EXPECT_EQ(a.skeleton.segments[i].name, b.skeleton.segments[i].name);
+    EXPECT_EQ(a.skeleton.segments[i].parent, b.skeleton.segments[i].parent);
+    EXPECT_EQ(a.skeleton.segments[i].aliases, b.skeleton.segments[i].aliases);
+    expect_same(a.skeleton.segments[i].joint, b.skeleton.segments[i].joint);
+  }
+  ASSERT_EQ(a.fits.size(), b.fits.size());
+  for (std::size_t i = 0; i < a.fits.size(); ++i) {
+    EXPECT_EQ(a.fits[i].joint, b.fits[i].joint);
+    EXPECT_EQ(a.fits[i].rule, b.fits[i].rule);
+    EXPECT_EQ(a.fits[i].radius_mm, b.fits[i].radius_mm);
+    EXPECT_EQ(a.fits[i].residual_mm, b.fits[i].residual_mm);
+    EXPECT_EQ(a.fits[i].inlier_share, b.fits[i].inlier_share);
+    EXPECT_EQ(a.fits[i].points, b.fits[i].points);
+  }
+}
+
+void expect_same(const Certificate& a, const Certificate& b) {
+  EXPECT_EQ(a.solver_residual, b.solver_residual);
+  EXPECT_EQ(a.solved_min_weight, b.solved_min_weight);
+  EXPECT_EQ(a.solved_max_weight, b.solved_max_weight);
+  EXPECT_EQ(a.solved_row_sum_error, b.solved_row_sum_error);
+  EXPECT_EQ(a.repaired_rows, b.repaired_rows);
+  EXPECT_EQ(a.repaired_largest_change, b.repaired_largest_change);
+  EXPECT_EQ(a.min_weight, b.min_weight);
+  EXPECT_EQ(a.max_weight, b.max_weight);
+  EXPECT_EQ(a.row_sum_error, b.row_sum_error);
+  EXPECT_EQ(a.min_dihedral_deg, b.min_dihedral_deg);
+  EXPECT_EQ(a.max_dihedral_deg, b.max_dihedral_deg);
+  EXPECT_EQ(a.inverted_tets, b.inverted_tets);
+  EXPECT_EQ(a.degenerate_tets, b.degenerate_tets);
+  EXPECT_EQ(a.positive_offdiagonal_share, b.positive_offdiagonal_share);
+  EXPECT_EQ(a.tissue_vertices, b.tissue_vertices);
+  EXPECT_EQ(a.outside_vertices, b.outside_vertices);
+  EXPECT_EQ(a.max_outside_mm, b.max_outside_mm);
+  EXPECT_EQ(a.bone_rigidity_mm, b.bone_rigidity_mm);
+}
+
+}  // namespace
+
+void expect_same(const Model& a, const Model& b) {
+  EXPECT_EQ(a.name, b.name);
+  expect_same(a.rig, b.rig);
+  EXPECT_TRUE(same(a.nodes, b.nodes));
+  EXPECT_TRUE(same(a.tets, b.tets));
+  EXPECT_EQ(a.tet_label, b.tet_label);
+  EXPECT_EQ(a.bone_names, b.bone_names);
+  EXPECT_EQ(a.bone_segment, b.bone_segment);
+  EXPECT_EQ(a.weights.offsets, b.weights.offsets);
+  EXPECT_EQ(a.weights.segment, b.weights.segment);
+  EXPECT_EQ(a.weights.weight, b.weights.weight);
+  EXPECT_TRUE(same(a.cor.centre, b.cor.centre));
+  EXPECT_EQ(a.cor.has_centre, b.cor.has_centre);
+  EXPECT_EQ(a.cor.sigma, b.cor.sigma);
+  ASSERT_EQ(a.tissues.size(), b.tissues.size());
+  for (std::size_t i = 0; i < a.tissues.size(); ++i) {
+    EXPECT_EQ(a.tissues[i].name, b.tissues[i].name);
+    EXPECT_EQ(a.tissues[i].group, b.tissues[i].group);
+    EXPECT_TRUE(same(a.tissues[i].V, b.tissues[i].V));
+    EXPECT_TRUE(same(a.tissues[i].F, b.tissues[i].F));
+    EXPECT_EQ(a.tissues[i].segment, b.tissues[i].segment);
+    EXPECT_EQ(a.tissues[i].tet, b.tissues[i].tet);
+    EXPECT_TRUE(same(a.tissues[i].barycentric, b.tissues[i].barycentric));
+  }
+  ASSERT_EQ(a.volumes.size(), b.volumes.size());
+  for (std::size_t i = 0; i < a.volumes.size(); ++i) {
+    EXPECT_EQ(a.volumes[i].name, b.volumes[i].name);
+    EXPECT_EQ(a.volumes[i].image.grid, b.volumes[i].image.grid);
+    EXPECT_EQ(a.volumes[i].image.type, b.volumes[i].image.type);
+    EXPECT_EQ(a.volumes[i].image.components, b.volumes[i].image.components);
+    EXPECT_EQ(a.volumes[i].image.bytes, b.volumes[i].image.bytes);
+    EXPECT_EQ(a.volumes[i].background, b.volumes[i].background);
+    EXPECT_EQ(a.volumes[i].labels, b.volumes[i].labels);
+    EXPECT_EQ(a.volumes[i].table, b.volumes[i].table);
+  }
+  expect_same(a.certificate, b.certificate);
+  EXPECT_EQ(a.provenance, b.provenance);
+}
+
+}  // namespace ecorche::test
