@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small client of an ecorche server: framed Protobuf over TCP (docs/protocol.md), plain sockets, no threads.
+
+    from ecorche_client import Client
+
+    with Client("127.0.0.1", 7070) as client:
+        body = client.open()                          # skeleton, tissues, triangles
+        client.subscribe_mesh(["skin"])
+        knee = body.joint("knee_right")
+        for i in range(100):
+            pose = body.rest_pose()
+            pose[knee] = (math.cos(i / 200), math.sin(i / 200), 0, 0)   # (w, x, y, z), from the scanned rest pose
+            client.send_pose(pose)
+            for frame in client.frames(seconds=1 / 90):
+                print(frame.pose_sequence, frame.positions["skin"].shape)   # mm, LPS
+
+Needs numpy and the messages generated from proto/ecorche/v1 (the build leaves them in BUILD/proto/python):
+
+    protoc -I proto --python_out=SOMEWHERE proto/ecorche/v1/*.proto       and SOMEWHERE on PYTHONPATH
+"""
+import select
+import socket
+import struct
+import time
+
+import numpy as np
+
+from ecorche.v1 import common_pb2, envelope_pb2
+
+ALIGNMENT = 16
+SCALARS = {
+    common_pb2.SCALAR_TYPE_U8: np.dtype("<u1"), common_pb2.SCALAR_TYPE_I8: np.dtype("<i1"),
+    common_pb2.SCALAR_TYPE_U16: np.dtype("<u2"), common_pb2.SCALAR_TYPE_I16: np.dtype("<i2"),
+    common_pb2.SCALAR_TYPE_U32: np.dtype("<u4"), common_pb2.SCALAR_TYPE_I32: np.dtype("<i4"),
+    common_pb2.SCALAR_TYPE_F32: np.dtype("<f4"), common_pb2.SCALAR_TYPE_F64: np.dtype("<f8"),
+}
+
+
+class ServerError(Exception):
+    """A Status of the server that is not OK; `code` is a google.rpc number."""
+
+    def __init__(self, status):
+        super().__init__(f"status {status.code}: {status.message}")
+        self.code = status.code
+
+
+def aligned(size):
+    return -(-size // ALIGNMENT) * ALIGNMENT
+
+
+def encode(envelope, payload=b""):
+    """The bytes of one frame; the payload must be a multiple of 16 long."""
+    body = envelope.SerializeToString()
+    head = struct.pack("<II", len(body), len(payload)) + body
+    return head.ljust(aligned(len(head)), b"\0") + payload
+
+
+def array(description, payload):
+    """The rows that a v1.Array describes, count x components, without copying."""
+    dtype = SCALARS[description.type]
+    size = description.count * description.components
+    if description.offset % ALIGNMENT or description.offset + size * dtype.itemsize > len(payload):
+        raise ValueError("an array reaches beyond its payload")
+    flat = np.frombuffer(payload, dtype, size, description.offset)
+    return flat.reshape(description.count, description.components)
+
+
+class Body:
+    """What OpenModel told: `message` is the v1.ModelOpened; `triangles` has one #F x 3 array per tissue name."""
+
+    def __init__(self, message, payload):
+        self.message = message
+        self.joints = [segment.joint.name for segment in message.skeleton.segments]
+        self.tissues = [tissue.name for tissue in message.tissues]
+        self.triangles = {tissue.name: array(tissue.triangles, payload)
+                          for tissue in message.tissues if tissue.HasField("triangles")}
+
+    def joint(self, name):
+        """Row of a joint in poses."""
+        return self.joints.index(name)
+
+    def rest_pose(self):
+        """The scanned rest pose: #joints x 4, (w, x, y, z)."""
+        pose = np.zeros((len(self.joints), 4))
+        pose[:, 0] = 1
+        return pose
+
+
+class MeshFrame:
+    """`positions`: #V x 3 float32, mm, LPS, by tissue name."""
+
+    def __init__(self, message, payload, body):
+        self.message = message
+        self.subscription, self.pose_sequence = message.subscription, message.pose_sequence
+        self.positions = {body.tissues[entry.tissue]: array(entry.array, payload) for entry in message.arrays}
+
+
+class VolumeFrame:
+    """`voxels`: size_k x size_j x size_i (x components); where they lie is in `message.grid`."""
+
+    def __init__(self, message, payload):
+        self.message = message
+        self.subscription, self.pose_sequence = message.subscription, message.pose_sequence
+        if message.status.code:
+            raise ServerError(message.status)
+        grid = message.grid
+        rows = array(message.voxels, payload)
+        self.voxels = rows.reshape(grid.size_k, grid.size_j, grid.size_i, *rows.shape[1:]).squeeze(-1)
+
+
+class Client:
+    """One connection. Not for several threads. Frames are acknowledged as they are read, so read often."""
+
+    def __init__(self, host, port, name="python", timeout=30.0):
+        self.timeout = timeout
+        self.body = None
+        self.acks = []            # v1.PoseAck since the last look
+        self.bytes_received = 0
+        self._requests = 0
+        self._sequence = 0
+        self._waiting = []
+        self._buffer = bytearray()
+        self._socket = socket.create_connection((host, port), timeout)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        hello = envelope_pb2.Envelope()
+        hello.client_hello.protocol_min = hello.client_hello.protocol_max = 1
+        hello.client_hello.client = name
+        hello.client_hello.encodings.append(common_pb2.ENCODING_F32)
+        self.server = self._call(hello)[0].server_hello
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self._socket.close()
+
+    def models(self):
+        """What the server holds: a list of v1.ModelSummary."""
+        request = envelope_pb2.Envelope()
+        request.list_models.SetInParent()
+        return list(self._call(request)[0].model_list.models)
+
+    def open(self, model="", session=""):
+        """Opens a model; the server's first by default, in a session of one's own by default."""
+        request = envelope_pb2.Envelope()
+        request.open_model.model = model
+        request.open_model.session = session
+        answer, payload = self._call(request)
+        self.body = Body(answer.model_opened, payload)
+        return self.body
+
+    def subscribe_mesh(self, tissues=(), quality=False):
+        """Frames of these tissues, of all by default; returns the subscription's number."""
+        request = envelope_pb2.Envelope()
+        request.subscribe.mesh.tissues.extend(tissues)
+        request.subscribe.mesh.encoding = common_pb2.ENCODING_F32
+        request.subscribe.mesh.quality = quality
+        return self._call(request)[0].subscribed.subscription
+
+    def subscribe_volume(self, name, nearest=False):
+        """Frames of a posed volume; returns the subscription's number."""
+        request = envelope_pb2.Envelope()
+        request.subscribe.volume.volume = name
+        request.subscribe.volume.nearest = nearest
+        return self._call(request)[0].subscribed.subscription
+
+    def send_pose(self, rotations, root_translation=(0, 0, 0), skinning=common_pb2.SKINNING_COR):
+        """Sends a whole pose (#joints x 4, w x y z) and returns its sequence number. Does not wait: see frames() and acks."""
+        self._sequence += 1
+        envelope = envelope_pb2.Envelope()
+        update = envelope.pose_update
+        update.sequence = self._sequence
+        update.rig_digest = self.body.message.rig_digest
+        update.root_translation.x, update.root_translation.y, update.root_translation.z = root_translation
+        update.rotation.extend(np.asarray(rotations, dtype=float).ravel())
+        update.skinning = skinning
+        self._socket.sendall(encode(envelope))
+        return self._sequence
+
+    def frames(self, seconds):
+        """Yields the MeshFrames and VolumeFrames that arrive within `seconds`."""
+        until = time.monotonic() + seconds
+        while True:
+            message = self._waiting.pop(0) if self._waiting else self._read(until)
+            if message is None:
+                return
+            envelope, payload = message
+            kind = envelope.WhichOneof("message")
+            if kind == "mesh_frame":
+                yield MeshFrame(envelope.mesh_frame, payload, self.body)
+            elif kind == "volume_frame":
+                yield VolumeFrame(envelope.volume_frame, payload)
+            elif kind == "pose_ack":
+                self.acks.append(envelope.pose_ack)
+
+    def _call(self, request):
+        self._requests += 1
+        request.request_id = self._requests
+        self._socket.sendall(encode(request))
+        until = time.monotonic() + self.timeout
+        while True:
+            message = self._read(until)
+            if message is None:
+                raise TimeoutError("the server does not answer")
+            if message[0].request_id != request.request_id:
+                self._waiting.append(message)
+                continue
+            if message[0].WhichOneof("message") == "status" and message[0].status.code:
+                raise ServerError(message[0].status)
+            return message
+
+    def _fill(self, size, until):
+        """Waits for `size` bytes of the present frame; False when they do not come in time (they are kept)."""
+        while len(self._buffer) < size:
+            if not select.select([self._socket], [], [], max(0.0, until - time.monotonic()))[0]:
+                return False
+            received = self._socket.recv(max(65536, size - len(self._buffer)))
+            if not received:
+                raise ConnectionError("the server hung up")
+            self.bytes_received += len(received)
+            self._buffer += received
+        return True
+
+    def _read(self, until):
+        """The next message and its payload, or None."""
+        if not self._fill(8, until):
+            return None
+        envelope_bytes, payload_bytes = struct.unpack_from("<II", self._buffer)
+        start = aligned(8 + envelope_bytes)
+        if not self._fill(start + payload_bytes, until):
+            return None
+        envelope = envelope_pb2.Envelope.FromString(bytes(self._buffer[8:8 + envelope_bytes]))
+        payload = bytes(self._buffer[start:start + payload_bytes])
+        del self._buffer[:start + payload_bytes]
+        self._attend(envelope)
+        return envelope, payload
+
+    def _attend(self, envelope):
+        """What the protocol asks of every client at once."""
+        kind = envelope.WhichOneof("message")
+        answer = envelope_pb2.Envelope()
+        if kind in ("mesh_frame", "volume_frame"):
+            frame = getattr(envelope, kind)
+            answer.frame_ack.subscription = frame.subscription
+            answer.frame_ack.frame = frame.frame
+            self._socket.sendall(encode(answer))
+        elif kind == "ping":
+            answer.request_id = envelope.request_id
+            answer.pong.data = envelope.ping.data
+            self._socket.sendall(encode(answer))
+        elif kind == "goodbye":
+            raise ServerError(envelope.goodbye.status)
+        elif kind == "status" and envelope.request_id == 0:
+            raise ServerError(envelope.status)

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every limit, and that nobody else notices when one strikes.
+#include "tests/unit/server/test_server.hpp"
+
+namespace ecorche::server {
+namespace {
+
+TEST(LimitsTest, AHelloTooLateEndsTheConnection) {
+  Limits limits;
+  limits.hello_seconds = 0.05;
+  const TestServer server(limits);
+  RawClient client(server);
+  EXPECT_EQ(client.last_words(), StatusCode::deadline_exceeded);
+}
+
+TEST(LimitsTest, AHelloTooLargeEndsTheConnection) {
+  const TestServer server;
+  RawClient client(server);
+  v1::Envelope hello;
+  hello.mutable_client_hello()->set_token(std::string(5000, 'x'));
+  client.send(hello);
+  EXPECT_EQ(client.last_words(), StatusCode::resource_exhausted);
+}
+
+TEST(LimitsTest, LaterEnvelopesMayBeLargerButNotTooLarge) {
+  const TestServer server;
+  RawClient client(server);
+  client.send_hello();
+  ASSERT_TRUE(client.receive());
+  v1::Envelope large;
+  large.mutable_ping()->set_data(std::string(60000, 'x'));
+  client.send(large);
+  const auto pong = client.receive();
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->envelope.pong().data().size(), 64U);
+  large.mutable_ping()->set_data(std::string(70000, 'x'));
+  client.send(large);
+  EXPECT_EQ(client.last_words(), StatusCode::resource_exhausted);
+}
+
+TEST(LimitsTest, APayloadTooLargeEndsTheConnectionBeforeItIsSent) {
+  const TestServer server;
+  RawClient client(server);
+  client.send_hello();
+  ASSERT_TRUE(client.receive());
+  client.send(std::string("\x04\x00\x00\x00\x00\x00\x00\x40", 8));  // a gigabyte is announced
+  EXPECT_EQ(client.last_words(), StatusCode::resource_exhausted);
+}
+
+TEST(LimitsTest, OneConnectionTooManyIsToldSo) {
+  Limits limits;
+  limits.connections = 2;
+  const TestServer server(limits);
+  TestClient a(server);
+  auto b = std::make_unique<TestClient>(server);
+  RawClient third(server);
+  EXPECT_EQ(third.last_words(), StatusCode::resource_exhausted);
+  a.subscribe_mesh();
+  a.next_mesh(0);
+  // Room again once one has left.
+  b.reset();
+  bool welcome = false;
+  for (int i = 0; i < 200 && !welcome; ++i) {
+    RawClient again(server);
+    again.send_hello();
+    const auto answer = again.receive();
+    welcome = answer && answer->envelope.has_server_hello();
+  }
+  EXPECT_TRUE(welcome);
+}
+
+TEST(LimitsTest, SubscriptionsPerConnection) {
+  Limits limits;
+  limits.subscriptions = 2;
+  const TestServer server(limits);
+  TestClient client(server);
+  client.subscribe_mesh();
+  client.subscribe_volume(client.opened().volumes(0).name());
+  v1::Envelope third;
+  third.mutable_subscribe()->mutable_mesh()->add_tissues(client.opened().tissues(0).name());
+  EXPECT_EQ(error_of_call(client.client(), third), ErrorKind::temporary);
+}
+
+TEST(LimitsTest, PosesAreTakenUpNoFasterThanTheRate) {
+  Limits limits;
+  limits.poses_per_second = 20;
+  const TestServer server(limits);
+  TestClient client(server);
+  const auto start = client::Clock::now();
+  // The first is taken up at once; each of the next four waits its 50 ms.
+  for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
+    client.send(sequence, client.bent(0.1));
+    EXPECT_EQ(client.next_ack().sequence(), sequence);
+  }
+  EXPECT_GE(client::Clock::now() - start, std::chrono::milliseconds(4 * 50 - 1));
+}
+
+TEST(LimitsTest, MessagesBeyondTheRateWaitAndAreAllAnswered) {
+  Limits limits;
+  limits.messages_per_second = 50;
+  const TestServer server(limits);
+  client::Client client(server.address(), "test");
+  v1::Envelope ping;
+  ping.mutable_ping();
+  const auto start = client::Clock::now();
+  // A second's worth may come at once.
+  for (int i = 0; i < 70; ++i) EXPECT_TRUE(client.call(ping).envelope.has_pong());
+  EXPECT_GE(client::Clock::now() - start, std::chrono::milliseconds(300));
+}
+
+TEST(LimitsTest, HalfAMessageIsNotWaitedForForever) {
+  Limits limits;
+  limits.stall_seconds = 0.1;
+  const TestServer server(limits);
+  RawClient client(server);
+  client.send_hello();
+  ASSERT_TRUE(client.receive());
+  client.send(std::string("\x09\x00\x00", 3));
+  EXPECT_EQ(client.last_words(), StatusCode::deadline_exceeded);
+}
+
+TEST(LimitsTest, WhoSaysNothingIsDroppedInTheEnd) {
+  Limits limits;
+  limits.idle_seconds = 0.2;
+  const TestServer server(limits);
+  RawClient client(server);
+  client.send_hello();
+  ASSERT_TRUE(client.receive());
+  EXPECT_EQ(client.last_words(), StatusCode::deadline_exceeded);
+}
+
+// Opens and subscribes without ever acknowledging a frame.
+void subscribe_and_sleep(RawClient& client, const std::string& session) {
+  client.send_hello();
+  ASSERT_TRUE(client.receive());
+  v1::Envelope open;
+  open.set_request_id(1);
+  open.mutable_open_model()->set_session(session);
+  client.send(open);
+  ASSERT_TRUE(client.receive());
+  v1::Envelope subscribe;
+  subscribe.set_request_id(2);
+  subscribe.mutable_subscribe()->mutable_mesh();
+  client.send(subscribe);
+}
+
+TEST(LimitsTest, AStalledClientIsDroppedAndNobodyElseNotices) {
+  Limits limits;
+  limits.stall_seconds = 0.3;
+  const TestServer server(limits);
+  TestClient creator(server, "shared");
+  creator.subscribe_mesh();
+  RawClient sleeper(server);
+  subscribe_and_sleep(sleeper, "shared");
+  bool gone = false;
+  std::uint64_t sequence = 0;
+  while (!gone && sequence < 500) {
+    ++sequence;
+    creator.send(sequence, creator.bent(0.001 * static_cast<double>(sequence)));
+    creator.next_mesh(sequence);  // every pose, at once
+    if (sequence > 100) gone = sleeper.hung_up(0.001);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_TRUE(gone);
+}
+
+TEST(LimitsTest, NoMoreFramesAreSentThanAreAcknowledged) {
+  Limits limits;
+  limits.frames_in_flight = 2;
+  const TestServer server(limits);
+  TestClient creator(server, "shared");
+  RawClient sleeper(server);
+  subscribe_and_sleep(sleeper, "shared");
+  for (std::uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    creator.send(sequence, creator.bent(0.01 * static_cast<double>(sequence)));
+    EXPECT_EQ(creator.next_ack().sequence(), sequence);
+  }
+  std::vector<v1::MeshFrame> frames;
+  const auto drain = [&] {
+    while (const auto frame = sleeper.receive(0.3)) {
+      if (frame->envelope.has_mesh_frame()) frames.push_back(frame->envelope.mesh_frame());
+    }
+  };
+  drain();
+  ASSERT_EQ(frames.size(), 2U);
+  v1::Envelope ack;
+  ack.mutable_frame_ack()->set_subscription(frames[1].subscription());
+  ack.mutable_frame_ack()->set_frame(frames[1].frame());
+  sleeper.send(ack);
+  drain();
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[2].pose_sequence(), 20U);  // the newest replaced all that waited
+}
+
+}  // namespace
+}  // namespace ecorche::server

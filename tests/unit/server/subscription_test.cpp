@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/server/subscription.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::server {
+namespace {
+
+TEST(Subscription, NoNamesAreAllTissuesAndOrderDoesNotMatter) {
+  const Model model = test::toy_model();
+  v1::Subscribe request;
+  request.mutable_mesh();
+  Want all;
+  ASSERT_TRUE(read_want(request, model, all).ok());
+  EXPECT_EQ(std::get<MeshWant>(all).tissues.size(), model.tissues.size());
+  for (auto tissue = model.tissues.rbegin(); tissue != model.tissues.rend(); ++tissue)
+    request.mutable_mesh()->add_tissues(tissue->name);
+  request.mutable_mesh()->add_tissues(model.tissues[0].name);
+  Want named;
+  ASSERT_TRUE(read_want(request, model, named).ok());
+  EXPECT_EQ(all, named);
+  request.mutable_mesh()->set_quality(true);
+  ASSERT_TRUE(read_want(request, model, named = Want()).ok());
+  EXPECT_NE(all, named);
+}
+
+TEST(Subscription, LabelsAreAlwaysNearest) {
+  const Model model = test::toy_model();
+  for (const ModelVolume& volume : model.volumes) {
+    v1::Subscribe request;
+    request.mutable_volume()->set_volume(volume.name);
+    Want want;
+    ASSERT_TRUE(read_want(request, model, want).ok());
+    const auto expected = volume.labels ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
+    EXPECT_EQ(std::get<VolumeWant>(want).sampling, expected) << volume.name;
+  }
+}
+
+TEST(Subscription, WhatCannotBeDoneSaysSo) {
+  const Model model = test::toy_model();
+  struct Case {
+    const char* what;
+    std::function<void(v1::Subscribe&)> ask;
+    StatusCode code;
+  };
+  const std::string ct = model.volumes[0].name;
+  const Case cases[] = {
+      {"nothing", [](v1::Subscribe&) {}, StatusCode::invalid_argument},
+      {"tissue", [](v1::Subscribe& s) { s.mutable_mesh()->add_tissues("tail"); }, StatusCode::not_found},
+      {"volume", [](v1::Subscribe& s) { s.mutable_volume()->set_volume("mri"); }, StatusCode::not_found},
+      {"rate",
+       [](v1::Subscribe& s) {
+         s.mutable_mesh();
+         s.set_max_rate(30);
+       },
+       StatusCode::unimplemented},
+      {"u16", [](v1::Subscribe& s) { s.mutable_mesh()->set_encoding(v1::ENCODING_U16); },
+       StatusCode::unimplemented},
+      {"delta", [](v1::Subscribe& s) { s.mutable_mesh()->set_encoding(v1::ENCODING_U16_DELTA); },
+       StatusCode::unimplemented},
+      {"normals", [](v1::Subscribe& s) { s.mutable_mesh()->set_normals(true); }, StatusCode::unimplemented},
+      {"mesh region", [](v1::Subscribe& s) { s.mutable_mesh()->mutable_region(); },
+       StatusCode::unimplemented},
+      {"region",
+       [&](v1::Subscribe& s) {
+         s.mutable_volume()->set_volume(ct);
+         s.mutable_volume()->mutable_region();
+       },
+       StatusCode::unimplemented},
+      {"slices",
+       [&](v1::Subscribe& s) {
+         s.mutable_volume()->set_volume(ct);
+         s.mutable_volume()->add_slices();
+       },
+       StatusCode::unimplemented},
+      {"compressed",
+       [&](v1::Subscribe& s) {
+         s.mutable_volume()->set_volume(ct);
+         s.mutable_volume()->set_compressed(true);
+       },
+       StatusCode::unimplemented},
+  };
+  for (const Case& c : cases) {
+    v1::Subscribe request;
+    c.ask(request);
+    Want want;
+    const Status status = read_want(request, model, want);
+    EXPECT_EQ(status.code, c.code) << c.what;
+    EXPECT_NE(status.message.find("subscribe: "), std::string::npos) << status.message;
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::server

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/unit/server/test_server.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "proto/convert.hpp"
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::server {
+namespace {
+
+client::Clock::time_point within(double seconds) {
+  return client::Clock::now() +
+         std::chrono::duration_cast<client::Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+}  // namespace
+
+TestServer::TestServer(const Limits& limits)
+    : model_(std::make_shared<const Model>(test::toy_model())), workers_(2, [](const Job& job) { job(); }) {
+  spdlog::set_level(spdlog::level::off);
+  Options options;
+  options.port = 0;
+  options.version = "test";
+  options.limits = limits;
+  server_ =
+      std::make_unique<Server>(options, std::vector<NamedModel>{{"toy", model_}, {"twin", model_}}, workers_);
+  thread_ = std::thread([this] { server_->run(); });
+}
+
+TestServer::~TestServer() {
+  stop();
+  join();
+}
+
+void TestServer::join() {
+  if (thread_.joinable()) thread_.join();
+}
+
+TestClient::TestClient(const TestServer& server, const std::string& session)
+    : client_(server.address(), "test") {
+  v1::Envelope open;
+  open.mutable_open_model()->set_model("toy");
+  open.mutable_open_model()->set_session(session);
+  opened_ = client_.call(open).envelope.model_opened();
+}
+
+std::uint32_t TestClient::subscribe_mesh(const std::vector<std::string>& tissues, bool quality) {
+  v1::Envelope envelope;
+  v1::MeshSelection& mesh = *envelope.mutable_subscribe()->mutable_mesh();
+  mesh.mutable_tissues()->Assign(tissues.begin(), tissues.end());
+  mesh.set_quality(quality);
+  return client_.call(envelope).envelope.subscribed().subscription();
+}
+
+std::uint32_t TestClient::subscribe_volume(const std::string& name, bool nearest) {
+  v1::Envelope envelope;
+  envelope.mutable_subscribe()->mutable_volume()->set_volume(name);
+  envelope.mutable_subscribe()->mutable_volume()->set_nearest(nearest);
+  return client_.call(envelope).envelope.subscribed().subscription();
+}
+
+Pose TestClient::bent(double angle) const {
+  Pose pose = Pose::rest(static_cast<std::size_t>(opened_.skeleton().segments_size()));
+  pose.rotation[2] = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX());
+  return pose;
+}
+
+v1::Envelope TestClient::update(std::uint64_t sequence, const Pose& pose) const {
+  v1::Envelope envelope;
+  v1::PoseUpdate& update = *envelope.mutable_pose_update();
+  update.set_sequence(sequence);
+  update.set_rig_digest(opened_.rig_digest());
+  wire::to_proto(pose, update);
+  return envelope;
+}
+
+void TestClient::send(std::uint64_t sequence, const Pose& pose) {
+  client_.send(update(sequence, pose));
+}
+
+RawClient::RawClient(const TestServer& server)
+    : socket_(server.address(), within(5)), reader_({.envelope_bytes = 1 << 20, .payload_bytes = 1 << 26}) {}
+
+void RawClient::send(const std::string& bytes) {
+  socket_.write(std::as_bytes(std::span(bytes)), within(10));
+}
+
+void RawClient::send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload) {
+  const wire::EncodedFrame frame = wire::encode(envelope, std::move(payload));
+  send(frame.head);
+  if (frame.payload) socket_.write(*frame.payload, within(10));
+}
+
+void RawClient::send_hello() {
+  v1::Envelope hello;
+  hello.mutable_client_hello()->set_protocol_min(1);
+  hello.mutable_client_hello()->set_protocol_max(1);
+  send(hello);
+}
+
+std::optional<wire::Frame> RawClient::receive(double seconds) {
+  const auto until = within(seconds);
+  try {
+    while (!reader_.complete()) {
+      const std::size_t n = socket_.read(reader_.want(), until);
+      if (n == 0 || !reader_.advance(n).ok()) return std::nullopt;
+    }
+  } catch (const Error&) {
+    return std::nullopt;  // hung up
+  }
+  return reader_.take();
+}
+
+StatusCode RawClient::last_words() {
+  StatusCode code = StatusCode::unknown;
+  while (const auto frame = receive()) {
+    if (frame->envelope.has_status() && frame->envelope.request_id() == 0)
+      code = wire::from_proto(frame->envelope.status()).code;
+    if (frame->envelope.has_goodbye()) code = wire::from_proto(frame->envelope.goodbye().status()).code;
+  }
+  return code;
+}
+
+bool RawClient::hung_up(double seconds) {
+  const auto until = within(seconds);
+  std::array<std::byte, 4096> bytes{};
+  try {
+    while (socket_.read(bytes, until) > 0) {
+    }
+  } catch (const Error&) {
+    return true;
+  }
+  return false;
+}
+
+ErrorKind error_of_call(client::Client& client, const v1::Envelope& request) {
+  try {
+    client.call(request);
+  } catch (const Error& error) {
+    return error.kind();
+  }
+  return ErrorKind::internal;
+}
+
+}  // namespace ecorche::server

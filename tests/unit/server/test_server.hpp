@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// A server of the toy body on a free loopback port, and clients that are easy to hold.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "clients/cpp/client.hpp"
+#include "core/values/model.hpp"
+#include "core/values/pose.hpp"
+#include "runtime/server/server.hpp"
+
+namespace ecorche::server {
+
+/// Serves the toy body as `toy`, and the same under `twin`, until destroyed.
+class TestServer {
+ public:
+  explicit TestServer(const Limits& limits = {});
+  ~TestServer();
+
+  wire::Address address() const { return {"127.0.0.1", server_->port()}; }
+  const Model& model() const { return *model_; }
+  void stop() { server_->stop(); }
+  /// Waits for run() to return.
+  void join();
+
+ private:
+  // ThreadSanitizer sees no edges inside TBB's own threads: here a pose is one thread's work.
+  tbb::global_control one_thread_{tbb::global_control::max_allowed_parallelism, 1};
+  std::shared_ptr<const Model> model_;
+  Workers workers_;
+  std::unique_ptr<Server> server_;
+  std::thread thread_;
+};
+
+/// A client with the toy body open.
+class TestClient {
+ public:
+  explicit TestClient(const TestServer& server, const std::string& session = {});
+
+  const v1::ModelOpened& opened() const { return opened_; }
+  client::Client& client() { return client_; }
+
+  std::uint32_t subscribe_mesh(const std::vector<std::string>& tissues = {}, bool quality = false);
+  std::uint32_t subscribe_volume(const std::string& name, bool nearest = false);
+  /// The rest pose with its second joint turned by `angle` about z.
+  Pose bent(double angle) const;
+  void send(std::uint64_t sequence, const Pose& pose);
+  /// The update that send() sends, to be spoilt.
+  v1::Envelope update(std::uint64_t sequence, const Pose& pose) const;
+
+  /// The next message for which `wanted` holds; others are dropped. Fails the test after some seconds.
+  template <class Wanted>
+  wire::Frame next(Wanted&& wanted) {
+    const auto until = client::Clock::now() + std::chrono::seconds(20);
+    while (auto frame = client_.receive(until)) {
+      if (wanted(frame->envelope)) return std::move(*frame);
+    }
+    throw Error(ErrorKind::internal, "test", "the message did not come", "see the test");
+  }
+  wire::Frame next_mesh(std::uint64_t sequence) {
+    return next([=](const v1::Envelope& e) {
+      return e.has_mesh_frame() && e.mesh_frame().pose_sequence() == sequence;
+    });
+  }
+  v1::PoseAck next_ack() {
+    return next([](const v1::Envelope& e) { return e.has_pose_ack(); }).envelope.pose_ack();
+  }
+
+ private:
+  client::Client client_;
+  v1::ModelOpened opened_;
+};
+
+/// A socket without manners. Reads what the server says; null once it hung up or said nothing for `seconds`.
+class RawClient {
+ public:
+  explicit RawClient(const TestServer& server);
+
+  void send(const std::string& bytes);
+  void send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload = nullptr);
+  void send_hello();
+  std::optional<wire::Frame> receive(double seconds = 10);
+  /// The code of the Status that ends the connection, and that it then ends; `unknown` when none came.
+  StatusCode last_words();
+  /// The server hung up within the time.
+  bool hung_up(double seconds = 10);
+
+ private:
+  client::Socket socket_;
+  wire::FrameReader reader_;
+};
+
+/// What a call fails with; Error{internal} when it does not.
+ErrorKind error_of_call(client::Client& client, const v1::Envelope& request);
+
+}  // namespace ecorche::server
