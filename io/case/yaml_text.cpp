@@ -17,16 +17,20 @@ std::string write_number(double value) {
 std::string write_degrees(double radians) {
   constexpr long double degree = std::numbers::pi_v<long double> / 180;
   const long double degrees = radians / degree;
-  char text[64];
-  // A degree in double is too coarse for some radians: up to 21 digits, but nobody meets more than 17 from
-  // whole degrees.
-  for (int digits = 1; digits <= 21; ++digits) {
-    const char* end =
-        std::to_chars(text, text + sizeof text, degrees, std::chars_format::general, digits).ptr;
+  // A degree in double is too coarse for some radians: extended digits where plain ones do not do.
+  const auto exact = [&](std::chars_format format, int digits) -> std::string {
+    char text[96];
+    const char* end = std::to_chars(text, text + sizeof text, degrees, format, digits).ptr;
     long double back = 0;
     std::from_chars(text, end, back);
-    if (static_cast<double>(back * degree) == radians)
-      return std::string(static_cast<const char*>(text), end);
+    return static_cast<double>(back * degree) == radians ? std::string(static_cast<const char*>(text), end)
+                                                         : "";
+  };
+  for (int digits = 0; digits <= 17; ++digits) {
+    if (const std::string text = exact(std::chars_format::fixed, digits); !text.empty()) return text;
+  }
+  for (int digits = 17; digits <= 21; ++digits) {
+    if (const std::string text = exact(std::chars_format::general, digits); !text.empty()) return text;
   }
   return write_number(static_cast<double>(degrees));
 }

@@ -89,13 +89,15 @@ class TreeBuilder final : public YAML::EventHandler {
     check(mark, anchor);
     if (awaits_key()) fail(mark, "a key that is no plain word", "keys are words");
     Node* node = &root_;
+    bool under_key = false;
     if (!open_.empty()) {
       Open& top = open_.back();
-      node = top.node->kind == Kind::map ? &top.node->pairs.back().second : &top.node->items.emplace_back();
+      under_key = top.node->kind == Kind::map;
+      node = under_key ? &top.node->pairs.back().second : &top.node->items.emplace_back();
       top.has_key = false;
     }
     node->kind = kind;
-    node->line = mark.line + 1;
+    if (!under_key) node->line = mark.line + 1;  // else the line of its key
     return *node;
   }
   void open(Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
