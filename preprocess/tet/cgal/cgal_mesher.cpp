@@ -38,7 +38,7 @@ constexpr double kLargest = 8;           // circumradius far from surfaces, in t
 constexpr double kTetsPerRadius3 =
     3.6;  // measured: tets of a volume are about this many times volume / radius^3
 constexpr double kNodesPerTet = 0.22;  // measured, with much boundary; 0.17 without
-constexpr double kRoom = 0.9;          // of the allowed number is aimed at
+constexpr double kRoom = 0.93;         // of the allowed number is aimed at
 constexpr double kSliverBound = 10;    // degrees, of the smallest dihedral angle
 
 /// Circumradius wanted at a place, mm: `near` at surfaces, growing with the distance from them.

@@ -71,14 +71,19 @@ class Clipper {
             grid_.origin[2] - 0.5 * grid_.spacing[2]};
   }
 
+  /// Corners and centres are multiples of a power of two, exact in float32: right angles stay right, and the
+  /// off-diagonals between centres stay 0.
   BccLattice lay(double side) const {
+    const double unit = std::exp2(std::floor(std::log2(side)) - 8);
+    side = std::ceil(side / unit) * unit;
     BccLattice::Cell cubes;
     Eigen::Vector3d start;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double extent = grid_.size[axis] * grid_.spacing[axis];
       cubes[axis] = static_cast<std::int32_t>(std::ceil(extent / side)) + 2 * kMargin;
       start[static_cast<Eigen::Index>(axis)] =
-          low()[static_cast<Eigen::Index>(axis)] + 0.5 * (extent - cubes[axis] * side);
+          std::floor((low()[static_cast<Eigen::Index>(axis)] + 0.5 * (extent - cubes[axis] * side)) / unit) *
+          unit;
     }
     return {start, side, cubes};
   }

@@ -9,12 +9,12 @@
 #include <cmath>
 #include <cstring>
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/tetgen/child_process.hpp"
+#include "preprocess/tet/tetgen/complex.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 
 namespace ecorche::tet {
@@ -22,41 +22,6 @@ namespace {
 
 /// Tets no larger than a cube of this many voxels' volume, however many are allowed.
 constexpr double kFinestVolumeInVoxels = 12;
-
-/// Skin and bones as one piecewise linear complex: triangles over shared vertices, each once.
-struct Complex {
-  std::vector<double> points;  // 3 a vertex
-  std::vector<std::array<int, 3>> triangles;
-  std::size_t vertices() const { return points.size() / 3; }
-};
-
-class ComplexBuilder {
- public:
-  void add(const SurfaceMesh& surface) {
-    for (Eigen::Index f = 0; f < surface.F.rows(); ++f) {
-      std::array<int, 3> t{};
-      for (std::size_t c = 0; c < 3; ++c)
-        t[c] = vertex(surface.V.row(surface.F(f, static_cast<Eigen::Index>(c))));
-      std::array<int, 3> sorted = t;
-      std::sort(sorted.begin(), sorted.end());
-      if (sorted[0] == sorted[1] || sorted[1] == sorted[2]) continue;
-      if (seen_.insert(sorted).second) complex_.triangles.push_back(t);
-    }
-  }
-  Complex take() { return std::move(complex_); }
-
- private:
-  template <class Row>
-  int vertex(const Row& p) {
-    const auto [entry, fresh] =
-        number_.try_emplace({p[0], p[1], p[2]}, static_cast<int>(complex_.vertices()));
-    if (fresh) complex_.points.insert(complex_.points.end(), {p[0], p[1], p[2]});
-    return entry->second;
-  }
-  Complex complex_;
-  std::map<std::array<double, 3>, int> number_;
-  std::set<std::array<int, 3>> seen_;
-};
 
 /// TetGen's result as it crosses from the child: two counts, then points, corners and regions.
 struct Raw {
@@ -83,24 +48,55 @@ void get(const std::vector<std::byte>& bytes, std::size_t& at, std::vector<T>& v
   at += sizeof count + count * sizeof(T);
 }
 
-std::vector<std::byte> tetrahedralize_complex(const Complex& complex, double largest_volume) {
-  std::vector<tetgenio::facet> facets(complex.triangles.size());
-  std::vector<tetgenio::polygon> polygons(complex.triangles.size());
-  std::vector<std::array<int, 3>> corners = complex.triangles;
-  std::vector<double> points = complex.points;
-  for (std::size_t f = 0; f < facets.size(); ++f) {
-    polygons[f] = {corners[f].data(), 3};
-    facets[f] = {&polygons[f], 1, nullptr, 0};
+/// A complex in TetGen's own arrays, which stay ours.
+class TetgenInput {
+ public:
+  explicit TetgenInput(const Complex& complex)
+      : points_(complex.points),
+        corners_(complex.triangles),
+        polygons_(corners_.size()),
+        facets_(corners_.size()) {
+    for (std::size_t f = 0; f < facets_.size(); ++f) {
+      polygons_[f] = {corners_[f].data(), 3};
+      facets_[f] = {&polygons_[f], 1, nullptr, 0};
+    }
+    for (const Complex::Seed& seed : complex.seeds)
+      regions_.insert(regions_.end(), {seed.point[0], seed.point[1], seed.point[2], 1.0 + seed.label, -1.0});
+    in_.pointlist = points_.data();
+    in_.numberofpoints = static_cast<int>(complex.vertices());
+    in_.facetlist = facets_.data();
+    in_.numberoffacets = static_cast<int>(facets_.size());
+    in_.regionlist = regions_.empty() ? nullptr : regions_.data();
+    in_.numberofregions = static_cast<int>(complex.seeds.size());
   }
-  tetgenio in, out;
-  in.pointlist = points.data();
-  in.numberofpoints = static_cast<int>(complex.vertices());
-  in.facetlist = facets.data();
-  in.numberoffacets = static_cast<int>(facets.size());
+  ~TetgenInput() { in_.initialize(); }  // or TetGen would delete the arrays
+  TetgenInput(const TetgenInput&) = delete;
+  TetgenInput& operator=(const TetgenInput&) = delete;
+
+  void run(std::string switches, tetgenio& out) { tetrahedralize(switches.data(), &in_, &out); }
+
+ private:
+  std::vector<double> points_, regions_;
+  std::vector<std::array<int, 3>> corners_;
+  std::vector<tetgenio::polygon> polygons_;
+  std::vector<tetgenio::facet> facets_;
+  tetgenio in_;
+};
+
+/// The number of triangles that cross others, as bytes.
+std::vector<std::byte> count_crossings(const Complex& complex) {
+  tetgenio out;
+  TetgenInput(complex).run("pdQ", out);
+  std::vector<std::byte> bytes;
+  put(bytes, std::vector<int>{out.numberoftrifaces});
+  return bytes;
+}
+
+std::vector<std::byte> fill(const Complex& complex, double largest_volume) {
   // p: of a complex; Y: surfaces stay as they are; q: radius-edge ratio / smallest dihedral angle, where the
   // surfaces allow it; A: regions are numbered; z: from 0; Q: quiet; a: largest volume.
-  std::string switches = "pYq1.414/15AzQa" + std::to_string(largest_volume);
-  tetrahedralize(switches.data(), &in, &out);
+  tetgenio out;
+  TetgenInput(complex).run("pYq1.414/15AzQa" + std::to_string(largest_volume), out);
   Raw raw;
   raw.points.assign(out.pointlist, out.pointlist + 3 * static_cast<std::ptrdiff_t>(out.numberofpoints));
   raw.corners.assign(out.tetrahedronlist,
@@ -109,7 +105,6 @@ std::vector<std::byte> tetrahedralize_complex(const Complex& complex, double lar
   for (std::size_t t = 0; t < raw.regions.size(); ++t)
     raw.regions[t] = static_cast<int>(
         out.tetrahedronattributelist[t * static_cast<std::size_t>(out.numberoftetrahedronattributes)]);
-  in.initialize();  // the arrays are not TetGen's to delete
   std::vector<std::byte> bytes;
   put(bytes, raw.points);
   put(bytes, raw.corners);
@@ -145,7 +140,7 @@ std::uint16_t voxel_at(const Image& labels, const Eigen::Vector3d& p) {
 }
 
 /// Each region between surfaces takes the label that most of its volume has in the image.
-void label_regions(TetMesh& mesh, const std::vector<int>& regions, const Image& labels) {
+void label_by_image(TetMesh& mesh, const std::vector<int>& regions, const Image& labels) {
   std::map<int, std::map<std::uint16_t, double>> votes;
   for (Eigen::Index t = 0; t < mesh.T.rows(); ++t) {
     const auto a = mesh.V.row(mesh.T(t, 0)), b = mesh.V.row(mesh.T(t, 1));
@@ -161,6 +156,17 @@ void label_regions(TetMesh& mesh, const std::vector<int>& regions, const Image& 
   mesh.label.resize(regions.size());
   for (std::size_t t = 0; t < regions.size(); ++t)
     mesh.label[t] = static_cast<std::uint16_t>(label[regions[t]] - voxel::soft);
+}
+
+/// Regions that were seeded carry label + 1.
+void label_by_seeds(TetMesh& mesh, const std::vector<int>& regions, std::size_t bones) {
+  mesh.label.resize(regions.size());
+  for (std::size_t t = 0; t < regions.size(); ++t) {
+    if (regions[t] < 1 || static_cast<std::size_t>(regions[t]) > bones + 1)
+      throw Error(ErrorKind::internal, "tetgen", "a region without a seed",
+                  "use --mesher cgal, and report it");
+    mesh.label[t] = static_cast<std::uint16_t>(regions[t] - 1);
+  }
 }
 
 double body_volume(const Image& labels) {
@@ -179,28 +185,25 @@ class TetgenMesher : public Mesher {
   std::string_view name() const override { return "tetgen"; }
 
   TetMesh mesh(const Input& input, const Options& options, const Context& context) const override {
-    ComplexBuilder builder;
-    builder.add(input.patient.skin);
-    for (const CaseBone& bone : input.patient.bones) builder.add(bone.surface);
-    const Complex complex = builder.take();
-    if (static_cast<std::int64_t>(complex.vertices()) > options.max_nodes)
-      throw refusal("skin and bones have " + std::to_string(complex.vertices()) +
-                    " vertices, all of which it keeps, and " + std::to_string(options.max_nodes) +
-                    " nodes are allowed");
+    Complex complex = complex_of_surfaces(input.patient);
+    const std::string obstacle = obstacle_of(complex, options, context);
+    if (!obstacle.empty()) {
+      context.warn(obstacle + ": TetGen fills the surfaces of the voxels instead");
+      complex = complex_from_voxels(input, options, context);
+    }
     const double body = body_volume(input.labels);
     // Refined tets have about half the largest volume; the other half of the budget is for those at surfaces.
     double volume = std::max(kFinestVolumeInVoxels * std::pow(input.labels.grid.spacing[0], 3),
                              4 * body / static_cast<double>(options.max_tets));
     for (;;) {
-      const ChildResult result = run_in_child([&] { return tetrahedralize_complex(complex, volume); },
-                                              {.seconds = options.seconds}, context);
+      const ChildResult result =
+          run_in_child([&] { return fill(complex, volume); }, {.seconds = options.seconds}, context);
       if (result.end == ChildResult::End::timed_out)
         throw refusal("TetGen did not come back within " + std::to_string(static_cast<int>(options.seconds)) +
                       " s");
       if (result.end == ChildResult::End::failed)
-        throw refusal(
-            "TetGen could not fill the surfaces (" +
-            (result.said.empty() ? std::string("they may touch, cross or stay open") : result.said) + ")");
+        throw refusal("TetGen could not fill the surfaces" +
+                      (result.said.empty() ? "" : " (" + result.said + ")"));
       std::vector<int> regions;
       TetMesh mesh = unpack(result.bytes, regions);
       if (mesh.T.rows() == 0) throw refusal("the skin does not close, so that TetGen found no inside");
@@ -208,7 +211,11 @@ class TetgenMesher : public Mesher {
           std::max(static_cast<double>(mesh.T.rows()) / static_cast<double>(options.max_tets),
                    static_cast<double>(mesh.V.rows()) / static_cast<double>(options.max_nodes));
       if (excess <= 1) {
-        label_regions(mesh, regions, input.labels);
+        if (complex.seeds.empty()) {
+          label_by_image(mesh, regions, input.labels);
+        } else {
+          label_by_seeds(mesh, regions, input.patient.bones.size());
+        }
         context.report(1);
         return mesh;
       }
@@ -218,6 +225,37 @@ class TetgenMesher : public Mesher {
       volume *= 2 * excess * excess;
       context.warn(made + ": again with tets up to " + std::to_string(volume) + " mm^3");
     }
+  }
+
+ private:
+  /// Why TetGen cannot fill the surfaces themselves; empty where it can.
+  static std::string obstacle_of(const Complex& complex, const Options& options, const Context& context) {
+    if (5 * static_cast<std::int64_t>(complex.vertices()) > 4 * options.max_nodes ||
+        7 * static_cast<std::int64_t>(complex.vertices()) >
+            options.max_tets)  // at least about 7 tets a vertex, measured
+      return "skin and bones have " + std::to_string(complex.vertices()) +
+             " vertices, too many for the allowed tets";
+    const ChildResult check =
+        run_in_child([&] { return count_crossings(complex); }, {.seconds = options.seconds}, context);
+    if (check.end == ChildResult::End::timed_out) return "looking for crossing surfaces took too long";
+    if (check.end == ChildResult::End::failed) return "skin and bones cannot be checked for crossings";
+    std::size_t at = 0;
+    std::vector<int> crossings;
+    get(check.bytes, at, crossings);
+    return crossings[0] == 0 ? ""
+                             : std::to_string(crossings[0]) + " triangles of skin and bones cross others";
+  }
+
+  /// Boundaries between the labels, of a lattice as fine as a share of the budget allows: tets inside may be
+  /// larger.
+  static Complex complex_from_voxels(const Input& input, const Options& options, const Context& context) {
+    Options share = options;
+    share.max_tets = options.max_tets * 2 / 3;
+    share.max_nodes = options.max_nodes * 2 / 3;
+    const TetMesh lattice = make_lattice_mesher()->mesh(input, share, context);
+    const double volume = tet_det(lattice.V.row(lattice.T(0, 0)), lattice.V.row(lattice.T(0, 1)),
+                                  lattice.V.row(lattice.T(0, 2)), lattice.V.row(lattice.T(0, 3)));
+    return complex_of_lattice(lattice, std::cbrt(2 * volume));  // six times side^3 / 12
   }
 };
 

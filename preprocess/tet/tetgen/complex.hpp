@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Piecewise linear complexes: what TetGen fills.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/values/case.hpp"
+#include "core/values/mesh.hpp"
+
+namespace ecorche::tet {
+
+/// Triangles over shared vertices, each once; no two of them may cross. Between them lie regions.
+struct Complex {
+  struct Seed {
+    std::array<double, 3> point;  ///< strictly inside a region
+    std::uint16_t label;          ///< of its tets, as in TetMesh
+  };
+  std::vector<double> points;  ///< 3 a vertex, mm
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<Seed> seeds;  ///< one a region; or none where nobody knows the regions
+  std::size_t vertices() const { return points.size() / 3; }
+};
+
+/// Skin and bones as they are; vertices at equal places are one.
+Complex complex_of_surfaces(const Case& patient);
+
+/// The faces between tets of different labels, and those of the boundary, with nodes on them moved towards
+/// the mean of their neighbours on the surface. `mesh` must be a piece of a body-centred cubic lattice of
+/// cubes of `side`: its tets are 0.7 side high and no node moves by more than 0.2 side, so that none turns
+/// over and no two faces cross.
+Complex complex_of_lattice(const TetMesh& mesh, double side);
+
+}  // namespace ecorche::tet
