@@ -99,6 +99,8 @@ std::string Value::where() const {
 }
 
 void Value::fail(std::string what, std::string mend) const {
+  constexpr std::size_t most = 300;  // a value may be as long as its file
+  if (what.size() > most) what = what.substr(0, most) + "...";
   throw Error(ErrorKind::config, where(), std::move(what), std::move(mend));
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image/itk_images.hpp"
 
+// First: it makes ITK usable by other compilers than gcc.
+#include "io/image/itk_compilers.hpp"
+
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>

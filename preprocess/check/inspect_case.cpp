@@ -25,7 +25,7 @@ std::string plural(std::int64_t count, const std::string& noun) {
 
 std::string rounded(double x) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", x);
+  std::snprintf(text.data(), text.size(), "%.3g", x);
   return text.data();
 }
 

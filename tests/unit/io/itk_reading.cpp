@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/io/itk_reading.hpp"
 
+// First: it makes ITK usable by other compilers than gcc.
+#include "io/image/itk_compilers.hpp"
+
 #include <itkImage.h>
 #include <itkImageFileReader.h>
 #include <itkMetaImageIO.h>
