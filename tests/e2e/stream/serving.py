@@ -38,4 +38,6 @@ class Server:
     def __exit__(self, *_):
         if self.process.poll() is None:
             self.stop()
+        self.process.stdout.close()
+        self.process.stderr.close()
         self._folder.cleanup()
