@@ -32,14 +32,16 @@ void check_target(const std::filesystem::path& folder) {
     throw Error(ErrorKind::cannot_create, folder.string(), "is a file", "name a folder with -o");
   }
   if (!fs::is_empty(folder) && !fs::exists(folder / "truth.yaml")) {
-    throw Error(ErrorKind::cannot_create, folder.string(), "holds files, but no phantom", "name a new or empty folder with -o");
+    throw Error(ErrorKind::cannot_create, folder.string(), "holds files, but no phantom",
+                "name a new or empty folder with -o");
   }
 }
 
 int run(const Program& program, const Settings& settings) {
   check_target(settings.folder);
-  const phantom::Phantom made = settings.bar ? phantom::make_bar(settings.size, program.context("bar"))
-                                             : phantom::make(settings.size, settings.seed, program.context("phantom"));
+  const phantom::Phantom made = settings.bar
+                                    ? phantom::make_bar(settings.size, program.context("bar"))
+                                    : phantom::make(settings.size, settings.seed, program.context("phantom"));
   const Case& patient = made.patient;
   io::write_case(settings.folder, patient, program.context("write"));
   if (!made.clips.empty()) files::make_folder(settings.folder / "motion");
@@ -48,21 +50,30 @@ int run(const Program& program, const Settings& settings) {
   files::write_text(settings.folder / "truth.yaml", io::skeleton_to_yaml(made.truth));
 
   Eigen::Index vertices = patient.skin.V.rows(), triangles = patient.skin.F.rows();
-  for (const CaseBone& bone : patient.bones) vertices += bone.surface.V.rows(), triangles += bone.surface.F.rows();
+  for (const CaseBone& bone : patient.bones)
+    vertices += bone.surface.V.rows(), triangles += bone.surface.F.rows();
   std::map<std::string, int> groups;
   for (const CaseTissue& tissue : patient.tissues) {
     vertices += tissue.surface.V.rows(), triangles += tissue.surface.F.rows();
     ++groups[std::string(group_name(tissue.group))];
   }
-  nlohmann::json object{{"case", (settings.folder / "case.yaml").string()}, {"segments", made.truth.segments.size()}, {"bones", patient.bones.size()},
-                        {"tissues", groups}, {"vertices", vertices}, {"triangles", triangles}, {"clips", made.clips.size()}};
-  std::string text = fmt::format("{}: {} segments, {} bones", (settings.folder / "case.yaml").string(), made.truth.segments.size(), patient.bones.size());
-  for (const auto& [group, count] : groups) text += fmt::format(", {} {}{}", count, group, count == 1 ? "" : "s");
+  nlohmann::json object{{"case", (settings.folder / "case.yaml").string()},
+                        {"segments", made.truth.segments.size()},
+                        {"bones", patient.bones.size()},
+                        {"tissues", groups},
+                        {"vertices", vertices},
+                        {"triangles", triangles},
+                        {"clips", made.clips.size()}};
+  std::string text = fmt::format("{}: {} segments, {} bones", (settings.folder / "case.yaml").string(),
+                                 made.truth.segments.size(), patient.bones.size());
+  for (const auto& [group, count] : groups)
+    text += fmt::format(", {} {}{}", count, group, count == 1 ? "" : "s");
   text += fmt::format("; {} vertices, {} triangles", vertices, triangles);
   if (!patient.volumes.empty()) {
     const ImageGrid& grid = patient.volumes.front().image.grid;
     object["image"] = {{"size", grid.size}, {"spacing", grid.spacing}};
-    text += fmt::format("; image {} x {} x {} at {} mm", grid.size[0], grid.size[1], grid.size[2], grid.spacing[0]);
+    text += fmt::format("; image {} x {} x {} at {} mm", grid.size[0], grid.size[1], grid.size[2],
+                        grid.spacing[0]);
   }
   program.result(text, object);
   return 0;
@@ -74,13 +85,19 @@ void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
   const auto settings = std::make_shared<Settings>();
   CLI::App* command = app.add_subcommand("phantom", "write the built-in synthetic patient as a case");
   command->add_option("-o,--output", settings->folder, "folder of the case")->required();
-  const std::map<std::string, phantom::Size> sizes{{"small", phantom::Size::small}, {"standard", phantom::Size::standard}, {"paper", phantom::Size::paper}};
-  command->add_option("--size", settings->size, "small (tests), standard (demo) or paper (Sujar18's largest model)")
+  const std::map<std::string, phantom::Size> sizes{{"small", phantom::Size::small},
+                                                   {"standard", phantom::Size::standard},
+                                                   {"paper", phantom::Size::paper}};
+  command
+      ->add_option("--size", settings->size,
+                   "small (tests), standard (demo) or paper (Sujar18's largest model)")
       ->transform(CLI::CheckedTransformer(sizes, CLI::ignore_case))
       ->default_str("standard");
-  command->add_option("--seed", settings->seed, "draws the body's proportions and the noise of the CT")->capture_default_str();
+  command->add_option("--seed", settings->seed, "draws the body's proportions and the noise of the CT")
+      ->capture_default_str();
   command->add_flag("--bar", settings->bar, "the bar of Sujar18 figure 7 instead of a patient");
-  command->callback([&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
+  command->callback(
+      [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
 }
 
 }  // namespace ecorche::app

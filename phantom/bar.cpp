@@ -13,13 +13,14 @@ namespace {
 
 using Vec3 = Eigen::Vector3d;
 
-constexpr double kLength = 800, kHalfWidth = 50;       // mm
+constexpr double kLength = 800, kHalfWidth = 50;  // mm
 constexpr double kBoneHalfLength = 80, kBoneHalfWidth = 15;
 
 /// A box as a regular grid of squares, each cut in two, no vertex twice.
 SurfaceMesh box_mesh(const Vec3& lo, const Vec3& hi, double edge) {
   std::array<int, 3> n{};
-  for (int a = 0; a < 3; ++a) n[static_cast<std::size_t>(a)] = std::max(1, static_cast<int>(std::lround((hi[a] - lo[a]) / edge)));
+  for (int a = 0; a < 3; ++a)
+    n[static_cast<std::size_t>(a)] = std::max(1, static_cast<int>(std::lround((hi[a] - lo[a]) / edge)));
   std::map<std::array<int, 3>, std::int32_t> row;
   std::vector<std::array<std::int32_t, 3>> triangles;
   std::vector<Vec3> points;
@@ -27,7 +28,8 @@ SurfaceMesh box_mesh(const Vec3& lo, const Vec3& hi, double edge) {
     const auto [found, fresh] = row.try_emplace(at, static_cast<std::int32_t>(points.size()));
     if (fresh) {
       Vec3 p;
-      for (int a = 0; a < 3; ++a) p[a] = lo[a] + (hi[a] - lo[a]) * at[static_cast<std::size_t>(a)] / n[static_cast<std::size_t>(a)];
+      for (int a = 0; a < 3; ++a)
+        p[a] = lo[a] + (hi[a] - lo[a]) * at[static_cast<std::size_t>(a)] / n[static_cast<std::size_t>(a)];
       points.push_back(p);
     }
     return found->second;
@@ -59,9 +61,11 @@ SurfaceMesh box_mesh(const Vec3& lo, const Vec3& hi, double edge) {
   }
   SurfaceMesh mesh;
   mesh.V.resize(static_cast<Eigen::Index>(points.size()), 3);
-  for (std::size_t i = 0; i < points.size(); ++i) mesh.V.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
+  for (std::size_t i = 0; i < points.size(); ++i)
+    mesh.V.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
   mesh.F.resize(static_cast<Eigen::Index>(triangles.size()), 3);
-  for (std::size_t i = 0; i < triangles.size(); ++i) mesh.F.row(static_cast<Eigen::Index>(i)) << triangles[i][0], triangles[i][1], triangles[i][2];
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    mesh.F.row(static_cast<Eigen::Index>(i)) << triangles[i][0], triangles[i][1], triangles[i][2];
   return mesh;
 }
 
@@ -77,7 +81,8 @@ Phantom make_bar(Size size, const Context& context) {
     const std::string number = std::to_string(i + 1);
     const double middle = 100 + 200.0 * i;
     CaseBone bone{"bone_" + number, "bar_" + number, {}};
-    bone.surface = box_mesh({-kBoneHalfWidth, -kBoneHalfWidth, middle - kBoneHalfLength}, {kBoneHalfWidth, kBoneHalfWidth, middle + kBoneHalfLength}, edge);
+    bone.surface = box_mesh({-kBoneHalfWidth, -kBoneHalfWidth, middle - kBoneHalfLength},
+                            {kBoneHalfWidth, kBoneHalfWidth, middle + kBoneHalfLength}, edge);
     bar.patient.bones.push_back(std::move(bone));
 
     Segment segment;

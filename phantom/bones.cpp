@@ -20,8 +20,8 @@ Part bone(std::string name, std::string segment, Shape shape, double detail, int
   return part;
 }
 
-/// A bone gives way to those of the next segment. A little less than the gap, so that surfaces made concentric to a
-/// joint, which keep exactly that gap, are not scratched.
+/// A bone gives way to those of the next segment. A little less than the gap, so that surfaces made
+/// concentric to a joint, which keep exactly that gap, are not scratched.
 Shape clear_of(const Shape& bone, const std::vector<Shape>& next, double gap) {
   return subtract(bone, grow(unite(next), gap - 0.5));
 }
@@ -31,7 +31,8 @@ Shape clear_of(const Shape& bone, const std::vector<Shape>& next, double gap) {
 std::vector<Part> make_bones(const Landmarks& at) {
   const Shape toes = toe_bone(at), hand = hand_bone(at), skull = skull_bone(at), mandible = mandible_bone(at);
   const Shape foot = clear_of(foot_bone(at), {toes}, kGap);
-  const Shape tibia = clear_of(tibia_bone(at), {foot}, kGap), fibula = clear_of(fibula_bone(at), {foot}, kGap);
+  const Shape tibia = clear_of(tibia_bone(at), {foot}, kGap),
+              fibula = clear_of(fibula_bone(at), {foot}, kGap);
   const Shape patella = patella_bone(at);
   const Shape femur = clear_of(femur_bone(at), {tibia, fibula, patella}, kGap);
   const Shape ulna = clear_of(ulna_bone(at), {hand}, kGap), radius = clear_of(radius_bone(at), {hand}, kGap);
@@ -39,40 +40,43 @@ std::vector<Part> make_bones(const Landmarks& at) {
   const Shape scapula = clear_of(scapula_bone(at), {humerus}, kBallGap);
   const Shape clavicle = subtract(clear_of(clavicle_bone(at), {humerus}, kGap), grow(scapula, 3));
   const Shape neck = clear_of(cervical_spine(at), {skull, mandible}, kGap);
-  const Shape ribs = clear_of(rib_cage(at), {neck, scapula, clavicle, mirrored(scapula), mirrored(clavicle)}, kGap);
+  const Shape ribs =
+      clear_of(rib_cage(at), {neck, scapula, clavicle, mirrored(scapula), mirrored(clavicle)}, kGap);
   const Shape lumbar = clear_of(lumbar_spine(at), {ribs}, kGap);
   const Shape pelvis = clear_of(pelvis_bone(at), {lumbar, femur, mirrored(femur)}, kBallGap);
 
   std::vector<Part> bones;
-  bones.push_back(bone("pelvis", "pelvis", pelvis, 7, 420));
-  bones.push_back(bone("lumbar_spine", "spine_lumbar", lumbar, 6, 150));
-  bones.push_back(bone("rib_cage", "spine_thoracic", ribs, 4.5, 850));
-  bones.push_back(bone("cervical_spine", "neck", neck, 4, 130));
-  bones.push_back(bone("skull", "head", skull, 5, 340));
-  bones.push_back(bone("mandible", "head", mandible, 6, 70));
-  add_pair(bones, bone("clavicle", "shoulder_girdle", clavicle, 6, 36));
-  add_pair(bones, bone("scapula", "shoulder_girdle", scapula, 4, 130));
-  add_pair(bones, bone("humerus", "upper_arm", humerus, 9, 130));
-  add_pair(bones, bone("radius", "forearm", radius, 6.5, 60));
-  add_pair(bones, bone("ulna", "forearm", ulna, 6.5, 70));
-  add_pair(bones, bone("hand_bones", "hand", hand, 3.6, 180));
-  add_pair(bones, bone("femur", "thigh", femur, 12, 170));
-  add_pair(bones, bone("patella", "shank", patella, 7, 24));
-  add_pair(bones, bone("tibia", "shank", tibia, 10, 100));
-  add_pair(bones, bone("fibula", "shank", fibula, 6, 44));
-  add_pair(bones, bone("foot_bones", "foot", foot, 5, 150));
-  add_pair(bones, bone("toe_bones", "toes", toes, 4.2, 80));
+  bones.push_back(bone("pelvis", "pelvis", pelvis, 7, 378));
+  bones.push_back(bone("lumbar_spine", "spine_lumbar", lumbar, 6, 135));
+  bones.push_back(bone("rib_cage", "spine_thoracic", ribs, 4.5, 765));
+  bones.push_back(bone("cervical_spine", "neck", neck, 4, 117));
+  bones.push_back(bone("skull", "head", skull, 5, 306));
+  bones.push_back(bone("mandible", "head", mandible, 6, 63));
+  add_pair(bones, bone("clavicle", "shoulder_girdle", clavicle, 6, 31));
+  add_pair(bones, bone("scapula", "shoulder_girdle", scapula, 4, 110));
+  add_pair(bones, bone("humerus", "upper_arm", humerus, 9, 110));
+  add_pair(bones, bone("radius", "forearm", radius, 6.5, 51));
+  add_pair(bones, bone("ulna", "forearm", ulna, 6.5, 60));
+  add_pair(bones, bone("hand_bones", "hand", hand, 3.6, 153));
+  add_pair(bones, bone("femur", "thigh", femur, 12, 144));
+  add_pair(bones, bone("patella", "shank", patella, 7, 20));
+  add_pair(bones, bone("tibia", "shank", tibia, 10, 85));
+  add_pair(bones, bone("fibula", "shank", fibula, 6, 37));
+  add_pair(bones, bone("foot_bones", "foot", foot, 5, 128));
+  add_pair(bones, bone("toe_bones", "toes", toes, 4.2, 68));
   return bones;
 }
 
 Shape make_keepout(const Landmarks& at, const std::vector<Part>& bones) {
   std::vector<Shape> all;
   for (const Part& part : bones) all.push_back(part.shape);
-  std::vector<Shape> joints{sphere(at.hip, kFemoralHead + 13), sphere(at.shoulder, kHumeralHead + 11),
-                            cylinder(at.knee - 48 * at.knee_axis, at.knee + 48 * at.knee_axis, kKneeRadius + 12, 6),
-                            cylinder(at.elbow - 32 * at.elbow_axis, at.elbow + 32 * at.elbow_axis, kElbowRadius + 9, 5),
-                            cylinder(at.ankle - 26 * at.ankle_axis, at.ankle + 26 * at.ankle_axis, kAnkleRadius + 10, 5),
-                            sphere(at.wrist, 15)};
+  std::vector<Shape> joints{
+      sphere(at.hip, kFemoralHead + 13),
+      sphere(at.shoulder, kHumeralHead + 11),
+      cylinder(at.knee - 48 * at.knee_axis, at.knee + 48 * at.knee_axis, kKneeRadius + 12, 6),
+      cylinder(at.elbow - 32 * at.elbow_axis, at.elbow + 32 * at.elbow_axis, kElbowRadius + 9, 5),
+      cylinder(at.ankle - 26 * at.ankle_axis, at.ankle + 26 * at.ankle_axis, kAnkleRadius + 10, 5),
+      sphere(at.wrist, 15)};
   const Shape left = unite(joints);
   return unite({grow(unite(all), 3), left, mirrored(left)});
 }

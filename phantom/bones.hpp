@@ -24,7 +24,8 @@ Shape humerus_bone(const Landmarks& at);
 Shape ulna_bone(const Landmarks& at);
 Shape radius_bone(const Landmarks& at);
 Shape hand_bone(const Landmarks& at);
-/// Points from the wrist to the tip of digit 0 (thumb) to 4, in the hand's frame: (dorsal, ulnar, proximal), mm.
+/// Points from the wrist to the tip of digit 0 (thumb) to 4, in the hand's frame: (dorsal, ulnar, proximal),
+/// mm.
 std::vector<Vec> digit_path(int digit);
 
 Shape femur_bone(const Landmarks& at);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// A stretch of spine: bodies and discs, arches, spinous and transverse processes. Its ends are round, their tips at
-/// `z0` and `z1`, so that neighbours can roll on each other.
+/// A stretch of spine: bodies and discs, arches, spinous and transverse processes. Its ends are round, their
+/// tips at `z0` and `z1`, so that neighbours can roll on each other.
 Shape spine(double z0, double z1, double r0, double r1, int vertebrae, double spinous, double transverse) {
   std::vector<Shape> parts;
   std::vector<Vec> bodies, arch;
@@ -32,14 +32,16 @@ Shape spine(double z0, double z1, double r0, double r1, int vertebrae, double sp
     arch_radii.push_back(0.45 * r);
     parts.push_back(round_cone(back, 0.4 * r, back + Vec(0, spinous, -0.6 * spinous), 0.28 * r));
     for (const double side : {-1.0, 1.0}) {
-      parts.push_back(round_cone(c + Vec(0, 0.8 * r, 0), 0.42 * r, c + Vec(side * transverse, 0.9 * r, 2), 0.3 * r));
+      parts.push_back(
+          round_cone(c + Vec(0, 0.8 * r, 0), 0.42 * r, c + Vec(side * transverse, 0.9 * r, 2), 0.3 * r));
     }
   }
   parts.push_back(chain(arch, arch_radii));
   return unite(parts, 3);
 }
 
-/// The point at depth 3 mm under the thorax's envelope, at height `z`, `angle` round from the spine to the left and front.
+/// The point at depth 3 mm under the thorax's envelope, at height `z`, `angle` round from the spine to the
+/// left and front.
 Vec on_thorax(const Shape& envelope, double angle, double z) {
   const Vec axis(0, 0, z), way(std::sin(angle), std::cos(angle), 0);
   double inner = 0, outer = 250;
@@ -50,10 +52,12 @@ Vec on_thorax(const Shape& envelope, double angle, double z) {
   return axis + inner * way;
 }
 
-/// Rib 1 to 10, left: along the envelope from the spine, falling, then rising again as cartilage to the sternum.
+/// Rib 1 to 10, left: along the envelope from the spine, falling, then rising again as cartilage to the
+/// sternum.
 Vec rib_point(const Shape& envelope, int rib, double s) {
   const double z_spine = 1434 - 25.0 * (rib - 1), z_front = 1388 - 19.0 * (rib - 1);
-  const double z = z_spine + (z_front - z_spine) * s - (4 + 8.0 * rib) * std::pow(std::sin(kPi * std::min(s, 1.0)), 1.3);
+  const double z =
+      z_spine + (z_front - z_spine) * s - (4 + 8.0 * rib) * std::pow(std::sin(kPi * std::min(s, 1.0)), 1.3);
   return on_thorax(envelope, (0.10 + 0.88 * s) * kPi, z);
 }
 
@@ -71,7 +75,8 @@ Shape rib(const Shape& envelope, int number) {
 Shape hip_bone(const Landmarks& at) {
   const Vec& h = at.hip;
   // The wing: a bowl, thick at its crest.
-  const Eigen::Matrix3d tilt = (Eigen::AngleAxisd(-0.30, Vec::UnitZ()) * Eigen::AngleAxisd(0.42, Vec::UnitY())).toRotationMatrix();
+  const Eigen::Matrix3d tilt =
+      (Eigen::AngleAxisd(0.32, Vec::UnitZ()) * Eigen::AngleAxisd(0.42, Vec::UnitY())).toRotationMatrix();
   const Vec wing = h + Vec(12, 24, 82);
   Shape ilium = ellipsoid(wing, {17, 74, 70}, tilt);
   ilium = subtract(ilium, ellipsoid(wing + tilt * Vec(-24, -6, 8), {27, 76, 76}, tilt), 4);
@@ -81,12 +86,16 @@ Shape hip_bone(const Landmarks& at) {
     crest.push_back(wing + tilt * Vec(5, -72 * std::cos(a), 67 * std::sin(a)));
   }
   const Shape crest_tube = chain(crest, std::vector<double>(crest.size(), 7.5));
-  const Shape body = unite({round_cone(h + Vec(-2, 10, 30), 21, h + Vec(6, 20, 60), 12), round_cone(h + Vec(-8, 4, 10), 30, h, 33)}, 10);
+  const Shape body = unite({round_cone(h + Vec(-2, 10, 30), 21, h + Vec(6, 20, 60), 12),
+                            round_cone(h + Vec(-12, 4, 12), 34, h + Vec(-4, 2, 4), 36)},
+                           10);
   const Shape ischium = tube({h + Vec(-6, 20, -14), h + Vec(-14, 30, -50), h + Vec(-22, 24, -78)}, 17, 15, 8);
-  const Shape upper_ramus = tube({h + Vec(-18, -18, 0), h + Vec(-46, -44, -8), Vec(9, h.y() - 56, h.z() - 22)}, 14, 11, 10);
+  const Shape upper_ramus =
+      tube({h + Vec(-18, -18, 0), h + Vec(-46, -44, -8), Vec(9, h.y() - 56, h.z() - 22)}, 14, 11, 10);
   const Shape symphysis = round_cone({5, h.y() - 56, h.z() - 20}, 11, {5, h.y() - 50, h.z() - 44}, 9);
-  const Shape lower_ramus = tube({Vec(8, h.y() - 50, h.z() - 44), h + Vec(-56, -14, -72), h + Vec(-26, 18, -82)}, 9, 11, 10);
-  const Shape joint = tube({h + Vec(-34, 52, 74), h + Vec(-52, 54, 70)}, 19, 19, 2);  // to the sacrum
+  const Shape lower_ramus =
+      tube({Vec(8, h.y() - 50, h.z() - 44), h + Vec(-56, -14, -72), h + Vec(-26, 18, -82)}, 9, 11, 10);
+  const Shape joint = round_cone(h + Vec(-12, 62, 84), 16, h + Vec(-56, 54, 72), 19);  // to the sacrum
   return unite({ilium, crest_tube, body, ischium, upper_ramus, symphysis, lower_ramus, joint}, 9);
 }
 
@@ -94,10 +103,20 @@ Shape hip_bone(const Landmarks& at) {
 
 Vec spine_at(double z) {
   // Sacrum, lumbar lordosis, thoracic kyphosis, cervical lordosis.
-  static const std::vector<Vec> curve = smooth_path(
-      {{0, 80, 900}, {0, 68, 960}, {0, 42, 1016}, {0, 34, 1090}, {0, 46, 1172}, {0, 60, 1270}, {0, 63, 1340}, {0, 50, 1452}, {0, 30, 1510}, {0, 16, 1566}, {0, 12, 1600}},
-      401);
-  const auto above = std::lower_bound(curve.begin(), curve.end(), z, [](const Vec& p, double height) { return p.z() < height; });
+  static const std::vector<Vec> curve = smooth_path({{0, 80, 900},
+                                                     {0, 68, 960},
+                                                     {0, 42, 1016},
+                                                     {0, 34, 1090},
+                                                     {0, 46, 1172},
+                                                     {0, 60, 1270},
+                                                     {0, 63, 1340},
+                                                     {0, 50, 1452},
+                                                     {0, 30, 1510},
+                                                     {0, 16, 1566},
+                                                     {0, 12, 1600}},
+                                                    401);
+  const auto above = std::lower_bound(curve.begin(), curve.end(), z,
+                                      [](const Vec& p, double height) { return p.z() < height; });
   if (above == curve.begin()) return {0, curve.front().y(), z};
   if (above == curve.end()) return {0, curve.back().y(), z};
   const Vec &a = *(above - 1), &b = *above;
@@ -110,13 +129,15 @@ Shape thorax_envelope() {
 
 Shape pelvis_bone(const Landmarks& at) {
   const Shape hip = hip_bone(at);
-  const Shape sacrum = unite({round_cone({16, 62, 984}, 21, {6, 90, 905}, 9), round_cone({-16, 62, 984}, 21, {-6, 90, 905}, 9),
-                              round_cone({0, 58, 990}, 22, {0, 92, 880}, 7)}, 6);
+  const Shape sacrum =
+      unite({round_cone({16, 62, 984}, 21, {6, 90, 905}, 9), round_cone({-16, 62, 984}, 21, {-6, 90, 905}, 9),
+             round_cone({0, 58, 990}, 22, {0, 92, 880}, 7)},
+            6);
   Shape pelvis = unite({hip, mirrored(hip), sacrum}, 6);
   // The sockets: spherical, opening outwards, forwards and down.
   Shape socket = sphere(at.hip, kFemoralHead + kBallGap);
   const Vec opening = Vec(0.82, -0.30, -0.48).normalized();
-  socket = unite({socket, round_cone(at.hip + 22 * opening, 30, at.hip + 60 * opening, 56)});
+  socket = unite({socket, round_cone(at.hip + 28 * opening, 27, at.hip + 66 * opening, 54)});
   return subtract(subtract(pelvis, socket), mirrored(socket));
 }
 
@@ -154,14 +175,17 @@ Shape skull_cavity() {
 }
 
 Shape skull_bone(const Landmarks&) {
-  const Shape cranium = unite({ellipsoid({0, 6, 1660}, {73, 88, 75}), ellipsoid({0, 34, 1616}, {52, 46, 36})}, 24);
-  const Shape brow = chain({{-44, -64, 1650}, {-20, -77, 1655}, {20, -77, 1655}, {44, -64, 1650}}, {11, 12, 12, 11});
-  const Shape face = unite({round_box({0, -48, 1608}, {36, 30, 40}, 20), round_box({0, -66, 1580}, {25, 15, 16}, 10)}, 16);
+  const Shape cranium =
+      unite({ellipsoid({0, 6, 1660}, {73, 88, 75}), ellipsoid({0, 34, 1616}, {52, 46, 36})}, 24);
+  const Shape brow =
+      chain({{-44, -64, 1650}, {-20, -77, 1655}, {20, -77, 1655}, {44, -64, 1650}}, {11, 12, 12, 11});
+  const Shape face =
+      unite({round_box({0, -48, 1608}, {36, 30, 40}, 20), round_box({0, -66, 1580}, {25, 15, 16}, 10)}, 16);
   const Shape cheek = tube({{34, -66, 1608}, {58, -46, 1606}, {68, -14, 1612}}, 11, 7, 10);
   const Shape nasal = round_cone({0, -80, 1646}, 7, {0, -94, 1622}, 4.5);
   const Shape base = round_cone({0, -20, 1590}, 22, {0, 14, 1586}, 14);
   Shape skull = unite({cranium, brow, face, cheek, mirrored(cheek), nasal, base}, 10);
-  const Shape orbit = ellipsoid({31, -82, 1630}, {18, 24, 15});
+  const Shape orbit = ellipsoid({32, -84, 1630}, {18, 17, 14});
   const Shape aperture = ellipsoid({0, -92, 1602}, {10, 16, 13});
   const Shape magnum = cylinder({0, 24, 1570}, {0, 30, 1625}, 16, 2);  // joins the cavity to the outside
   skull = subtract(skull, unite({orbit, mirrored(orbit), aperture}), 4);
@@ -169,7 +193,8 @@ Shape skull_bone(const Landmarks&) {
 }
 
 Shape mandible_bone(const Landmarks&) {
-  const Shape half = tube({{0, -82, 1546}, {26, -70, 1547}, {44, -36, 1551}, {52, -10, 1566}, {55, -4, 1596}}, 10, 7.5, 18);
+  const Shape half =
+      tube({{0, -82, 1546}, {26, -70, 1547}, {44, -36, 1551}, {52, -10, 1566}, {55, -4, 1596}}, 10, 7.5, 18);
   return unite({half, mirrored(half), round_cone({0, -84, 1542}, 11, {0, -82, 1556}, 9)}, 6);
 }
 

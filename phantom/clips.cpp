@@ -47,7 +47,8 @@ Clip empty_clip(const Skeleton& truth, std::string name) {
     joint.name = segment.aliases.front();
     joint.parent = segment.parent;
     joint.offset = segment.joint.center;
-    if (segment.parent >= 0) joint.offset -= truth.segments[static_cast<std::size_t>(segment.parent)].joint.center;
+    if (segment.parent >= 0)
+      joint.offset -= truth.segments[static_cast<std::size_t>(segment.parent)].joint.center;
     clip.joints.push_back(joint);
   }
   return clip;
@@ -56,7 +57,8 @@ Clip empty_clip(const Skeleton& truth, std::string name) {
 void add_frame(const Skeleton& truth, const Angles& angles, const Vec3& root, Clip& clip) {
   for (const Segment& segment : truth.segments) {
     const auto found = angles.find(segment.joint.name);
-    clip.rotation.push_back(found == angles.end() ? Eigen::Quaterniond::Identity() : turn(segment.joint, found->second));
+    clip.rotation.push_back(found == angles.end() ? Eigen::Quaterniond::Identity()
+                                                  : turn(segment.joint, found->second));
   }
   clip.root_position.push_back(root);
 }
@@ -67,7 +69,8 @@ Vec3 ankle_at(const Skeleton& truth, const Angles& angles, const std::string& an
   for (std::size_t i = 0; i < truth.segments.size(); ++i) {
     const Segment& segment = truth.segments[i];
     const auto found = angles.find(segment.joint.name);
-    const Eigen::Quaterniond q = found == angles.end() ? Eigen::Quaterniond::Identity() : turn(segment.joint, found->second);
+    const Eigen::Quaterniond q =
+        found == angles.end() ? Eigen::Quaterniond::Identity() : turn(segment.joint, found->second);
     const RigidTransform local{q, segment.joint.center - q * segment.joint.center};
     global[i] = segment.parent < 0 ? local : global[static_cast<std::size_t>(segment.parent)] * local;
     if (segment.joint.name == ankle) return global[i] * segment.joint.center;
@@ -88,20 +91,24 @@ Clip make_walk(const Skeleton& truth) {
     for (const bool left : {true, false}) {
       const std::string end = left ? "_left" : "_right";
       const double p = left ? t : t + 0.5, s = left ? swing : -swing;
-      angles["hip" + end] = {{"flexion", 8 + 20 * std::cos(2 * kPi * (p + 0.04))}, {"adduction", 3 * bump(p, 0.25, 0.12)}};
+      angles["hip" + end] = {{"flexion", 8 + 20 * std::cos(2 * kPi * (p + 0.04))},
+                             {"adduction", 3 * bump(p, 0.25, 0.12)}};
       angles["knee" + end] = {{"flexion", 4 + 13 * bump(p, 0.14, 0.09) + 54 * bump(p, 0.73, 0.10)}};
-      angles["ankle" + end] = {{"dorsiflexion", 9 * bump(p, 0.42, 0.13) - 17 * bump(p, 0.63, 0.07) - 5 * bump(p, 0.07, 0.05)}};
+      angles["ankle" + end] = {
+          {"dorsiflexion", 9 * bump(p, 0.42, 0.13) - 17 * bump(p, 0.63, 0.07) - 5 * bump(p, 0.07, 0.05)}};
       angles["toe_joint" + end] = {{"extension", 25 * bump(p, 0.58, 0.07)}};
       angles["shoulder" + end] = {{"flexion", 3 - 17 * s}};
       angles["elbow" + end] = {{"flexion", 14 - 9 * s}};
     }
     angles["pelvis"] = {{"rotation", -5 * swing}, {"obliquity", 2.5 * std::sin(2 * kPi * t)}};
-    angles["lumbar"] = {{"flexion", 2}, {"rotation", 4 * swing}, {"lateral_bending", -2 * std::sin(2 * kPi * t)}};
+    angles["lumbar"] = {
+        {"flexion", 2}, {"rotation", 4 * swing}, {"lateral_bending", -2 * std::sin(2 * kPi * t)}};
     angles["thorax"] = {{"rotation", 5 * swing}};
     angles["neck"] = {{"rotation", -2 * swing}};
     angles["head"] = {{"rotation", -2 * swing}};
     // Lowest in double support, shifted over the standing leg.
-    add_frame(truth, angles, rest + Vec3(12 * std::sin(2 * kPi * t), 0, -16 - 12 * std::cos(4 * kPi * t)), clip);
+    add_frame(truth, angles, rest + Vec3(12 * std::sin(2 * kPi * t), 0, -16 - 12 * std::cos(4 * kPi * t)),
+              clip);
   }
   return clip;
 }
@@ -130,7 +137,8 @@ Clip make_bend(const Skeleton& truth) {
       angles["wrist" + end] = {{"flexion", -15 * u}};
     }
     // The ankles stay where they stand.
-    const Vec3 moved = ankle_at(truth, angles, "ankle_left") - truth.segments[static_cast<std::size_t>(ankle)].joint.center;
+    const Vec3 moved =
+        ankle_at(truth, angles, "ankle_left") - truth.segments[static_cast<std::size_t>(ankle)].joint.center;
     add_frame(truth, angles, rest - Vec3(0, moved.y(), moved.z()), clip);
   }
   return clip;

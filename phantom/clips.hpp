@@ -10,7 +10,8 @@ namespace ecorche::phantom {
 /// Two strides on the spot, 2.4 s at 30 frames per second; the frame after the last is the first.
 Clip make_walk(const Skeleton& truth);
 
-/// Bends forward and reaches down with the head turned, knees giving, feet on their places; and back up. 4 s, looping.
+/// Bends forward and reaches down with the head turned, knees giving, feet on their places; and back up. 4 s,
+/// looping.
 Clip make_bend(const Skeleton& truth);
 
 }  // namespace ecorche::phantom

@@ -19,12 +19,26 @@ namespace {
 constexpr std::array<double, 4> kPulls{0.6, 0.6, 0.4, 0};  // the last pass only puts vertices on the surface
 constexpr int kBlock = 8;  // samples along an edge of the blocks that are skipped or filled together
 
-/// Corner c of a cell has offsets (c & 1, c >> 1 & 1, c >> 2). Edge e = 4 * axis + (which of four, by the other axes).
-constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1}, {2, 3}, {4, 5}, {6, 7},  // along x, at (y, z) bits
-                                                     {0, 2}, {1, 3}, {4, 6}, {5, 7},  // along y, at (x, z) bits
-                                                     {0, 4}, {1, 5}, {2, 6}, {3, 7}}};  // along z, at (x, y) bits
-constexpr std::array<std::array<int, 4>, 6> kFaces{
-    {{0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 5, 7, 6}}};  // corners in a ring
+/// Corner c of a cell has offsets (c & 1, c >> 1 & 1, c >> 2). Edge e = 4 * axis + (which of four, by the
+/// other axes).
+constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
+                                                     {2, 3},
+                                                     {4, 5},
+                                                     {6, 7},  // along x, at (y, z) bits
+                                                     {0, 2},
+                                                     {1, 3},
+                                                     {4, 6},
+                                                     {5, 7},  // along y, at (x, z) bits
+                                                     {0, 4},
+                                                     {1, 5},
+                                                     {2, 6},
+                                                     {3, 7}}};  // along z, at (x, y) bits
+constexpr std::array<std::array<int, 4>, 6> kFaces{{{0, 2, 6, 4},
+                                                    {1, 3, 7, 5},
+                                                    {0, 1, 5, 4},
+                                                    {2, 3, 7, 6},
+                                                    {0, 1, 3, 2},
+                                                    {4, 5, 7, 6}}};  // corners in a ring
 
 int edge_between(int a, int b) {
   for (int e = 0; e < 12; ++e) {
@@ -89,7 +103,8 @@ class SurfaceNets {
     // The odd shift keeps lattice planes off the round numbers at which shapes have their planes of symmetry.
     for (int a = 0; a < 3; ++a) {
       origin_[a] = (std::floor(shape.box().lo[a] / h_) - 2.0 - 0.3719) * h_;
-      n_[static_cast<std::size_t>(a)] = static_cast<std::int32_t>(std::ceil((shape.box().hi[a] - origin_[a]) / h_)) + 4;
+      n_[static_cast<std::size_t>(a)] =
+          static_cast<std::int32_t>(std::ceil((shape.box().hi[a] - origin_[a]) / h_)) + 4;
     }
   }
 
@@ -107,7 +122,8 @@ class SurfaceNets {
  private:
   std::size_t at(int i, int j, int k) const {
     return static_cast<std::size_t>(i) +
-           static_cast<std::size_t>(n_[0]) * (static_cast<std::size_t>(j) + static_cast<std::size_t>(n_[1]) * static_cast<std::size_t>(k));
+           static_cast<std::size_t>(n_[0]) *
+               (static_cast<std::size_t>(j) + static_cast<std::size_t>(n_[1]) * static_cast<std::size_t>(k));
   }
   std::size_t corner(const Cell& c, int corner) const {
     return at(c[0] + (corner & 1), c[1] + (corner >> 1 & 1), c[2] + (corner >> 2));
@@ -122,7 +138,8 @@ class SurfaceNets {
   /// Values on all samples; far from the surface only their sign is meant.
   void sample() {
     value_.assign(at(0, 0, n_[2]), 1.0F);
-    const int bx = (n_[0] + kBlock - 1) / kBlock, by = (n_[1] + kBlock - 1) / kBlock, bz = (n_[2] + kBlock - 1) / kBlock;
+    const int bx = (n_[0] + kBlock - 1) / kBlock, by = (n_[1] + kBlock - 1) / kBlock,
+              bz = (n_[2] + kBlock - 1) / kBlock;
     tbb::parallel_for(0, bx * by * bz, [&](int block) {
       if (context_.stop.stop_requested()) return;
       const Cell lo{block % bx * kBlock, block / bx % by * kBlock, block / (bx * by) * kBlock};
@@ -138,7 +155,8 @@ class SurfaceNets {
     const bool far = std::abs(d) > Shape::lipschitz * std::sqrt(3.0) * h_ * middle;
     if (!far && edge > 2) {
       const int half = edge / 2;
-      for (int q = 0; q < 8; ++q) fill({lo[0] + (q & 1) * half, lo[1] + (q >> 1 & 1) * half, lo[2] + (q >> 2) * half}, half);
+      for (int q = 0; q < 8; ++q)
+        fill({lo[0] + (q & 1) * half, lo[1] + (q >> 1 & 1) * half, lo[2] + (q >> 2) * half}, half);
       return;
     }
     for (int k = lo[2]; k < std::min(lo[2] + edge, n_[2]); ++k) {
@@ -161,10 +179,13 @@ class SurfaceNets {
       }
     });
     for (const auto& layer : layers) cells_.insert(cells_.end(), layer.begin(), layer.end());
-    if (cells_.empty()) throw Error(ErrorKind::internal, "phantom", "a shape has no surface at spacing " + std::to_string(h_), "use a finer lattice");
+    if (cells_.empty())
+      throw Error(ErrorKind::internal, "phantom", "a shape has no surface at spacing " + std::to_string(h_),
+                  "use a finer lattice");
   }
 
-  /// Fills outside samples in until no lattice square has its inside corners on a diagonal. Only ever fills: it ends.
+  /// Fills outside samples in until no lattice square has its inside corners on a diagonal. Only ever fills:
+  /// it ends.
   void make_unambiguous() {
     std::vector<Cell> work = cells_;
     bool filled = false;
@@ -182,7 +203,8 @@ class SurfaceNets {
           filled = true;
           const int q = face[chosen];
           for (int n = 0; n < 8; ++n) {
-            touched.push_back({cell[0] + (q & 1) - (n & 1), cell[1] + (q >> 1 & 1) - (n >> 1 & 1), cell[2] + (q >> 2) - (n >> 2)});
+            touched.push_back({cell[0] + (q & 1) - (n & 1), cell[1] + (q >> 1 & 1) - (n >> 1 & 1),
+                               cell[2] + (q >> 2) - (n >> 2)});
           }
         }
       }
@@ -231,7 +253,8 @@ class SurfaceNets {
         if ((value_[corner(c, 1 << axis)] < 0) == in) continue;
         const int u = (axis + 1) % 3, v = (axis + 2) % 3;
         std::array<std::int32_t, 4> quad{};
-        constexpr int ring[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};  // steps back along u and v, clockwise about the axis
+        constexpr int ring[4][2] = {
+            {0, 0}, {1, 0}, {1, 1}, {0, 1}};  // steps back along u and v, clockwise about the axis
         for (std::size_t i = 0; i < 4; ++i) {
           Cell cell = c;
           cell[static_cast<std::size_t>(u)] -= ring[i][0];
@@ -276,12 +299,14 @@ class SurfaceNets {
   SurfaceMesh triangulate() const {
     SurfaceMesh mesh;
     mesh.V.resize(static_cast<Eigen::Index>(vertices_.size()), 3);
-    for (std::size_t v = 0; v < vertices_.size(); ++v) mesh.V.row(static_cast<Eigen::Index>(v)) = vertices_[v].transpose();
+    for (std::size_t v = 0; v < vertices_.size(); ++v)
+      mesh.V.row(static_cast<Eigen::Index>(v)) = vertices_[v].transpose();
     mesh.F.resize(static_cast<Eigen::Index>(2 * quads_.size()), 3);
     Eigen::Index f = 0;
     for (const auto& q : quads_) {
       const auto p = [&](std::size_t i) -> const Vec& { return vertices_[static_cast<std::size_t>(q[i])]; };
-      const std::size_t s = (p(0) - p(2)).squaredNorm() <= (p(1) - p(3)).squaredNorm() ? 0 : 1;  // the shorter diagonal
+      const std::size_t s =
+          (p(0) - p(2)).squaredNorm() <= (p(1) - p(3)).squaredNorm() ? 0 : 1;  // the shorter diagonal
       mesh.F.row(f++) << q[s], q[s + 1], q[s + 2];
       mesh.F.row(f++) << q[s], q[s + 2], q[(s + 3) % 4];
     }

@@ -51,17 +51,4 @@ Landmarks make_landmarks(std::uint64_t seed) {
   return at;
 }
 
-void add_pair(std::vector<Part>& parts, Part part) {
-  const std::string name = part.name, segment = part.segment;
-  const int left = static_cast<int>(parts.size());
-  part.name = name + "_left";
-  if (!segment.empty()) part.segment = segment + "_left";
-  parts.push_back(part);
-  part.name = name + "_right";
-  if (!segment.empty()) part.segment = segment + "_right";
-  part.shape = mirrored(part.shape);
-  part.mirror_of = left;
-  parts.push_back(part);
-}
-
 }  // namespace ecorche::phantom

@@ -19,17 +19,20 @@ namespace {
 
 /// What a size means. Surfaces get about 1.5 vertices per lattice square of area; the body has 5.3 m^2.
 struct Resolution {
-  double spacing;         ///< mm, of the lattice where a part is not thin
-  double thin;            ///< spacing over the part's thinnest radius, at most
-  double voxel;           ///< mm
-  bool simplify;          ///< down to Part::small_vertices
+  double spacing;  ///< mm, of the lattice where a part is not thin
+  double thin;     ///< spacing over the part's thinnest radius, at most
+  double voxel;    ///< mm
+  bool simplify;   ///< down to Part::small_vertices
 };
 
 Resolution resolution_of(Size size) {
   switch (size) {
-    case Size::small: return {10, 1.25, 6, true};
-    case Size::standard: return {7.8, 1.25, 4, false};
-    case Size::paper: break;
+    case Size::small:
+      return {10, 1.25, 6, true};
+    case Size::standard:
+      return {7.8, 1.25, 4, false};
+    case Size::paper:
+      break;
   }
   return {2.4, 1, 2.5, false};
 }
@@ -41,8 +44,8 @@ SurfaceMesh mirror_image(const SurfaceMesh& mesh) {
   return image;
 }
 
-/// Back onto the surface after simplification. Chords of a convex surface lie inside it, so that bones and tissues only
-/// shrink; the skin keeps the simplifier's balance of inside and outside instead.
+/// Back onto the surface after simplification. Chords of a convex surface lie inside it, so that bones and
+/// tissues only shrink; the skin keeps the simplifier's balance of inside and outside instead.
 void put_on(const Shape& shape, SurfaceMesh& mesh) {
   for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
     Vec p = mesh.V.row(v).transpose();
@@ -54,9 +57,11 @@ void put_on(const Shape& shape, SurfaceMesh& mesh) {
   }
 }
 
-std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resolution& resolution, const Context& context) {
+std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resolution& resolution,
+                                     const Context& context) {
   std::vector<SurfaceMesh> meshes(parts.size());
-  // Whole parts side by side where they are many and small; the lattice's own loops keep all cores busy otherwise.
+  // Whole parts side by side where they are many and small; the lattice's own loops keep all cores busy
+  // otherwise.
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
     const Part& part = parts[i];
     if (part.mirror_of >= 0 || context.stop.stop_requested()) return;
@@ -69,37 +74,19 @@ std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resol
   });
   context.check_stop();
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (parts[i].mirror_of >= 0) meshes[i] = mirror_image(meshes[static_cast<std::size_t>(parts[i].mirror_of)]);
+    if (parts[i].mirror_of >= 0)
+      meshes[i] = mirror_image(meshes[static_cast<std::size_t>(parts[i].mirror_of)]);
   }
   return meshes;
-}
-
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
 }
 
 }  // namespace
 
 Phantom make(Size size, std::uint64_t seed, const Context& context) {
   const Resolution resolution = resolution_of(size);
-  const Landmarks at = make_landmarks(seed);
-  const std::vector<Part> bones = make_bones(at);
-  const std::vector<Part> vessels = make_vessels(at);
-  const std::vector<Part> organs = make_organs(at, bones, vessels);
-  std::vector<Part> neighbours = organs;
-  append(neighbours, vessels);
-  const std::vector<Part> muscles = make_muscles(at, make_keepout(at, bones), neighbours);
-  const Part skin = make_skin(at, bones, muscles);
-
-  // Labels are painted in this order, so bones win where two parts share a voxel.
-  std::vector<Part> parts = muscles;
-  const int offset = static_cast<int>(muscles.size() + neighbours.size());
-  append(parts, neighbours);
-  for (Part bone : bones) {
-    if (bone.mirror_of >= 0) bone.mirror_of += offset;
-    parts.push_back(std::move(bone));
-  }
+  const Body body = make_body(seed);
+  const Landmarks& at = body.at;
+  const std::vector<Part>& parts = body.parts;
   Phantom phantom;
   phantom.truth = make_skeleton(at, false);
   phantom.clips = {make_walk(phantom.truth), make_bend(phantom.truth)};
@@ -109,7 +96,7 @@ Phantom make(Size size, std::uint64_t seed, const Context& context) {
   patient.skeleton = make_skeleton(at, true);
   std::vector<SurfaceMesh> meshes = make_meshes(parts, resolution, context);
   context.report(0.4);
-  patient.skin = make_meshes({skin}, resolution, context).front();
+  patient.skin = make_meshes({body.skin}, resolution, context).front();
   context.report(0.7);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (parts[i].group == Group::bone) {
@@ -120,7 +107,7 @@ Phantom make(Size size, std::uint64_t seed, const Context& context) {
   }
   Context scan_context = context;
   scan_context.progress = [&](double done) { context.report(0.7 + 0.3 * done); };
-  Scan scan = make_scan(skin, parts, resolution.voxel, seed, scan_context);
+  Scan scan = make_scan(body.skin, parts, resolution.voxel, seed, scan_context);
   patient.volumes = {std::move(scan.ct), std::move(scan.ct_noisy)};
   patient.labels = std::move(scan.labels);
   context.report(1);

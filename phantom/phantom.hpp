@@ -20,12 +20,13 @@ enum class Size : std::uint8_t {
 };
 
 struct Phantom {
-  Case patient;               ///< as it would be scanned: its joints are rules or given centres
-  Skeleton truth;             ///< the same skeleton with every true centre and axis given
-  std::vector<Clip> clips;    ///< `walk` and `bend`, at 30 frames per second, at least 2 s, looping
+  Case patient;             ///< as it would be scanned: its joints are rules or given centres
+  Skeleton truth;           ///< the same skeleton with every true centre and axis given
+  std::vector<Clip> clips;  ///< `walk` and `bend`, at 30 frames per second, at least 2 s, looping
 };
 
-/// Same size and seed, same bytes. `seed` draws the noise of the CT and the small variation of body proportions.
+/// Same size and seed, same bytes. `seed` draws the noise of the CT and the small variation of body
+/// proportions.
 Phantom make(Size size, std::uint64_t seed, const Context& context);
 
 /// The bar of Sujar18 figure 7: four bones in a row in a square bar, three joints.

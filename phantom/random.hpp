@@ -19,7 +19,8 @@ inline double uniform(std::uint64_t seed, std::uint64_t index) {
   return static_cast<double>(hash(seed, index) >> 11) * 0x1p-53;
 }
 
-/// Zero mean, unit variance, bell-shaped (the sum of four 16-bit uniforms; no libm, so the same on every machine).
+/// Zero mean, unit variance, bell-shaped (the sum of four 16-bit uniforms; no libm, so the same on every
+/// machine).
 inline double gaussian(std::uint64_t seed, std::uint64_t index) {
   const std::uint64_t h = hash(seed, index);
   const auto sum = static_cast<double>((h & 0xFFFF) + (h >> 16 & 0xFFFF) + (h >> 32 & 0xFFFF) + (h >> 48));

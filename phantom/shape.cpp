@@ -26,7 +26,9 @@ Box box_of(const Vec& centre, const Vec& half, const Eigen::Matrix3d& axes) {
 
 class Sphere final : public Shape::Node {
  public:
-  Sphere(const Vec& centre, double radius) : Node(Box()), centre_(centre), radius_(radius) { box_.add(centre, radius); }
+  Sphere(const Vec& centre, double radius) : Node(Box()), centre_(centre), radius_(radius) {
+    box_.add(centre, radius);
+  }
   double distance(const Vec& p) const override { return (p - centre_).norm() - radius_; }
 
  private:
@@ -37,7 +39,11 @@ class Sphere final : public Shape::Node {
 class Ellipsoid final : public Shape::Node {
  public:
   Ellipsoid(const Vec& centre, const Vec& radii, const Eigen::Matrix3d& axes)
-      : Node(Box()), centre_(centre), inverse_(radii.cwiseInverse()), smallest_(radii.minCoeff()), axes_(axes.transpose()) {
+      : Node(Box()),
+        centre_(centre),
+        inverse_(radii.cwiseInverse()),
+        smallest_(radii.minCoeff()),
+        axes_(axes.transpose()) {
     const Vec extent = (axes.array().square().matrix() * radii.cwiseProduct(radii)).cwiseSqrt();
     box_ = {centre - extent, centre + extent};
   }
@@ -47,7 +53,8 @@ class Ellipsoid final : public Shape::Node {
     const double k1 = u.cwiseProduct(inverse_).norm();
     if (k1 < 1e-12) return -smallest_;
     const double first_order = k0 * (k0 - 1) / k1;
-    // Inside, the estimate runs away from the surface's nearest point; this is exact in the middle of the longest axis.
+    // Inside, the estimate runs away from the surface's nearest point; this is exact in the middle of the
+    // longest axis.
     return k0 < 1 ? std::max(first_order, -smallest_ * std::sqrt(1 - k0 * k0)) : first_order;
   }
 
@@ -63,7 +70,15 @@ struct RoundCone {
   double ra, rb, l2, rr, a2, il2;
 
   RoundCone(const Vec& a_, double ra_, const Vec& b_, double rb_)
-      : a(a_), b(b_), ba(b_ - a_), ra(ra_), rb(rb_), l2(ba.squaredNorm()), rr(ra_ - rb_), a2(l2 - rr * rr), il2(1 / l2) {}
+      : a(a_),
+        b(b_),
+        ba(b_ - a_),
+        ra(ra_),
+        rb(rb_),
+        l2(ba.squaredNorm()),
+        rr(ra_ - rb_),
+        a2(l2 - rr * rr),
+        il2(1 / l2) {}
 
   double distance(const Vec& p) const {
     if (a2 <= 0) return std::min((p - a).norm() - ra, (p - b).norm() - rb);  // one ball holds the other
@@ -108,7 +123,8 @@ class Chain final : public Shape::Node {
 
   double run_distance(std::size_t run, const Vec& p) const {
     double d = std::numeric_limits<double>::infinity();
-    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, links_.size()); ++i) d = std::min(d, links_[i].distance(p));
+    for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, links_.size()); ++i)
+      d = std::min(d, links_[i].distance(p));
     return d;
   }
 
@@ -119,7 +135,11 @@ class Chain final : public Shape::Node {
 class RoundBox final : public Shape::Node {
  public:
   RoundBox(const Vec& centre, const Vec& half, double edge, const Eigen::Matrix3d& axes)
-      : Node(box_of(centre, half, axes)), centre_(centre), core_((half.array() - edge).matrix()), edge_(edge), axes_(axes.transpose()) {}
+      : Node(box_of(centre, half, axes)),
+        centre_(centre),
+        core_((half.array() - edge).matrix()),
+        edge_(edge),
+        axes_(axes.transpose()) {}
   double distance(const Vec& p) const override {
     const Vec q = (axes_ * (p - centre_)).cwiseAbs() - core_;
     return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0) - edge_;
@@ -134,7 +154,12 @@ class RoundBox final : public Shape::Node {
 class Cylinder final : public Shape::Node {
  public:
   Cylinder(const Vec& a, const Vec& b, double radius, double edge)
-      : Node(Box()), middle_((a + b) / 2), axis_((b - a).normalized()), half_((b - a).norm() / 2 - edge), radius_(radius - edge), edge_(edge) {
+      : Node(Box()),
+        middle_((a + b) / 2),
+        axis_((b - a).normalized()),
+        half_((b - a).norm() / 2 - edge),
+        radius_(radius - edge),
+        edge_(edge) {
     box_.add(a, radius);
     box_.add(b, radius);
   }
@@ -153,7 +178,9 @@ class Cylinder final : public Shape::Node {
 class HalfSpace final : public Shape::Node {
  public:
   HalfSpace(const Vec& point, const Vec& normal)
-      : Node({Vec::Constant(-1e9), Vec::Constant(1e9)}), normal_(normal.normalized()), offset_(normal_.dot(point)) {}
+      : Node({Vec::Constant(-1e9), Vec::Constant(1e9)}),
+        normal_(normal.normalized()),
+        offset_(normal_.dot(point)) {}
   double distance(const Vec& p) const override { return normal_.dot(p) - offset_; }
 
  private:
@@ -171,7 +198,9 @@ class Union final : public Shape::Node {
     double d = std::numeric_limits<double>::infinity();
     for (const Shape& part : parts_) {
       // A part further away than `d + blend` changes nothing.
-      if (part.box().distance(p) >= std::max(d, -blend_) + blend_ && d < std::numeric_limits<double>::infinity()) continue;
+      if (part.box().distance(p) >= std::max(d, -blend_) + blend_ &&
+          d < std::numeric_limits<double>::infinity())
+        continue;
       d = smooth_min(d, part.distance(p), d < std::numeric_limits<double>::infinity() ? blend_ : 0);
     }
     return d;
@@ -184,11 +213,14 @@ class Union final : public Shape::Node {
 
 class Difference final : public Shape::Node {
  public:
-  Difference(const Shape& from, const Shape& what, double blend) : Node(from.box()), from_(from), what_(what), blend_(blend) {}
+  Difference(const Shape& from, const Shape& what, double blend)
+      : Node(from.box()), from_(from), what_(what), blend_(blend) {}
   double distance(const Vec& p) const override {
     const double d = from_.distance(p);
     // Far outside, the distance to what it was cut from is a good enough bound.
-    if (d >= kFar || d >= blend_ - what_.box().distance(p)) return d;
+    if (d >= kFar) return d;
+    const double away = what_.box().distance(p);
+    if (away > 0 && d >= blend_ - away) return d;
     return -smooth_min(-d, what_.distance(p), blend_);
   }
 
@@ -200,8 +232,13 @@ class Difference final : public Shape::Node {
 class Intersection final : public Shape::Node {
  public:
   Intersection(const Shape& a, const Shape& b, double blend)
-      : Node({a.box().lo.cwiseMax(b.box().lo), a.box().hi.cwiseMin(b.box().hi)}), a_(a), b_(b), blend_(blend) {}
-  double distance(const Vec& p) const override { return -smooth_min(-a_.distance(p), -b_.distance(p), blend_); }
+      : Node({a.box().lo.cwiseMax(b.box().lo), a.box().hi.cwiseMin(b.box().hi)}),
+        a_(a),
+        b_(b),
+        blend_(blend) {}
+  double distance(const Vec& p) const override {
+    return -smooth_min(-a_.distance(p), -b_.distance(p), blend_);
+  }
 
  private:
   Shape a_, b_;
@@ -261,7 +298,9 @@ Shape::Sample Shape::sample(const Vec& p, double step) const {
   return sample;
 }
 
-Shape sphere(const Vec& centre, double radius) { return make<Sphere>(centre, radius); }
+Shape sphere(const Vec& centre, double radius) {
+  return make<Sphere>(centre, radius);
+}
 Shape ellipsoid(const Vec& centre, const Vec& radii, const Eigen::Matrix3d& axes) {
   return make<Ellipsoid>(centre, radii, axes);
 }
@@ -271,15 +310,33 @@ Shape round_cone(const Vec& a, double radius_a, const Vec& b, double radius_b) {
 Shape round_box(const Vec& centre, const Vec& half, double edge, const Eigen::Matrix3d& axes) {
   return make<RoundBox>(centre, half, edge, axes);
 }
-Shape cylinder(const Vec& a, const Vec& b, double radius, double edge) { return make<Cylinder>(a, b, radius, edge); }
-Shape chain(const std::vector<Vec>& points, const std::vector<double>& radii) { return make<Chain>(points, radii); }
-Shape half_space(const Vec& point, const Vec& normal) { return make<HalfSpace>(point, normal); }
-Shape unite(const std::vector<Shape>& parts, double blend) { return make<Union>(parts, blend); }
-Shape subtract(const Shape& from, const Shape& what, double blend) { return make<Difference>(from, what, blend); }
-Shape intersect(const Shape& a, const Shape& b, double blend) { return make<Intersection>(a, b, blend); }
-Shape grow(const Shape& shape, double mm) { return make<Grown>(shape, mm); }
-Shape mirrored(const Shape& shape) { return make<Mirrored>(shape); }
-Shape symmetric(const Shape& shape) { return make<Symmetric>(shape); }
+Shape cylinder(const Vec& a, const Vec& b, double radius, double edge) {
+  return make<Cylinder>(a, b, radius, edge);
+}
+Shape chain(const std::vector<Vec>& points, const std::vector<double>& radii) {
+  return make<Chain>(points, radii);
+}
+Shape half_space(const Vec& point, const Vec& normal) {
+  return make<HalfSpace>(point, normal);
+}
+Shape unite(const std::vector<Shape>& parts, double blend) {
+  return make<Union>(parts, blend);
+}
+Shape subtract(const Shape& from, const Shape& what, double blend) {
+  return make<Difference>(from, what, blend);
+}
+Shape intersect(const Shape& a, const Shape& b, double blend) {
+  return make<Intersection>(a, b, blend);
+}
+Shape grow(const Shape& shape, double mm) {
+  return make<Grown>(shape, mm);
+}
+Shape mirrored(const Shape& shape) {
+  return make<Mirrored>(shape);
+}
+Shape symmetric(const Shape& shape) {
+  return make<Symmetric>(shape);
+}
 
 std::vector<Vec> smooth_path(const std::vector<Vec>& points, int count) {
   const int n = static_cast<int>(points.size());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Solids as signed distances: negative inside, mm. Everything in the phantom (meshes, labels, CT) is asked of these.
+// Solids as signed distances: negative inside, mm. Everything in the phantom (meshes, labels, CT) is asked of
+// these.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -27,8 +28,8 @@ struct Box {
   double distance(const Vec& p) const { return (lo - p).cwiseMax(p - hi).cwiseMax(0.0).norm(); }
 };
 
-/// An immutable solid, cheap to copy. Its distance is exact for single primitives (first-order exact for ellipsoids)
-/// and a bound after blending; nowhere does it change faster than `lipschitz` mm per mm.
+/// An immutable solid, cheap to copy. Its distance is exact for single primitives (first-order exact for
+/// ellipsoids) and a bound after blending; nowhere does it change faster than `lipschitz` mm per mm.
 class Shape {
  public:
   static constexpr double lipschitz = 1.25;  ///< ellipsoids, inside; everything else has 1
@@ -55,7 +56,8 @@ class Shape {
     double distance = 0;
     Vec normal = Vec::UnitZ();  ///< unit, the way in which the distance grows
   };
-  /// Distance and normal together, from the corners of a small tetrahedron about `p` (`step` mm along each axis).
+  /// Distance and normal together, from the corners of a small tetrahedron about `p` (`step` mm along each
+  /// axis).
   Sample sample(const Vec& p, double step = 0.05) const;
 
  private:
@@ -64,7 +66,8 @@ class Shape {
 
 Shape sphere(const Vec& centre, double radius);
 /// Half axes `radii` along the columns of `axes`.
-Shape ellipsoid(const Vec& centre, const Vec& radii, const Eigen::Matrix3d& axes = Eigen::Matrix3d::Identity());
+Shape ellipsoid(const Vec& centre, const Vec& radii,
+                const Eigen::Matrix3d& axes = Eigen::Matrix3d::Identity());
 /// The hull of two balls.
 Shape round_cone(const Vec& a, double radius_a, const Vec& b, double radius_b);
 /// Half edges `half` along the columns of `axes`, with edges rounded by `edge` (inside the half edges).

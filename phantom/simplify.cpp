@@ -56,7 +56,8 @@ class Collapser {
       for (const int v : face) {
         quadric_[index(v)].add_plane(unit, unit.dot(position_[index(face[0])]), area);
         // A little pull towards where the vertex was keeps flat regions from crumpling.
-        for (int a = 0; a < 3; ++a) quadric_[index(v)].add_plane(Vec::Unit(a), position_[index(v)][a], 1e-3 * area);
+        for (int a = 0; a < 3; ++a)
+          quadric_[index(v)].add_plane(Vec::Unit(a), position_[index(v)][a], 1e-3 * area);
       }
     }
     for (const auto& face : faces_) {
@@ -70,7 +71,8 @@ class Collapser {
     while (alive_ > vertices && !heap_.empty()) {
       const Candidate best = heap_.top();
       heap_.pop();
-      if (best.stamp != stamp_[index(best.a)] + stamp_[index(best.b)] || removed(best.a) || removed(best.b)) continue;
+      if (best.stamp != stamp_[index(best.a)] + stamp_[index(best.b)] || removed(best.a) || removed(best.b))
+        continue;
       if (allowed(best)) collapse(best);
     }
   }
@@ -136,7 +138,8 @@ class Collapser {
   bool allowed(const Candidate& c) const {
     const std::vector<int> ring_a = neighbours(c.a), ring_b = neighbours(c.b);
     std::vector<int> common;
-    std::set_intersection(ring_a.begin(), ring_a.end(), ring_b.begin(), ring_b.end(), std::back_inserter(common));
+    std::set_intersection(ring_a.begin(), ring_a.end(), ring_b.begin(), ring_b.end(),
+                          std::back_inserter(common));
     if (common.size() != 2 || ring_a.size() + ring_b.size() < 8) return false;
     for (const int u : common) {
       if (faces_of_[index(u)].size() < 4) return false;
@@ -152,8 +155,10 @@ class Collapser {
       std::array<Vec, 3> p;
       for (std::size_t i = 0; i < 3; ++i) p[i] = face[i] == v ? x : position_[index(face[i])];
       const Vec before = normal(face), after = (p[1] - p[0]).cross(p[2] - p[0]);
-      const double longest = std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm()});
-      if (after.norm() < 0.12 * longest || after.dot(before) < 0.5 * after.norm() * before.norm()) return false;
+      const double longest =
+          std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm()});
+      if (after.norm() < 0.12 * longest || after.dot(before) < 0.5 * after.norm() * before.norm())
+        return false;
     }
     return true;
   }

@@ -24,8 +24,9 @@ class Builder {
   explicit Builder(bool patient) : patient_(patient) { skeleton_.name = "phantom"; }
 
   /// Adds a segment whose joint frame at rest is `axes`.
-  Joint& add(const std::string& name, const std::string& parent, const std::string& joint, JointKind kind, const Vec& center,
-             const Eigen::Matrix3d& axes, std::initializer_list<Range> ranges, std::vector<std::string> aliases) {
+  Joint& add(const std::string& name, const std::string& parent, const std::string& joint, JointKind kind,
+             const Vec& center, const Eigen::Matrix3d& axes, std::initializer_list<Range> ranges,
+             std::vector<std::string> aliases) {
     Segment segment;
     segment.name = name;
     segment.parent = parent.empty() ? -1 : skeleton_.find_segment(parent);
@@ -82,48 +83,67 @@ void rest_from_axes(Joint& joint) {
 }
 
 void add_arm(Builder& build, const Landmarks& at, bool left) {
-  const std::string end = left ? "_left" : "_right", alias = left ? "Left" : "Right", small = left ? "left" : "right";
+  const std::string end = left ? "_left" : "_right", alias = left ? "Left" : "Right",
+                    small = left ? "left" : "right";
   const double side = left ? 1 : -1;
   const auto point = [&](const Vec& p) -> Vec { return {side * p.x(), p.y(), p.z()}; };
-  const auto frame = [&](const Eigen::Matrix3d& f) -> Eigen::Matrix3d { return left ? f : mirrored_frame(f); };
-  const Eigen::Matrix3d upper = frame_xz(at.elbow_axis, at.shoulder - at.elbow), fore = frame_xz(at.elbow_axis, at.elbow - at.wrist);
+  const auto frame = [&](const Eigen::Matrix3d& f) -> Eigen::Matrix3d {
+    return left ? f : mirrored_frame(f);
+  };
+  const Eigen::Matrix3d upper = frame_xz(at.elbow_axis, at.shoulder - at.elbow),
+                        fore = frame_xz(at.elbow_axis, at.elbow - at.wrist);
 
-  build.add("shoulder_girdle" + end, "spine_thoracic", "sternoclavicular" + end, JointKind::ball, point(at.sternoclavicular),
-            Eigen::Matrix3d::Identity(), {{"axial_rotation", 0, -1, -10, 45}, {"depression", 1, side, -45, 10}, {"protraction", 2, -side, -30, 30}},
+  build.add("shoulder_girdle" + end, "spine_thoracic", "sternoclavicular" + end, JointKind::ball,
+            point(at.sternoclavicular), Eigen::Matrix3d::Identity(),
+            {{"axial_rotation", 0, -1, -10, 45},
+             {"depression", 1, side, -45, 10},
+             {"protraction", 2, -side, -30, 30}},
             {alias + "Shoulder", small + "Shoulder", small + "Clavicle"});
-  Joint& shoulder = build.add("upper_arm" + end, "shoulder_girdle" + end, "shoulder" + end, JointKind::ball, point(at.shoulder), frame(upper),
-                              {{"flexion", 0, -1, -60, 180}, {"adduction", 1, side, -88, 45}, {"rotation", 2, -side, -90, 90}},
-                              {alias + "Arm", small + "UpperArm"});
+  Joint& shoulder = build.add(
+      "upper_arm" + end, "shoulder_girdle" + end, "shoulder" + end, JointKind::ball, point(at.shoulder),
+      frame(upper),
+      {{"flexion", 0, -1, -60, 180}, {"adduction", 1, side, -88, 45}, {"rotation", 2, -side, -90, 90}},
+      {alias + "Arm", small + "UpperArm"});
   rest_from_axes(shoulder);
   build.by_sphere(shoulder, "humerus" + end, "scapula" + end);
-  Joint& elbow = build.add("forearm" + end, "upper_arm" + end, "elbow" + end, JointKind::hinge, point(at.elbow), frame(fore),
-                           {{"flexion", 0, -1, 0, 150}, {"adduction", 1, side, 0, 0}, {"rotation", 2, -side, 0, 0}},
-                           {alias + "ForeArm", small + "LowerArm"});
+  Joint& elbow = build.add(
+      "forearm" + end, "upper_arm" + end, "elbow" + end, JointKind::hinge, point(at.elbow), frame(fore),
+      {{"flexion", 0, -1, 0, 150}, {"adduction", 1, side, 0, 0}, {"rotation", 2, -side, 0, 0}},
+      {alias + "ForeArm", small + "LowerArm"});
   elbow.sequence[0].rest = at.elbow_flexion;
   // The hand's frame: x towards the back of the hand, y to the little finger, z to the elbow.
-  build.add("hand" + end, "forearm" + end, "wrist" + end, JointKind::universal, point(at.wrist), frame(at.hand),
+  build.add("hand" + end, "forearm" + end, "wrist" + end, JointKind::universal, point(at.wrist),
+            frame(at.hand),
             {{"flexion", 1, side, -70, 80}, {"deviation", 0, 1, -20, 30}, {"rotation", 2, -side, 0, 0}},
             {alias + "Hand", small + "Hand"});
 }
 
 void add_leg(Builder& build, const Landmarks& at, bool left) {
-  const std::string end = left ? "_left" : "_right", alias = left ? "Left" : "Right", small = left ? "left" : "right";
+  const std::string end = left ? "_left" : "_right", alias = left ? "Left" : "Right",
+                    small = left ? "left" : "right";
   const double side = left ? 1 : -1;
   const auto point = [&](const Vec& p) -> Vec { return {side * p.x(), p.y(), p.z()}; };
-  const auto frame = [&](const Eigen::Matrix3d& f) -> Eigen::Matrix3d { return left ? f : mirrored_frame(f); };
-  const Eigen::Matrix3d thigh = frame_xz(at.knee_axis, at.hip - at.knee), shank = frame_xz(at.knee_axis, at.knee - at.ankle);
+  const auto frame = [&](const Eigen::Matrix3d& f) -> Eigen::Matrix3d {
+    return left ? f : mirrored_frame(f);
+  };
+  const Eigen::Matrix3d thigh = frame_xz(at.knee_axis, at.hip - at.knee),
+                        shank = frame_xz(at.knee_axis, at.knee - at.ankle);
 
-  Joint& hip = build.add("thigh" + end, "pelvis", "hip" + end, JointKind::ball, point(at.hip), frame(thigh),
-                         {{"flexion", 0, -1, -30, 120}, {"adduction", 1, side, -45, 30}, {"rotation", 2, -side, -45, 45}},
-                         {alias + "UpLeg", small + "UpperLeg"});
+  Joint& hip = build.add(
+      "thigh" + end, "pelvis", "hip" + end, JointKind::ball, point(at.hip), frame(thigh),
+      {{"flexion", 0, -1, -30, 120}, {"adduction", 1, side, -45, 30}, {"rotation", 2, -side, -45, 45}},
+      {alias + "UpLeg", small + "UpperLeg"});
   rest_from_axes(hip);
   build.by_sphere(hip, "femur" + end, "pelvis");
   build.add("shank" + end, "thigh" + end, "knee" + end, JointKind::hinge, point(at.knee), frame(shank),
-            {{"flexion", 0, 1, -5, 135}, {"adduction", 1, side, 0, 0}, {"rotation", 2, -side, 0, 0}}, {alias + "Leg", small + "LowerLeg"});
+            {{"flexion", 0, 1, -5, 135}, {"adduction", 1, side, 0, 0}, {"rotation", 2, -side, 0, 0}},
+            {alias + "Leg", small + "LowerLeg"});
   build.add("foot" + end, "shank" + end, "ankle" + end, JointKind::universal, point(at.ankle), frame(at.foot),
-            {{"dorsiflexion", 0, -1, -50, 20}, {"eversion", 1, -side, -35, 20}, {"rotation", 2, -side, 0, 0}}, {alias + "Foot", small + "Foot"});
+            {{"dorsiflexion", 0, -1, -50, 20}, {"eversion", 1, -side, -35, 20}, {"rotation", 2, -side, 0, 0}},
+            {alias + "Foot", small + "Foot"});
   build.add("toes" + end, "foot" + end, "toe_joint" + end, JointKind::hinge, point(at.ball), frame(at.foot),
-            {{"extension", 0, -1, -40, 65}, {"adduction", 1, side, 0, 0}, {"rotation", 2, -side, 0, 0}}, {alias + "ToeBase", small + "Toes"});
+            {{"extension", 0, -1, -40, 65}, {"adduction", 1, side, 0, 0}, {"rotation", 2, -side, 0, 0}},
+            {alias + "ToeBase", small + "Toes"});
 }
 
 }  // namespace
@@ -131,20 +151,27 @@ void add_leg(Builder& build, const Landmarks& at, bool left) {
 Skeleton make_skeleton(const Landmarks& at, bool patient) {
   Builder build(patient);
   const Eigen::Matrix3d lps = Eigen::Matrix3d::Identity();
-  const auto trunk = [&](const char* name, const char* parent, const char* joint, const Vec& center, double bend, double lean, double turn,
-                         std::vector<std::string> aliases) {
-    build.add(name, parent, joint, JointKind::ball, center, lps,
-              {{"flexion", 0, 1, -0.5 * bend, bend}, {"lateral_bending", 1, 1, -lean, lean}, {"rotation", 2, 1, -turn, turn}}, std::move(aliases))
+  const auto trunk = [&](const char* name, const char* parent, const char* joint, const Vec& center,
+                         double bend, double lean, double turn, std::vector<std::string> aliases) {
+    build
+        .add(name, parent, joint, JointKind::ball, center, lps,
+             {{"flexion", 0, 1, -0.5 * bend, bend},
+              {"lateral_bending", 1, 1, -lean, lean},
+              {"rotation", 2, 1, -turn, turn}},
+             std::move(aliases))
         .limits_source = kSpineRanges;
   };
-  Joint& root = build.add("pelvis", "", "pelvis", JointKind::free, at.root, lps, {{"tilt", 0, 1, 0, 0}, {"obliquity", 1, 1, 0, 0}, {"rotation", 2, 1, 0, 0}}, {"Hips", "hips"});
+  Joint& root = build.add("pelvis", "", "pelvis", JointKind::free, at.root, lps,
+                          {{"tilt", 0, 1, 0, 0}, {"obliquity", 1, 1, 0, 0}, {"rotation", 2, 1, 0, 0}},
+                          {"Hips", "hips"});
   for (AngleAxis& angle : root.sequence) {
     angle.min = -std::numeric_limits<double>::infinity();
     angle.max = std::numeric_limits<double>::infinity();
   }
   root.limits_source.clear();
   trunk("spine_lumbar", "pelvis", "lumbar", at.lumbar, 60, 25, 10, {"LowerBack"});
-  trunk("spine_thoracic", "spine_lumbar", "thorax", at.thorax, 40, 25, 35, {"Spine1", "Spine", "chest", "upperChest"});
+  trunk("spine_thoracic", "spine_lumbar", "thorax", at.thorax, 40, 25, 35,
+        {"Spine1", "Spine", "chest", "upperChest"});
   trunk("neck", "spine_thoracic", "neck", at.neck, 40, 30, 45, {"Neck", "Neck1"});
   trunk("head", "neck", "head", at.head, 30, 15, 45, {"Head"});
   for (const bool left : {true, false}) {

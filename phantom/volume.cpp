@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kAir = -1024, kSkin = 40, kSpongy = 250, kNoise = 15;
 constexpr double kSkinThickness = 2, kCortex = 3.5, kFade = 3;  // mm
-constexpr int kTile = 8;                             // voxels along an edge of the tiles that are skipped together
+constexpr int kTile = 8;  // voxels along an edge of the tiles that are skipped together
 
 /// HU of a part at depth `d` (negative inside).
 double hounsfield(const Part& part, double d) {
@@ -41,12 +41,16 @@ ImageGrid grid_over(const Box& box, double voxel) {
 /// Writes one part over what is there, tile by tile within its box.
 class Painter {
  public:
-  Painter(const Part& part, std::uint8_t label, const ImageGrid& grid, std::vector<float>& hu, std::span<std::uint8_t> labels)
+  Painter(const Part& part, std::uint8_t label, const ImageGrid& grid, std::vector<float>& hu,
+          std::span<std::uint8_t> labels)
       : part_(part), label_(label), grid_(grid), hu_(hu), labels_(labels), voxel_(grid.spacing[0]) {
     const Box box = part.shape.box().grown(voxel_);
     for (std::size_t a = 0; a < 3; ++a) {
-      lo_[a] = std::max(0, static_cast<int>(std::floor((box.lo[static_cast<int>(a)] - grid.origin[a]) / voxel_)));
-      hi_[a] = std::min(grid.size[a], static_cast<int>(std::ceil((box.hi[static_cast<int>(a)] - grid.origin[a]) / voxel_)) + 1);
+      lo_[a] =
+          std::max(0, static_cast<int>(std::floor((box.lo[static_cast<int>(a)] - grid.origin[a]) / voxel_)));
+      hi_[a] =
+          std::min(grid.size[a],
+                   static_cast<int>(std::ceil((box.hi[static_cast<int>(a)] - grid.origin[a]) / voxel_)) + 1);
       tiles_[a] = std::max(0, (hi_[a] - lo_[a] + kTile - 1) / kTile);
     }
   }
@@ -54,7 +58,9 @@ class Painter {
   void run(const Context& context) {
     tbb::parallel_for(0, tiles_[0] * tiles_[1] * tiles_[2], [&](int tile) {
       if (context.stop.stop_requested()) return;
-      paint({lo_[0] + tile % tiles_[0] * kTile, lo_[1] + tile / tiles_[0] % tiles_[1] * kTile, lo_[2] + tile / (tiles_[0] * tiles_[1]) * kTile}, kTile);
+      paint({lo_[0] + tile % tiles_[0] * kTile, lo_[1] + tile / tiles_[0] % tiles_[1] * kTile,
+             lo_[2] + tile / (tiles_[0] * tiles_[1]) * kTile},
+            kTile);
     });
     context.check_stop();
   }
@@ -66,7 +72,8 @@ class Painter {
   }
 
   void paint(const std::array<int, 3>& at, int edge) {
-    const double middle = (edge - 1) / 2.0, reach = Shape::lipschitz * (std::sqrt(3.0) * middle + 0.5) * voxel_;
+    const double middle = (edge - 1) / 2.0,
+                 reach = Shape::lipschitz * (std::sqrt(3.0) * middle + 0.5) * voxel_;
     const double d = part_.shape.distance(centre(at[0] + middle, at[1] + middle, at[2] + middle));
     if (d > reach) return;
     // Deep inside only the part's own value is left; bones and skin have their shells to pass first.
@@ -74,7 +81,8 @@ class Painter {
     if (!deep && edge > 2) {
       const int half = edge / 2;
       for (int q = 0; q < 8; ++q) {
-        const std::array<int, 3> child{at[0] + (q & 1) * half, at[1] + (q >> 1 & 1) * half, at[2] + (q >> 2) * half};
+        const std::array<int, 3> child{at[0] + (q & 1) * half, at[1] + (q >> 1 & 1) * half,
+                                       at[2] + (q >> 2) * half};
         if (child[0] < hi_[0] && child[1] < hi_[1] && child[2] < hi_[2]) paint(child, half);
       }
       return;
@@ -105,8 +113,10 @@ class Painter {
 
 }  // namespace
 
-Scan make_scan(const Part& skin, const std::vector<Part>& parts, double voxel, std::uint64_t seed, const Context& context) {
-  if (parts.size() > 253) throw Error(ErrorKind::internal, "phantom", "too many parts for 8-bit labels", "report it");
+Scan make_scan(const Part& skin, const std::vector<Part>& parts, double voxel, std::uint64_t seed,
+               const Context& context) {
+  if (parts.size() > 253)
+    throw Error(ErrorKind::internal, "phantom", "too many parts for 8-bit labels", "report it");
   const ImageGrid grid = grid_over(skin.shape.box(), voxel);
   Scan scan;
   scan.labels.image = Image(grid, ScalarType::u8);
@@ -122,7 +132,8 @@ Scan make_scan(const Part& skin, const std::vector<Part>& parts, double voxel, s
 
   scan.ct = {"ct", Image(grid, ScalarType::i16), kAir};
   scan.ct_noisy = {"ct_noisy", Image(grid, ScalarType::i16), kAir};
-  const auto smooth = scan.ct.image.scalars<std::int16_t>(), noisy = scan.ct_noisy.image.scalars<std::int16_t>();
+  const auto smooth = scan.ct.image.scalars<std::int16_t>(),
+             noisy = scan.ct_noisy.image.scalars<std::int16_t>();
   const std::size_t layer = static_cast<std::size_t>(grid.size[0]) * static_cast<std::size_t>(grid.size[1]);
   tbb::parallel_for(0, grid.size[2], [&](int k) {
     const std::size_t first = layer * static_cast<std::size_t>(k);
