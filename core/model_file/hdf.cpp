@@ -17,6 +17,9 @@ herr_t keep_description(unsigned, const H5E_error2_t* error, void* text) {
 }  // namespace
 
 Session::Session() : lock_(library_mutex()) {
+  // After it has refused a damaged file HDF5 1.10 cannot close itself ("infinite loop closing library", on
+  // stderr, at the end of the process). Every file is closed here anyway.
+  [[maybe_unused]] static const herr_t stays_open = H5dont_atexit();
   H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }

@@ -20,8 +20,9 @@ namespace fs = std::filesystem;
 // Large datasets begin on a page, so that a loader can map them; small ones stay together.
 constexpr hsize_t kAlignFrom = 65536, kAlignment = 4096;
 
-// HDF5 1.10 crashes at the end of a process in which the closing of a file failed. So the disk is asked for
-// all the space before HDF5 writes anything, while a full disk is still an ordinary error.
+// HDF5 1.10 does not get over a file whose closing fails: it keeps it, and may crash when the process ends.
+// So the disk is asked for all the space before HDF5 writes anything, while a full disk is still an ordinary
+// error.
 void reserve(const fs::path& path, const std::string& shown, std::uint64_t bytes) {
   const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
   const int error = file < 0 ? errno : ::posix_fallocate(file, 0, static_cast<off_t>(bytes));

@@ -10,6 +10,13 @@
 
 #include "tests/support/toy_model.hpp"
 
+// HDF5 1.10 itself loses a block whenever H5Gopen or H5Dopen refuses a damaged header; a C program of those
+// calls alone shows the same.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() {
+  return "leak:libhdf5_serial";
+}
+
 namespace ecorche::test {
 
 namespace fs = std::filesystem;
