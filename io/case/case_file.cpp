@@ -252,7 +252,9 @@ class CaseReader {
   void check_rules(const std::map<std::string, Value>& rules) const {
     std::vector<std::string> bones;
     for (const CaseBone& bone : out_.bones) bones.push_back(bone.name);
-    for (const auto& [segment, rule] : rules) {
+    for (const auto& entry : rules) {
+      const std::string& segment = entry.first;
+      const Value& rule = entry.second;
       const bool present = std::any_of(out_.bones.begin(), out_.bones.end(),
                                        [&](const CaseBone& bone) { return bone.segment == segment; });
       if (!present) continue;

@@ -133,19 +133,18 @@ void Value::expect(Kind kind, std::string_view example) const {
 
 void Value::allow(std::span<const std::string_view> keys) const {
   expect(Kind::map, "{key: value}");
-  for (const auto& [key, node] : node_->pairs) {
+  for (const auto& [key, value] : pairs()) {
     if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
     const std::vector<std::string> known(keys.begin(), keys.end());
-    child(node, path_of(key)).fail_unknown("key", key, known);
+    value.fail_unknown("key", key, known);
   }
 }
 
 std::optional<Value> Value::find(std::string_view key) const {
   expect(Kind::map, "{key: value}");
-  for (const auto& [name, node] : node_->pairs) {
-    if (name == key) return child(node, path_of(key));
-  }
-  return std::nullopt;
+  const auto found = std::find(node_->keys.begin(), node_->keys.end(), key);
+  if (found == node_->keys.end()) return std::nullopt;
+  return child(node_->items[static_cast<std::size_t>(found - node_->keys.begin())], path_of(key));
 }
 
 Value Value::at(std::string_view key) const {
@@ -156,7 +155,9 @@ Value Value::at(std::string_view key) const {
 std::vector<std::pair<std::string, Value>> Value::pairs() const {
   expect(Kind::map, "{key: value}");
   std::vector<std::pair<std::string, Value>> out;
-  for (const auto& [key, node] : node_->pairs) out.emplace_back(key, child(node, path_of(key)));
+  for (std::size_t i = 0; i < node_->keys.size(); ++i) {
+    out.emplace_back(node_->keys[i], child(node_->items[i], path_of(node_->keys[i])));
+  }
   return out;
 }
 

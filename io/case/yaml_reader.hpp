@@ -28,8 +28,8 @@ struct Node {
   Kind kind = Kind::null;
   int line = 0;  ///< from 1
   std::string scalar;
-  std::vector<Node> items;                          ///< of a list
-  std::vector<std::pair<std::string, Node>> pairs;  ///< of a map, in file order
+  std::vector<std::string> keys;  ///< of a map, in file order
+  std::vector<Node> items;        ///< of a list, or the values of a map
 };
 
 /// A node with its place. Cheap to copy; keeps the whole tree alive. Every member that reads throws

@@ -59,7 +59,7 @@ class TreeBuilder final : public YAML::EventHandler {
   struct Open {
     Node* node;
     bool has_key = false;
-    std::set<std::string> keys = {};
+    std::set<std::string> seen = {};
   };
 
   [[noreturn]] void fail(const YAML::Mark& mark, std::string what, std::string mend) const {
@@ -77,12 +77,12 @@ class TreeBuilder final : public YAML::EventHandler {
     return !open_.empty() && open_.back().node->kind == Kind::map && !open_.back().has_key;
   }
   void take_key(const YAML::Mark& mark, const std::string& key) {
-    auto& pairs = open_.back().node->pairs;
-    if (!open_.back().keys.insert(key).second) {
+    if (!open_.back().seen.insert(key).second) {
       fail(mark, "the key '" + key + "' stands twice", "keep one of them");
     }
-    pairs.emplace_back(key, Node{});
-    pairs.back().second.line = mark.line + 1;
+    Node& map = *open_.back().node;
+    map.keys.push_back(key);
+    map.items.emplace_back().line = mark.line + 1;
     open_.back().has_key = true;
   }
   Node& add(Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
@@ -93,7 +93,7 @@ class TreeBuilder final : public YAML::EventHandler {
     if (!open_.empty()) {
       Open& top = open_.back();
       under_key = top.node->kind == Kind::map;
-      node = under_key ? &top.node->pairs.back().second : &top.node->items.emplace_back();
+      node = under_key ? &top.node->items.back() : &top.node->items.emplace_back();
       top.has_key = false;
     }
     node->kind = kind;

@@ -10,11 +10,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// The two axes beside `axis`, so that (first, second, axis) is right-handed.
-std::array<int, 2> beside(int axis) {
-  return {(axis + 1) % 3, (axis + 2) % 3};
-}
-
 // How often the edge a -> b passes the ray from p along +x in the plane: 1 upward, -1 downward. Always
 // computed from the lower end, so that both triangles of an edge see the same.
 int passes(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
@@ -35,7 +30,7 @@ Inside::Inside(const SurfaceMesh& surface) : surface_(surface) {
 
 Inside::Columns Inside::build(int axis) const {
   Columns out;
-  const auto [u, v] = beside(axis);
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;  // u, v, axis: right-handed
   const Points& V = surface_.V;
   const Eigen::Index count = surface_.F.rows();
   if (count == 0) {
@@ -79,7 +74,7 @@ Inside::Columns Inside::build(int axis) const {
 
 int Inside::crossings(const Vector3d& p, int axis) const {
   const Columns& columns = columns_[static_cast<std::size_t>(axis)];
-  const auto [u, v] = beside(axis);
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;  // u, v, axis: right-handed
   const Vector2d q(p[u], p[v]);
   std::array<int, 2> cell{};
   for (int k = 0; k < 2; ++k) {
