@@ -11,10 +11,11 @@ namespace ecorche::rig {
 namespace {
 
 constexpr std::uint64_t kSeed = 20180901;
-constexpr int kDraws = 500;       // half outliers leave 1 - (15/16)^500 of a miss: never
-constexpr double kBand = 0.025;   // of the extent: about 5 % of the radius of a ball's facing half
-constexpr double kFarBand = 2.5;  // robust standard deviations, in the refinement
-constexpr int kRounds = 10;       // of choosing inliers and fitting them again
+constexpr int kDraws = 500;        // half outliers leave 1 - (15/16)^500 of a miss: never
+constexpr double kBand = 0.025;    // of the extent: about 5 % of the radius of a ball's facing half
+constexpr double kFarBand = 2.5;   // robust standard deviations, in the refinement
+constexpr double kSurface = 0.25;  // of the radius: farther points are of another part of the bone
+constexpr int kRounds = 10;        // of choosing inliers and fitting them again
 
 struct Sphere {
   Eigen::Vector3d center;
@@ -119,9 +120,13 @@ std::optional<SphereFit> fit_sphere(const Points& points) {
   fit.center = best->center;
   fit.radius = best->radius;
   fit.inlier_share = static_cast<double>(inliers.size()) / static_cast<double>(count);
-  double sum = 0;
-  for (const double d : distance) sum += d * d;
-  fit.residual = std::sqrt(sum / static_cast<double>(count));
+  double sum = 0, near = 0;
+  for (const double d : distance) {
+    if (d > kSurface * fit.radius) continue;
+    sum += d * d;
+    ++near;
+  }
+  fit.residual = near > 0 ? std::sqrt(sum / near) : fit.radius;
   return fit;
 }
 

@@ -11,7 +11,7 @@ namespace ecorche::rig {
 struct SphereFit {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius = 0;        ///< mm
-  double residual = 0;      ///< mm, rms distance of all points from the sphere, outliers too
+  double residual = 0;      ///< mm, rms distance from the sphere of the points within 25 % of its radius
   double inlier_share = 0;  ///< of the points, within the band in which the sphere was found
 };
 
