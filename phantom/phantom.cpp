@@ -57,6 +57,10 @@ void put_on(const Shape& shape, SurfaceMesh& mesh) {
   }
 }
 
+Box bounds_of(const SurfaceMesh& mesh) {
+  return {mesh.V.colwise().minCoeff().transpose(), mesh.V.colwise().maxCoeff().transpose()};
+}
+
 std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resolution& resolution,
                                      const Context& context) {
   std::vector<SurfaceMesh> meshes(parts.size());
@@ -107,7 +111,7 @@ Phantom make(Size size, std::uint64_t seed, const Context& context) {
   }
   Context scan_context = context;
   scan_context.progress = [&](double done) { context.report(0.7 + 0.3 * done); };
-  Scan scan = make_scan(body.skin, parts, resolution.voxel, seed, scan_context);
+  Scan scan = make_scan(body.skin, parts, bounds_of(patient.skin), resolution.voxel, seed, scan_context);
   patient.volumes = {std::move(scan.ct), std::move(scan.ct_noisy)};
   patient.labels = std::move(scan.labels);
   context.report(1);

@@ -113,11 +113,11 @@ class Painter {
 
 }  // namespace
 
-Scan make_scan(const Part& skin, const std::vector<Part>& parts, double voxel, std::uint64_t seed,
-               const Context& context) {
+Scan make_scan(const Part& skin, const std::vector<Part>& parts, const Box& bounds, double voxel,
+               std::uint64_t seed, const Context& context) {
   if (parts.size() > 253)
     throw Error(ErrorKind::internal, "phantom", "too many parts for 8-bit labels", "report it");
-  const ImageGrid grid = grid_over(skin.shape.box(), voxel);
+  const ImageGrid grid = grid_over(bounds, voxel);
   Scan scan;
   scan.labels.image = Image(grid, ScalarType::u8);
   std::vector<float> hu(grid.voxels(), static_cast<float>(kAir));

@@ -17,9 +17,10 @@ struct Scan {
   CaseLabels labels;    ///< u8: 1 soft, then 2 + row of `parts`; 0 outside
 };
 
-/// Samples skin and parts on cubic voxels of `voxel` mm. A voxel carries the label of the last part that
-/// holds its centre. Same bytes for any number of threads. At most 253 parts.
-Scan make_scan(const Part& skin, const std::vector<Part>& parts, double voxel, std::uint64_t seed,
-               const Context& context);
+/// Samples skin and parts on cubic voxels of `voxel` mm over `bounds` and one voxel more all round. A voxel
+/// carries the label of the last part that holds its centre. Same bytes for any number of threads. At most
+/// 253 parts.
+Scan make_scan(const Part& skin, const std::vector<Part>& parts, const Box& bounds, double voxel,
+               std::uint64_t seed, const Context& context);
 
 }  // namespace ecorche::phantom

@@ -87,7 +87,7 @@ TEST(Scan, TilesChangeNothing) {
   ball.name = "ball", ball.group = Group::bone,
   ball.shape = unite({sphere({10, 0, 0}, 14), round_cone({0, 0, 0}, 8, {-30, 5, 9}, 5)}, 6),
   ball.hounsfield = 1100;
-  const Scan scan = make_scan(skin, {ball}, 3, 1, {});
+  const Scan scan = make_scan(skin, {ball}, skin.shape.box(), 3, 1, {});
   const auto labels = scan.labels.image.scalars<std::uint8_t>();
   const ImageGrid& grid = scan.labels.image.grid;
   for (int k = 0; k < grid.size[2]; ++k) {
