@@ -10,9 +10,9 @@
 namespace ecorche::cor {
 namespace {
 
-/// Bins per 1/sigma, and the most that a table may have: below sigma = 0.0125 the figures of centres.hpp
+/// Bins per 1/sigma, and the most that a table may have: below sigma = 0.01 the figures of centres.hpp
 /// fade.
-constexpr double kBinsTimesSigma = 6.4;
+constexpr double kBinsTimesSigma = 5;
 constexpr int kMostBins = 512;
 
 /// A pair with less than this part of the body's volume moves no centre: see kNothing in centres.cpp.

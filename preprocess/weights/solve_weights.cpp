@@ -162,7 +162,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   context.report(0.9);
 
   Eigen::MatrixXd& values = solved.values;
-  const Repair repaired = repair(L, fixed, values, context);
+  const Repair repaired = repair(fixed, values);
   certificate.repaired_rows = repaired.rows;
   certificate.repaired_largest_change = repaired.largest_change;
   if (repaired.largest_change > kLargestChange) {
