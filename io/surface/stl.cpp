@@ -51,6 +51,7 @@ void check_coordinate(double x, const std::string& where, std::size_t facet) {
 
 SurfaceMesh assemble(const VertexMerge& merge, const std::vector<std::array<std::int32_t, 3>>& facets) {
   SurfaceMesh mesh;
+  if (facets.empty()) return mesh;
   const auto& points = merge.points();
   mesh.V.resize(static_cast<Eigen::Index>(points.size()), 3);
   mesh.F.resize(static_cast<Eigen::Index>(facets.size()), 3);
