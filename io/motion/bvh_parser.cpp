@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ours, since assimp's reader (the tests' second opinion) works in float32, takes two joints of one name for
-// one, and must be guarded by as strict a reading as this one anyway.
+// Ours, since assimp's reader works in float32, and needs a guard that reads as strictly as this. The tests
+// ask assimp for a second opinion on every rotation order.
 #include "io/motion/bvh_parser.hpp"
 
 #include <algorithm>
