@@ -96,7 +96,7 @@ TEST_P(EveryMesher, FillsTheBodyAndLabelsItsBones) {
 }
 
 TEST_P(EveryMesher, KeepsTheLimits) {
-  const Prepared p(trunk(), 2);
+  const Prepared p(trunk(), 2.5);
   const TetMesh free = p.mesh(GetParam());
   Options few;
   few.max_tets = free.T.rows() * 3 / 4;
@@ -116,9 +116,9 @@ TEST_P(EveryMesher, KeepsTheLimits) {
 }
 
 TEST_P(EveryMesher, SameBytesAgainAndForAnyNumberOfThreads) {
-  const Prepared p(trunk(), 3);
+  const Prepared p(trunk(), 2.5);
   std::vector<TetMesh> meshes;
-  for (const int threads : {1, 2, 2}) {
+  for (const int threads : {1, 2}) {
     tbb::task_arena arena(threads);
     arena.execute([&] { meshes.push_back(p.mesh(GetParam())); });
     canonicalize(meshes.back());
@@ -228,14 +228,14 @@ TEST(Cgal, SmallestAngleIsLifted) {
 
 TEST(Cgal, FindsPartsThatItsOwnFirstPointsWouldMiss) {
   std::vector<SurfaceMesh> bones;
-  for (int n = 0; n < 12; ++n)
-    bones.push_back(shapes::box({-22.0 + 4 * n, -0.4, -0.4}, {-21.2 + 4 * n, 0.4, 0.4}));
-  const Prepared p(shapes::body(shapes::ellipsoid({0, 0, 0}, {30, 30, 30}, 12), bones), 1);
+  for (int n = 0; n < 6; ++n)
+    bones.push_back(shapes::box({-10.0 + 4 * n, -0.4, -0.4}, {-9.2 + 4 * n, 0.4, 0.4}));
+  const Prepared p(shapes::body(shapes::ellipsoid({0, 0, 0}, {16, 16, 16}, 8), bones), 1);
   Options few;
-  few.max_tets = 60'000;
+  few.max_tets = 12'000;
   const TetMesh mesh = p.mesh("cgal", few);
-  const std::map<std::uint16_t, double> volumes = measures::volumes(mesh);
-  EXPECT_EQ(volumes.size(), 13U) << "twelve specks of a voxel or two, far smaller than the tets around them";
+  EXPECT_EQ(measures::volumes(mesh).size(), 7U)
+      << "six specks of a voxel or two, smaller than the tets around them";
 }
 #endif
 
