@@ -133,7 +133,7 @@ TEST_F(CaseRefusals, RootDataIsTheDataFolder) {
 }
 
 TEST_F(CaseRefusals, NotYaml) {
-  refused("unit: mm", "unit: [mm, {", "3: a key that is no plain word");
+  refused("unit: mm", "unit: [mm, {", "7: is no YAML: illegal block entry (mend the line)");
   refused("unit: mm", "unit: \"mm" + std::string(5000, 'x'), "3:unit: 'mmxxx");
   refused("unit: mm", "unit: &a mm", "3: an anchor (&name) (write the value out)");
   refused("unit: mm", "unit: !!str mm", "3: a tag (");
