@@ -176,7 +176,7 @@ double largest_step(const std::vector<float>& a, const std::vector<float>& b) {
   return worst;
 }
 
-// One joint swept through more than a whole turn, a degree at a time. In every frame neighbours stay
+// One joint swept through more than a whole turn, two degrees at a time. In every frame neighbours stay
 // together. From frame to frame everything moves by little, but for one moment: at exactly 180 degrees the
 // way round that is shorter changes sides, and what blends two segments by quaternions changes with it. A
 // pose tells a rotation and no history, so no rule could go on: at 180 degrees both ways are equally good,
@@ -189,17 +189,17 @@ TEST(BodyPoser, AJointTurnedThroughAWholeTurnTearsNothing) {
     for (const Skinning skinning : kAll) {
       std::vector<float> before;
       double stretch_within = 0;
-      for (int degree = 0; degree <= 400; ++degree) {
+      for (int degree = 0; degree <= 400; degree += 2) {
         Pose pose = Pose::rest(3);
         pose.rotation[1] = AngleAxisd(degree * pi / 180, axis.normalized());
         ASSERT_TRUE(poser.run(pose, skinning, {}, body).ok());
         const double stretch = largest_stretch(*model, body.nodes);
         if (degree <= 180) stretch_within = std::max(stretch_within, stretch);
         EXPECT_LE(stretch, 1.001 * stretch_within + 0.05) << degree << " deg, " << skinning_name(skinning);
-        // 1 degree at 300 mm is 5 mm.
-        const bool changes_sides = degree == 181 && skinning != Skinning::lbs;
+        // 2 degrees at 300 mm are 10 mm.
+        const bool changes_sides = degree == 182 && skinning != Skinning::lbs;
         if (!before.empty() && !changes_sides) {
-          EXPECT_LT(largest_step(before, body.nodes), 12) << degree;
+          EXPECT_LT(largest_step(before, body.nodes), 24) << degree;
         }
         before = body.nodes;
       }

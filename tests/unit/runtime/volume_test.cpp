@@ -40,10 +40,10 @@ ImageGrid skew_grid(bool left_handed) {
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction = turn.toRotationMatrix();
   if (left_handed) direction.col(2) *= -1;
   std::copy_n(direction.data(), 9, grid.direction.begin());
-  grid.spacing = {7, 9, 12};
+  grid.spacing = {11, 14, 19};
   const Vector3d low = direction * Vector3d(-90, -90, left_handed ? -330 : -40);
   grid.origin = {low.x(), low.y(), low.z()};
-  grid.size = {50, 39, 34};
+  grid.size = {32, 25, 22};
   return grid;
 }
 
