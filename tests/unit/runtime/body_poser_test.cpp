@@ -41,6 +41,25 @@ Model loose_toy(const Vector3d& place = Vector3d::Zero()) {
   return model;
 }
 
+// The toy whose three segments overlap along the whole beam.
+Model wide_toy() {
+  Model made = loose_toy();
+  Weights wide;
+  wide.offsets = {0};
+  for (Eigen::Index n = 0; n < made.nodes.rows(); ++n) {
+    const double u = static_cast<double>(made.nodes(n, 2)) / 300;
+    const std::array<double, 3> w{(1 - u) * (1 - u), 2 * u * (1 - u), u * u};
+    for (std::uint16_t s = 0; s < 3; ++s) {
+      if (w[s] < 1e-6) continue;
+      wide.segment.push_back(s);
+      wide.weight.push_back(static_cast<float>(w[s]));
+    }
+    wide.offsets.push_back(wide.weight.size());
+  }
+  made.weights = wide;
+  return made;
+}
+
 Pose random_pose(std::mt19937& random, double most) {
   std::uniform_real_distribution<double> angle(-most, most), mm(-500, 500);
   std::normal_distribution<double> normal;
@@ -102,9 +121,8 @@ TEST(BodyPoser, RigidMotionMovesEverythingByIt) {
   }
 }
 
-TEST(BodyPoser, AgreesWithThePlainReferences) {
+void expect_references(const std::shared_ptr<const Model>& model) {
   std::mt19937 random(12);
-  const auto model = shared(loose_toy({700, -300, 1700}));
   const BodyPoser poser(model);
   PosedBody body = poser.make_frame();
   for (int trial = 0; trial < 30; ++trial) {
@@ -119,6 +137,16 @@ TEST(BodyPoser, AgreesWithThePlainReferences) {
       EXPECT_LT(test::farthest(body.nodes, stored), 0.1) << skinning_name(skinning);
     }
   }
+}
+
+TEST(BodyPoser, AgreesWithThePlainReferences) {
+  expect_references(shared(loose_toy({700, -300, 1700})));
+}
+
+// Poses here turn base against tip by more than 180 degrees: signs come from the tree, not from a pivot per
+// node.
+TEST(BodyPoser, AgreesWithThePlainReferencesWhereThreeSegmentsBlend) {
+  expect_references(shared(wide_toy()));
 }
 
 TEST(BodyPoser, MethodsDifferWhereTheyShould) {
@@ -212,21 +240,7 @@ TEST(BodyPoser, AJointTurnedThroughAWholeTurnTearsNothing) {
 // to tip is the other way round, and only the tree knows better. Where three segments blend, a pivot per node
 // would tear.
 TEST(BodyPoser, JointsThatAddUpBeyondHalfATurnTearNothing) {
-  Model made = loose_toy();
-  Weights wide;  // the three segments overlap along the whole beam
-  wide.offsets = {0};
-  for (Eigen::Index n = 0; n < made.nodes.rows(); ++n) {
-    const double u = static_cast<double>(made.nodes(n, 2)) / 300;
-    const std::array<double, 3> w{(1 - u) * (1 - u), 2 * u * (1 - u), u * u};
-    for (std::uint16_t s = 0; s < 3; ++s) {
-      if (w[s] < 1e-6) continue;
-      wide.segment.push_back(s);
-      wide.weight.push_back(static_cast<float>(w[s]));
-    }
-    wide.offsets.push_back(wide.weight.size());
-  }
-  made.weights = wide;
-  const auto model = shared(std::move(made));
+  const auto model = shared(wide_toy());
   const BodyPoser poser(model);
   PosedBody body = poser.make_frame();
   for (int degree = 0; degree <= 175; degree += 5) {
