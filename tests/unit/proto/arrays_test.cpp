@@ -58,7 +58,10 @@ TEST(Arrays, ALyingDescriptionIsRefused) {
         described(v1::SCALAR_TYPE_UNSPECIFIED, 1, 1, 0), described(static_cast<v1::ScalarType>(99), 1, 1, 0),
         described(v1::SCALAR_TYPE_F32, 1, huge, 16),
         described(v1::SCALAR_TYPE_F64, std::numeric_limits<std::uint32_t>::max(), huge, 0),
-        described(v1::SCALAR_TYPE_U8, 1, 1, huge - 15), described(v1::SCALAR_TYPE_F64, 4, huge / 16, 32)}) {
+        described(v1::SCALAR_TYPE_U8, 1, 1, huge - 15), described(v1::SCALAR_TYPE_F64, 4, huge / 16, 32),
+        // Sums that wrap to few bytes.
+        described(v1::SCALAR_TYPE_F32, 1, (1ULL << 62) + 1, 0),
+        described(v1::SCALAR_TYPE_F64, 4, (1ULL << 59) + 1, 32)}) {
     EXPECT_FALSE(find(bad, payload, bytes)) << bad.offset() << " " << bad.count();
   }
 }
