@@ -35,11 +35,10 @@ using Point = Kernel::Point_3;
 constexpr double kFinestInVoxels = 1.3;  // circumradius at surfaces: finer shows the voxels' steps
 constexpr double kGrowth = 0.35;         // mm of circumradius per mm of distance from a surface
 constexpr double kLargest = 8;           // circumradius far from surfaces, in those at surfaces
-constexpr double kTetsPerRadius3 =
-    3.6;  // measured: tets of a volume are about this many times volume / radius^3
-constexpr double kNodesPerTet = 0.22;  // measured, with much boundary; 0.17 without
-constexpr double kRoom = 0.93;         // of the allowed number is aimed at
-constexpr double kSliverBound = 10;    // degrees, of the smallest dihedral angle
+constexpr double kTetsPerRadius3 = 6.6;  // measured on bodies: tets over volume / radius^3
+constexpr double kNodesPerTet = 0.22;    // measured, with much boundary; 0.17 without
+constexpr double kRoom = 0.93;           // of the allowed number is aimed at
+constexpr double kSliverBound = 10;      // degrees, of the smallest dihedral angle
 
 /// Circumradius wanted at a place, mm: `near` at surfaces, growing with the distance from them.
 class Sizing {
