@@ -17,6 +17,8 @@ namespace ecorche::phantom {
 namespace {
 
 constexpr std::array<double, 4> kPulls{0.6, 0.6, 0.4, 0};  // the last pass only puts vertices on the surface
+constexpr double kFolded = -0.2;                           // cosine between a triangle and its lattice edge
+constexpr int kUnfoldings = 8;
 constexpr int kBlock = 8;  // samples along an edge of the blocks that are skipped or filled together
 
 /// Corner c of a cell has offsets (c & 1, c >> 1 & 1, c >> 2). Edge e = 4 * axis + (which of four, by the
@@ -96,6 +98,12 @@ const std::array<Sheets, 256>& sheet_table() {
 
 using Cell = std::array<std::int32_t, 3>;
 
+/// Four vertices round a crossed lattice edge, counter-clockwise seen from outside.
+struct Quad {
+  std::array<std::int32_t, 4> v;
+  Vec out;  ///< along the lattice edge, from its inside to its outside end
+};
+
 class SurfaceNets {
  public:
   SurfaceNets(const Shape& shape, double spacing, const Context& context)
@@ -115,7 +123,9 @@ class SurfaceNets {
     place_vertices();
     make_quads();
     context_.check_stop();
+    net_ = vertices_;
     for (const double pull : kPulls) relax(pull);
+    unfold();
     return triangulate();
   }
 
@@ -263,7 +273,7 @@ class SurfaceNets {
           quad[i] = vertex_at(cell, edge_between(from, from | 1 << axis));
         }
         if (!in) std::swap(quad[1], quad[3]);
-        quads_.push_back(quad);
+        quads_.push_back({quad, (in ? 1.0 : -1.0) * Vec::Unit(axis)});
       }
     }
   }
@@ -272,9 +282,9 @@ class SurfaceNets {
   void relax(double pull) {
     std::vector<Vec> sum(vertices_.size(), Vec::Zero());
     std::vector<int> count(vertices_.size(), 0);
-    for (const auto& quad : quads_) {
+    for (const Quad& quad : quads_) {
       for (std::size_t i = 0; i < 4; ++i) {
-        const auto a = static_cast<std::size_t>(quad[i]), b = static_cast<std::size_t>(quad[(i + 1) % 4]);
+        const auto a = static_cast<std::size_t>(quad.v[i]), b = static_cast<std::size_t>(quad.v[(i + 1) % 4]);
         sum[a] += vertices_[b];
         ++count[a];
       }
@@ -296,19 +306,55 @@ class SurfaceNets {
     return q.cwiseMax(home_[v] - reach).cwiseMin(home_[v] + reach);
   }
 
+  /// The cosine between the way out and the worse triangle of a quad cut from its corner `s` to `s + 2`.
+  double facing(const Quad& quad, std::size_t s) const {
+    const auto p = [&](std::size_t i) -> const Vec& {
+      return vertices_[static_cast<std::size_t>(quad.v[i % 4])];
+    };
+    const Vec a = (p(s + 1) - p(s)).cross(p(s + 2) - p(s)), b = (p(s + 2) - p(s)).cross(p(s + 3) - p(s));
+    return std::min(a.dot(quad.out) / (a.norm() + 1e-30), b.dot(quad.out) / (b.norm() + 1e-30));
+  }
+
+  /// Where to cut a quad: along its shorter diagonal, unless that folds it over.
+  std::size_t cut(const Quad& quad) const {
+    const auto p = [&](std::size_t i) -> const Vec& {
+      return vertices_[static_cast<std::size_t>(quad.v[i])];
+    };
+    const std::size_t shorter = (p(0) - p(2)).squaredNorm() <= (p(1) - p(3)).squaredNorm() ? 0 : 1;
+    return facing(quad, shorter) > kFolded || facing(quad, 1 - shorter) < facing(quad, shorter) ? shorter
+                                                                                                : 1 - shorter;
+  }
+
+  /// On creases finer than the lattice, sliding can fold the surface over. A quad that faces against its
+  /// lattice edge gets its corners moved back towards the net's own positions, where no quad is folded.
+  void unfold() {
+    for (int pass = 0; pass < kUnfoldings; ++pass) {
+      std::vector<char> marked(vertices_.size(), 0);
+      bool folded = false;
+      for (const Quad& quad : quads_) {
+        if (facing(quad, cut(quad)) > kFolded) continue;
+        folded = true;
+        for (const std::int32_t v : quad.v) marked[static_cast<std::size_t>(v)] = 1;
+      }
+      if (!folded) return;
+      for (std::size_t v = 0; v < vertices_.size(); ++v) {
+        if (marked[v] != 0) vertices_[v] = (vertices_[v] + net_[v]) / 2;
+      }
+    }
+  }
+
   SurfaceMesh triangulate() const {
     SurfaceMesh mesh;
     mesh.V.resize(static_cast<Eigen::Index>(vertices_.size()), 3);
-    for (std::size_t v = 0; v < vertices_.size(); ++v)
+    for (std::size_t v = 0; v < vertices_.size(); ++v) {
       mesh.V.row(static_cast<Eigen::Index>(v)) = vertices_[v].transpose();
+    }
     mesh.F.resize(static_cast<Eigen::Index>(2 * quads_.size()), 3);
     Eigen::Index f = 0;
-    for (const auto& q : quads_) {
-      const auto p = [&](std::size_t i) -> const Vec& { return vertices_[static_cast<std::size_t>(q[i])]; };
-      const std::size_t s =
-          (p(0) - p(2)).squaredNorm() <= (p(1) - p(3)).squaredNorm() ? 0 : 1;  // the shorter diagonal
-      mesh.F.row(f++) << q[s], q[s + 1], q[s + 2];
-      mesh.F.row(f++) << q[s], q[s + 2], q[(s + 3) % 4];
+    for (const Quad& quad : quads_) {
+      const std::size_t s = cut(quad);
+      mesh.F.row(f++) << quad.v[s], quad.v[s + 1], quad.v[s + 2];
+      mesh.F.row(f++) << quad.v[s], quad.v[s + 2], quad.v[(s + 3) % 4];
     }
     return mesh;
   }
@@ -321,8 +367,10 @@ class SurfaceNets {
   std::vector<float> value_;
   std::vector<Cell> cells_;
   std::vector<std::int32_t> first_;  // of each cell, by its first corner: its first vertex
-  std::vector<Vec> vertices_, home_;
-  std::vector<std::array<std::int32_t, 4>> quads_;
+  std::vector<Vec> vertices_;
+  std::vector<Vec> home_;  // the middle of each vertex's cell
+  std::vector<Vec> net_;   // where each vertex began
+  std::vector<Quad> quads_;
 };
 
 }  // namespace

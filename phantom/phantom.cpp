@@ -45,13 +45,16 @@ SurfaceMesh mirror_image(const SurfaceMesh& mesh) {
 }
 
 /// Back onto the surface after simplification. Chords of a convex surface lie inside it, so that bones and
-/// tissues only shrink; the skin keeps the simplifier's balance of inside and outside instead.
+/// tissues only shrink; the skin's vertices stand out a little instead, so that its chords do not cut into
+/// what it covers.
+constexpr double kSkinAllowance = 2;  // mm
+
 void put_on(const Shape& shape, SurfaceMesh& mesh) {
   for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
     Vec p = mesh.V.row(v).transpose();
     for (int i = 0; i < 3; ++i) {
       const Shape::Sample at = shape.sample(p);
-      p -= std::clamp(at.distance, -1.0, 1.0) * at.normal;
+      p -= std::clamp(at.distance, -1.5, 1.5) * at.normal;
     }
     mesh.V.row(v) = p.transpose();
   }
@@ -74,7 +77,7 @@ std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resol
     meshes[i] = isosurface(part.shape, std::min(resolution.spacing, resolution.thin * part.detail), quiet);
     if (!resolution.simplify) return;
     meshes[i] = simplify(meshes[i], part.small_vertices);
-    if (part.group != Group::skin) put_on(part.shape, meshes[i]);
+    put_on(part.group == Group::skin ? grow(part.shape, kSkinAllowance) : part.shape, meshes[i]);
   });
   context.check_stop();
   for (std::size_t i = 0; i < parts.size(); ++i) {

@@ -113,7 +113,7 @@ Part make_skin(const Landmarks& at, const std::vector<Part>& bones, const std::v
   skin.shape = symmetric(unite(parts, 14));
   skin.detail = 6;
   skin.hounsfield = -90;  // fat; see volume.cpp
-  skin.small_vertices = 2000;
+  skin.small_vertices = 2150;
   return skin;
 }
 

@@ -21,6 +21,16 @@ TEST(SmallPhantom, EverySurfaceIsOneSolid) {
   });
 }
 
+TEST(SmallPhantom, TheCoarseSkinStillCoversEverything) {
+  const Case& patient = small_phantom().patient;
+  for_each_surface(patient, [&](const std::string& name, const SurfaceMesh& mesh) {
+    if (name == "skin") return;
+    for (Eigen::Index v = 0; v < mesh.V.rows(); v += 3) {
+      EXPECT_GT(winding(patient.skin, mesh.V.row(v).transpose()), 0.5) << name << " at " << mesh.V.row(v);
+    }
+  });
+}
+
 TEST(SmallPhantom, IsSmallAndComplete) {
   const Case& patient = small_phantom().patient;
   Eigen::Index vertices = 0;
