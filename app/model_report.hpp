@@ -2,16 +2,17 @@
 // What `verify` and `preprocess` say of a model under --json (DESIGN 7).
 #pragma once
 
+#include <cstddef>
 #include <nlohmann/json.hpp>
-#include <vector>
 
-#include "core/model_file/model_file.hpp"
 #include "core/values/model.hpp"
 
 namespace ecorche::app {
 
-/// {"ok", "nodes", "tets", "segments", "weights", "mesh", "tissues", "bones", "digests"} from the model's
-/// certificate and what was found of the digests. `ok`: every bound holds and every digest is good.
-nlohmann::json model_report(const Model& model, const std::vector<model_file::DigestCheck>& digests);
+/// {"ok", "nodes", "tets", "segments", "weights", "mesh", "tissues", "bones", "digests"}: counts of `model`
+/// (null: it could not be read, and what it would have said is null), figures of `certificate`, digests
+/// looked at and found bad.
+nlohmann::json model_report(bool ok, const Model* model, const Certificate& certificate, std::size_t checked,
+                            std::size_t bad);
 
 }  // namespace ecorche::app

@@ -2,10 +2,10 @@
 // `ecorche preprocess`: a case in, a model out.
 #include "preprocess/pipeline.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <numeric>
 #include <sstream>
 
 #include "app/command.hpp"
@@ -97,7 +97,13 @@ int run(const Program& program, const Settings& settings) {
   timed(stages, "write", [&] { model_file::write(made.model, settings.output, program.context("write")); });
 
   const auto digests = model_file::check_digests(settings.output, program.context("digests"));
-  nlohmann::json report = model_report(made.model, digests);
+  const auto bad = static_cast<std::size_t>(std::count_if(
+      digests.begin(), digests.end(), [](const model_file::DigestCheck& d) { return !d.good; }));
+  if (bad > 0) {
+    throw Error(ErrorKind::io, settings.output.string(),
+                std::to_string(bad) + " datasets came back changed from the disk", "check the disk");
+  }
+  nlohmann::json report = model_report(true, &made.model, made.model.certificate, digests.size(), bad);
   for (const StageTime& s : stages) {
     report["stages"].push_back({{"name", s.name}, {"seconds", s.seconds}, {"peak_rss_mib", s.peak_rss_mib}});
   }

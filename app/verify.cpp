@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/command.hpp"
+#include "app/model_report.hpp"
 #include "core/model_file/figures.hpp"
 #include "core/model_file/model_file.hpp"
 #include "preprocess/pipeline.hpp"
@@ -66,35 +67,6 @@ Verdict verify(const std::string& path, const Program& program) {
   return verdict;
 }
 
-// DESIGN 7. What a model that cannot be read would have said is null.
-nlohmann::json to_json(const Verdict& v) {
-  const auto known = [&](auto value) { return v.read ? nlohmann::json(value) : nlohmann::json(); };
-  const Certificate& c = v.found;
-  return {
-      {"ok", v.faults.empty()},
-      {"nodes", known(v.model.node_count())},
-      {"tets", known(v.model.tet_count())},
-      {"segments", known(v.model.segment_count())},
-      {"weights",
-       {{"min", known(c.min_weight)},
-        {"max", known(c.max_weight)},
-        {"row_sum_error", known(c.row_sum_error)},
-        {"repaired_rows", known(c.repaired_rows)}}},
-      {"mesh",
-       {{"min_dihedral_deg", known(c.min_dihedral_deg)},
-        {"max_dihedral_deg", known(c.max_dihedral_deg)},
-        {"inverted", known(c.inverted_tets)},
-        {"positive_offdiagonal_share", known(c.positive_offdiagonal_share)}}},
-      {"tissues",
-       {{"count", known(v.model.tissues.size())},
-        {"vertices", known(c.tissue_vertices)},
-        {"outside", known(c.outside_vertices)},
-        {"max_outside_mm", known(c.max_outside_mm)}}},
-      {"bones", {{"rigidity", known(c.bone_rigidity_mm)}}},
-      {"digests", {{"checked", v.checked}, {"bad", v.bad}}},
-  };
-}
-
 std::string to_text(const Verdict& v) {
   std::string text = std::to_string(v.checked) + " datasets, " + std::to_string(v.bad) + " damaged\n";
   if (v.read) {
@@ -120,7 +92,9 @@ void declare_verify(CLI::App& app, Program& program, Run& chosen) {
     chosen = [path, &program] {
       const Verdict verdict = verify(*path, program);
       for (const std::string& fault : verdict.faults) program.note("fault: " + fault);
-      program.result(to_text(verdict), to_json(verdict));
+      program.result(to_text(verdict),
+                     model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr, verdict.found,
+                                  verdict.checked, verdict.bad));
       return verdict.faults.empty() ? 0 : exit_code(ErrorKind::data);
     };
   });
