@@ -15,6 +15,7 @@
 #include "preprocess/provenance.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/tet/mesher.hpp"
+#include "preprocess/tet/relax_slivers.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
@@ -51,6 +52,14 @@ class Stages {
   const StageCallback& on_stage_;
   std::vector<StageTime>& times_;
 };
+
+std::string describe(const tet::SliverReport& slivers) {
+  std::ostringstream line;
+  line << slivers.before << " tets had angles beyond 10 to 165 degrees, " << slivers.after
+       << " still have; their nodes moved by at most " << slivers.largest_move_mm << " mm, on surfaces by "
+       << slivers.largest_surface_move_mm << " mm";
+  return line.str();
+}
 
 template <class T>
 void check_range(std::string_view option, T value, const Options::Range<T>& range) {
@@ -205,6 +214,8 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
     o.max_tets = options.max_tets;
     o.max_nodes = options.max_nodes;
     TetMesh made = mesher->mesh({patient, *labels}, o, context);
+    const tet::SliverReport slivers = tet::relax_slivers(made, {}, context);
+    if (slivers.before > 0) context.info(describe(slivers));
     tet::canonicalize(made);
     return std::optional(std::move(made));
   });
