@@ -51,9 +51,12 @@ struct Options {
 
 /// One Laplacian, one factor, all segments as one block; segments without a bone get no weights. A connected
 /// part of the mesh without any bone is named and attached to the nearest boned part (its nodes take the
-/// weights of the nearest node there). Rows beyond [0, 1] are clamped and renormalised, and counted
-/// (repair.hpp); Error{data} when that would change a weight by more than 1e-2, naming the worst node and its
-/// tets. The certificate's solved_* members stand for what was solved, before that.
+/// weights of the nearest node there). A solution that
+/// leaves [-1e-3, 1 + 1e-3] beside bad tets is solved again with those tets' ties mended, with a warning
+/// (monotone.hpp); Error{data} when more than 2 % of the nodes would need that. What still leaves [0, 1] is
+/// clamped and renormalised, and counted (repair.hpp); Error{data} when that would change a weight by more
+/// than 1e-2, naming the worst node and its tets. The certificate's solved_* members stand for the solver's
+/// last solution, before it is clamped.
 WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
                             const std::vector<std::int32_t>& bone_segment, std::size_t segments,
                             const Options& options, const Context& context);

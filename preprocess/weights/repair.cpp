@@ -17,13 +17,11 @@ Repair repair(const std::vector<std::uint8_t>& fixed, Eigen::MatrixXd& values) {
     row /= row.sum();
     if (!left) continue;
     ++report.rows;
-    Eigen::Index column = 0;
-    const double change = (row - before).cwiseAbs().maxCoeff(&column);
+
+    const double change = (row - before).cwiseAbs().maxCoeff();
     if (change > report.largest_change) {
       report.largest_change = change;
-      report.worst_solved = before(column);
       report.worst_node = static_cast<std::int32_t>(n);
-      report.worst_column = static_cast<std::int32_t>(column);
     }
   }
   return report;

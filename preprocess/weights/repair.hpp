@@ -12,15 +12,11 @@ namespace ecorche::weights {
 
 /// Linear elements keep 0 <= w <= 1 only where no off-diagonal is positive; slivers break it (DESIGN 7). The
 /// rule: a row that left [0, 1] is clamped and divided by its sum, which moves its weights by about as much
-/// as they had left. Tried and not taken: an M-matrix (positive off-diagonals dropped) solved again on the
-/// node and two rings around it moved weights by 0.1 on a TetGen mesh that had left the bounds by 0.007; on
-/// the node alone, still by 0.02 to 0.1.
+/// as they had left.
 struct Repair {
   std::uint64_t rows = 0;     ///< rows that left [0, 1] by more than kRounding
   double largest_change = 0;  ///< of any weight
-  double worst_solved = 0;    ///< the weight that changed most, as solved
   std::int32_t worst_node = -1;
-  std::int32_t worst_column = -1;
 };
 
 inline constexpr double kRounding = 1e-9;  ///< below it a violation is the solver's rounding, not the mesh's

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <utility>
 
 #include "preprocess/weights/harmonic.hpp"
+#include "preprocess/weights/monotone.hpp"
 #include "preprocess/weights/parts.hpp"
 #include "preprocess/weights/repair.hpp"
 
@@ -44,23 +46,34 @@ void warn_of_untouched_bones(const TetMesh& mesh, const Case& patient, const Con
   }
 }
 
-[[noreturn]] void refuse(const TetMesh& mesh, const Repair& repaired, std::int32_t segment) {
+void warn_of_mended_nodes(const MonotoneResult& solved, const Context& context) {
+  if (solved.mended_nodes == 0) return;
+  std::array<char, 200> line{};
+  std::snprintf(
+      line.data(), line.size(),
+      "weights left [0, 1] by up to %.2g beside bad tets: solved again with the ties of %lld nodes mended",
+      solved.first_violation, static_cast<long long>(solved.mended_nodes));
+  context.warn(line.data());
+}
+
+/// Names a node whose weights cannot be had, and the tets around it.
+[[noreturn]] void refuse(const TetMesh& mesh, std::int32_t node, double violation, std::int64_t like_it) {
   std::string tets;
   int named = 0;
   for (Eigen::Index t = 0; t < mesh.T.rows() && named < 8; ++t) {
-    if ((mesh.T.row(t).array() != repaired.worst_node).all()) continue;
+    if ((mesh.T.row(t).array() != node).all()) continue;
     tets += (named++ == 0 ? "" : ", ") + std::to_string(t);
   }
-  const auto p = mesh.V.row(repaired.worst_node);
+  const auto p = mesh.V.row(node);
   std::array<char, 400> what{};
   std::snprintf(what.data(), what.size(),
-                "node %d at (%.2f, %.2f, %.2f) has the weight %.4g for segment %d, and a repair would change "
-                "it by %.2g, "
-                "more than %g; its tets: %s",
-                repaired.worst_node, p(0), p(1), p(2), repaired.worst_solved, segment,
-                repaired.largest_change, kLargestChange, tets.c_str());
+                "the weights of node %d at (%.2f, %.2f, %.2f) leave [0, 1] by %.2g, and %lld of %lld nodes "
+                "need mending; "
+                "its tets: %s",
+                node, p(0), p(1), p(2), violation, static_cast<long long>(like_it),
+                static_cast<long long>(mesh.V.rows()), tets.c_str());
   throw Error(ErrorKind::data, "weights", what.data(),
-              "its tets are slivers: use another mesher or a finer --voxel");
+              "the mesh is full of slivers: use another mesher, or more tets by --max-tets or --voxel");
 }
 
 /// Largest, smallest and row sums over the rows that were solved.
@@ -132,7 +145,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   context.report(0.1);
   context.check_stop();
 
-  const solve::SparseMatrix L = laplacian(mesh.V, mesh.T, &certificate.positive_offdiagonal_share);
+  solve::SparseMatrix L = laplacian(mesh.V, mesh.T, &certificate.positive_offdiagonal_share);
   context.report(0.2);
   context.check_stop();
 
@@ -149,7 +162,12 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   }
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
-  HarmonicResult solved = solve_harmonic(L, fixed, boundary, *solver, scaled);
+  MonotoneResult monotone = solve_monotone(std::move(L), fixed, boundary, *solver, scaled);
+  if (monotone.violation > kSmallViolation) {
+    refuse(mesh, monotone.worst_node, monotone.violation, monotone.mended_nodes);
+  }
+  warn_of_mended_nodes(monotone, context);
+  HarmonicResult& solved = monotone.harmonic;
   boundary.resize(0, 0);
   certificate.solver_residual = solved.residual;
   measure_solved(solved.values, source, certificate);
@@ -166,7 +184,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   certificate.repaired_rows = repaired.rows;
   certificate.repaired_largest_change = repaired.largest_change;
   if (repaired.largest_change > kLargestChange) {
-    refuse(mesh, repaired, columns[static_cast<std::size_t>(repaired.worst_column)]);
+    refuse(mesh, repaired.worst_node, repaired.largest_change, static_cast<std::int64_t>(repaired.rows));
   }
   context.check_stop();
   result.weights = store(values, columns, source, certificate);

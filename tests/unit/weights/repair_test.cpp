@@ -18,8 +18,6 @@ TEST(Repair, ClampsAndCountsOnlyWhatLeftTheBounds) {
   EXPECT_EQ(report.rows, 2U);
   EXPECT_NEAR(report.largest_change, 0.004, 1e-15);
   EXPECT_EQ(report.worst_node, 1);
-  EXPECT_EQ(report.worst_column, 0);
-  EXPECT_EQ(report.worst_solved, 1.004);
   EXPECT_LT((values.row(0) - before.row(0)).cwiseAbs().maxCoeff(), 1e-15);
   EXPECT_EQ(values.row(1), Eigen::RowVector3d(1, 0, 0));
   EXPECT_NEAR(values(2, 0), 0.6 / 1.002, 1e-15);
