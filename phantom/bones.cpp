@@ -23,7 +23,7 @@ Part bone(std::string name, std::string segment, Shape shape, double detail, int
 /// A bone gives way to those of the next segment. A little less than the gap, so that surfaces made
 /// concentric to a joint, which keep exactly that gap, are not scratched.
 Shape clear_of(const Shape& bone, const std::vector<Shape>& next, double gap) {
-  return subtract(bone, grow(unite(next), gap - 0.5));
+  return subtract(bone, grow(unite(next), gap - 0.5), 1);
 }
 
 }  // namespace

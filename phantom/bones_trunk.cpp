@@ -87,7 +87,7 @@ Shape hip_bone(const Landmarks& at) {
   }
   const Shape crest_tube = chain(crest, std::vector<double>(crest.size(), 7.5));
   const Shape body = unite({round_cone(h + Vec(-2, 10, 30), 21, h + Vec(6, 20, 60), 12),
-                            round_cone(h + Vec(-12, 4, 12), 34, h + Vec(-4, 2, 4), 36)},
+                            round_cone(h + Vec(-14, 6, 14), 35, h + Vec(-7, 3, 6), 37)},
                            10);
   const Shape ischium = tube({h + Vec(-6, 20, -14), h + Vec(-14, 30, -50), h + Vec(-22, 24, -78)}, 17, 15, 8);
   const Shape upper_ramus =
@@ -137,8 +137,8 @@ Shape pelvis_bone(const Landmarks& at) {
   // The sockets: spherical, opening outwards, forwards and down.
   Shape socket = sphere(at.hip, kFemoralHead + kBallGap);
   const Vec opening = Vec(0.82, -0.30, -0.48).normalized();
-  socket = unite({socket, round_cone(at.hip + 28 * opening, 27, at.hip + 66 * opening, 54)});
-  return subtract(subtract(pelvis, socket), mirrored(socket));
+  socket = unite({socket, cylinder(at.hip + 4 * opening, at.hip + 80 * opening, 48, 2)});
+  return subtract(subtract(pelvis, socket, 4), mirrored(socket), 4);
 }
 
 Shape lumbar_spine(const Landmarks& at) {

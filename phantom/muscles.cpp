@@ -118,7 +118,7 @@ std::vector<Muscle> arm_muscles(const Landmarks& at) {
       {"deltoid",
        unite({strand({g + Vec(-34, -26, 34), g + Vec(18, -37, -6), g + Vec(50, -8, -122)}, 8, 18, 7),
               strand({g + Vec(18, 4, 48), g + Vec(43, 2, -4), g + Vec(54, 2, -126)}, 8, 18, 7),
-              strand({g + Vec(-10, 48, 30), g + Vec(24, 38, -12), g + Vec(50, 14, -122)}, 8, 18, 7)},
+              strand({g + Vec(4, 45, 20), g + Vec(24, 38, -12), g + Vec(50, 14, -122)}, 8, 18, 7)},
              14),
        80},
       {"biceps_brachii",
@@ -192,7 +192,7 @@ std::vector<Muscle> trunk_muscles(const Landmarks& at, const Shape& scapula) {
              8, 10, 8, 18),
        84},
       {"erector_spinae",
-       strand({{28, 90, 1004}, {36, 80, 1060}, {38, 78, 1130}, {36, 96, 1210}, {31, 107, 1260}}, 9, 16, 7),
+       strand({{28, 90, 1004}, {36, 80, 1060}, {38, 78, 1115}, {37, 86, 1160}, {34, 97, 1192}}, 9, 16, 8),
        44},
   };
 }
@@ -211,7 +211,7 @@ std::vector<Part> make_muscles(const Landmarks& at, const Shape& scapula, const 
       part.name = muscle.name;
       part.group = Group::muscle;
       // Those before it have the right of way.
-      part.shape = subtract(muscle.shape, unite(taken), 2);
+      part.shape = subtract(muscle.shape, unite(taken, 2), 5);
       part.outline = muscle.shape;
       part.detail = 6;
       part.hounsfield = 55;

@@ -58,7 +58,7 @@ std::vector<Part> make_organs(const Landmarks&, const std::vector<Part>& bones,
   const auto clear = [&](const Shape& shape, const std::vector<Shape>& others) {
     std::vector<Shape> away{solid};
     if (!others.empty()) away.push_back(grow(unite(others), 3));
-    return subtract(shape, unite(away), 3);
+    return subtract(shape, unite(away, 3), 3);
   };
 
   const Eigen::Matrix3d tilt =
@@ -72,7 +72,7 @@ std::vector<Part> make_organs(const Landmarks&, const std::vector<Part>& bones,
       tube({{44, 8, 1226}, {62, -6, 1204}, {62, -28, 1168}, {40, -48, 1136}, {8, -52, 1128}}, 31, 17, 24),
       cavity, 6);
   const Shape raw_spleen = intersect(
-      ellipsoid({90, 28, 1186}, {19, 34, 40}, Eigen::AngleAxisd(0.3, Vec::UnitX()).toRotationMatrix()),
+      ellipsoid({86, 26, 1196}, {21, 32, 34}, Eigen::AngleAxisd(0.3, Vec::UnitX()).toRotationMatrix()),
       grow(cavity, -1), 4);
   const Shape kidney = subtract(
       ellipsoid({60, 46, 1128}, {23, 19, 46}, Eigen::AngleAxisd(-0.2, Vec::UnitY()).toRotationMatrix()),
@@ -80,7 +80,7 @@ std::vector<Part> make_organs(const Landmarks&, const std::vector<Part>& bones,
   const Shape raw_trachea =
       unite({tube({{0, -20, 1535}, {0, 2, 1460}, {-6, 17, 1400}, {-6, 22, 1362}}, 8, 8, 20),
              tube({{-6, 22, 1364}, {-22, 22, 1342}, {-34, 22, 1326}}, 6.5, 5.5, 8),
-             tube({{-6, 22, 1364}, {6, 18, 1340}, {28, 12, 1322}}, 6, 5.5, 8)},
+             tube({{-6, 22, 1364}, {4, 14, 1342}, {30, 6, 1326}}, 6, 5.5, 8)},
             4);
   const Shape raw_colon = intersect(colon(), grow(cavity, 6), 4);
 
