@@ -72,8 +72,7 @@ std::string text_report(const Report& report) {
   for (const Finding& finding : report.findings) {
     out += fmt::format("{}: {}: {}", check::severity_name(finding.severity), finding.where, finding.what);
     if (finding.at)
-      out += fmt::format(", at [{:.2f}, {:.2f}, {:.2f}]", finding.at->x(), finding.at->y(),
-                         finding.at->z());
+      out += fmt::format(", at [{:.2f}, {:.2f}, {:.2f}]", finding.at->x(), finding.at->y(), finding.at->z());
     out += fmt::format(" ({})\n", finding.mend);
   }
   if (report.findings.empty()) out += "nothing found\n";

@@ -112,7 +112,7 @@ class CaseReader {
       if (options_.data.empty()) root->fail("the data folder is not known", "name it with --data DIR");
       base = options_.data;
     }
-    const fs::path path = base / file.text();
+    fs::path path = base / file.text();
     std::error_code ignored;
     if (!fs::is_regular_file(path, ignored)) {
       throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");

@@ -27,10 +27,10 @@ std::string write_degrees(double radians) {
                                                          : "";
   };
   for (int digits = 0; digits <= 17; ++digits) {
-    if (const std::string text = exact(std::chars_format::fixed, digits); !text.empty()) return text;
+    if (std::string text = exact(std::chars_format::fixed, digits); !text.empty()) return text;
   }
   for (int digits = 17; digits <= 21; ++digits) {
-    if (const std::string text = exact(std::chars_format::general, digits); !text.empty()) return text;
+    if (std::string text = exact(std::chars_format::general, digits); !text.empty()) return text;
   }
   return write_number(static_cast<double>(degrees));
 }

@@ -72,7 +72,7 @@ class Inspector {
   }
 
  private:
-  void tell(Severity severity, std::string where, std::string what, std::optional<Vector3d> at,
+  void tell(Severity severity, std::string where, std::string what, const std::optional<Vector3d>& at,
             std::string mend) {
     report_.findings.push_back({severity, std::move(where), std::move(what), at, std::move(mend)});
   }
