@@ -3,10 +3,10 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "preprocess/mapping/boundary.hpp"
 #include "preprocess/mapping/closest_point.hpp"
@@ -33,7 +33,7 @@ std::vector<std::uint32_t> along_curve(const Points& points, const Eigen::Aligne
     code[i] = {morton(points.row(static_cast<Eigen::Index>(i)).transpose(), box),
                static_cast<std::uint32_t>(i)};
   }
-  std::sort(code.begin(), code.end());
+  tbb::parallel_sort(code.begin(), code.end());  // no two are equal: one order
   std::vector<std::uint32_t> order(code.size());
   for (std::size_t i = 0; i < code.size(); ++i) order[i] = code[i].second;
   return order;
@@ -70,14 +70,18 @@ Binding Locator::bind(const Points& points, const Context& context) const {
   binding.outside_mm.assign(count, 0);
   const std::vector<std::uint32_t> order = along_curve(points, impl_->grid.box());
   using Range = tbb::blocked_range<std::size_t>;
-  tbb::parallel_for(Range(0, count, 1024), [&](const Range& range) {
+  // Equal parts for any number of threads, so that the guesses are the same too.
+  const auto bind_part = [&](const Range& range) {
     context.check_stop();
-    std::int32_t face = -1;  // of the previous point outside: near, hence a good first guess
+    // Of the previous points inside and outside: near, hence good first guesses.
+    std::int32_t holder = -1, face = -1;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const std::size_t p = order[i];
       const Eigen::Vector3d x = points.row(static_cast<Eigen::Index>(p)).transpose();
-      std::int32_t tet = impl_->grid.find(x);
-      if (tet < 0) {
+      std::int32_t tet = impl_->grid.find(x, holder);
+      if (tet >= 0) {
+        holder = tet;
+      } else {
         const FaceTree::Hit hit = impl_->tree.nearest(x, face);
         face = hit.face;
         tet = impl_->faces[static_cast<std::size_t>(face)].tet;
@@ -91,7 +95,8 @@ Binding Locator::bind(const Points& points, const Context& context) const {
       // The run time weighs corners 1 to 3; corner 0 takes what their rounding leaves.
       row[0] = static_cast<float>(1.0 - (double{row[1]} + double{row[2]} + double{row[3]}));
     }
-  });
+  };
+  tbb::parallel_for(Range(0, count, 1024), bind_part, tbb::simple_partitioner{});
   for (const float distance : binding.outside_mm) {
     binding.outside += distance > 0 ? 1 : 0;
     binding.max_outside_mm = std::max(binding.max_outside_mm, double{distance});

@@ -8,45 +8,52 @@
 namespace ecorche::mapping {
 namespace {
 
-// Every tet, listed at each of its four nodes.
+// Nodes of a tet, ascending.
+std::array<std::int32_t, 4> sorted(const Tets& tets, std::int64_t tet) {
+  std::array<std::int32_t, 4> n{tets(tet, 0), tets(tet, 1), tets(tet, 2), tets(tet, 3)};
+  const auto order = [&](std::size_t a, std::size_t b) {
+    if (n[a] > n[b]) std::swap(n[a], n[b]);
+  };
+  order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
+  return n;
+}
+
+// Every face is met at its lowest node. Of a tet's four faces three have its lowest node and one its second
+// lowest: each tet is listed at those two.
 struct TetsOfNodes {
   std::vector<std::int32_t> begin, tet;
 
   TetsOfNodes(std::int64_t nodes, const Tets& tets)
-      : begin(static_cast<std::size_t>(nodes) + 1), tet(static_cast<std::size_t>(tets.size())) {
-    const std::int32_t* corner = tets.data();
-    for (std::int64_t i = 0; i < tets.size(); ++i) ++begin[static_cast<std::size_t>(corner[i]) + 1];
+      : begin(static_cast<std::size_t>(nodes) + 1), tet(static_cast<std::size_t>(2 * tets.rows())) {
+    for (std::int64_t t = 0; t < tets.rows(); ++t) {
+      const auto n = sorted(tets, t);
+      ++begin[static_cast<std::size_t>(n[0]) + 1];
+      ++begin[static_cast<std::size_t>(n[1]) + 1];
+    }
     for (std::size_t n = 1; n < begin.size(); ++n) begin[n] += begin[n - 1];
     std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
-    for (std::int64_t i = 0; i < tets.size(); ++i) {
-      tet[static_cast<std::size_t>(next[static_cast<std::size_t>(corner[i])]++)] =
-          static_cast<std::int32_t>(i / 4);
+    for (std::int64_t t = 0; t < tets.rows(); ++t) {
+      const auto n = sorted(tets, t);
+      tet[static_cast<std::size_t>(next[static_cast<std::size_t>(n[0])]++)] = static_cast<std::int32_t>(t);
+      tet[static_cast<std::size_t>(next[static_cast<std::size_t>(n[1])]++)] = static_cast<std::int32_t>(t);
     }
   }
 };
 
-// Faces whose smallest node is `node` and that occur once among the tets around it.
+// Faces whose lowest node is `node` and that occur once among the tets around it.
 void faces_from(std::int32_t node, const TetsOfNodes& around, const Tets& tets,
                 std::vector<BoundaryFace>& scratch, std::vector<BoundaryFace>& out) {
   scratch.clear();
-  for (auto i = around.begin[static_cast<std::size_t>(node)];
-       i < around.begin[static_cast<std::size_t>(node) + 1]; ++i) {
+  const auto at = static_cast<std::size_t>(node);
+  for (std::int32_t i = around.begin[at]; i < around.begin[at + 1]; ++i) {
     const std::int32_t tet = around.tet[static_cast<std::size_t>(i)];
-    std::array<std::int32_t, 3> others;
-    std::size_t count = 0;
-    for (int c = 0; c < 4; ++c) {
-      if (tets(tet, c) > node) {
-        for (std::size_t at = count++;; --at) {  // insertion: at most three
-          if (at == 0 || others[at - 1] < tets(tet, c)) {
-            others[at] = tets(tet, c);
-            break;
-          }
-          others[at] = others[at - 1];
-        }
-      }
-    }
-    for (std::size_t a = 0; a + 1 < count; ++a) {
-      for (std::size_t b = a + 1; b < count; ++b) scratch.push_back({{node, others[a], others[b]}, tet});
+    const auto n = sorted(tets, tet);
+    if (n[0] == node) {
+      scratch.push_back({{n[0], n[1], n[2]}, tet});
+      scratch.push_back({{n[0], n[1], n[3]}, tet});
+      scratch.push_back({{n[0], n[2], n[3]}, tet});
+    } else {
+      scratch.push_back({{n[1], n[2], n[3]}, tet});
     }
   }
   std::sort(scratch.begin(), scratch.end(), [](const auto& x, const auto& y) { return x.node < y.node; });

@@ -20,14 +20,16 @@ class TetGrid {
  public:
   TetGrid(const PointsF& nodes, const Tets& tets, const Context& context);
 
-  /// The tet of lowest index that holds p, faces included; -1 outside of all.
-  std::int32_t find(const Eigen::Vector3d& p) const;
+  /// The tet of lowest index that holds p, faces included; -1 outside of all. `hint`: a tet to try first, or
+  /// -1; it is the answer only where p is well inside it, so that it saves time and changes nothing.
+  std::int32_t find(const Eigen::Vector3d& p, std::int32_t hint = -1) const;
 
   std::array<Eigen::Vector3d, 4> corners(std::int32_t tet) const;
   const Eigen::AlignedBox3d& box() const { return box_; }
 
  private:
   std::array<std::int64_t, 3> cell_of(const Eigen::Vector3d& p) const;
+  bool holds(std::int32_t tet, const Eigen::Vector3d& p, double least) const;
   template <class F>
   void for_cells(std::int64_t tet, F&& f) const;
 
