@@ -93,8 +93,8 @@ void declare_verify(CLI::App& app, Program& program, Run& chosen) {
       const Verdict verdict = verify(*path, program);
       for (const std::string& fault : verdict.faults) program.note("fault: " + fault);
       program.result(to_text(verdict),
-                     model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr, verdict.found,
-                                  verdict.checked, verdict.bad));
+                     model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr,
+                                  verdict.found, verdict.checked, verdict.bad));
       return verdict.faults.empty() ? 0 : exit_code(ErrorKind::data);
     };
   });
