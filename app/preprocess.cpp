@@ -119,6 +119,20 @@ std::string listed(const std::vector<std::string_view>& names) {
   return out;
 }
 
+// 0, or an edge in range: told as one thing.
+CLI::Validator voxel_edge() {
+  static constexpr auto range = preprocess::Options::voxel_range;
+  std::ostringstream said;
+  said << "0, or " << range.low << " to " << range.high;
+  return {[said = said.str()](std::string& text) -> std::string {
+            double edge = 0;
+            const bool number = CLI::detail::lexical_cast(text, edge);
+            if (number && (edge == 0 || (edge >= range.low && edge <= range.high))) return {};
+            return "'" + text + "' is not " + said + " mm";
+          },
+          said.str()};
+}
+
 std::vector<std::string> strings(const std::vector<std::string_view>& names) {
   return {names.begin(), names.end()};
 }
@@ -143,7 +157,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
       ->add_option(
           "--voxel", o.voxel_mm,
           "voxel edge, mm; 0: the finest whose image stays within 250 x 120 x 700 voxels or their number")
-      ->check(CLI::Range(0.0, 0.0) | CLI::Range(Options::voxel_range.low, Options::voxel_range.high))
+      ->check(voxel_edge())
       ->capture_default_str();
   command
       ->add_option("--max-tets", o.max_tets, "never more tets than this: sizes are coarsened until it holds")
@@ -160,9 +174,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
                    "who solves for the weights: auto (" + automatic + "), " + listed(weights::solver_names()))
       ->check(CLI::IsMember(solvers))
       ->capture_default_str();
-  command
-      ->add_option("--cor-sigma", o.cor_sigma,
-                   "width of the similarity of weights, LeHodgins16: above 0, below 0.1")
+  command->add_option("--cor-sigma", o.cor_sigma, "width of the similarity of weights (LeHodgins16 eq. 1)")
       ->check(CLI::Range(Options::sigma_range.low, Options::sigma_range.high))
       ->capture_default_str();
   command->add_option("--data", settings->input.data,
