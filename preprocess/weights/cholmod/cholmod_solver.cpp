@@ -33,7 +33,10 @@ struct State {
     common.supernodal = CHOLMOD_SUPERNODAL;
     common.final_ll = 1;
     common.nmethods = 1;
-    common.method[0].ordering = CHOLMOD_METIS;
+    // METIS by way of CHOLMOD's own nested dissection: the same fill in the same time (290 k unknowns: 1.33e8
+    // against 1.32e8 entries, 4.2 against 4.0 s), but METIS_NodeND takes SIGTERM for its own errors while it
+    // runs, and dies of one from outside.
+    common.method[0].ordering = CHOLMOD_NESDIS;
   }
   ~State() {
     cholmod_free_factor(&factor, &common);

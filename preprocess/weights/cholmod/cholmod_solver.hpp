@@ -8,8 +8,8 @@
 
 namespace ecorche::weights {
 
-/// Double precision, supernodal, ordered by METIS (by AMD where METIS is not built in), BLAS on one thread.
-/// About 1 GB of factor per 200 k unknowns of a tet mesh. Not to be shared between threads.
+/// Double precision, supernodal, ordered by nested dissection (METIS; by AMD where it is not built in), BLAS
+/// on one thread. About 1 GB of factor per 200 k unknowns of a tet mesh. Not to be shared between threads.
 std::unique_ptr<solve::SpdSolver> make_cholmod_solver();
 
 }  // namespace ecorche::weights
