@@ -78,7 +78,8 @@ class Cli(unittest.TestCase):
         blocker = self.folder / "file"
         blocker.write_text("in the way")
         self.assert_error(run("phantom", "-o", blocker / "deeper"), 73)
-        self.assert_error(run("pose", MODEL, "-o", blocker / "deeper"), 73)
+        self.assert_error(run("pose", MODEL, "-o", blocker / "deeper", "--motion", CASE / "motion" / "walk.bvh",
+                              "--frames", "0:1"), 73)
         self.assert_error(run("preprocess", CASE, "-o", self.folder / "absent" / "m.hdf"), 73, "m.hdf")
         self.assertEqual(blocker.read_text(), "in the way")
 
@@ -90,7 +91,8 @@ class Cli(unittest.TestCase):
 
     def test_a_wrong_pose_is_refused(self):
         pose = self.folder / "pose.yaml"
-        pose.write_text("ecorche_pose: 1\njoints: {third_elbow: {flexion_deg: 3}}\n")
+        skeleton = re.search(r"^name: (\S+)", (CASE / "skeleton.yaml").read_text(), re.M).group(1)
+        pose.write_text(f"ecorche_pose: 1\nskeleton: {skeleton}\njoints: {{third_elbow: {{flexion_deg: 3}}}}\n")
         self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--pose", pose), 78, "third_elbow")
         self.assertFalse((self.folder / "p").exists() and any((self.folder / "p").iterdir()), "nothing may be written")
 
