@@ -167,7 +167,7 @@ def read_model(path):
         vtk, own = file["VTKHDF"], file["ecorche"]
         points, connectivity = vtk["Points"][:], vtk["Connectivity"][:]
         label = vtk["CellData/label"][:]
-        segments = [text(name) for name in own["skeleton/names"][:]]
+        segments = [text(name) for name in own["skeleton/segment"][:]]
         offsets = own["weights/offsets"][:].astype(np.int64)
         rows = np.repeat(np.arange(len(points)), np.diff(offsets))
         weights = {}
@@ -182,7 +182,7 @@ def read_model(path):
         tets = tets_of(points, connectivity, {"label": label.astype(np.int32), "owner": owner[corner[:, 0]].astype(np.int32)})
         tissues = []
         for name, group in own["tissues"].items():
-            tissues.append(Tissue(name, text(group.attrs["group"]), surface_of(group["points"][:], group["triangles"][:])))
+            tissues.append(Tissue(name, text(group["group"][0]), surface_of(group["points"][:], group["triangles"][:])))
     return Body(path.stem, tissues, [], tets, weights, segments)
 
 

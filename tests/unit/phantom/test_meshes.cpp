@@ -57,23 +57,6 @@ TEST(SmallPhantom, FitsItsImage) {
   EXPECT_GT(size.z(), 1700);
 }
 
-TEST(SmallPhantom, SameSeedSameBytesAnotherSeedAnotherBody) {
-  const Phantom again = make(Size::small, 1, Context{}), other = make(Size::small, 2, Context{});
-  const Case &a = small_phantom().patient, &b = again.patient, &c = other.patient;
-  EXPECT_EQ(a.skin.V, b.skin.V);
-  EXPECT_EQ(a.skin.F, b.skin.F);
-  for (std::size_t i = 0; i < a.tissues.size(); ++i)
-    EXPECT_EQ(a.tissues[i].surface.V, b.tissues[i].surface.V);
-  for (std::size_t i = 0; i < a.volumes.size(); ++i)
-    EXPECT_EQ(a.volumes[i].image.bytes, b.volumes[i].image.bytes);
-  EXPECT_EQ(a.labels->image.bytes, b.labels->image.bytes);
-  EXPECT_NE(a.volumes[1].image.bytes, c.volumes[1].image.bytes);
-  EXPECT_FALSE(a.bones.back().surface.V.rows() == c.bones.back().surface.V.rows() &&
-               a.bones.back().surface.V == c.bones.back().surface.V);
-  EXPECT_NE(again.truth.segments[again.truth.segments.size() - 1].joint.center,
-            other.truth.segments.back().joint.center);
-}
-
 TEST(SmallPhantom, EveryBoneHasAnOwner) {
   const Case& patient = small_phantom().patient;
   std::set<std::string> owners;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <random>
 
 #include "core/values/mesh.hpp"
 
@@ -59,6 +60,20 @@ inline TetMesh box_mesh(const std::array<int, 3>& n, double edge,
   }
   mesh.T.resize(static_cast<Eigen::Index>(tets.size() / 4), 4);
   for (std::size_t i = 0; i < tets.size(); ++i) mesh.T.data()[i] = row[static_cast<std::size_t>(tets[i])];
+  return mesh;
+}
+
+/// A box whose inner nodes are shaken: tets of every shape.
+inline TetMesh shaken_box(int n, double by) {
+  TetMesh mesh = box_mesh({n, n, n}, 10);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> shift(-by, by);
+  for (Eigen::Index i = 0; i < mesh.V.rows(); ++i) {
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const double x = mesh.V(i, c);
+      if (x > 0 && x < 10 * n) mesh.V(i, c) += shift(random);
+    }
+  }
   return mesh;
 }
 

@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <random>
 
 #include "preprocess/weights/harmonic.hpp"
 #include "tests/unit/weights/box_mesh.hpp"
@@ -15,20 +14,6 @@ using solve::SparseMatrix;
 
 Eigen::MatrixXd full(const SparseMatrix& L) {
   return Eigen::MatrixXd(L).selfadjointView<Eigen::Lower>();
-}
-
-/// A box whose inner nodes are shaken: tets of every shape.
-TetMesh shaken_box(int n, double by) {
-  TetMesh mesh = test::box_mesh({n, n, n}, 10);
-  std::mt19937 random(4);
-  std::uniform_real_distribution<double> shift(-by, by);
-  for (Eigen::Index i = 0; i < mesh.V.rows(); ++i) {
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      const double x = mesh.V(i, c);
-      if (x > 0 && x < 10 * n) mesh.V(i, c) += shift(random);
-    }
-  }
-  return mesh;
 }
 
 TEST(Laplacian, OfOneTetIsTheCotangentFormula) {
@@ -55,7 +40,7 @@ TEST(Laplacian, OfOneTetIsTheCotangentFormula) {
 }
 
 TEST(Laplacian, EqualsTheSumOverTets) {
-  const TetMesh mesh = shaken_box(4, 3);
+  const TetMesh mesh = test::shaken_box(4, 3);
   Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(mesh.V.rows(), mesh.V.rows());
   for (Eigen::Index t = 0; t < mesh.T.rows(); ++t) {
     Eigen::Matrix4d corners;
@@ -90,7 +75,7 @@ TEST(Laplacian, CountsPositiveOffDiagonals) {
   const TetMesh even = test::box_mesh({3, 3, 3}, 10);
   laplacian(even.V, even.T, &share);
   EXPECT_EQ(share, 0);
-  const TetMesh shaken = shaken_box(4, 3);
+  const TetMesh shaken = test::shaken_box(4, 3);
   const SparseMatrix L = laplacian(shaken.V, shaken.T, &share);
   int positive = 0, all = 0;
   for (Eigen::Index c = 0; c < L.cols(); ++c) {
@@ -117,7 +102,7 @@ TEST(Laplacian, RefusesATetWithoutVolume) {
 }
 
 TEST(Harmonic, ReproducesLinearFunctionsExactly) {
-  const TetMesh mesh = shaken_box(6, 2);
+  const TetMesh mesh = test::shaken_box(6, 2);
   const SparseMatrix L = laplacian(mesh.V, mesh.T, nullptr);
   Eigen::MatrixXd linear(mesh.V.rows(), 2);
   linear.col(0) = mesh.V * Eigen::Vector3d(0.3, -1, 2);
@@ -143,47 +128,6 @@ TEST(Harmonic, NeedsAFixedNode) {
   const std::vector<std::uint8_t> none(static_cast<std::size_t>(mesh.V.rows()), 0);
   const auto solver = make_solver("eigen");
   EXPECT_THROW(solve_harmonic(L, none, Eigen::MatrixXd::Zero(mesh.V.rows(), 1), *solver, {}), Error);
-}
-
-TEST(Solvers, AreChosenByNameAndAgree) {
-  EXPECT_EQ(make_solver("auto")->name(), solver_names().front());
-  try {
-    make_solver("magic");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::usage);
-    EXPECT_NE(std::string(error.what()).find("'magic'"), std::string::npos) << error.what();
-    EXPECT_NE(error.mend().find("eigen"), std::string::npos);
-  }
-  const TetMesh mesh = shaken_box(9, 2);
-  const SparseMatrix L = laplacian(mesh.V, mesh.T, nullptr);
-  std::vector<std::uint8_t> fixed(static_cast<std::size_t>(mesh.V.rows()), 0);
-  Eigen::MatrixXd boundary = Eigen::MatrixXd::Zero(mesh.V.rows(), 3);
-  std::mt19937 random(9);
-  for (int i = 0; i < 40; ++i) {
-    const std::size_t n = random() % fixed.size();
-    fixed[n] = 1;
-    boundary(static_cast<Eigen::Index>(n), i % 3) = 1;
-  }
-  const auto first = make_solver(solver_names().front());
-  const auto last = make_solver(solver_names().back());
-  const HarmonicResult a = solve_harmonic(L, fixed, boundary, *first, {});
-  const HarmonicResult b = solve_harmonic(L, fixed, boundary, *last, {});
-  EXPECT_LT((a.values - b.values).cwiseAbs().maxCoeff(), 1e-10);
-}
-
-TEST(Solvers, RefuseAMatrixThatIsNotDefinite) {
-  const TetMesh mesh = test::box_mesh({3, 3, 3}, 10);
-  SparseMatrix L = laplacian(mesh.V, mesh.T, nullptr);
-  L.coeffRef(5, 5) = -1;
-  for (const std::string_view name : solver_names()) {
-    try {
-      make_solver(name)->factor(L, {});
-      FAIL() << name;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::data) << error.what();
-    }
-  }
 }
 
 }  // namespace
