@@ -30,7 +30,8 @@ NearestPoint::NearestPoint(const Points& V, std::vector<std::int32_t> subset) : 
 Eigen::Vector3i NearestPoint::cell(const Eigen::Vector3d& p) const {
   Eigen::Vector3i c;
   for (int k = 0; k < 3; ++k) {
-    c[k] = std::clamp(static_cast<int>(std::floor((p[k] - box_.min()[k]) / edge_)), 0, size_[k] - 1);
+    const double at = std::floor((p[k] - box_.min()[k]) / edge_);
+    c[k] = static_cast<int>(std::clamp(at, 0.0, static_cast<double>(size_[k] - 1)));
   }
   return c;
 }
