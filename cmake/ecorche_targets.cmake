@@ -55,7 +55,7 @@ function(ecorche_test_properties name)
   set(models ${folder}/small_lattice.hdf)
   if(ECORCHE_GPL)
     set(first cgal)
-    set(models ${folder}/small_cgal.hdf:${models})
+    set(models ${folder}/small_cgal.hdf:${folder}/small_tetgen.hdf:${models})
   endif()
   set(environment ECORCHE_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/ecorche ECORCHE_CASE=${folder}/small
     ECORCHE_MODEL=${folder}/small_${first}.hdf ECORCHE_MODELS=${models}:${folder}/small_${first}_coarse.hdf

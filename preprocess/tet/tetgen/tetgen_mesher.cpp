@@ -15,6 +15,7 @@
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/tetgen/child_process.hpp"
 #include "preprocess/tet/tetgen/complex.hpp"
+#include "preprocess/tet/tetgen/split_edges.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 
 namespace ecorche::tet {
@@ -22,6 +23,10 @@ namespace {
 
 /// Tets no larger than a cube of this many voxels' volume, however many are allowed.
 constexpr double kFinestVolumeInVoxels = 12;
+/// Edges of the surfaces are halved down to this length, as far as the budget goes.
+constexpr double kLongestEdgeInVoxels = 2;
+/// A budget of tets for each vertex of the surfaces; about 7 are the least, the others fill the inside.
+constexpr std::int64_t kTetsPerSurfaceVertex = 20;
 
 /// TetGen's result as it crosses from the child: two counts, then points, corners and regions.
 struct Raw {
@@ -190,6 +195,11 @@ class TetgenMesher : public Mesher {
     if (!obstacle.empty()) {
       context.warn(obstacle + ": TetGen fills the surfaces of the voxels instead");
       complex = complex_from_voxels(input, options, context);
+    } else {
+      // Surfaces coarser than the gaps between them leave slivers there.
+      split_long_edges(complex, kLongestEdgeInVoxels * input.labels.grid.spacing[0],
+                       static_cast<std::size_t>(
+                           std::min(options.max_tets / kTetsPerSurfaceVertex, options.max_nodes / 4)));
     }
     const double body = body_volume(input.labels);
     // Refined tets have about half the largest volume; the other half of the budget is for those at surfaces.
