@@ -16,6 +16,9 @@ function(ecorche_library name)
   endif()
 endfunction()
 
+# What the sanitizers build.
+add_custom_target(unit_tests)
+
 # ecorche_test(NAME SOURCES ... [LIBS ...] [ARGS ...] [TIMEOUT seconds] [LABELS ...] [FIXTURES ...])
 # One gtest executable and one ctest entry: a process start per case would cost more than the cases.
 function(ecorche_test name)
@@ -26,6 +29,9 @@ function(ecorche_test name)
   find_package(GTest REQUIRED)
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE ecorche_flags ecorche_sanitizers ${A_LIBS} GTest::gtest GTest::gtest_main)
+  if(name MATCHES "^unit_" AND NOT A_LABELS MATCHES "release_only|slow")
+    add_dependencies(unit_tests ${name})
+  endif()
   add_test(NAME ${name} COMMAND ${name} ${A_ARGS})
   ecorche_test_properties(${name} TIMEOUT ${A_TIMEOUT} LABELS ${A_LABELS} FIXTURES ${A_FIXTURES})
 endfunction()

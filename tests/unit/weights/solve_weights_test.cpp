@@ -130,7 +130,7 @@ Beam shaken(double worst) {
     for (Eigen::Index n = 0; n < mesh.V.rows(); ++n) {
       const Eigen::RowVector3d before = mesh.V.row(n);
       if ((before.head<2>() - Eigen::RowVector2d(15, 15)).norm() < 9) continue;
-      mesh.V.row(n) += Eigen::RowVector3d(step(random), step(random), step(random));
+      for (Eigen::Index k = 0; k < 3; ++k) mesh.V(n, k) += step(random);
       for (const Eigen::Index t : tets_of[static_cast<std::size_t>(n)]) {
         const auto p = [&](Eigen::Index k) { return mesh.V.row(mesh.T(t, k)); };
         if (tet_det(p(0), p(1), p(2), p(3)) < worst * 125) {
@@ -151,7 +151,8 @@ TEST(SolveWeights, ViolationsAreRepairedAndCounted) {
   const WeightsResult result =
       solve_weights(beam.mesh, beam.patient, beam.bone_segment, 5, {"auto", true}, context);
   const Certificate& c = result.certificate;
-  EXPECT_NE(said.find("weights left [0, 1] by up to 0.0027 beside bad tets"), std::string::npos) << said;
+  EXPECT_NE(said.find("weights left [0, 1] by up to 0."), std::string::npos) << said;
+  EXPECT_NE(said.find(" beside bad tets: solved again"), std::string::npos) << said;
   EXPECT_GE(c.solved_min_weight, -1e-3);
   EXPECT_LE(c.solved_max_weight, 1 + 1e-3);
   EXPECT_LT(c.solved_row_sum_error, 1e-9);
