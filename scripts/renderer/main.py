@@ -29,6 +29,8 @@ def parse():
     parser.add_argument("--height", type=int, default=1200, help="pixels (default %(default)s)")
     parser.add_argument("--segment", help="whose weight is drawn on a model (default: the third of the skeleton)")
     parser.add_argument("--cut", type=float, help="y of the cutting plane through a model, mm (default: the middle)")
+    parser.add_argument("--view", choices=sorted(scene.VIEWS), default="front",
+                        help="from where surfaces side by side are seen (default %(default)s)")
     return parser.parse_args()
 
 
@@ -45,7 +47,7 @@ def main():
         written.append(path)
 
     if all(path.suffix in bodies.SURFACES for path in args.paths):
-        save(scene.row_of_surfaces([bodies.read_surface(path) for path in args.paths], args.height), "row")
+        save(scene.row_of_surfaces([bodies.read_surface(path) for path in args.paths], args.view, args.height), "row")
     elif len(args.paths) != 1:
         raise SystemExit("error: render: several inputs must all be surfaces (name one case, model or posed folder)")
     else:

@@ -4,7 +4,7 @@ import colorsys
 import hashlib
 
 import numpy as np
-from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (chooses the drawing back end)
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
@@ -155,17 +155,19 @@ def translucent(body, view, height):
     return shoot(actors, view, height)
 
 
-def row_of_surfaces(surfaces, height):
-    """Surfaces side by side, first at the left."""
+def row_of_surfaces(surfaces, view, height):
+    """Surfaces side by side as seen from `view`, first at the left."""
+    direction, up = (np.array(v, float) for v in VIEWS[view])
+    right = np.cross(up, direction) / np.linalg.norm(direction)
     actors, at = [], 0.0
     for surface in surfaces:
+        points = vtk_to_numpy(surface.GetPoints().GetData())
+        along = points @ right
         actor = surface_actor(surface, (0.80, 0.62, 0.50))
-        low, high = bounds_of([actor])
-        gap = 0.15 * (high - low).max()
-        actor.SetPosition(at - low[0], 0, -low[2])
-        at += high[0] - low[0] + gap
+        actor.SetPosition(*(right * (at - along.min()) - up * points[:, 2].min()))
+        at += np.ptp(along) + 0.15 * np.ptp(points, axis=0).max()
         actors.append(actor)
-    return shoot(actors, "front", height)
+    return shoot(actors, view, height)
 
 
 def distinct(index):
@@ -228,7 +230,6 @@ def tet_cuts(body, y, segment, height):
     low, high = bounds[0::2], bounds[1::2]
     y = (low[1] + high[1]) / 2 if y is None else y
     cells = body.tets.GetCellData()
-    from vtkmodules.util.numpy_support import vtk_to_numpy
     arrays = {cells.GetArrayName(i): vtk_to_numpy(cells.GetArray(i)) for i in range(cells.GetNumberOfArrays())}
     for name in ("label", "owner"):
         if name in arrays:
