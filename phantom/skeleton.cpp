@@ -2,6 +2,7 @@
 // The virtual skeleton of the phantom: 21 segments, anatomical angles, normal ranges.
 #include <cmath>
 #include <initializer_list>
+#include <numbers>
 
 #include "phantom/body.hpp"
 
@@ -9,7 +10,11 @@ namespace ecorche::phantom {
 
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+/// As a reader of degrees rounds them, so that the files say 30 and not 29.999999999999997.
+double radians(double degrees) {
+  return static_cast<double>(degrees * (std::numbers::pi_v<long double> / 180));
+}
+
 constexpr const char* kRanges = "AAOS, Joint Motion (1965), normal adult ranges, rounded";
 constexpr const char* kSpineRanges = "White and Panjabi, Clinical Biomechanics of the Spine (1990), rounded";
 
@@ -39,8 +44,8 @@ class Builder {
       angle.name = range.name;
       angle.axis = range.axis;
       angle.sign = range.sign;
-      angle.min = range.min_deg * kDegree;
-      angle.max = range.max_deg * kDegree;
+      angle.min = radians(range.min_deg);
+      angle.max = radians(range.max_deg);
       segment.joint.sequence.push_back(angle);
     }
     segment.joint.limits_source = kRanges;
@@ -79,7 +84,9 @@ Eigen::Matrix3d mirrored_frame(const Eigen::Matrix3d& left) {
 void rest_from_axes(Joint& joint) {
   const Eigen::Matrix3d& r = joint.axes;
   const double turns[3] = {std::atan2(-r(1, 2), r(2, 2)), std::asin(r(0, 2)), std::atan2(-r(0, 1), r(0, 0))};
-  for (std::size_t i = 0; i < 3; ++i) joint.sequence[i].rest = joint.sequence[i].sign * turns[i];
+  for (std::size_t i = 0; i < 3; ++i) {
+    joint.sequence[i].rest = std::abs(turns[i]) < 1e-9 ? 0 : joint.sequence[i].sign * turns[i];
+  }
 }
 
 void add_arm(Builder& build, const Landmarks& at, bool left) {
