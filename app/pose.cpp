@@ -127,6 +127,23 @@ std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t fram
   return numbers;
 }
 
+double degrees(double radians) {
+  return radians * 180 / std::numbers::pi;
+}
+
+// Where the clip's zero pose is not the scan's.
+void note_alignment(const Program& program, const Rig& rig, const kinematics::Retarget& match) {
+  for (std::size_t s = 0; s < match.alignment.size(); ++s) {
+    const int parent = rig.skeleton.segments[s].parent;
+    if (parent < 0) continue;
+    const double angle =
+        match.alignment[s].angularDistance(match.alignment[static_cast<std::size_t>(parent)]);
+    if (angle < 1e-6) continue;
+    program.note("note: in the clip's zero pose " + rig.skeleton.segments[s].name + " is turned by " +
+                 std::to_string(std::lround(degrees(angle))) + " degrees from the scan's; aligned");
+  }
+}
+
 std::vector<Frame> read_frames(const Program& program, const Settings& settings, const Rig& rig) {
   if (settings.pose.empty() == settings.motion.empty()) {
     usage("pose", settings.pose.empty() ? "nothing to pose" : "both --pose and --motion are given",
@@ -141,6 +158,7 @@ std::vector<Frame> read_frames(const Program& program, const Settings& settings,
     program.note("warning: " + settings.motion.string() + ": joint '" + joint +
                  "' moves nothing of this model");
   }
+  note_alignment(program, rig, match);
   std::vector<Frame> frames;
   const std::vector<std::size_t> numbers = frame_numbers(settings.frames, clip.frames());
   for (const std::size_t f : numbers) {
@@ -149,10 +167,6 @@ std::vector<Frame> read_frames(const Program& program, const Settings& settings,
     frames.push_back({name, kinematics::pose_at(rig, clip, match, f)});
   }
   return frames;
-}
-
-double degrees(double radians) {
-  return radians * 180 / std::numbers::pi;
 }
 
 json quality_json(const Model& model, const runtime::PoseQuality& quality) {

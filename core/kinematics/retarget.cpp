@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/kinematics/rest_alignment.hpp"
 #include "core/values/error.hpp"
 
 namespace ecorche::kinematics {
@@ -63,14 +64,6 @@ ClipPlace place_of(const Clip& clip, std::size_t frame, int joint) {
   return {parent.turn * local, parent.point + parent.turn * clip.joints[j].offset};
 }
 
-Eigen::Vector3d zero_point(const Clip& clip, int joint) {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  for (; joint >= 0; joint = clip.joints[static_cast<std::size_t>(joint)].parent) {
-    point += clip.joints[static_cast<std::size_t>(joint)].offset;
-  }
-  return point;
-}
-
 }  // namespace
 
 Retarget match(const Rig& rig, const Clip& clip) {
@@ -102,6 +95,7 @@ Retarget match(const Rig& rig, const Clip& clip) {
                     list_of(segments) + ")",
                 "add the clip's joint names to the skeleton as aliases");
   }
+  out.alignment = align_rest(rig, clip, out.clip_joint);
   return out;
 }
 
@@ -122,7 +116,7 @@ Pose pose_at(const Rig& rig, const Clip& clip, const Retarget& retarget, std::si
     const Eigen::Quaterniond parent_turn =
         parent < 0 ? Eigen::Quaterniond::Identity() : turn[static_cast<std::size_t>(parent)];
     const int joint = retarget.clip_joint[s];
-    turn[s] = joint < 0 ? parent_turn : place_of(clip, frame, joint).turn;
+    turn[s] = joint < 0 ? parent_turn : place_of(clip, frame, joint).turn * retarget.alignment[s];
     const Eigen::Quaterniond local = parent_turn.conjugate() * turn[s];
     const Eigen::Vector3d v = segments[s].joint.axes.transpose() * local.vec();
     pose.rotation[s] = Eigen::Quaterniond(local.w(), v.x(), v.y(), v.z()).normalized();

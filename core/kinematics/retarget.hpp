@@ -2,6 +2,7 @@
 // A motion clip played on a rig, joint by joint name.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
@@ -11,10 +12,11 @@
 namespace ecorche::kinematics {
 
 /// Which clip joint moves which segment. Names are compared without case, spaces, '_' and ':' prefixes; a
-/// segment's own name, its joint's name and its aliases count. The clip's zero pose is taken to be the
-/// scanned rest pose.
+/// segment's own name, its joint's name and its aliases count.
 struct Retarget {
-  std::vector<int> clip_joint;              ///< #segments; -1 where the clip has none: follows its parent
+  std::vector<int> clip_joint;  ///< #segments; -1 where the clip has none: follows its parent
+  std::vector<Eigen::Quaterniond>
+      alignment;                            ///< #segments, from the scan to the clip's zero pose (align_rest)
   std::vector<std::string> unused_joints;   ///< clip joints that move nothing (end sites excepted)
   std::vector<std::string> still_segments;  ///< segments that no clip joint moves
 };
