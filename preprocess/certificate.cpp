@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "core/kinematics/forward.hpp"
-#include "preprocess/mapping/closest_point.hpp"
+#include "preprocess/geometry/closest_point.hpp"
 #include "preprocess/pipeline.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
@@ -130,7 +130,7 @@ struct TissuePart {
   void add(std::int64_t vertex) {
     const Eigen::Vector3d p = tissue->V.row(vertex).transpose().cast<double>();
     const double distance =
-        mapping::distance_to_tet(p, corners_of(*model, tissue->tet[static_cast<std::size_t>(vertex)]));
+        geometry::distance_to_tet(p, corners_of(*model, tissue->tet[static_cast<std::size_t>(vertex)]));
     outside += distance > kInside ? 1 : 0;
     if (distance > kInside) max_outside_mm = std::max(max_outside_mm, distance);
   }

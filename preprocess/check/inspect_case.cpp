@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "preprocess/check/inside.hpp"
-#include "preprocess/mapping/face_tree.hpp"
+#include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::check {
 namespace {
@@ -136,21 +136,14 @@ class Inspector {
   template <class Step>
   void check_bones(Step& step) {
     const Inside inside(patient_.skin);
-    std::vector<mapping::FaceTree::Corners> corners(static_cast<std::size_t>(patient_.skin.F.rows()));
-    for (std::size_t f = 0; f < corners.size(); ++f) {
-      for (int c = 0; c < 3; ++c) {
-        corners[f][static_cast<std::size_t>(c)] =
-            patient_.skin.V.row(patient_.skin.F(static_cast<Eigen::Index>(f), c)).transpose();
-      }
-    }
-    const mapping::FaceTree skin(corners);
+    const geometry::FaceTree skin(patient_.skin);
     for (std::size_t b = 0; b < patient_.bones.size(); ++b) {
       check_bone(patient_.bones[b], inside, skin, report_.surfaces[b + 1]);
       step();
     }
   }
 
-  void check_bone(const CaseBone& bone, const Inside& inside, const mapping::FaceTree& skin,
+  void check_bone(const CaseBone& bone, const Inside& inside, const geometry::FaceTree& skin,
                   SurfaceLine& line) {
     BoneOutside out;
     std::int64_t count = 0;
@@ -160,7 +153,7 @@ class Inspector {
       if (v % 4096 == 0) context_.check_stop();
       const Vector3d p = bone.surface.V.row(v).transpose();
       if (inside(p)) continue;
-      const mapping::FaceTree::Hit hit = skin.nearest(p, hint);
+      const geometry::FaceTree::Hit hit = skin.nearest(p, hint);
       hint = hit.face;
       const double distance = std::sqrt(hit.squared);
       if (distance <= touching_mm) continue;

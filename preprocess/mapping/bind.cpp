@@ -8,14 +8,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "preprocess/geometry/closest_point.hpp"
+#include "preprocess/geometry/face_tree.hpp"
+#include "preprocess/geometry/morton.hpp"
 #include "preprocess/mapping/boundary.hpp"
-#include "preprocess/mapping/closest_point.hpp"
-#include "preprocess/mapping/face_tree.hpp"
-#include "preprocess/mapping/morton.hpp"
 #include "preprocess/mapping/tet_grid.hpp"
 
 namespace ecorche::mapping {
 namespace {
+
+using geometry::FaceTree;
 
 std::vector<FaceTree::Corners> corners_of(const PointsF& nodes, const std::vector<BoundaryFace>& faces) {
   std::vector<FaceTree::Corners> corners(faces.size());
@@ -30,7 +32,7 @@ std::vector<FaceTree::Corners> corners_of(const PointsF& nodes, const std::vecto
 std::vector<std::uint32_t> along_curve(const Points& points, const Eigen::AlignedBox3d& box) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> code(static_cast<std::size_t>(points.rows()));
   for (std::size_t i = 0; i < code.size(); ++i) {
-    code[i] = {morton(points.row(static_cast<Eigen::Index>(i)).transpose(), box),
+    code[i] = {geometry::morton(points.row(static_cast<Eigen::Index>(i)).transpose(), box),
                static_cast<std::uint32_t>(i)};
   }
   tbb::parallel_sort(code.begin(), code.end());  // no two are equal: one order
@@ -89,7 +91,7 @@ Binding Locator::bind(const Points& points, const Context& context) const {
         binding.outside_mm[p] = std::max(static_cast<float>(std::sqrt(hit.squared)), 1e-30F);
       }
       binding.tet[p] = tet;
-      const Eigen::Vector4d exact = barycentric(x, impl_->grid.corners(tet));
+      const Eigen::Vector4d exact = geometry::barycentric(x, impl_->grid.corners(tet));
       auto row = binding.barycentric.row(static_cast<Eigen::Index>(p));
       row = exact.transpose().cast<float>();
       // The run time weighs corners 1 to 3; corner 0 takes what their rounding leaves.

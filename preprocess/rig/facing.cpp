@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "preprocess/mapping/face_tree.hpp"
+#include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -40,13 +40,7 @@ double mean_edge(const SurfaceMesh& mesh) {
 Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other) {
   const auto count = static_cast<std::size_t>(bone.V.rows());
   if (count == 0 || other.F.rows() == 0) return Points(0, 3);
-  std::vector<mapping::FaceTree::Corners> corners(static_cast<std::size_t>(other.F.rows()));
-  for (std::size_t f = 0; f < corners.size(); ++f) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      corners[f][c] = other.V.row(other.F(static_cast<Eigen::Index>(f), static_cast<int>(c))).transpose();
-    }
-  }
-  const mapping::FaceTree tree(corners);
+  const geometry::FaceTree tree(other);
   const Points normal = vertex_normals(bone);
 
   std::vector<double> distance(count);
@@ -54,7 +48,7 @@ Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other) {
   std::int32_t hint = -1;
   for (std::size_t v = 0; v < count; ++v) {
     const Eigen::Vector3d p = bone.V.row(static_cast<Eigen::Index>(v)).transpose();
-    const mapping::FaceTree::Hit hit = tree.nearest(p, hint);
+    const geometry::FaceTree::Hit hit = tree.nearest(p, hint);
     hint = hit.face;
     distance[v] = std::sqrt(hit.squared);
     looks[v] = (hit.point - p).dot(normal.row(static_cast<Eigen::Index>(v))) >= kFacingCosine * distance[v];

@@ -9,7 +9,7 @@
 #include <map>
 #include <string>
 
-#include "preprocess/voxel/nearest_surface.hpp"
+#include "preprocess/geometry/face_tree.hpp"
 #include "preprocess/voxel/open_surface.hpp"
 #include "preprocess/voxel/rasterize.hpp"
 #include "preprocess/voxel/snapped_surface.hpp"
@@ -118,12 +118,11 @@ using Contested = std::map<std::size_t, std::vector<std::uint16_t>>;
 /// The claimant whose surface is nearest to the voxel's centre. Bones that share a wall lie at the same
 /// distance but for rounding: the lower index keeps the voxel unless another is nearer by more than that.
 void settle(const Contested& contested, const Case& patient, Image& labels, const Context& context) {
-  std::map<std::uint16_t, NearestSurface> surfaces;
+  std::map<std::uint16_t, geometry::FaceTree> surfaces;
   for (const auto& [voxel, claimants] : contested)
     for (const std::uint16_t label : claimants)
       if (!surfaces.contains(label))
-        surfaces.emplace(label,
-                         NearestSurface(patient.bones[static_cast<std::size_t>(label - first_bone)].surface));
+        surfaces.emplace(label, patient.bones[static_cast<std::size_t>(label - first_bone)].surface);
   const std::vector<Contested::value_type> all(contested.begin(), contested.end());
   const ImageGrid& grid = labels.grid;
   const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
@@ -137,7 +136,7 @@ void settle(const Contested& contested, const Case& patient, Image& labels, cons
                    static_cast<double>(voxel / (nx * ny)));
     double best = std::numeric_limits<double>::infinity();
     for (const std::uint16_t label : all[n].second) {
-      const double d = surfaces.at(label).squared_distance({p[0], p[1], p[2]});
+      const double d = surfaces.at(label).nearest({p[0], p[1], p[2]}).squared;
       if (d < best - tolerance) {
         best = d;
         out[voxel] = label;

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "preprocess/geometry/face_tree.hpp"
 #include "preprocess/weights/harmonic.hpp"
-#include "preprocess/weights/surface_distance.hpp"
 
 namespace ecorche::weights {
 namespace {
@@ -47,7 +47,7 @@ std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
 
   std::vector<std::int32_t> owner(static_cast<std::size_t>(mesh.V.rows()), -1);
   std::vector<std::pair<std::size_t, std::size_t>> contested;  // ranges of `all`
-  std::map<std::int32_t, SurfaceDistance> distances;
+  std::map<std::int32_t, geometry::FaceTree> surfaces;
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
     bool several = false;
     for (end = begin; end < all.size() && all[end].node == all[begin].node; ++end) {
@@ -57,7 +57,7 @@ std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
     if (!several) continue;
     contested.emplace_back(begin, end);
     for (std::size_t i = begin; i < end; ++i) {
-      distances.try_emplace(all[i].bone, patient.bones[static_cast<std::size_t>(all[i].bone)].surface);
+      surfaces.try_emplace(all[i].bone, patient.bones[static_cast<std::size_t>(all[i].bone)].surface);
     }
   }
   tbb::parallel_for(std::size_t{0}, contested.size(), [&](std::size_t c) {
@@ -65,7 +65,7 @@ std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
     const std::int32_t node = all[begin].node;
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = begin; i < end; ++i) {
-      const double d = distances.at(all[i].bone).squared(mesh.V.row(node));
+      const double d = surfaces.at(all[i].bone).nearest(mesh.V.row(node)).squared;
       if (d >= best) continue;  // ties to the lower bone, which comes first
       best = d;
       owner[static_cast<std::size_t>(node)] = segment(all[i]);

@@ -6,6 +6,7 @@
 
 #include <random>
 
+#include "tests/support/triangle_distance.hpp"
 #include "tests/unit/mapping/exhaustive.hpp"
 #include "tests/unit/mapping/lattices.hpp"
 

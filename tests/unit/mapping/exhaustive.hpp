@@ -73,24 +73,6 @@ inline std::map<std::array<std::int32_t, 3>, std::int32_t> outer_faces(const Tet
   return outer;
 }
 
-/// Distance of p from a triangle: its plane where the foot falls inside, else the nearest of its edges.
-inline double triangle_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                const Eigen::Vector3d& c) {
-  const auto edge = [&](const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
-    const double length = (v - u).squaredNorm();
-    const double at = length > 0 ? std::clamp((p - u).dot(v - u) / length, 0.0, 1.0) : 0.0;
-    return (p - (u + at * (v - u))).norm();
-  };
-  double least = std::min({edge(a, b), edge(b, c), edge(c, a)});
-  const Eigen::Vector3d normal = (b - a).cross(c - a);
-  if (normal.norm() > 0) {
-    const bool in = (b - a).cross(p - a).dot(normal) >= 0 && (c - b).cross(p - b).dot(normal) >= 0 &&
-                    (a - c).cross(p - c).dot(normal) >= 0;
-    if (in) least = std::min(least, std::abs((p - a).dot(normal)) / normal.norm());
-  }
-  return least;
-}
-
 /// The run time's way from rest to rest, in float32.
 inline Eigen::RowVector3f rebuilt(const PointsF& nodes, const Tets& tets, std::int32_t tet,
                                   const Eigen::RowVector4f& bary) {

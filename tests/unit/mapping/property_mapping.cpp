@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/model_file/model_file.hpp"
+#include "tests/support/triangle_distance.hpp"
 #include "tests/unit/mapping/exhaustive.hpp"
 
 namespace ecorche {

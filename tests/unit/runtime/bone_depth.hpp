@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/values/model.hpp"
-#include "preprocess/mapping/face_tree.hpp"
+#include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::test {
 
@@ -49,7 +49,7 @@ class BoneDepth {
 
  private:
   static constexpr std::size_t kCells = 64;
-  using Corners = mapping::FaceTree::Corners;
+  using Corners = geometry::FaceTree::Corners;
 
   static std::vector<Corners> corners_of(const Tissue& bone) {
     std::vector<Corners> out;
@@ -83,7 +83,7 @@ class BoneDepth {
     return sum != 0 && (s0 * c[0].z() + s1 * c[1].z() + s2 * c[2].z()) / sum > p.z();
   }
 
-  mapping::FaceTree tree_;
+  geometry::FaceTree tree_;
   std::vector<Corners> corners_;
   Eigen::AlignedBox3d box_;
   std::vector<std::vector<std::int32_t>> cells_;

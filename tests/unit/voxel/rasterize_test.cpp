@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <random>
 
-#include "preprocess/voxel/nearest_surface.hpp"
 #include "preprocess/voxel/open_surface.hpp"
 #include "tests/unit/voxel/shapes.hpp"
 
@@ -156,32 +155,6 @@ TEST(OpenSurface, GeneralizedWindingOfASphere) {
   EXPECT_NEAR(generalized_winding(sphere, {1, 2, 0}), 1, 1e-12);
   EXPECT_NEAR(generalized_winding(sphere, {7, 2, 0}), 0, 1e-12);
   EXPECT_NEAR(generalized_winding(shapes::inside_out(sphere), {1, 2, 0}), -1, 1e-12);
-}
-
-TEST(NearestSurface, EqualsAllTriangles) {
-  const SurfaceMesh surface =
-      shapes::together(shapes::ellipsoid({0, 0, 0}, {5, 3, 8}, 6), shapes::box({6, 0, 0}, {7, 1, 9}));
-  const NearestSurface tree(surface);
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> draw(-10, 10);
-  for (int n = 0; n < 500; ++n) {
-    const Eigen::Vector3d p(draw(random), draw(random), draw(random));
-    double truth = 1e300;
-    for (Eigen::Index f = 0; f < surface.F.rows(); ++f)
-      truth =
-          std::min(truth, squared_distance(p, surface.V.row(surface.F(f, 0)), surface.V.row(surface.F(f, 1)),
-                                           surface.V.row(surface.F(f, 2))));
-    EXPECT_EQ(tree.squared_distance(p), truth);
-  }
-}
-
-TEST(NearestSurface, DistanceToATriangleByRegions) {
-  const Eigen::Vector3d a(0, 0, 0), b(4, 0, 0), c(0, 3, 0);
-  EXPECT_DOUBLE_EQ(squared_distance({1, 1, 2}, a, b, c), 4);     // over the face
-  EXPECT_DOUBLE_EQ(squared_distance({2, -3, 0}, a, b, c), 9);    // beside an edge
-  EXPECT_DOUBLE_EQ(squared_distance({-3, -4, 0}, a, b, c), 25);  // beyond a corner
-  EXPECT_DOUBLE_EQ(squared_distance({2, 3, 0}, a, a, b), 9);     // degenerate: a segment
-  EXPECT_DOUBLE_EQ(squared_distance({0, 3, 4}, a, a, a), 25);    // a point
 }
 
 }  // namespace

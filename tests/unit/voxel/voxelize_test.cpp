@@ -8,8 +8,8 @@
 #include <random>
 #include <string>
 
-#include "preprocess/voxel/nearest_surface.hpp"
 #include "preprocess/voxel/open_surface.hpp"
+#include "tests/support/triangle_distance.hpp"
 #include "tests/unit/voxel/shapes.hpp"
 
 namespace ecorche::voxel {
@@ -85,10 +85,7 @@ void expect_label_rule(const Case& patient, double voxel) {
     double best = 1e300;
     for (const std::uint16_t claim : claims) {
       const SurfaceMesh& surface = patient.bones[static_cast<std::size_t>(claim - first_bone)].surface;
-      double d = 1e300;
-      for (Eigen::Index f = 0; f < surface.F.rows(); ++f)
-        d = std::min(d, squared_distance(p, surface.V.row(surface.F(f, 0)), surface.V.row(surface.F(f, 1)),
-                                         surface.V.row(surface.F(f, 2))));
+      const double distance = test::surface_distance(p, surface), d = distance * distance;
       if (d < best - 1e-9 * voxel * voxel) {
         best = d;
         expected = claim;

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "preprocess/weights/harmonic.hpp"
-#include "preprocess/weights/surface_distance.hpp"
 #include "tests/unit/weights/box_mesh.hpp"
 
 namespace ecorche::weights {
@@ -53,44 +50,6 @@ TEST(BoneNodes, BonesOfOneSegmentDoNotContest) {
 TEST(BoneNodes, RefusesALabelWithoutABone) {
   const TetMesh mesh = test::box_mesh({1, 1, 1}, 10, [](const Eigen::Vector3d&) { return 3; });
   EXPECT_THROW(bone_nodes(mesh, Case{}, {0, 1}), Error);
-}
-
-TEST(SurfaceDistance, EqualsTheSearchOverAllTriangles) {
-  std::mt19937 random(6);
-  std::uniform_real_distribution<double> at(-50, 50), edge(-8, 8);
-  SurfaceMesh soup;
-  const int triangles = 300;
-  soup.V.resize(3 * triangles, 3);
-  soup.F.resize(triangles, 3);
-  for (int f = 0; f < triangles; ++f) {
-    const Eigen::RowVector3d middle(at(random), at(random), at(random));
-    for (int k = 0; k < 3; ++k) {
-      soup.F(f, k) = 3 * f + k;
-      soup.V.row(3 * f + k) = middle + Eigen::RowVector3d(edge(random), edge(random), edge(random));
-    }
-    if (f % 50 == 0) soup.V.row(3 * f + 1) = soup.V.row(3 * f);  // degenerate
-  }
-  const SurfaceDistance tree(soup);
-  for (int i = 0; i < 300; ++i) {
-    const Eigen::Vector3d p(2 * at(random), 2 * at(random), at(random));
-    double best = 1e300;
-    for (int f = 0; f < triangles; ++f) {
-      // By sampling barycentrics: an upper bound, and near enough to catch a wrong region.
-      const Eigen::Vector3d a = soup.V.row(3 * f), b = soup.V.row(3 * f + 1), c = soup.V.row(3 * f + 2);
-      const double d = squared_distance_to_triangle(p, a, b, c);
-      double sampled = 1e300;
-      for (int u = 0; u <= 20; ++u) {
-        for (int v = 0; u + v <= 20; ++v) {
-          sampled = std::min(sampled, (a + (b - a) * (u / 20.0) + (c - a) * (v / 20.0) - p).squaredNorm());
-        }
-      }
-      EXPECT_LE(d, sampled * (1 + 1e-9));
-      EXPECT_GT(std::sqrt(d), std::sqrt(sampled) - 1.5);  // samples are about 1 mm apart
-      best = std::min(best, d);
-    }
-    EXPECT_DOUBLE_EQ(tree.squared(p), best);
-  }
-  EXPECT_EQ(SurfaceDistance(SurfaceMesh{}).squared({0, 0, 0}), std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

@@ -5,9 +5,12 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
-namespace ecorche::mapping {
+#include "core/values/mesh.hpp"
+
+namespace ecorche::geometry {
 
 /// A bounding volume hierarchy without pointers: triangles along a Morton curve, boxes over each four of
 /// them, boxes over each four boxes, and so on. The answer depends on the triangles only: not on the threads,
@@ -18,12 +21,16 @@ class FaceTree {
 
   struct Hit {
     std::int32_t face = -1;  ///< the lowest of those at this distance; -1 only for an empty tree
-    double squared = 0;      ///< mm^2
+    double squared = std::numeric_limits<double>::infinity();  ///< mm^2
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
   };
 
   /// Triangle i is corners[i].
   explicit FaceTree(const std::vector<Corners>& corners);
+  /// Triangle i is row i of F. Nothing of the surface is kept.
+  explicit FaceTree(const SurfaceMesh& surface) : FaceTree(corners_of(surface)) {}
+
+  static std::vector<Corners> corners_of(const SurfaceMesh& surface);
 
   /// The nearest triangle. `hint`: a face of an earlier answer near p, or -1; it saves time only.
   Hit nearest(const Eigen::Vector3d& p, std::int32_t hint = -1) const;
@@ -39,4 +46,4 @@ class FaceTree {
   std::vector<std::vector<Eigen::AlignedBox3d>> levels_;  // [0] over triangles; the last has one box
 };
 
-}  // namespace ecorche::mapping
+}  // namespace ecorche::geometry

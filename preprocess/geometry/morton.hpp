@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace ecorche::mapping {
+namespace ecorche::geometry {
 
 /// Place of a point along the Morton curve of `box`, 21 bits an axis.
 inline std::uint64_t morton(const Eigen::Vector3d& p, const Eigen::AlignedBox3d& box) {
@@ -26,4 +26,4 @@ inline std::uint64_t morton(const Eigen::Vector3d& p, const Eigen::AlignedBox3d&
   return code;
 }
 
-}  // namespace ecorche::mapping
+}  // namespace ecorche::geometry

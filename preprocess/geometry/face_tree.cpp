@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/mapping/face_tree.hpp"
+#include "preprocess/geometry/face_tree.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 
-#include "preprocess/mapping/closest_point.hpp"
-#include "preprocess/mapping/morton.hpp"
+#include "preprocess/geometry/closest_point.hpp"
+#include "preprocess/geometry/morton.hpp"
 
-namespace ecorche::mapping {
+namespace ecorche::geometry {
 namespace {
 
 // A box is skipped only when it is farther than the best by more than rounding, so that every face at the
@@ -16,6 +15,17 @@ namespace {
 constexpr double kSlack = 1 + 1e-12;
 
 }  // namespace
+
+std::vector<FaceTree::Corners> FaceTree::corners_of(const SurfaceMesh& surface) {
+  std::vector<Corners> corners(static_cast<std::size_t>(surface.F.rows()));
+  for (std::size_t f = 0; f < corners.size(); ++f) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::int32_t vertex = surface.F(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(c));
+      corners[f][c] = surface.V.row(vertex).transpose();
+    }
+  }
+  return corners;
+}
 
 FaceTree::FaceTree(const std::vector<Corners>& corners) {
   Eigen::AlignedBox3d box;
@@ -61,7 +71,6 @@ void FaceTree::try_leaf(std::size_t leaf, const Eigen::Vector3d& p, Hit& best) c
 FaceTree::Hit FaceTree::nearest(const Eigen::Vector3d& p, std::int32_t hint) const {
   Hit best;
   if (corners_.empty()) return best;
-  best.squared = std::numeric_limits<double>::infinity();
   if (hint >= 0) try_leaf(static_cast<std::size_t>(place_[static_cast<std::size_t>(hint)]) / kFan, p, best);
 
   struct Entry {
@@ -91,4 +100,4 @@ FaceTree::Hit FaceTree::nearest(const Eigen::Vector3d& p, std::int32_t hint) con
   return best;
 }
 
-}  // namespace ecorche::mapping
+}  // namespace ecorche::geometry

@@ -8,7 +8,7 @@
 #include <array>
 #include <limits>
 
-namespace ecorche::mapping {
+namespace ecorche::geometry {
 
 /// The point of triangle (a, b, c) that is closest to p, by Voronoi regions (Ericson, Real-Time Collision
 /// Detection, 5.1.5). A triangle without area answers one of its edges or corners.
@@ -56,4 +56,4 @@ inline double distance_to_tet(const Eigen::Vector3d& p, const std::array<Eigen::
   return std::sqrt(least);
 }
 
-}  // namespace ecorche::mapping
+}  // namespace ecorche::geometry

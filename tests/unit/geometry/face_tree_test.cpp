@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/mapping/face_tree.hpp"
+#include "preprocess/geometry/face_tree.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "preprocess/mapping/closest_point.hpp"
-#include "tests/unit/mapping/exhaustive.hpp"
+#include "preprocess/geometry/closest_point.hpp"
+#include "tests/support/triangle_distance.hpp"
 
-namespace ecorche::mapping {
+namespace ecorche::geometry {
 namespace {
 
 using Eigen::Vector3d;
@@ -86,8 +86,41 @@ TEST(FaceTreeTies, the_lowest_face_wins) {
 }
 
 TEST(FaceTreeTies, no_face_no_answer) {
-  EXPECT_EQ(FaceTree({}).nearest({0, 0, 0}).face, -1);
+  const FaceTree::Hit none = FaceTree(SurfaceMesh{}).nearest({0, 0, 0});
+  EXPECT_EQ(none.face, -1);
+  EXPECT_EQ(none.squared, std::numeric_limits<double>::infinity());
+}
+
+TEST_F(Soup, of_a_surface_with_shared_vertices) {
+  SurfaceMesh surface;
+  surface.V = 20 * Points::Random(60, 3);
+  surface.F.resize(90, 3);
+  for (Eigen::Index f = 0; f < surface.F.rows(); ++f) {
+    for (int c = 0; c < 3; ++c) surface.F(f, c) = static_cast<std::int32_t>(random_() % 60);
+  }
+  const FaceTree tree(surface);
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d p = Vector3d::Random() * 40;
+    EXPECT_NEAR(std::sqrt(tree.nearest(p).squared), test::surface_distance(p, surface), 1e-9);
+  }
+}
+
+// The twin itself, by many points of the triangle: an upper bound, and near enough to catch a wrong region.
+TEST_F(Soup, the_twin_is_right) {
+  for (const FaceTree::Corners& f : faces_) {
+    const Vector3d p = f[0] + Vector3d::Random() * 8;
+    double sampled = 1e300;
+    for (int u = 0; u <= 20; ++u) {
+      for (int v = 0; u + v <= 20; ++v) {
+        const Vector3d q = f[0] + (f[1] - f[0]) * (u / 20.0) + (f[2] - f[0]) * (v / 20.0);
+        sampled = std::min(sampled, (q - p).norm());
+      }
+    }
+    const double d = test::triangle_distance(p, f[0], f[1], f[2]);
+    EXPECT_LE(d, sampled * (1 + 1e-9));
+    EXPECT_GT(d, sampled - 0.6);  // samples are at most 0.6 mm from any point
+  }
 }
 
 }  // namespace
-}  // namespace ecorche::mapping
+}  // namespace ecorche::geometry
