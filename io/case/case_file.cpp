@@ -40,7 +40,8 @@ Eigen::Matrix3d parse_axes(const Value& value) {
 
 double parse_unit(const Value& value) {
   const auto unit = unit_from_name(value.text());
-  if (!unit) value.fail("'" + value.text() + "' is no unit", "use mm, cm or m");
+  if (!unit)
+    value.fail("'" + value.text() + "' is no unit", "use um, mm, cm, m, in, or a number: millimetres a unit");
   return *unit;
 }
 
@@ -144,18 +145,19 @@ class CaseReader {
   SurfaceMesh read_mesh(const Value& entry) {
     const bool is_map = entry.kind() == Kind::map;
     const Value file = is_map ? entry.at("file") : entry;
-    Frame frame = frame_;
-    bool given = frame_given_;
-    if (is_map) {
-      if (const auto axes = entry.find("frame")) {
-        frame.axes = parse_axes(*axes);
-        given = true;
-      }
-      if (const auto unit = entry.find("unit")) frame.unit_mm = parse_unit(*unit);
-    }
+    const auto axes = is_map ? entry.find("frame") : std::nullopt;
+    const auto unit = is_map ? entry.find("unit") : std::nullopt;
     TaggedSurface surface = read_tagged_surface(locate(entry, file));
-    if (const auto tagged = surface.space ? axes_from_code(*surface.space) : std::nullopt) {
-      if (!given) frame.axes = *tagged;
+    const auto tagged = surface.space ? axes_from_code(*surface.space) : std::nullopt;
+    Frame frame = frame_;
+    if (axes) frame.axes = parse_axes(*axes);
+    if (unit) frame.unit_mm = parse_unit(*unit);
+    if (surface.unit_mm) {
+      // A format that fixes its frame (glTF) means it; only the entry itself knows better.
+      if (!axes && tagged) frame.axes = *tagged;
+      if (!unit) frame.unit_mm = *surface.unit_mm;
+    } else if (tagged) {
+      if (!axes && !frame_given_) frame.axes = *tagged;
       if (frame.axes != *tagged) {
         context_.warn(file.where() + ": its header says SPACE=" + *surface.space +
                       ", which the given frame overrides");

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
+#include <charconv>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -46,12 +47,17 @@ inline std::optional<Eigen::Matrix3d> axes_from_code(std::string_view code) {
   return axes;
 }
 
-/// 1, 10 or 1000 for mm, cm and m.
+/// Millimetres of a unit: um, mm, cm, m, in, or a positive number (25.4) that says it.
 inline std::optional<double> unit_from_name(std::string_view name) {
+  if (name == "um") return 1e-3;
   if (name == "mm") return 1.0;
   if (name == "cm") return 10.0;
   if (name == "m") return 1000.0;
-  return std::nullopt;
+  if (name == "in") return 25.4;
+  double millimetres = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), millimetres);
+  if (error != std::errc() || end != name.data() + name.size()) return std::nullopt;
+  return millimetres > 1e-9 && millimetres < 1e9 ? std::optional(millimetres) : std::nullopt;
 }
 
 }  // namespace ecorche::io

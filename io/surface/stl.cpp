@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/values/error.hpp"
+#include "io/surface/mesh_builder.hpp"
 #include "io/surface/vertex_merge.hpp"
 
 namespace ecorche::io::stl {

@@ -11,9 +11,6 @@
 
 namespace ecorche::io::stl {
 
-/// Coordinates beyond this (in the file's unit) are refused: squares of them no longer fit a float.
-inline constexpr double largest_coordinate = 1e9;
-
 /// A binary or text STL, told by content: a binary one may begin with "solid", so the size decides first
 /// (84 + 50 n bytes). Corners with equal coordinates become one vertex, in order of first use (-0 counts as
 /// 0). `where` names the file in messages. Throws Error{data}.

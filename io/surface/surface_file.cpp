@@ -1,11 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/surface/surface_file.hpp"
 
+#include <algorithm>
+#include <array>
+
 #include "core/files/atomic_file.hpp"
 #include "core/values/error.hpp"
 #include "io/surface/glb.hpp"
+#include "io/surface/gltf.hpp"
+#include "io/surface/obj.hpp"
+#include "io/surface/off.hpp"
+#include "io/surface/ply.hpp"
 #include "io/surface/stl.hpp"
 #include "io/surface/vtk_files.hpp"
+#include "io/surface/vtk_legacy.hpp"
+#include "io/surface/vtp.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -18,16 +27,36 @@ std::string extension_of(const std::filesystem::path& path) {
   return extension;
 }
 
+void check_corners(const SurfaceMesh& mesh) {
+  for (Eigen::Index i = 0; i < mesh.F.size(); ++i) {
+    const std::int32_t v = mesh.F.data()[i];
+    if (v >= 0 && v < mesh.V.rows()) continue;
+    throw Error(ErrorKind::internal, "mesh",
+                "triangle " + std::to_string(i / 3) + " uses vertex " + std::to_string(v), "report this");
+  }
+}
+
 }  // namespace
 
 TaggedSurface read_tagged_surface(const std::filesystem::path& path) {
-  const std::string extension = extension_of(path);
-  if (extension != ".stl") {
-    throw Error(ErrorKind::data, path.string(), "'" + extension + "' surfaces cannot be read",
-                "convert it to .stl");
+  const std::string extension = extension_of(path), where = path.string();
+  constexpr std::array<std::string_view, 8> known{".stl", ".obj", ".ply",  ".off",
+                                                  ".vtp", ".vtk", ".gltf", ".glb"};
+  if (std::find(known.begin(), known.end(), extension) == known.end()) {
+    throw Error(ErrorKind::data, where, "'" + extension + "' surfaces cannot be read",
+                "convert it to .stl, .obj, .ply, .off, .vtp, .vtk, .gltf or .glb");
   }
   const std::string bytes = files::read_text(path, kLargestFile);
-  return {stl::decode(bytes, path.string()), stl::space_tag(bytes)};
+  if (extension == ".stl") return {stl::decode(bytes, where), stl::space_tag(bytes), {}};
+  if (extension == ".obj") return {obj::decode(bytes, where), obj::space_tag(bytes), {}};
+  if (extension == ".ply") return {ply::decode(bytes, where), ply::space_tag(bytes), {}};
+  if (extension == ".off") return {off::decode(bytes, where), off::space_tag(bytes), {}};
+  if (extension == ".vtk") return {vtk_legacy::decode(bytes, where), vtk_legacy::space_tag(bytes), {}};
+  if (extension == ".vtp") {
+    vtp::Decoded decoded = vtp::decode(bytes, where);
+    return {std::move(decoded.mesh), std::move(decoded.space), {}};
+  }
+  return {gltf::decode(bytes, path), "LSA", 1000};
 }
 
 SurfaceMesh read_surface(const std::filesystem::path& path) {
@@ -37,13 +66,17 @@ SurfaceMesh read_surface(const std::filesystem::path& path) {
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh) {
   const std::string extension = extension_of(path);
   if (extension == ".stl") return files::write_text(path, stl::encode(mesh));
+  if (extension == ".obj" || extension == ".off") {
+    check_corners(mesh);
+    return files::write_text(path, extension == ".obj" ? obj::encode(mesh) : off::encode(mesh));
+  }
   const auto write = extension == ".ply"   ? vtk_files::write_ply
                      : extension == ".vtp" ? vtk_files::write_vtp
                      : extension == ".glb" ? write_glb
                                            : nullptr;
   if (write == nullptr) {
     throw Error(ErrorKind::usage, path.string(), "cannot write '" + extension + "' surfaces",
-                "use .stl, .ply, .vtp or .glb");
+                "use .stl, .obj, .ply, .off, .vtp or .glb");
   }
   files::AtomicFile file(path);
   write(file.temporary(), mesh);

@@ -12,22 +12,28 @@
 
 namespace ecorche::io {
 
-/// Reads `.stl` (binary or text, told by content). Bit-identical vertices are merged, in order of first use;
-/// triangles with two equal corners are kept. Nothing is moved or scaled. Throws Error{missing_input} or
-/// Error{data}: not the format its name says, shorter than its counts, no triangle, a coordinate that is not
-/// finite.
+/// Reads `.stl`, `.obj`, `.ply`, `.off`, `.vtp`, `.vtk` (legacy PolyData), `.gltf` and `.glb`: all triangles
+/// of a file as one surface, polygons and strips cut into triangles. The extension says the format, and
+/// content that contradicts it is refused. Bit-identical vertices are merged and unused ones left out, the
+/// order kept (of first use in STL, of the file elsewhere); triangles with two equal corners are kept.
+/// Nothing is moved or scaled. Throws Error{missing_input} or Error{data}: not the format its name says,
+/// shorter than its counts, no triangle, a coordinate that is not finite.
 SurfaceMesh read_surface(const std::filesystem::path& path);
 
-/// A surface, and the frame that its own header names (`SPACE=RAS`), if any.
+/// A surface, and what its file says of its own frame.
 struct TaggedSurface {
   SurfaceMesh mesh;
-  std::optional<std::string> space;
+  std::optional<std::string> space;  ///< `SPACE=RAS` in a header, comment or title; or the format's own axes
+  /// The millimetres of a unit where the format fixes unit and axes (glTF: 1000, with LSA as `space`).
+  std::optional<double> unit_mm;
 };
 TaggedSurface read_tagged_surface(const std::filesystem::path& path);
 
-/// Writes `.stl` (binary), `.ply` (binary), `.vtp`, `.glb`; atomically. `.stl` and `.ply` carry `SPACE=LPS`
-/// in their header; `.glb` is in metres, turned to glTF's frame (x left, y superior, z anterior). Throws
-/// Error{usage} for another extension, Error{cannot_create}, Error{io}.
+/// Writes `.stl` (binary), `.obj`, `.ply` (binary), `.off`, `.vtp`, `.glb`; atomically, coordinates as
+/// float32. `.stl`,
+/// `.obj`, `.ply` and `.off` carry `SPACE=LPS` in their header; `.glb` is in metres, turned to glTF's frame
+/// (x left, y superior, z anterior). Throws Error{usage} for another extension, Error{cannot_create},
+/// Error{io}.
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh);
 
 /// One array over the points or tets of a `.vtu`.

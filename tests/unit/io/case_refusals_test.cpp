@@ -60,7 +60,8 @@ TEST_F(CaseRefusals, KeysAndTypes) {
   refused("name: small\n", "", "1: lacks the key 'name' (add it)");
   refused("name: small", "name:", "1:name: must be a plain value, is nothing");
   refused("unit: mm", "unit: [mm]", "3:unit: must be a plain value, is a list");
-  refused("unit: mm", "unit: inch", "3:unit: 'inch' is no unit (use mm, cm or m)");
+  refused("unit: mm", "unit: inch",
+          "3:unit: 'inch' is no unit (use um, mm, cm, m, in, or a number: millimetres a unit)");
   refused("frame: LPS", "frame: LPL",
           "2:frame: 'LPL' is no frame (use LPS, RAS, or three letters such as LSA");
   refused("frame: LPS", "frame: LPS\nframe: RAS", "3: the key 'frame' stands twice (keep one of them)");

@@ -106,6 +106,34 @@ TEST_F(FramesOfACase, TheNearestWordWins) {
                [&] { read("", "skin.stl", {.data = {}, .frame = "XYZ"}); });
 }
 
+TEST_F(FramesOfACase, GltfIsMetresLeftUpForwardUnlessItsEntrySaysOtherwise) {
+  const SurfaceMesh skin = small_case().skin;
+  write_surface(scratch_ / "skin.glb", skin);
+  const auto off = [&](const std::string& frame, const std::string& entry) {
+    return (read(frame, entry).skin.V - skin.V).cwiseAbs().maxCoeff();
+  };
+  EXPECT_LT(off("", "skin.glb"), 1e-3);
+  EXPECT_LT(off("frame: RAS\nunit: cm\n", "skin.glb"), 1e-3);
+  EXPECT_LT(off("", "{file: skin.glb, frame: LSA, unit: 1000}"), 1e-3);
+  const SurfaceMesh millimetres = read("", "{file: skin.glb, unit: mm}").skin;
+  EXPECT_LT((1000 * millimetres.V - skin.V).cwiseAbs().maxCoeff(), 1e-3);
+  const SurfaceMesh right = read("", "{file: skin.glb, frame: RSA}").skin;
+  EXPECT_LT((right.V.col(0) + skin.V.col(0)).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_EQ(right.F.col(1), skin.F.col(2));  // left-handed
+}
+
+TEST_F(FramesOfACase, UnitsAreNamedOrNumbers) {
+  tag("         ");
+  for (const auto& [unit, millimetres] :
+       {std::pair("um", 1e-3), {"mm", 1.0}, {"cm", 10.0}, {"m", 1e3}, {"in", 25.4}, {"2.5", 2.5}}) {
+    EXPECT_EQ(Vector3d(read("unit: " + std::string(unit) + "\n", "skin.stl").skin.V.row(0).transpose()),
+              millimetres * corner_);
+  }
+  for (const char* unit : {"0", "-1", "nan", "1e99", "25.4mm"})
+    expect_error(ErrorKind::config, "is no unit",
+                 [&] { read("unit: " + std::string(unit) + "\n", "skin.stl"); });
+}
+
 TEST_F(FramesOfACase, CentresAndAxesOfTheSkeletonToo) {
   scratch_.put("skeleton.yaml",
                "ecorche_skeleton: 1\nname: a\nsegments:\n  pelvis:\n    joint: {name: root, center: [1, 2, "

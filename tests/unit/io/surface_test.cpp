@@ -155,15 +155,15 @@ TEST(Stl, EveryMistakeIsNamed) {
 
 TEST(Surface, OtherFilesAreRefused) {
   const Scratch scratch;
-  expect_error(ErrorKind::data, "a.obj: '.obj' surfaces cannot be read (convert it to .stl)",
-               [&] { read_surface(scratch.put("a.obj", "v 0 0 0")); });
+  expect_error(ErrorKind::data, "a.fbx: '.fbx' surfaces cannot be read (convert it to .stl, .obj,",
+               [&] { read_surface(scratch.put("a.fbx", "v 0 0 0")); });
   expect_error(ErrorKind::missing_input, "none.stl", [&] { read_surface(scratch / "none.stl"); });
   expect_error(ErrorKind::missing_input, "is a folder", [&] {
     std::filesystem::create_directory(scratch / "folder.stl");
     read_surface(scratch / "folder.stl");
   });
-  expect_error(ErrorKind::usage, "cannot write '.obj' surfaces (use .stl, .ply, .vtp or .glb)",
-               [&] { write_surface(scratch / "a.obj", block()); });
+  expect_error(ErrorKind::usage, "cannot write '.fbx' surfaces (use .stl, .obj, .ply, .off, .vtp or .glb)",
+               [&] { write_surface(scratch / "a.fbx", block()); });
   expect_error(ErrorKind::cannot_create, "a.ply",
                [&] { write_surface(scratch / "none" / "a.ply", block()); });
   expect_error(ErrorKind::usage, "cannot write tets as '.vtk' (use .vtu)",
@@ -174,7 +174,7 @@ TEST(Surface, NothingIsLeftWhereWritingFails) {
   const Scratch scratch;
   SurfaceMesh wrong = block();
   wrong.F(3, 1) = 8;
-  for (const char* name : {"a.stl", "a.ply", "a.vtp", "a.glb"}) {
+  for (const char* name : {"a.stl", "a.obj", "a.ply", "a.off", "a.vtp", "a.glb"}) {
     expect_error(ErrorKind::internal, "uses vertex 8", [&] { write_surface(scratch / name, wrong); });
   }
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));

@@ -6,6 +6,7 @@
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkNew.h>
+#include <vtkOBJReader.h>
 #include <vtkPLYReader.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
@@ -73,6 +74,7 @@ M rows(const tinygltf::Model& gltf, int accessor_number, Eigen::Index columns) {
 SurfaceMesh vtk_surface(const std::filesystem::path& path) {
   if (path.extension() == ".stl") return read<vtkSTLReader>(path);
   if (path.extension() == ".ply") return read<vtkPLYReader>(path);
+  if (path.extension() == ".obj") return read<vtkOBJReader>(path);
   return read<vtkXMLPolyDataReader>(path);
 }
 

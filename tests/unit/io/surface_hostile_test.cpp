@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bytes that nobody should have written, for every decoder of surfaces: a mesh whose triangles lie in it or
+// Error{data}, and never more memory than the bytes can justify.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <functional>
+#include <new>
+#include <random>
+
+#include "io/surface/gltf.hpp"
+#include "io/surface/obj.hpp"
+#include "io/surface/off.hpp"
+#include "io/surface/ply.hpp"
+#include "io/surface/stl.hpp"
+#include "io/surface/surface_file.hpp"
+#include "io/surface/vtk_legacy.hpp"
+#include "io/surface/vtp.hpp"
+#include "tests/unit/io/foreign_surfaces.hpp"
+#include "tests/unit/io/scratch.hpp"
+#include "tests/unit/io/small_case.hpp"
+
+namespace {
+std::size_t largest_allocation = 0;
+}
+
+// Every allocation of this program passes here: the largest one tells whether a count was believed.
+void* operator new(std::size_t size) {
+  largest_allocation = std::max(largest_allocation, size);
+  void* out = std::malloc(size == 0 ? 1 : size);
+  if (out == nullptr) throw std::bad_alloc();
+  return out;
+}
+void operator delete(void* at) noexcept {
+  std::free(at);
+}
+void operator delete(void* at, std::size_t) noexcept {
+  std::free(at);
+}
+
+namespace ecorche::io {
+namespace {
+
+struct Sample {
+  std::string name, bytes;
+  bool cut_is_wrong = true;  // a text may be cut between two lines and still be whole
+};
+
+SurfaceMesh decode(const std::string& name, std::string_view bytes) {
+  const std::string extension = std::filesystem::path(name).extension().string();
+  if (extension == ".ply") return ply::decode(bytes, name);
+  if (extension == ".obj") return obj::decode(bytes, name);
+  if (extension == ".off") return off::decode(bytes, name);
+  if (extension == ".vtk") return vtk_legacy::decode(bytes, name);
+  if (extension == ".vtp") return vtp::decode(bytes, name).mesh;
+  return gltf::decode(bytes, name);
+}
+
+std::string base64(const std::string& bytes) {
+  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[word >> (18 - 6 * k) & 63];
+  }
+  return out;
+}
+
+std::vector<Sample> samples() {
+  const Scratch scratch;
+  const SurfaceMesh mesh = box({-1.5, 2, 3.25}, {4, 5.125, 60});
+  std::vector<Sample> out;
+  const auto add = [&](const std::string& name, bool cut_is_wrong) {
+    out.push_back({name, scratch.get(name), cut_is_wrong});
+  };
+  const auto by_vtk = [&](const std::string& name, const std::string& form, bool cut_is_wrong = true) {
+    foreign::vtk_write(scratch / name, mesh, form);
+    add(name, cut_is_wrong);
+  };
+  by_vtk("text.ply", "text", false);
+  by_vtk("little.ply", "little");
+  by_vtk("big.ply", "big");
+  by_vtk("text.vtk", "text", false);
+  by_vtk("binary.vtk", "binary", false);
+  by_vtk("old.vtk", "binary4", false);
+  by_vtk("strips.vtk", "strips binary", false);
+  by_vtk("text.vtp", "text");
+  by_vtk("raw.vtp", "raw", false);
+  by_vtk("base64.vtp", "base64", false);
+  by_vtk("zlib.vtp", "zlib", false);
+  by_vtk("inline.vtp", "zlib64");
+  for (const char* name : {"a.obj", "a.off"}) {
+    write_surface(scratch / name, mesh);
+    add(name, false);
+  }
+  write_surface(scratch / "a.glb", mesh);
+  add("a.glb", true);
+  foreign::assimp_write(scratch / "a.gltf", mesh, "gltf2");
+  std::string text = scratch.get("a.gltf");
+  // Its buffer into the file.
+  for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) {
+    const std::string file = entry.path().filename().string();
+    const std::size_t at = text.find("\"" + file + "\"");
+    if (at != text.npos)
+      text.replace(at + 1, file.size(), "data:application/octet-stream;base64," + base64(scratch.get(file)));
+  }
+  out.push_back({"a.gltf", text, true});
+  return out;
+}
+
+// True where a mesh came out.
+bool survives(const Sample& sample, std::string_view bytes) {
+  largest_allocation = 0;
+  bool read = false;
+  try {
+    const SurfaceMesh mesh = decode(sample.name, bytes);
+    read = true;
+    EXPECT_GE(mesh.F.minCoeff(), 0);
+    EXPECT_LT(mesh.F.maxCoeff(), mesh.V.rows());
+    EXPECT_TRUE(mesh.V.allFinite());
+  } catch (const Error& error) {
+    EXPECT_EQ(static_cast<int>(error.kind()), static_cast<int>(ErrorKind::data)) << error.what();
+  }
+  EXPECT_LT(largest_allocation, std::size_t{24} << 20) << sample.name;
+  return read;
+}
+
+TEST(HostileSurfaces, EveryPrefixIsRefusedOrWhole) {
+  for (const Sample& sample : samples()) {
+    SCOPED_TRACE(sample.name);
+    for (std::size_t n = 0; n + 1 < sample.bytes.size(); ++n) {
+      const bool read = survives(sample, std::string_view(sample.bytes).substr(0, n));
+      // A file may end in newlines or closing tags that say nothing.
+      if (sample.cut_is_wrong && n + 24 < sample.bytes.size()) {
+        ASSERT_FALSE(read) << n;
+      }
+    }
+    EXPECT_NO_THROW(decode(sample.name, sample.bytes));
+  }
+}
+
+TEST(HostileSurfaces, FlippedBytesNeverHarm) {
+  std::mt19937 random(23);
+  for (const Sample& sample : samples()) {
+    SCOPED_TRACE(sample.name);
+    int read = 0;
+    for (int round = 0; round < 1500; ++round) {
+      std::string bytes = sample.bytes;
+      for (int flips = 0; flips < 1 + round % 4; ++flips)
+        bytes[random() % bytes.size()] = static_cast<char>(random());
+      read += survives(sample, bytes) ? 1 : 0;
+    }
+    EXPECT_GT(read, 5);  // those that hit a coordinate: the decoder is met
+  }
+}
+
+// Digits are where counts and indices stand in text.
+TEST(HostileSurfaces, LyingNumbersNeverHarm) {
+  std::mt19937 random(29);
+  constexpr std::array<std::string_view, 8> lies{
+      "-1", "4294967296", "9223372036854775807", "99999999999999999999", "1e308", "nan", "2147483647", "0"};
+  for (const Sample& sample : samples()) {
+    SCOPED_TRACE(sample.name);
+    for (int round = 0; round < 1500; ++round) {
+      std::string bytes = sample.bytes;
+      const std::size_t start = random() % std::min<std::size_t>(bytes.size(), 4000);
+      const std::size_t at = bytes.find_first_of("0123456789", start);
+      if (at == bytes.npos) continue;
+      const std::size_t end = std::min(bytes.find_first_not_of("0123456789", at), bytes.size());
+      bytes.replace(at, end - at, lies[random() % lies.size()]);
+      survives(sample, bytes);
+    }
+  }
+}
+
+TEST(HostileSurfaces, EveryMistakeIsNamed) {
+  const auto refused = [](const std::string& name, const std::string& bytes, const std::string& part) {
+    expect_error(ErrorKind::data, part, [&] { decode(name, bytes); });
+  };
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::string face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  refused("a.ply", "PLY\n", "is no PLY: its first line is not 'ply'");
+  refused("a.ply", "ply\nformat ascii 2.0\n", "a.ply:2: its version is '2.0', not 1.0");
+  refused("a.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", "a.ply:3: '-3' is no number of elements");
+  refused("a.ply", "ply\nformat ascii 1.0\nproperty float x\n",
+          "a.ply:3: a property stands before the first element");
+  refused("a.ply", head + "property half w\n", "a.ply:7: no type is named 'half'");
+  refused("a.ply", head + "dance\n", "a.ply:7: 'dance' is no keyword of a PLY header");
+  refused("a.ply", head + face + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "triangle 0 uses point 3 of 3");
+  refused("a.ply", head + face + "0 0 0\n1 0 nan\n0 1 0\n3 0 1 2\n", "point 1 has the coordinate nan");
+  refused("a.ply", head + face + "0 0 0\n1 0 1e10\n0 1 0\n3 0 1 2\n", "point 1 has the coordinate 1e+10");
+  refused("a.ply", head + face + "0 0 0\n1 0 0\n0 1 0\n200 0 1 2\n",
+          "a list of 200 values is longer than the file");
+  refused("a.ply", head + face + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n7\n", "has 1 bytes more than it declares");
+  refused("a.ply", "ply\nformat ascii 1.0\nelement vertex 999999999\nproperty float x\nend_header\n0\n",
+          "says 999999999 of element 'vertex', which take 2 bytes each, but has 2 bytes left");
+  refused("a.ply", head + "end_header\n0 0 0\n1 0 0\n0 1 0\n", "has no triangle");
+  refused("a.obj", "v 0 0\n", "a.obj:1: expected a number, found ''");
+  refused("a.obj", "v 0 0 0\nf 1 2 x\n", "a.obj:2: expected a whole number, found 'x'");
+  refused("a.obj", "v 0 0 0\nf 1 -2 1\n", "a.obj:2: corner -2 is none of 1 vertices");
+  refused("a.obj", "v 0 0 0\nf 1 2 3\n", "triangle 0 uses point 1 of 1");
+  refused("a.obj", "v 0 0 0\nf 1 1\n", "a.obj:2: a face has fewer than three corners");
+  refused("a.obj", "v 0 0 0\ncstype bspline\n",
+          "'cstype' is no keyword of a polygonal OBJ (save the surface as polygons)");
+  refused("a.obj", std::string("\x00\x01\x02", 3), "is no keyword of a polygonal OBJ");
+  refused("a.off", "solid\n", "is no OFF: it does not begin with 'OFF'");
+  refused("a.off", "4OFF\n1 1 0\n", "cannot be read (save it as a text OFF in three dimensions)");
+  refused("a.off", "OFF BINARY\n1 1 0\n", "cannot be read");
+  refused("a.off", "OFF\n3 1000000 0\n0 0 0\n1 0 0\n", "a.off:2: 1000000 is more than the file can hold");
+  refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "ends before all that it declares");
+  refused("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n",
+          "a.off:7: has more lines than it declares");
+  const std::string vtk = "# vtk DataFile Version 4.2\nx\nASCII\nDATASET POLYDATA\n";
+  refused("a.vtk", "# vtk DataFile\n", "is no legacy VTK file");
+  refused("a.vtk", "# vtk DataFile Version 4.2\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n",
+          "holds 'unstructured_grid', no surface (save its surface as POLYDATA)");
+  refused("a.vtk", vtk + "POINTS 1000 float\n0 0 0\n", "says 1000, more than the file can hold");
+  refused("a.vtk", vtk + "POINTS 3 half\n0 0 0 0 0 0 0 0 0\n", "no type is named 'half'");
+  refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n5 0 1 2\n",
+          "cell 0 has more corners than its list");
+  refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n3 0 1 7\n",
+          "triangle 0 uses point 7 of 3");
+  refused("a.vtp", "<VTKFile type=\"UnstructuredGrid\"></VTKFile>", "is no VTK PolyData");
+  refused("a.vtp", "<!DOCTYPE x [<!ENTITY a \"b\">]><x/>", "has a DOCTYPE");
+  refused("a.vtp", "<VTKFile", "is no XML: unclosed token");
+  const Scratch scratch;
+  foreign::vtk_write(scratch / "a.vtp", box({0, 0, 0}, {1, 1, 1}), "lz4");
+  refused("a.vtp", scratch.get("a.vtp"),
+          "its arrays are packed by vtkLZ4DataCompressor (save it packed by zlib, or not packed)");
+}
+
+// A polygon may have as many corners as it likes while it is convex; a hollow one is sought through.
+TEST(HostileSurfaces, EndlessPolygonsEnd) {
+  std::string star = "";
+  std::string corners = "f";
+  for (int i = 0; i < 2000; ++i) {
+    const double angle = 2 * M_PI * i / 2000, radius = i % 2 == 0 ? 1 : 2;
+    star += "v " + std::to_string(radius * std::cos(angle)) + " " + std::to_string(radius * std::sin(angle)) +
+            " 0\n";
+    corners += " " + std::to_string(i + 1);
+  }
+  expect_error(ErrorKind::data, "has a polygon of 2000 corners that is not convex (cut it into triangles)",
+               [&] { obj::decode(star + corners + "\n", "a.obj"); });
+}
+
+}  // namespace
+}  // namespace ecorche::io
