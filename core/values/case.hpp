@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,16 +21,34 @@ enum class Group : std::uint8_t { skin, bone, muscle, organ, vessel, nerve, cart
 std::string_view group_name(Group group);
 Group group_from_name(std::string_view name);
 
+/// Which half of a label that covers both: split by a plane of constant x, LPS.
+enum class Side : std::uint8_t { both, left, right };
+
+/// Voxels of the case's label map whose boundary is to become a surface (preprocess/label_surfaces).
+struct LabelSource {
+  std::vector<std::int64_t> ids;        ///< empty: every label but 0, with what they enclose
+  Side side = Side::both;               ///< left: voxels whose centre has x >= plane_mm
+  double plane_mm = 0;                  ///< LPS
+  double close_mm = 0;                  ///< gaps up to twice this wide are filled first
+  std::shared_ptr<const Image> within;  ///< where given: only voxels whose value there, on the same grid, ...
+  std::vector<std::int64_t> within_ids;  ///< ... is one of these
+  std::string where;                     ///< file, line and key, for messages
+};
+
+// An entry has a surface, or a source that `label_surfaces::resolve` turns into one.
+
 struct CaseBone {
   std::string name;
   std::string segment;  ///< owner
   SurfaceMesh surface;
+  std::optional<LabelSource> source = {};
 };
 
 struct CaseTissue {
   std::string name;
   Group group = Group::other;
   SurfaceMesh surface;
+  std::optional<LabelSource> source = {};
 };
 
 struct CaseVolume {
@@ -49,6 +68,7 @@ struct Case {
   Skeleton skeleton;
   std::string skin_name = "skin";
   SurfaceMesh skin;
+  std::optional<LabelSource> skin_source;
   std::vector<CaseBone> bones;
   std::vector<CaseTissue> tissues;  ///< without skin and bones
   std::vector<CaseVolume> volumes;

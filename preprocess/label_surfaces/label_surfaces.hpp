@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Surfaces of labels: closed meshes round the voxels of a label map.
+#pragma once
+
+#include "core/values/case.hpp"
+#include "core/values/context.hpp"
+
+namespace ecorche::label_surfaces {
+
+/// The surface of the voxels that `source` names in `labels`, LPS mm; no rows where there are none.
+///
+/// Closed, manifold, triangles counter-clockwise seen from outside, whatever the mask and the image's
+/// direction (also left-handed) and also at the image's border. Every vertex lies within half a voxel, in
+/// index space, of the boundary of the voxels. Smooth: Gibson 1998's constrained elastic surface nets, with
+/// Taubin 1995's filter for the elastic one, which would shrink the body. Voxels that touch only by an edge
+/// or a corner are apart. Where two labels meet face to face both have nearly the same surface.
+SurfaceMesh extract(const CaseLabels& labels, const LabelSource& source, const Context& context);
+
+/// Gives every entry of `patient` that has a source its surface, and forgets the source. The same bytes for
+/// any number of threads. O(voxels + surface). Throws Error{config}, naming the entry, for a source without
+/// voxels; Error{interrupted}.
+void resolve(Case& patient, const Context& context);
+
+}  // namespace ecorche::label_surfaces

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Masks that no scanner makes: closed and manifold all the same.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "preprocess/label_surfaces/label_surfaces.hpp"
+#include "tests/unit/label_surfaces/bodies.hpp"
+
+namespace ecorche::label_surfaces {
+namespace {
+
+using phantom::components;
+using phantom::expect_solid;
+using phantom::volume;
+
+SurfaceMesh solid(const CaseLabels& labels, const std::string& name) {
+  const SurfaceMesh mesh = extract(labels, ids({1}), {});
+  expect_solid(mesh, name);
+  EXPECT_LE(largest_from_squares(in_index_space(mesh, labels.image.grid), squares(labels, 1)), 0.5) << name;
+  return mesh;
+}
+
+TEST(LabelMasks, OneVoxel) {
+  const SurfaceMesh mesh =
+      solid(draw(cube_grid(3), [](int i, int j, int k) { return i == 1 && j == 1 && k == 1; }), "one");
+  EXPECT_EQ(components(mesh), 1);
+  EXPECT_GT(volume(mesh), 0.1);
+}
+
+TEST(LabelMasks, TheWholeImage) {
+  const SurfaceMesh mesh = solid(draw(cube_grid(12), [](int, int, int) { return 1; }), "all");
+  EXPECT_NEAR(volume(mesh) / 1728, 1, 0.04);
+  EXPECT_GE(mesh.V.minCoeff(), -1);
+  EXPECT_LE(mesh.V.maxCoeff(), 12);
+}
+
+TEST(LabelMasks, PlatesAndRodsOneVoxelThick) {
+  const SurfaceMesh plate = solid(draw(cube_grid(16), [](int, int, int k) { return k == 7; }), "plate");
+  EXPECT_NEAR(volume(plate) / 256, 1, 0.1);
+  solid(draw(cube_grid(16), [](int i, int j, int) { return i == 7 && j == 3; }), "rod");
+  solid(draw(cube_grid(16), [](int i, int, int k) { return k == (i * 3) / 4; }), "slanting plate");
+  const SurfaceMesh shell = solid(draw(cube_grid(25),
+                                       [](int i, int j, int k) {
+                                         const double r =
+                                             (Eigen::Vector3d(i, j, k) - Eigen::Vector3d(12, 12, 12)).norm();
+                                         return r > 9 && r <= 10.5;
+                                       }),
+                                  "shell");
+  EXPECT_EQ(components(shell), 2);
+}
+
+TEST(LabelMasks, VoxelsThatTouchByAnEdgeOrACornerAreApart) {
+  const auto two = [](std::array<int, 3> other) {
+    return draw(cube_grid(4), [&](int i, int j, int k) {
+      return (i == 1 && j == 1 && k == 1) || (i == other[0] && j == other[1] && k == other[2]);
+    });
+  };
+  EXPECT_EQ(components(solid(two({2, 2, 1}), "edge")), 2);
+  EXPECT_EQ(components(solid(two({2, 2, 2}), "corner")), 2);
+  EXPECT_EQ(components(solid(two({2, 1, 1}), "face")), 1);
+}
+
+TEST(LabelMasks, TouchingBalls) {
+  const SurfaceMesh mesh = solid(draw(cube_grid(30),
+                                      [](int i, int j, int k) {
+                                        const Eigen::Vector3d p(i, j, k);
+                                        return (p - Eigen::Vector3d(9, 15, 15)).norm() <= 6 ||
+                                               (p - Eigen::Vector3d(21.5, 15, 15)).norm() <= 6;
+                                      }),
+                                 "touching balls");
+  EXPECT_LE(components(mesh), 2);
+}
+
+TEST(LabelMasks, Checkerboards) {
+  solid(draw(cube_grid(7), [](int i, int j, int k) { return (i + j + k) % 2; }), "checkers");
+  solid(draw(cube_grid(8), [](int i, int j, int k) { return (i / 2 + j / 2 + k / 2) % 2; }), "checkers of 8");
+  solid(draw(cube_grid(7), [](int i, int j, int k) { return 1 - (i + j + k) % 2; }), "the other checkers");
+}
+
+TEST(LabelMasks, Noise) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 60; ++round) {
+    const unsigned share = 1 + random() % 9;
+    solid(draw(cube_grid(6), [&](int, int, int) { return random() % 10 < share ? 1 : 0; }), "noise");
+  }
+}
+
+// All 2^8 ways round one corner, and all pairs of neighbouring cells by noise above.
+TEST(LabelMasks, EveryCell) {
+  for (unsigned bits = 1; bits < 256; ++bits) {
+    solid(draw(cube_grid(2), [&](int i, int j, int k) { return bits >> (i + 2 * j + 4 * k) & 1U; }),
+          "cell " + std::to_string(bits));
+  }
+}
+
+TEST(LabelMasks, SidesSplitAtThePlane) {
+  ImageGrid grid = cube_grid(20);
+  grid.origin = {19, 0, 0};
+  grid.direction = {-1, 0, 0, 0, -1, 0, 0, 0, 1};  // x falls with i
+  const CaseLabels labels =
+      draw(grid, [](int i, int, int) { return (i >= 2 && i < 6) || (i >= 12 && i < 18); });
+  LabelSource left = ids({1}), right = ids({1});
+  left.side = Side::left;
+  right.side = Side::right;
+  left.plane_mm = right.plane_mm = 9.5;
+  const SurfaceMesh l = extract(labels, left, {}), r = extract(labels, right, {});
+  EXPECT_NEAR(volume(l), 4 * 400, 60);
+  EXPECT_NEAR(volume(r), 6 * 400, 60);
+  EXPECT_GT(l.V.col(0).minCoeff(), 13);
+  EXPECT_LT(r.V.col(0).maxCoeff(), 8);
+}
+
+TEST(LabelMasks, WithinAnotherImage) {
+  const CaseLabels labels = ball(cube_grid(21), {10, 10, 10}, 8);
+  auto regions = std::make_shared<Image>(labels.image.grid, ScalarType::i16);
+  for (std::size_t v = 0; v < labels.image.grid.voxels(); ++v)
+    regions->scalars<std::int16_t>()[v] = static_cast<std::int16_t>(v / 441 < 10 ? -5 : 300);
+  LabelSource source = ids({1});
+  source.within = regions;
+  source.within_ids = {-5, 7};
+  const SurfaceMesh low = extract(labels, source, {});
+  expect_solid(low, "low half");
+  EXPECT_LT(low.V.col(2).maxCoeff(), 10);
+  source.within_ids = {8};
+  EXPECT_EQ(extract(labels, source, {}).F.rows(), 0);
+}
+
+TEST(LabelMasks, TheOutsideOfEverythingHasNoHollows) {
+  const CaseLabels labels = draw(cube_grid(25), [](int i, int j, int k) {
+    const double r = (Eigen::Vector3d(i, j, k) - Eigen::Vector3d(12, 12, 12)).norm();
+    return r <= 5 ? 9 : r > 7 && r <= 10 ? 3 : 0;
+  });
+  const SurfaceMesh mesh = extract(labels, ids({}), {});
+  expect_solid(mesh, "body");
+  EXPECT_EQ(components(mesh), 1);
+  EXPECT_NEAR(volume(mesh), 4.0 / 3 * 3.14159265 * 1000, 100);
+}
+
+TEST(LabelMasks, ClosingFillsGapsAndNothingElse) {
+  const CaseLabels labels = draw(cube_grid(30), [](int i, int j, int k) {
+    return j > 5 && j < 24 && k > 5 && k < 24 && ((i > 4 && i < 13) || (i > 16 && i < 25));  // a gap of 4
+  });
+  LabelSource source = ids({});
+  EXPECT_EQ(components(extract(labels, source, {})), 2);
+  source.close_mm = 1.5;
+  EXPECT_EQ(components(extract(labels, source, {})), 2);
+  source.close_mm = 3;
+  const SurfaceMesh mesh = extract(labels, source, {});
+  expect_solid(mesh, "closed");
+  EXPECT_EQ(components(mesh), 1);
+  EXPECT_NEAR(volume(mesh) / (20 * 18 * 18), 1, 0.06);  // the rims of the gap stay round
+}
+
+}  // namespace
+}  // namespace ecorche::label_surfaces

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// A case whose entries come from labels.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "preprocess/label_surfaces/label_surfaces.hpp"
+#include "tests/unit/label_surfaces/bodies.hpp"
+
+namespace ecorche::label_surfaces {
+namespace {
+
+Case labelled_case() {
+  Case patient;
+  patient.labels = draw(cube_grid(40), [](int i, int j, int k) {
+    const double r = (Eigen::Vector3d(i, j, k) - Eigen::Vector3d(20, 20, 20)).norm();
+    return r > 18 ? 0 : r > 14 ? 5 : k < 18 ? 200 : k < 22 ? 5 : 201;
+  });
+  patient.skin_source = ids({});
+  patient.bones.resize(2);
+  patient.bones[0].source = ids({200});
+  patient.bones[1].source = ids({201});
+  patient.tissues.resize(2);
+  patient.tissues[0].source = ids({5});
+  patient.tissues[1].surface.V.setOnes(3, 3);  // a tissue from a file stays what it is
+  return patient;
+}
+
+TEST(Resolve, GivesEverySourceItsSurface) {
+  Case patient = labelled_case();
+  double last = 0;
+  Context context;
+  context.progress = [&](double fraction) { last = fraction; };
+  resolve(patient, context);
+  EXPECT_EQ(last, 1);
+  phantom::expect_solid(patient.skin, "skin");
+  phantom::expect_solid(patient.bones[0].surface, "bone 0");
+  phantom::expect_solid(patient.bones[1].surface, "bone 1");
+  phantom::expect_solid(patient.tissues[0].surface, "tissue");
+  EXPECT_EQ(patient.tissues[1].surface.V.rows(), 3);
+  EXPECT_FALSE(patient.skin_source || patient.bones[0].source || patient.tissues[0].source);
+  EXPECT_NEAR(phantom::volume(patient.skin),
+              phantom::volume(patient.bones[0].surface) + phantom::volume(patient.bones[1].surface) +
+                  phantom::volume(patient.tissues[0].surface),
+              0.01 * phantom::volume(patient.skin));
+}
+
+TEST(Resolve, SameBytesOnAnyNumberOfThreads) {
+  Case one = labelled_case(), many = labelled_case();
+  {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+    resolve(one, {});
+  }
+  resolve(many, {});
+  EXPECT_EQ(one.skin.V, many.skin.V);
+  EXPECT_EQ(one.tissues[0].surface.V, many.tissues[0].surface.V);
+  EXPECT_EQ(one.tissues[0].surface.F, many.tissues[0].surface.F);
+}
+
+TEST(Resolve, ALabelMapOfAnyIntegers) {
+  Case patient = labelled_case();
+  const Image bytes = patient.labels->image;
+  Image wide(bytes.grid, ScalarType::i32);
+  for (std::size_t v = 0; v < bytes.grid.voxels(); ++v) {
+    const int id = bytes.scalars<std::uint8_t>()[v];
+    wide.scalars<std::int32_t>()[v] = id == 200 ? -70000 : id == 201 ? 2'000'000'000 : id;
+  }
+  Case other = labelled_case();
+  other.labels->image = wide;
+  other.bones[0].source->ids = {-70000};
+  other.bones[1].source->ids = {2'000'000'000};
+  resolve(patient, {});
+  resolve(other, {});
+  EXPECT_EQ(patient.skin.V, other.skin.V);
+  EXPECT_EQ(patient.bones[0].surface.V, other.bones[0].surface.V);
+  EXPECT_EQ(patient.bones[1].surface.V, other.bones[1].surface.V);
+}
+
+TEST(Resolve, RefusesASourceWithoutVoxels) {
+  Case patient = labelled_case();
+  patient.bones[1].source->side = Side::right;
+  patient.bones[1].source->plane_mm = -100;
+  patient.bones[1].source->where = "case.yaml:8:bones[1]";
+  try {
+    resolve(patient, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::config);
+    EXPECT_STREQ(error.what(),
+                 "case.yaml:8:bones[1]: its labels have no voxel there (check its ids, side and within)");
+  }
+}
+
+TEST(Resolve, RefusesAPictureForALabelMap) {
+  Case patient = labelled_case();
+  Image noise(cube_grid(41), ScalarType::i32);
+  for (std::size_t v = 0; v < noise.grid.voxels(); ++v)
+    noise.scalars<std::int32_t>()[v] = static_cast<std::int32_t>(7 * v);
+  patient.labels->image = noise;
+  EXPECT_THROW(resolve(patient, {}), Error);
+}
+
+TEST(Resolve, StopsWhenAsked) {
+  Case patient = labelled_case();
+  std::stop_source stop;
+  stop.request_stop();
+  Context context;
+  context.stop = stop.get_token();
+  EXPECT_THROW(resolve(patient, context), Error);
+}
+
+}  // namespace
+}  // namespace ecorche::label_surfaces
