@@ -39,13 +39,27 @@ nlohmann::json to_json(const SurfaceLine& line) {
                      {"open_edges", to_json(f.open)},
                      {"nonmanifold_edges", to_json(f.nonmanifold)},
                      {"flipped_edges", to_json(f.flipped)},
+                     {"flipped_triangles", to_json(f.turned)},
+                     {"duplicate_triangles", to_json(f.duplicate)},
                      {"degenerate_triangles", to_json(f.degenerate)},
                      {"components", f.components},
+                     {"specks", line.specks},
+                     {"inner", line.inner},
                      {"volume_mm3", f.volume_mm3},
                      {"low", to_json(f.low)},
                      {"high", to_json(f.high)}};
-  if (line.outside)
-    out["outside_skin"] = {{"share", line.outside->share}, {"largest_mm", line.outside->largest_mm}};
+  out["holes"] = nlohmann::json::array();
+  for (const check::Hole& hole : f.holes)
+    out["holes"].push_back(
+        {{"edges", hole.edges}, {"length_mm", hole.length_mm}, {"at", to_json(hole.middle)}});
+  // null: a build without GPL parts does not look.
+  out["self_intersections"] = line.intersections ? to_json(*line.intersections) : nlohmann::json();
+  if (line.outside) {
+    out["outside_skin"] = {{"vertices", line.outside->count},
+                           {"share", line.outside->share},
+                           {"largest_mm", line.outside->largest_mm},
+                           {"farthest", to_json(line.outside->farthest)}};
+  }
   return out;
 }
 
@@ -76,6 +90,8 @@ std::string text_report(const Report& report) {
     out += fmt::format(" ({})\n", finding.mend);
   }
   if (report.findings.empty()) out += "nothing found\n";
+  if (!report.surfaces.empty() && !report.surfaces.front().intersections)
+    out += "this build does not look for self-intersections\n";
   if (!report.possible()) out += "this case cannot be preprocessed\n";
   return out;
 }

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/check/inspect_case.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <mutex>
 
+#include "preprocess/check/frames.hpp"
 #include "preprocess/check/inside.hpp"
+#include "preprocess/check/label_ids.hpp"
+#include "preprocess/check/self_intersections.hpp"
+#include "preprocess/check/surface_parts.hpp"
 #include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::check {
@@ -18,9 +25,21 @@ using Eigen::Vector3d;
 
 // A person's skin is between a finger and a giant; anything else is in another unit.
 constexpr double kSmallestSkin = 20, kLargestSkin = 3000;
+constexpr double kLikelySkin = 100;     // what a change of unit aims at
+constexpr std::size_t kSampled = 3000;  // vertices of bones that are tried in other frames
 
 std::string plural(std::int64_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+std::int64_t count_of(const std::vector<Hole>& holes) {
+  return static_cast<std::int64_t>(holes.size());
+}
+
+// `10 times larger`: what a unit should be.
+std::string larger(double factor) {
+  return factor > 1 ? std::to_string(std::lround(factor)) + " times larger"
+                    : std::to_string(std::lround(1 / factor)) + " times smaller";
 }
 
 std::string rounded(double x) {
@@ -49,22 +68,28 @@ class Inspector {
   Inspector(const Case& patient, const Context& context) : patient_(patient), context_(context) {}
 
   Report run() {
-    const double steps =
-        2.0 * static_cast<double>(patient_.bones.size()) + static_cast<double>(patient_.tissues.size()) + 1;
-    auto step = [&, done = 0]() mutable {
-      context_.check_stop();
-      context_.report(++done / steps);
-    };
-    add(patient_.skin_name, Group::skin, patient_.skin);
-    step();
-    check_skin();
-    for (const CaseBone& bone : patient_.bones) add(bone.name, Group::bone, bone.surface), step();
-    for (const CaseTissue& tissue : patient_.tissues) add(tissue.name, tissue.group, tissue.surface), step();
+    report_.surfaces.push_back({patient_.skin_name, Group::skin, {}, 0, 0, {}, {}});
+    meshes_.push_back(&patient_.skin);
+    for (const CaseBone& bone : patient_.bones) {
+      report_.surfaces.push_back({bone.name, Group::bone, {}, 0, 0, {}, {}});
+      meshes_.push_back(&bone.surface);
+    }
+    for (const CaseTissue& tissue : patient_.tissues) {
+      report_.surfaces.push_back({tissue.name, tissue.group, {}, 0, 0, {}, {}});
+      meshes_.push_back(&tissue.surface);
+    }
+    look_at_surfaces();
+    for (std::size_t i = 0; i < meshes_.size(); ++i) {
+      tell_surface(report_.surfaces[i], parts_[i]);
+      if (i == 0) check_skin();
+    }
     if (patient_.bones.empty())
       tell(Severity::error, "bones", "there is none", {}, "a case needs at least one bone");
     if (patient_.skin.F.rows() > 0) {
       check_places();
-      check_bones(step);
+      check_sizes();
+      check_agreement();
+      tell_outside();
     }
     check_segments();
     check_volumes();
@@ -77,30 +102,114 @@ class Inspector {
     report_.findings.push_back({severity, std::move(where), std::move(what), at, std::move(mend)});
   }
 
+  // All that is measured, the surfaces side by side.
+  void look_at_surfaces() {
+    parts_.resize(meshes_.size());
+    const Inside inside(patient_.skin);
+    const geometry::FaceTree skin(patient_.skin);
+    std::size_t all = 1, done = 0;
+    for (const SurfaceMesh* mesh : meshes_) all += static_cast<std::size_t>(mesh->F.rows());
+    std::mutex mutex;
+    tbb::parallel_for(std::size_t{0}, meshes_.size(), [&](std::size_t i) {
+      context_.check_stop();
+      const SurfaceMesh& mesh = *meshes_[i];
+      SurfaceLine& line = report_.surfaces[i];
+      line.figures = measure(mesh);
+      parts_[i] = surface_parts(mesh);
+      for (std::int32_t p = 0; p < parts_[i].classes.count; ++p) {
+        line.specks += parts_[i].speck(p, speck_mm);
+        line.inner += parts_[i].parts[static_cast<std::size_t>(p)].inside >= 0;
+      }
+      line.intersections = self_intersections(mesh, context_);
+      if (i > 0 && patient_.skin.F.rows() > 0) line.outside = measure_outside(mesh, inside, skin);
+      const std::lock_guard lock(mutex);
+      context_.report(static_cast<double>(done += static_cast<std::size_t>(mesh.F.rows())) /
+                      static_cast<double>(all));
+    });
+  }
+
+  Outside measure_outside(const SurfaceMesh& mesh, const Inside& inside,
+                          const geometry::FaceTree& skin) const {
+    Outside out;
+    std::int32_t hint = -1;
+    for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
+      if (v % 4096 == 0) context_.check_stop();
+      const Vector3d p = mesh.V.row(v).transpose();
+      if (inside(p)) continue;
+      const geometry::FaceTree::Hit hit = skin.nearest(p, hint);
+      hint = hit.face;
+      const double distance = std::sqrt(hit.squared);
+      if (distance <= touching_mm) continue;
+      ++out.count;
+      if (distance > out.largest_mm) {
+        out.largest_mm = distance;
+        out.farthest = p;
+      }
+    }
+    if (mesh.V.rows() > 0) out.share = static_cast<double>(out.count) / static_cast<double>(mesh.V.rows());
+    return out;
+  }
+
   // One surface by itself. Only skin and bones are filled when a body is prepared: faults of the rest do no
   // harm.
-  void add(const std::string& name, Group group, const SurfaceMesh& mesh) {
-    const SurfaceFigures figures = measure(mesh);
-    const Severity harm = group == Group::skin || group == Group::bone ? Severity::warning : Severity::note;
+  void tell_surface(const SurfaceLine& line, const SurfaceParts& parts) {
+    const SurfaceFigures& figures = line.figures;
+    const std::string& name = line.name;
+    const Severity harm =
+        line.group == Group::skin || line.group == Group::bone ? Severity::warning : Severity::note;
     const auto tell_of = [&](const Offenders& offenders, Severity severity, const std::string& noun,
                              const std::string& mend) {
       if (offenders.count > 0) tell(severity, name, plural(offenders.count, noun), offenders.first, mend);
     };
     if (figures.triangles == 0)
-      tell(group == Group::skin ? Severity::error : harm, name, "has no triangle", {}, "export it again");
-    tell_of(figures.open, harm, "open edge", "close its holes");
+      tell(line.group == Group::skin ? Severity::error : harm, name, "has no triangle", {},
+           "export it again");
+    if (!figures.holes.empty()) {
+      const Hole& longest = figures.holes.front();
+      tell(harm, name,
+           plural(figures.open.count, "open edge") + " in " + plural(count_of(figures.holes), "hole") +
+               ", the longest of " + plural(longest.edges, "edge") + " and " + rounded(longest.length_mm) +
+               " mm",
+           longest.middle, "ecorche repair closes small ones");
+    }
     tell_of(figures.nonmanifold, harm, "non-manifold edge", "let at most two triangles share an edge");
-    tell_of(figures.flipped, harm, "inconsistently oriented edge", "orient all triangles outward");
+    tell_of(figures.turned, harm, "flipped triangle", "orient all triangles outward");
+    if (figures.flipped.count > 0 && figures.turned.count == 0)
+      tell_of(figures.flipped, harm, "inconsistently oriented edge", "orient all triangles outward");
+    tell_of(figures.duplicate, Severity::note, "duplicate triangle", "keep one of each");
     tell_of(figures.degenerate, Severity::note, "degenerate triangle", "remove it");
+    if (line.intersections) {
+      const std::int64_t count = line.intersections->count;
+      if (count > 0)
+        tell(Severity::note, name, plural(count, "pair") + " of its triangles meet" + (count == 1 ? "s" : ""),
+             line.intersections->first, "voxels do not mind; mend it if a simulator will read it");
+    }
     if (figures.closed() && figures.triangles > 0 && figures.volume_mm3 < 0) {
       tell(harm, name, "is inside out: its volume is " + rounded(figures.volume_mm3 / 1000) + " ml", {},
            "flip its triangles, or mend the frame");
     }
-    if (group == Group::skin && figures.components > 1) {
-      tell(Severity::note, name, "has " + plural(figures.components, "part"), {},
-           "keep the outer surface only");
+    tell_parts(line, parts);
+  }
+
+  void tell_parts(const SurfaceLine& line, const SurfaceParts& parts) {
+    const auto first = [&](auto&& wanted) {
+      std::int32_t p = 0;
+      while (!wanted(p)) ++p;
+      return Vector3d(parts.parts[static_cast<std::size_t>(p)].box.center());
+    };
+    if (line.specks > 0) {
+      tell(Severity::note, line.name,
+           plural(line.specks, "speck") + " less than " + rounded(speck_mm) + " mm across",
+           first([&](std::int32_t p) { return parts.speck(p, speck_mm); }), "ecorche repair drops them");
     }
-    report_.surfaces.push_back({name, group, figures, std::nullopt});
+    if (line.inner > 0) {
+      tell(Severity::note, line.name, plural(line.inner, "closed part") + " inside another",
+           first([&](std::int32_t p) { return parts.parts[static_cast<std::size_t>(p)].inside >= 0; }),
+           "a cavity stays hollow; ecorche repair --drop-inner fills it");
+    }
+    const std::int64_t left = line.figures.components - line.specks - line.inner;
+    if (line.group == Group::skin && left > 1)
+      tell(Severity::note, line.name, "has " + plural(left, "part"), {}, "keep the outer surface only");
   }
 
   void check_skin() {
@@ -111,8 +220,11 @@ class Inspector {
       tell(Severity::error, patient_.skin_name, "encloses no volume", {}, "export the skin again");
     }
     if (extent < kSmallestSkin || extent > kLargestSkin) {
+      const double factor = unit_factor(extent, kLikelySkin, kLargestSkin);
       tell(Severity::warning, patient_.skin_name, "is " + rounded(extent) + " mm long", {},
-           "mend the case's unit, if that is wrong");
+           factor > 0 ? "mend the case's unit: with one " + larger(factor) + " it would be " +
+                            rounded(extent * factor) + " mm"
+                      : "mend the case's unit, if that is wrong");
     }
   }
 
@@ -133,44 +245,63 @@ class Inspector {
     }
   }
 
-  template <class Step>
-  void check_bones(Step& step) {
-    const Inside inside(patient_.skin);
-    const geometry::FaceTree skin(patient_.skin);
-    for (std::size_t b = 0; b < patient_.bones.size(); ++b) {
-      check_bone(patient_.bones[b], inside, skin, report_.surfaces[b + 1]);
-      step();
+  // A surface by itself in another unit.
+  void check_sizes() {
+    const SurfaceFigures& skin = report_.surfaces.front().figures;
+    const double whole = (skin.high - skin.low).maxCoeff();
+    for (std::size_t i = 1; i < report_.surfaces.size(); ++i) {
+      const SurfaceFigures& figures = report_.surfaces[i].figures;
+      const double extent = (figures.high - figures.low).maxCoeff();
+      if (figures.triangles == 0 || (extent <= 1.5 * whole && extent >= 1e-3 * whole)) continue;
+      const double factor = unit_factor(extent, 1e-2 * whole, whole);
+      tell(Severity::warning, report_.surfaces[i].name,
+           "is " + rounded(extent) + " mm long, the skin " + rounded(whole) + " mm", figures.low,
+           factor > 0 ? "mend its unit: with one " + larger(factor) + " it would be " +
+                            rounded(extent * factor) + " mm"
+                      : "mend its unit, if that is wrong");
     }
   }
 
-  void check_bone(const CaseBone& bone, const Inside& inside, const geometry::FaceTree& skin,
-                  SurfaceLine& line) {
-    BoneOutside out;
-    std::int64_t count = 0;
-    std::int32_t hint = -1;
-    Vector3d farthest = Vector3d::Zero();
-    for (Eigen::Index v = 0; v < bone.surface.V.rows(); ++v) {
-      if (v % 4096 == 0) context_.check_stop();
-      const Vector3d p = bone.surface.V.row(v).transpose();
-      if (inside(p)) continue;
-      const geometry::FaceTree::Hit hit = skin.nearest(p, hint);
-      hint = hit.face;
-      const double distance = std::sqrt(hit.squared);
-      if (distance <= touching_mm) continue;
-      ++count;
-      if (distance > out.largest_mm) {
-        out.largest_mm = distance;
-        farthest = p;
-      }
+  // Bones of which most lie outside, or that fill almost nothing of the body: is there a frame that agrees?
+  void check_agreement() {
+    const auto most =
+        static_cast<Eigen::Index>(kSampled / std::max<std::size_t>(1, patient_.bones.size()) + 1);
+    std::vector<Vector3d> points;
+    for (const CaseBone& bone : patient_.bones) {
+      const std::vector<Vector3d> some = sample_vertices(bone.surface, most);
+      points.insert(points.end(), some.begin(), some.end());
     }
-    if (bone.surface.V.rows() > 0)
-      out.share = static_cast<double>(count) / static_cast<double>(bone.surface.V.rows());
-    line.outside = out;
-    if (count == 0) return;
-    tell(Severity::warning, bone.name,
-         std::to_string(count) + (count == 1 ? " vertex (" : " vertices (") + rounded(100 * out.share) +
-             " %) outside the skin, by up to " + rounded(out.largest_mm) + " mm",
-         farthest, "the body will be skin and bones together; mend one of them if that is not meant");
+    const SurfaceFigures& skin = report_.surfaces.front().figures;
+    const auto found = find_agreement(points, Inside(patient_.skin), (skin.high - skin.low).maxCoeff());
+    if (!found) return;
+    std::string what = "bones and skin do not agree: ";
+    std::string mend;
+    if (!found->axes.isIdentity()) {
+      what += "turned " + found->turn();
+      mend = "give the bones frame: " + found->code() + " if it is LPS now";
+    }
+    if (found->scale != 1) {
+      what += (mend.empty() ? "" : " and ") + found->size();
+      mend += std::string(mend.empty() ? "" : ", and ") + "a unit " + larger(found->scale);
+    }
+    tell(Severity::warning, "bones", what + ", " + rounded(100 * found->share) + " % of the bones lie inside",
+         {}, mend);
+  }
+
+  void tell_outside() {
+    for (std::size_t i = 1; i < report_.surfaces.size(); ++i) {
+      const SurfaceLine& line = report_.surfaces[i];
+      if (!line.outside || line.outside->count == 0) continue;
+      const Outside& out = *line.outside;
+      const bool bone = line.group == Group::bone;
+      if (!bone && out.largest_mm <= tissue_outside_mm) continue;
+      tell(bone ? Severity::warning : Severity::note, line.name,
+           std::to_string(out.count) + (out.count == 1 ? " vertex (" : " vertices (") +
+               rounded(100 * out.share) + " %) outside the skin, by up to " + rounded(out.largest_mm) + " mm",
+           out.farthest,
+           bone ? "the body will be skin and bones together; mend one of them if that is not meant"
+                : "it will follow the nearest part of the body; mend it if that is not meant");
+    }
   }
 
   void check_segments() {
@@ -200,12 +331,39 @@ class Inspector {
              "mend the skin's frame or unit, or the image's header");
     };
     for (const CaseVolume& volume : patient_.volumes) check(volume.name, volume.image.grid);
-    if (patient_.labels) check("labels", patient_.labels->image.grid);
+    if (patient_.labels) {
+      check("labels", patient_.labels->image.grid);
+      check_labels(*patient_.labels);
+    }
+  }
+
+  void check_labels(const CaseLabels& labels) {
+    const auto used = label_ids(labels.image);
+    for (const auto& [id, name] : labels.table) {
+      if (!used.contains(id))
+        tell(Severity::warning, "labels", "no voxel has the id " + std::to_string(id) + " of '" + name + "'",
+             {}, "mend the table, or the image");
+    }
+    std::int64_t unnamed = 0;
+    std::string ids;
+    std::optional<Vector3d> first;
+    for (const auto& [id, use] : used) {
+      if (labels.table.contains(id)) continue;
+      if (unnamed++ < 10) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+      if (!first) first = use.first;
+    }
+    if (unnamed > 0)
+      tell(Severity::note, "labels",
+           plural(unnamed, "id") + " of the image " + (unnamed == 1 ? "is" : "are") +
+               " not in the table: " + ids + (unnamed > 10 ? ", ..." : ""),
+           first, "name them in the table, if they matter");
   }
 
   const Case& patient_;
   const Context& context_;
   Report report_;
+  std::vector<const SurfaceMesh*> meshes_;  // of report_.surfaces
+  std::vector<SurfaceParts> parts_;
 };
 
 }  // namespace

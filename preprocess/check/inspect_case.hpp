@@ -28,17 +28,21 @@ struct Finding {
   std::string mend;
 };
 
-/// How far a bone sticks out of the skin.
-struct BoneOutside {
-  double share = 0;       ///< of its vertices
-  double largest_mm = 0;  ///< distance of the farthest one from the skin
+/// How far a bone or a tissue sticks out of the skin.
+struct Outside {
+  std::int64_t count = 0;  ///< of its vertices
+  double share = 0;
+  double largest_mm = 0;                               ///< distance of the farthest one from the skin
+  Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  ///< LPS mm
 };
 
 struct SurfaceLine {
   std::string name;
   Group group = Group::other;
   SurfaceFigures figures;
-  std::optional<BoneOutside> outside;  ///< of bones
+  std::int64_t specks = 0, inner = 0;      ///< parts: tiny ones, and closed ones inside another
+  std::optional<Offenders> intersections;  ///< of the surface with itself; empty where nobody looked
+  std::optional<Outside> outside;          ///< of bones and tissues
 };
 
 struct Report {
@@ -47,11 +51,14 @@ struct Report {
   bool possible() const;              ///< no error among them
 };
 
-/// Vertices of bones less than this outside of the skin are taken to touch it.
+/// Vertices less than this outside of the skin are taken to touch it.
 inline constexpr double touching_mm = 0.01;
+/// Tissues that leave the skin by more than this are told, mm.
+inline constexpr double tissue_outside_mm = 10;
 
-/// Looks at every surface alone, at bones against the skin, at segments without a bone, and at bounds that
-/// cannot belong to one body. Throws Error{interrupted} only.
+/// Looks at every surface alone, at bones and tissues against the skin, at frames and units that would agree
+/// better, at segments without a bone, at the ids of the labels, and at bounds that cannot belong to one
+/// body. Throws Error{interrupted} only.
 Report inspect(const Case& patient, const Context& context);
 
 }  // namespace ecorche::check

@@ -3,39 +3,19 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <numeric>
-#include <tuple>
+#include <array>
+#include <span>
 #include <vector>
+
+#include "preprocess/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
 namespace {
 
 using Eigen::Vector3d;
+using geometry::HalfEdge;
 
 constexpr double kLeastArea = 1e-12;  // mm^2
-
-// An edge as one triangle runs along it.
-struct HalfEdge {
-  std::int32_t low, high, triangle;
-  bool upward;  // from low to high
-};
-
-std::vector<HalfEdge> sorted_edges(const SurfaceMesh& mesh) {
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * static_cast<std::size_t>(mesh.F.rows()));
-  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
-    const auto corner = [&](int c) { return mesh.F(f, c % 3); };
-    if (corner(0) == corner(1) || corner(1) == corner(2) || corner(2) == corner(0)) continue;
-    for (int c = 0; c < 3; ++c) {
-      const auto [low, high] = std::minmax({corner(c), corner(c + 1)});
-      edges.push_back({low, high, static_cast<std::int32_t>(f), corner(c) == low});
-    }
-  }
-  std::sort(edges.begin(), edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  return edges;
-}
 
 // Keeps the offender of the lowest triangle.
 class Tally {
@@ -53,47 +33,56 @@ class Tally {
   std::int32_t triangle_ = 0;
 };
 
-void count_edges(const SurfaceMesh& mesh, SurfaceFigures& figures) {
-  const std::vector<HalfEdge> edges = sorted_edges(mesh);
+void count_edges(const SurfaceMesh& mesh, std::span<const HalfEdge> edges, SurfaceFigures& figures) {
   Tally open, nonmanifold, flipped;
-  for (std::size_t begin = 0; begin < edges.size();) {
-    std::size_t end = begin + 1;
-    while (end < edges.size() && edges[end].low == edges[begin].low && edges[end].high == edges[begin].high)
-      ++end;
-    const Vector3d middle = 0.5 * (mesh.V.row(edges[begin].low) + mesh.V.row(edges[begin].high)).transpose();
-    const std::int32_t triangle = edges[begin].triangle;
-    if (end - begin == 1) open.add(triangle, middle);
-    if (end - begin > 2) nonmanifold.add(triangle, middle);
-    if (end - begin == 2 && edges[begin].upward == edges[begin + 1].upward) flipped.add(triangle, middle);
-    begin = end;
-  }
+  geometry::each_edge(edges, [&](std::span<const HalfEdge> edge) {
+    const Vector3d middle = 0.5 * (mesh.V.row(edge[0].low) + mesh.V.row(edge[0].high)).transpose();
+    const std::int32_t triangle = edge[0].triangle;
+    if (edge.size() == 1) open.add(triangle, middle);
+    if (edge.size() > 2) nonmanifold.add(triangle, middle);
+    if (edge.size() == 2 && edge[0].upward == edge[1].upward) flipped.add(triangle, middle);
+  });
   figures.open = open.take();
   figures.nonmanifold = nonmanifold.take();
   figures.flipped = flipped.take();
 }
 
-std::int64_t count_components(const SurfaceMesh& mesh) {
-  std::vector<std::int32_t> parent(static_cast<std::size_t>(mesh.V.rows()));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](std::int32_t v) {
-    while (parent[static_cast<std::size_t>(v)] != v) {
-      v = parent[static_cast<std::size_t>(v)] =
-          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(v)])];
+std::vector<Hole> find_holes(const SurfaceMesh& mesh, std::span<const HalfEdge> edges) {
+  std::vector<Hole> holes;
+  for (const geometry::BoundaryLoop& loop : geometry::boundary_loops(edges)) {
+    const std::vector<std::int32_t>& v = loop.vertices;
+    Hole hole;
+    hole.edges = static_cast<std::int64_t>(v.size()) - (loop.closed ? 0 : 1);
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      hole.middle += mesh.V.row(v[i]).transpose() / static_cast<double>(v.size());
+      if (i + 1 < v.size() || loop.closed)
+        hole.length_mm += (mesh.V.row(v[i]) - mesh.V.row(v[(i + 1) % v.size()])).norm();
     }
-    return v;
-  };
-  std::vector<bool> used(parent.size(), false);
-  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
-    for (int c = 0; c < 3; ++c) {
-      used[static_cast<std::size_t>(mesh.F(f, c))] = true;
-      const std::int32_t a = root(mesh.F(f, 0)), b = root(mesh.F(f, c));
-      parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-    }
+    holes.push_back(hole);
   }
-  std::int64_t count = 0;
-  for (std::size_t v = 0; v < parent.size(); ++v)
-    count += used[v] && parent[v] == static_cast<std::int32_t>(v);
-  return count;
+  std::stable_sort(holes.begin(), holes.end(),
+                   [](const Hole& a, const Hole& b) { return a.length_mm > b.length_mm; });
+  return holes;
+}
+
+Vector3d middle_of(const SurfaceMesh& mesh, std::int32_t f) {
+  return (mesh.V.row(mesh.F(f, 0)) + mesh.V.row(mesh.F(f, 1)) + mesh.V.row(mesh.F(f, 2))).transpose() / 3;
+}
+
+Offenders count_duplicates(const SurfaceMesh& mesh) {
+  std::vector<std::array<std::int32_t, 4>> sorted(static_cast<std::size_t>(mesh.F.rows()));
+  for (std::int32_t f = 0; f < mesh.F.rows(); ++f) {
+    auto& s = sorted[static_cast<std::size_t>(f)];
+    s = {mesh.F(f, 0), mesh.F(f, 1), mesh.F(f, 2), f};
+    std::sort(s.begin(), s.begin() + 3);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  Tally duplicate;
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    if (std::equal(sorted[i].begin(), sorted[i].begin() + 3, sorted[i - 1].begin()))
+      duplicate.add(sorted[i][3], middle_of(mesh, sorted[i][3]));
+  }
+  return duplicate.take();
 }
 
 }  // namespace
@@ -105,8 +94,19 @@ SurfaceFigures measure(const SurfaceMesh& mesh) {
   if (mesh.F.rows() == 0 || mesh.V.rows() == 0) return figures;
   figures.low = mesh.V.colwise().minCoeff().transpose();
   figures.high = mesh.V.colwise().maxCoeff().transpose();
-  count_edges(mesh, figures);
-  figures.components = count_components(mesh);
+  const std::vector<HalfEdge> edges = geometry::sorted_edges(mesh.F);
+  count_edges(mesh, edges, figures);
+  if (figures.open.count > 0) figures.holes = find_holes(mesh, edges);
+  if (figures.flipped.count > 0) {
+    const geometry::Orientation orientation = geometry::orientation(mesh.F, edges);
+    Tally turned;
+    for (std::int32_t f = 0; f < mesh.F.rows(); ++f) {
+      if (orientation.turn[static_cast<std::size_t>(f)]) turned.add(f, middle_of(mesh, f));
+    }
+    figures.turned = turned.take();
+  }
+  figures.duplicate = count_duplicates(mesh);
+  figures.components = geometry::parts(mesh).count;
   // About the middle, so that nothing is lost far from the origin.
   const Vector3d middle = 0.5 * (figures.low + figures.high);
   Tally degenerate;

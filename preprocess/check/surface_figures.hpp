@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "core/values/mesh.hpp"
 
@@ -16,11 +17,21 @@ struct Offenders {
   std::optional<Eigen::Vector3d> first;
 };
 
+/// A loop of open edges.
+struct Hole {
+  std::int64_t edges = 0;
+  double length_mm = 0;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< mean of its vertices
+};
+
 struct SurfaceFigures {
   std::int64_t vertices = 0, triangles = 0;
   Offenders open;               ///< edges of one triangle: holes
   Offenders nonmanifold;        ///< edges of three triangles or more
   Offenders flipped;            ///< edges that both their triangles run along the same way
+  std::vector<Hole> holes;      ///< loops of the open edges, the longest first
+  Offenders turned;             ///< triangles against the most of their patch
+  Offenders duplicate;          ///< triangles whose three corners an earlier one has
   Offenders degenerate;         ///< triangles with two equal corners, or an area below 1e-12 mm^2
   std::int64_t components = 0;  ///< of triangles that share vertices
   double volume_mm3 = 0;        ///< enclosed, signed: negative where triangles look inward; rough where open

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// `ecorche repair`: a case in, a mended case out, and a list of what was done.
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <filesystem>
+#include <mutex>
+
+#include "app/command.hpp"
+#include "core/values/error.hpp"
+#include "io/case/case_file.hpp"
+#include "preprocess/check/surface_figures.hpp"
+#include "preprocess/repair/repair_surface.hpp"
+
+namespace ecorche::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Settings {
+  fs::path path, output;
+  io::CaseOptions input;
+  repair::Options options;
+  bool dry_run = false;
+};
+
+struct Line {
+  std::string name;
+  repair::Done done;
+  check::SurfaceFigures after;
+};
+
+// Every word of the report: its key under --json, its column, its count.
+struct Column {
+  const char *key, *title;
+  std::int64_t repair::Done::*count;
+};
+constexpr Column kColumns[] = {
+    {"welded_vertices", "welded", &repair::Done::welded},
+    {"degenerate_dropped", "degen.", &repair::Done::degenerate},
+    {"duplicates_dropped", "dupl.", &repair::Done::duplicates},
+    {"fins_dropped", "fins", &repair::Done::fins},
+    {"triangles_turned", "turned", &repair::Done::turned},
+    {"vertices_split", "split", &repair::Done::split},
+    {"specks_dropped", "specks", &repair::Done::specks},
+    {"holes_filled", "holes", &repair::Done::holes},
+    {"filling_triangles", "filling", &repair::Done::filling},
+    {"flat_swapped", "flat", &repair::Done::flat},
+    {"inner_dropped", "inner", &repair::Done::inner},
+    {"parts_turned_outward", "outward", &repair::Done::outward},
+};
+
+// A case is never written over another, least of all over the one that is read.
+void check_output(const Settings& settings) {
+  std::error_code ignored;
+  const fs::path input =
+      fs::is_directory(settings.path, ignored) ? settings.path : settings.path.parent_path();
+  const auto same = [&](const fs::path& folder) {
+    return fs::equivalent(settings.output, folder.empty() ? fs::path(".") : folder, ignored);
+  };
+  if (same(input) || (!settings.input.data.empty() && same(settings.input.data))) {
+    throw Error(ErrorKind::usage, "--output", "'" + settings.output.string() + "' holds the input",
+                "name another folder: repair never writes over what it reads");
+  }
+  if (fs::exists(settings.output / "case.yaml", ignored)) {
+    throw Error(ErrorKind::cannot_create, settings.output.string(), "holds a case already",
+                "name another folder, or remove it");
+  }
+}
+
+std::vector<Line> mend(Case& patient, const Settings& settings, const Context& context) {
+  std::vector<SurfaceMesh*> meshes{&patient.skin};
+  std::vector<Line> lines{{patient.skin_name, {}, {}}};
+  for (CaseBone& bone : patient.bones) {
+    meshes.push_back(&bone.surface);
+    lines.push_back({bone.name, {}, {}});
+  }
+  for (CaseTissue& tissue : patient.tissues) {
+    meshes.push_back(&tissue.surface);
+    lines.push_back({tissue.name, {}, {}});
+  }
+  std::mutex mutex;
+  std::size_t finished = 0;
+  tbb::parallel_for(std::size_t{0}, meshes.size(), [&](std::size_t i) {
+    context.check_stop();
+    repair::Mended mended = repair::repair_surface(*meshes[i], settings.options, context);
+    lines[i].done = mended.done;
+    lines[i].after = check::measure(mended.mesh);
+    if (mended.done.anything()) *meshes[i] = std::move(mended.mesh);
+    const std::lock_guard lock(mutex);
+    context.report(static_cast<double>(++finished) / static_cast<double>(meshes.size()));
+  });
+  return lines;
+}
+
+std::string text_report(const std::vector<Line>& lines, const Settings& settings) {
+  std::string out = fmt::format("{:<24}", "surface");
+  for (const Column& column : kColumns) out += fmt::format(" {:>7}", column.title);
+  out += fmt::format(" {:>10} {:>10}\n", "open left", "n-m. left");
+  std::size_t untouched = 0;
+  for (const Line& line : lines) {
+    if (!line.done.anything() && line.after.closed()) {
+      ++untouched;
+      continue;
+    }
+    out += fmt::format("{:<24}", line.name);
+    for (const Column& column : kColumns) out += fmt::format(" {:>7}", line.done.*column.count);
+    out += fmt::format(" {:>10} {:>10}\n", line.after.open.count, line.after.nonmanifold.count);
+  }
+  out += fmt::format("{} of {} surfaces needed nothing\n", untouched, lines.size());
+  out +=
+      settings.dry_run ? "nothing was written (--dry-run)\n" : settings.output.string() + ": a whole case\n";
+  return out;
+}
+
+nlohmann::json json_report(const std::vector<Line>& lines) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const Line& line : lines) {
+    nlohmann::json entry{{"name", line.name}, {"changed", line.done.anything()}};
+    for (const Column& column : kColumns) entry[column.key] = line.done.*column.count;
+    entry["holes_left"] = line.done.holes_left;
+    entry["open_edges_left"] = line.after.open.count;
+    entry["nonmanifold_edges_left"] = line.after.nonmanifold.count;
+    entry["flipped_edges_left"] = line.after.flipped.count;
+    out.push_back(entry);
+  }
+  return out;
+}
+
+int run(const Program& program, const Settings& settings) {
+  if (settings.output.empty() && !settings.dry_run) {
+    throw Error(ErrorKind::usage, "--output", "is missing",
+                "name a folder for the mended case, or use --dry-run");
+  }
+  if (!settings.output.empty()) check_output(settings);
+  Case patient = io::read_case(settings.path, settings.input, program.context("read"));
+  const std::vector<Line> lines = mend(patient, settings, program.context("repair"));
+  if (!settings.dry_run) io::write_case(settings.output, patient, program.context("write"));
+  program.result(text_report(lines, settings),
+                 {{"ok", true}, {"written", !settings.dry_run}, {"surfaces", json_report(lines)}});
+  return 0;
+}
+
+}  // namespace
+
+void declare_repair(CLI::App& app, Program& program, Run& chosen) {
+  using repair::Options;
+  const auto settings = std::make_shared<Settings>();
+  CLI::App* command = app.add_subcommand("repair", "mend the surfaces of a case and write it as a new one");
+  command->add_option("CASE", settings->path, "a case.yaml, or the folder that holds one")->required();
+  command->add_option("-o,--output", settings->output, "the folder for the mended case");
+  Options& o = settings->options;
+  const auto number = [&](const char* name, double& value, const Options::Range& range, const char* help) {
+    command->add_option(name, value, help)->check(CLI::Range(range.low, range.high))->capture_default_str();
+  };
+  number("--weld", o.weld_mm, Options::weld_range,
+         "mm: vertices of open edges that lie nearer than this become one");
+  number("--holes", o.hole_mm, Options::hole_range,
+         "mm: holes no larger than a square of this edge are filled; 0: none");
+  number("--specks", o.speck_mm, Options::speck_range,
+         "mm: parts smaller than this across are dropped; 0: none");
+  command->add_flag("--drop-inner", o.drop_inner, "drop closed parts inside others: fills cavities");
+  command->add_flag("--dry-run", settings->dry_run, "say what would be done; write nothing");
+  command->add_option("--data", settings->input.data,
+                      "the folder that `root: data` paths of the case are in");
+  command->add_option("--frame", settings->input.frame,
+                      "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+  command->callback(
+      [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
+}
+
+}  // namespace ecorche::app
