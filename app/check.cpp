@@ -7,6 +7,7 @@
 #include "app/command.hpp"
 #include "io/case/case_file.hpp"
 #include "preprocess/check/inspect_case.hpp"
+#include "preprocess/label_surfaces/label_surfaces.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -97,7 +98,8 @@ std::string text_report(const Report& report) {
 }
 
 int run(const Program& program, const Settings& settings) {
-  const Case patient = io::read_case(settings.path, settings.input, program.context("read"));
+  Case patient = io::read_case(settings.path, settings.input, program.context("read"));
+  label_surfaces::resolve(patient, program.context("surfaces"));
   const Report report = check::inspect(patient, program.context("check"));
   nlohmann::json object{{"ok", report.possible()}, {"name", patient.name}};
   object["surfaces"] = nlohmann::json::array();

@@ -13,6 +13,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
+#include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
@@ -81,6 +82,7 @@ int run(const Program& program, const Settings& settings) {
   Case patient;
   timed(stages, "read",
         [&] { patient = io::read_case(settings.case_path, settings.input, program.context("read")); });
+  timed(stages, "surfaces", [&] { label_surfaces::resolve(patient, program.context("surfaces")); });
 
   // The pipeline has one context for all stages; each stage has a bar of its own.
   Context bar = program.context("preprocess");

@@ -26,7 +26,7 @@ enum class Side : std::uint8_t { both, left, right };
 
 /// Voxels of the case's label map whose boundary is to become a surface (preprocess/label_surfaces).
 struct LabelSource {
-  std::vector<std::int64_t> ids;        ///< empty: every label but 0, with what they enclose
+  std::vector<std::int64_t> ids;        ///< empty: every label but 0, with hollows, without specks
   Side side = Side::both;               ///< left: voxels whose centre has x >= plane_mm
   double plane_mm = 0;                  ///< LPS
   double close_mm = 0;                  ///< gaps up to twice this wide are filled first

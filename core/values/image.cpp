@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/values/image.hpp"
 
+#include <algorithm>
+#include <type_traits>
+#include <unordered_set>
+
 #include "core/values/error.hpp"
 
 namespace ecorche {
@@ -56,6 +60,47 @@ void Image::check_type(ScalarType asked) const {
         "scalars are " + std::string(scalar_name(type)) + ", asked as " + std::string(scalar_name(asked)),
         "report this");
   }
+}
+
+namespace {
+
+template <class T>
+std::vector<std::int64_t> distinct(std::span<const T> voxels, std::size_t most) {
+  std::vector<std::int64_t> values;
+  if constexpr (sizeof(T) <= 2) {
+    std::vector<char> seen(65536, 0);
+    for (const T v : voxels) seen[static_cast<std::uint16_t>(v)] = 1;
+    for (std::size_t bits = 0; bits < seen.size(); ++bits) {
+      if (seen[bits] != 0) values.push_back(static_cast<T>(bits));
+    }
+  } else {
+    std::unordered_set<std::int64_t> seen;
+    T last{};
+    for (const T v : voxels) {
+      if (v == last && !seen.empty()) continue;
+      last = v;
+      seen.insert(static_cast<std::int64_t>(v));
+      if (seen.size() > most) break;
+    }
+    values.assign(seen.begin(), seen.end());
+  }
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+}  // namespace
+
+std::vector<std::int64_t> distinct_values(const Image& image, std::size_t most) {
+  if (image.type == ScalarType::f32 || image.type == ScalarType::f64)
+    throw Error(ErrorKind::internal, "image", "its voxels are no whole numbers", "report this");
+  return with_scalar_type(image.type, [&](auto zero) {
+    using T = decltype(zero);
+    if constexpr (std::is_integral_v<T>) {
+      return distinct(image.scalars<T>(), most);
+    } else {
+      return std::vector<std::int64_t>();
+    }
+  });
 }
 
 }  // namespace ecorche

@@ -118,4 +118,8 @@ decltype(auto) with_scalar_type(ScalarType type, F&& f) {
   return f(double{});
 }
 
+/// The values that an image of whole numbers holds, ascending; more than `most` where it holds more, then not
+/// all of them. Throws Error{internal} for float voxels. O(voxels).
+std::vector<std::int64_t> distinct_values(const Image& image, std::size_t most);
+
 }  // namespace ecorche

@@ -9,6 +9,7 @@
 #include "core/values/error.hpp"
 #include "io/case/digest.hpp"
 #include "io/case/frame.hpp"
+#include "io/case/label_sources.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/image/image_file.hpp"
@@ -23,11 +24,14 @@ using yaml::Value;
 
 constexpr std::array<std::string_view, 9> kCaseKeys{"name",  "frame",   "unit",   "skeleton", "skin",
                                                     "bones", "tissues", "labels", "volumes"};
-constexpr std::array<std::string_view, 5> kSkinKeys{"file", "name", "frame", "unit", "root"};
-constexpr std::array<std::string_view, 6> kBoneKeys{"name", "file", "segment", "frame", "unit", "root"};
-constexpr std::array<std::string_view, 6> kTissueKeys{"name", "file", "group", "frame", "unit", "root"};
+constexpr std::array<std::string_view, 9> kSkinKeys{"file", "name",   "frame",  "unit",    "root",
+                                                    "side", "labels", "within", "close_mm"};
+constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment", "frame",  "unit",
+                                                     "root", "labels", "side",    "within", "close_mm"};
+constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
+                                                       "root", "labels", "side",  "within", "close_mm"};
 constexpr std::array<std::string_view, 4> kVolumeKeys{"name", "file", "background", "root"};
-constexpr std::array<std::string_view, 3> kLabelKeys{"file", "table", "root"};
+constexpr std::array<std::string_view, 4> kLabelKeys{"file", "table", "root", "mid_plane_mm"};
 constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
 
 Eigen::Matrix3d parse_axes(const Value& value) {
@@ -59,18 +63,32 @@ class CaseReader {
     steps_ = 2 + count("bones") + count("tissues") + count("volumes") + (root_.find("labels") ? 1 : 0);
     const std::map<std::string, Value> rules = read_skeleton_entry(root_.at("skeleton"));
     step();
-    read_skin(root_.at("skin"));
+    const auto labels = root_.find("labels");
+    if (labels) read_labels(*labels);
+    std::optional<double> mid_plane;
+    if (const auto plane = labels ? labels->find("mid_plane_mm") : std::nullopt) mid_plane = plane->number();
+    sources_.emplace(
+        out_.labels ? &*out_.labels : nullptr, mid_plane,
+        [this](const Value& entry, const Value& file) { return read_image(locate(entry, file)); });
+    if (labels && !root_.find("skin")) {
+      names_.emplace(out_.skin_name, labels->where());
+      out_.skin_source = sources_->everything(*labels);
+    } else {
+      read_skin(root_.at("skin"));
+    }
     const Value bones = root_.at("bones");
     for (const Value& entry : bones.items()) read_bone(entry);
     if (out_.bones.empty()) bones.fail("is empty", "list at least one bone");
     check_rules(rules);
     if (const auto tissues = root_.find("tissues")) {
-      for (const Value& entry : tissues->items()) read_tissue(entry);
+      for (const Value& entry : tissues->items()) {
+        if (!LabelSources::is_rest(entry)) read_tissue(entry);
+      }
+      read_rest(*tissues);
     }
     if (const auto volumes = root_.find("volumes")) {
       for (const Value& entry : volumes->items()) read_volume(entry);
     }
-    if (const auto labels = root_.find("labels")) read_labels(*labels);
     return std::move(out_);
   }
 
@@ -174,7 +192,35 @@ class CaseReader {
       if (const auto name = entry.find("name")) out_.skin_name = name->identifier();
     }
     names_.emplace(out_.skin_name, entry.where());
-    out_.skin = read_mesh(entry);
+    read_source(entry, out_.skin, out_.skin_source, true);
+  }
+
+  // A surface, or the labels that will give one.
+  void read_source(const Value& entry, SurfaceMesh& surface, std::optional<LabelSource>& source,
+                   bool may_be_all = false) {
+    if (sources_->is_one(entry)) {
+      source = sources_->read(entry, may_be_all);
+      step();
+    } else {
+      surface = read_mesh(entry);
+    }
+  }
+
+  // What is left when all other entries have taken their labels.
+  void read_rest(const Value& tissues) {
+    std::optional<std::string> first;
+    for (const Value& entry : tissues.items()) {
+      if (!LabelSources::is_rest(entry)) continue;
+      if (first) entry.fail("stands twice, first at " + *first, "keep one");
+      first = entry.where();
+      std::set<std::string> taken;
+      for (const auto& [name, where] : names_) taken.insert(name);
+      for (CaseTissue& tissue : sources_->rest(entry, std::move(taken))) {
+        names_.emplace(tissue.name, entry.where());
+        out_.tissues.push_back(std::move(tissue));
+      }
+      step();
+    }
   }
 
   void read_bone(const Value& entry) {
@@ -185,7 +231,7 @@ class CaseReader {
     bone.segment = segment.text();
     if (out_.skeleton.find_segment(bone.segment) < 0)
       segment.fail_unknown("segment", bone.segment, segments_);
-    bone.surface = read_mesh(entry);
+    read_source(entry, bone.surface, bone.source);
     out_.bones.push_back(std::move(bone));
   }
 
@@ -206,7 +252,7 @@ class CaseReader {
       }
       tissue.group = group_from_name(group->text());
     }
-    tissue.surface = read_mesh(entry);
+    read_source(entry, tissue.surface, tissue.source);
     out_.tissues.push_back(std::move(tissue));
   }
 
@@ -277,6 +323,7 @@ class CaseReader {
   Case out_;
   std::map<std::string, std::string> names_;  // of skin, bones and tissues, and where they stand
   std::vector<std::string> segments_;
+  std::optional<LabelSources> sources_;
   std::size_t steps_ = 1, done_ = 0;
 };
 

@@ -73,6 +73,30 @@ std::vector<float> squared_distance(const Mask& mask, std::uint8_t target,
   return d;
 }
 
+// Gives every voxel that `from` reaches through faces, over voxels like it, the value `to`; how many.
+std::size_t flood(Mask& mask, std::size_t start, std::uint8_t to, std::vector<std::size_t>& work) {
+  const std::uint8_t from = mask.inside[start];
+  const std::array<std::size_t, 4> step{1, mask.offset(0, 1, 0), mask.offset(0, 0, 1), mask.inside.size()};
+  std::size_t count = 1;
+  work.assign(1, start);
+  mask.inside[start] = to;
+  while (!work.empty()) {
+    const std::size_t at = work.back();
+    work.pop_back();
+    const auto visit = [&](std::size_t next) {
+      if (mask.inside[next] != from) return;
+      mask.inside[next] = to;
+      ++count;
+      work.push_back(next);
+    };
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (at % step[a + 1] >= step[a]) visit(at - step[a]);
+      if (at % step[a + 1] + step[a] < step[a + 1]) visit(at + step[a]);
+    }
+  }
+  return count;
+}
+
 }  // namespace
 
 void close_gaps(Mask& mask, const std::array<double, 3>& spacing, double radius_mm, const Context& context) {
@@ -90,26 +114,23 @@ void close_gaps(Mask& mask, const std::array<double, 3>& spacing, double radius_
 
 void fill_hollows(Mask& mask) {
   constexpr std::uint8_t reached = 2;
-  const std::array<std::size_t, 3> step{1, mask.offset(0, 1, 0), mask.offset(0, 0, 1)};
-  // The margin is outside and one piece: from its corner everything outside is reached.
-  std::vector<std::size_t> work{0};
-  mask.inside[0] = reached;
-  const auto size = mask.size;
-  while (!work.empty()) {
-    const std::size_t at = work.back();
-    work.pop_back();
-    const std::array<std::size_t, 3> index{at % step[1], at % step[2] / step[1], at / step[2]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const auto visit = [&](std::size_t to) {
-        if (mask.inside[to] != 0) return;
-        mask.inside[to] = reached;
-        work.push_back(to);
-      };
-      if (index[a] > 0) visit(at - step[a]);
-      if (index[a] + 1 < static_cast<std::size_t>(size[a])) visit(at + step[a]);
-    }
-  }
+  std::vector<std::size_t> work;
+  flood(mask, 0, reached, work);  // the margin is outside and one piece
   for (std::uint8_t& voxel : mask.inside) voxel = voxel == reached ? 0 : 1;
+}
+
+void drop_specks(Mask& mask, double share) {
+  constexpr std::uint8_t seen = 2;
+  std::vector<std::size_t> work;
+  std::vector<std::pair<std::size_t, std::size_t>> pieces;  // a voxel of each, and how many it has
+  std::size_t largest = 0;
+  for (std::size_t i = 0; i < mask.inside.size(); ++i) {
+    if (mask.inside[i] != 1) continue;
+    pieces.emplace_back(i, flood(mask, i, seen, work));
+    largest = std::max(largest, pieces.back().second);
+  }
+  for (const auto& [start, count] : pieces)
+    flood(mask, start, static_cast<double>(count) < share * static_cast<double>(largest) ? 0 : 1, work);
 }
 
 }  // namespace ecorche::label_surfaces

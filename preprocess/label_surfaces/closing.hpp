@@ -16,4 +16,8 @@ void close_gaps(Mask& mask, const std::array<double, 3>& spacing, double radius_
 /// Fills what the outside does not reach through faces of voxels. O(voxels).
 void fill_hollows(Mask& mask);
 
+/// Takes away what is connected through faces of voxels and has fewer than `share` of the voxels of the
+/// largest such piece. O(voxels).
+void drop_specks(Mask& mask, double share);
+
 }  // namespace ecorche::label_surfaces

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <unordered_map>
 
 #include "preprocess/label_surfaces/closing.hpp"
 
@@ -12,30 +10,8 @@ namespace ecorche::label_surfaces {
 namespace {
 
 constexpr std::size_t kMostIds = 65536;
-
-template <class T>
-std::vector<std::int64_t> distinct(std::span<const T> voxels) {
-  std::vector<std::int64_t> ids;
-  if constexpr (sizeof(T) <= 2) {
-    std::vector<char> seen(65536, 0);
-    for (const T v : voxels) seen[static_cast<std::uint16_t>(v)] = 1;
-    for (std::size_t bits = 0; bits < seen.size(); ++bits) {
-      if (seen[bits] != 0) ids.push_back(static_cast<T>(bits));
-    }
-  } else {
-    std::unordered_map<std::int64_t, char> seen;
-    T last{};
-    for (const T v : voxels) {
-      if (v == last && !seen.empty()) continue;
-      last = v;
-      seen.emplace(static_cast<std::int64_t>(v), 1);
-      if (seen.size() > kMostIds) break;
-    }
-    for (const auto& entry : seen) ids.push_back(entry.first);
-  }
-  std::sort(ids.begin(), ids.end());
-  return ids;
-}
+// Stray voxels off the body are no bodies: fewer than this share of the largest piece.
+constexpr double kSpeck = 1e-3;
 
 // Where every voxel's id stands in `ids`.
 template <class T>
@@ -61,14 +37,14 @@ void number(std::span<const T> voxels, const std::vector<std::int64_t>& ids,
 LabelBlocks::LabelBlocks(const CaseLabels& labels, const Context& context) : labels_(labels) {
   const Image& image = labels.image;
   index_.resize(image.grid.voxels());
+  ids_ = distinct_values(image, kMostIds);
+  if (ids_.size() > kMostIds) {
+    throw Error(ErrorKind::data, "labels", "the label map has more than 65536 ids",
+                "is it a label map, or a picture?");
+  }
+  context.check_stop();
   with_scalar_type(image.type, [&](auto zero) {
     using T = decltype(zero);
-    ids_ = distinct(image.scalars<T>());
-    if (ids_.size() > kMostIds) {
-      throw Error(ErrorKind::data, "labels", "the label map has more than 65536 ids",
-                  "is it a label map, or a picture?");
-    }
-    context.check_stop();
     number(image.scalars<T>(), ids_, index_);
   });
   context.check_stop();
@@ -173,7 +149,10 @@ Mask LabelBlocks::mask(const LabelSource& source, const Context& context) const 
   }
   if (!any) return {};
   if (source.close_mm > 0) close_gaps(mask, grid.spacing, source.close_mm, context);
-  if (source.ids.empty()) fill_hollows(mask);
+  if (source.ids.empty()) {
+    fill_hollows(mask);
+    drop_specks(mask, kSpeck);
+  }
   return mask;
 }
 

@@ -126,11 +126,12 @@ TEST(LabelMasks, WithinAnotherImage) {
   EXPECT_EQ(extract(labels, source, {}).F.rows(), 0);
 }
 
-TEST(LabelMasks, TheOutsideOfEverythingHasNoHollows) {
+TEST(LabelMasks, TheOutsideOfEverythingHasNoHollowsAndNoSpecks) {
   const CaseLabels labels = draw(cube_grid(25), [](int i, int j, int k) {
     const double r = (Eigen::Vector3d(i, j, k) - Eigen::Vector3d(12, 12, 12)).norm();
-    return r <= 5 ? 9 : r > 7 && r <= 10 ? 3 : 0;
+    return r <= 5 ? 9 : r > 7 && r <= 10 ? 3 : i == 0 && j < 2 && k == 3 ? 4 : 0;  // 4: a speck
   });
+  EXPECT_EQ(components(extract(labels, ids({3, 4, 9}), {})), 4);
   const SurfaceMesh mesh = extract(labels, ids({}), {});
   expect_solid(mesh, "body");
   EXPECT_EQ(components(mesh), 1);
