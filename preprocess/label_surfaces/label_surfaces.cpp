@@ -15,9 +15,7 @@
 namespace ecorche::label_surfaces {
 namespace {
 
-SurfaceMesh surface_of(const LabelBlocks& blocks, const ImageGrid& grid, const LabelSource& source,
-                       const Context& context) {
-  Mask mask = blocks.mask(source, context);
+SurfaceMesh surface_of(Mask mask, const ImageGrid& grid, const Context& context) {
   if (mask.inside.empty()) return {};
   SurfaceNet net = make_net(mask, context);
   mask.inside = {};
@@ -43,7 +41,7 @@ struct Job {
 }  // namespace
 
 SurfaceMesh extract(const CaseLabels& labels, const LabelSource& source, const Context& context) {
-  return surface_of(LabelBlocks(labels, context), labels.image.grid, source, context);
+  return surface_of(LabelBlocks(labels, context).mask(source, context), labels.image.grid, context);
 }
 
 void resolve(Case& patient, const Context& context) {
@@ -59,7 +57,12 @@ void resolve(Case& patient, const Context& context) {
     throw Error(ErrorKind::config, jobs.front().source->where, "the case has no labels",
                 "name them under labels");
   }
-  const LabelBlocks blocks(*patient.labels, context);
+  LabelBlocks blocks(*patient.labels, context);
+  std::optional<Mask> body;
+  if (patient.skin_source && patient.skin_source->ids.empty()) {
+    body = blocks.mask(*patient.skin_source, context);
+    blocks.keep_within(*body);
+  }
   for (Job& job : jobs) job.work = blocks.work(*job.source);
   // The largest first, so that no thread is left alone with it; each job is one thread's.
   std::stable_sort(jobs.begin(), jobs.end(), [](const Job& a, const Job& b) { return a.work > b.work; });
@@ -71,7 +74,9 @@ void resolve(Case& patient, const Context& context) {
   std::mutex mutex;
   tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), [&](int) {
     for (std::size_t j = next++; j < jobs.size(); j = next++) {
-      *jobs[j].surface = surface_of(blocks, patient.labels->image.grid, *jobs[j].source, quiet);
+      const bool whole = body && jobs[j].surface == &patient.skin;
+      Mask mask = whole ? std::move(*body) : blocks.mask(*jobs[j].source, quiet);
+      *jobs[j].surface = surface_of(std::move(mask), patient.labels->image.grid, quiet);
       const std::lock_guard lock(mutex);
       context.report(static_cast<double>(++done) / static_cast<double>(jobs.size()));
     }

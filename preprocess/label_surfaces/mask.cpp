@@ -90,6 +90,25 @@ LabelBlocks::Box LabelBlocks::box(const std::vector<std::uint8_t>& chosen) const
   return all;
 }
 
+void LabelBlocks::keep_within(const Mask& body) {
+  const auto nothing = std::lower_bound(ids_.begin(), ids_.end(), 0) - ids_.begin();
+  if (nothing == std::ssize(ids_) || ids_[static_cast<std::size_t>(nothing)] != 0)
+    return;  // no voxel is outside
+  const auto& n = labels_.image.grid.size;
+  std::size_t at = 0;
+  for (int k = 0; k < n[2]; ++k) {
+    for (int j = 0; j < n[1]; ++j) {
+      for (int i = 0; i < n[0]; ++i, ++at) {
+        const std::array<int, 3> v{i - body.low[0], j - body.low[1], k - body.low[2]};
+        bool in = true;
+        for (std::size_t a = 0; a < 3; ++a) in = in && v[a] >= 0 && v[a] < body.size[a];
+        if (!in || body.inside[body.offset(v[0], v[1], v[2])] == 0)
+          index_[at] = static_cast<std::uint16_t>(nothing);
+      }
+    }
+  }
+}
+
 std::size_t LabelBlocks::work(const LabelSource& source) const {
   const Box b = box(chosen(source));
   std::size_t voxels = 1;

@@ -34,6 +34,8 @@ class LabelBlocks {
   /// The voxels of `source`, cropped; empty (size 0) where there are none. Gaps are closed and hollows filled
   /// as the source says. O(voxels of its ids' box).
   Mask mask(const LabelSource& source, const Context& context) const;
+  /// Forgets what is labelled outside of `body`. O(voxels).
+  void keep_within(const Mask& body);
   /// The voxels that `mask` would look at: a measure of its work.
   std::size_t work(const LabelSource& source) const;
 

@@ -44,6 +44,21 @@ TEST(Resolve, GivesEverySourceItsSurface) {
               0.01 * phantom::volume(patient.skin));
 }
 
+TEST(Resolve, SpecksOffTheBodyBelongToNobody) {
+  Case patient = labelled_case();
+  auto voxels = patient.labels->image.scalars<std::uint8_t>();
+  voxels[patient.labels->image.grid.offset(0, 0, 0)] = 5;
+  EXPECT_EQ(phantom::components(extract(*patient.labels, ids({5}), {})), 4);
+  resolve(patient, {});
+  EXPECT_EQ(phantom::components(patient.tissues[0].surface), 3);  // a shell with a floor
+  EXPECT_EQ(phantom::components(patient.skin), 1);
+  Case listed = labelled_case();  // a skin of listed labels says nothing of the others
+  listed.skin_source->ids = {5, 200, 201};
+  listed.labels = patient.labels;
+  resolve(listed, {});
+  EXPECT_EQ(phantom::components(listed.tissues[0].surface), 4);
+}
+
 TEST(Resolve, SameBytesOnAnyNumberOfThreads) {
   Case one = labelled_case(), many = labelled_case();
   {
