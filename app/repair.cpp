@@ -10,6 +10,7 @@
 #include "core/values/error.hpp"
 #include "io/case/case_file.hpp"
 #include "preprocess/check/surface_figures.hpp"
+#include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/repair/repair_surface.hpp"
 
 namespace ecorche::app {
@@ -134,6 +135,7 @@ int run(const Program& program, const Settings& settings) {
   }
   if (!settings.output.empty()) check_output(settings);
   Case patient = io::read_case(settings.path, settings.input, program.context("read"));
+  label_surfaces::resolve(patient, program.context("surfaces"));
   const std::vector<Line> lines = mend(patient, settings, program.context("repair"));
   if (!settings.dry_run) io::write_case(settings.output, patient, program.context("write"));
   program.result(text_report(lines, settings),
