@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes case.yaml and skeleton.yaml of the BodyParts3D body beside itself, from the data's own tables and bones.
+"""Writes case.yaml and skeleton.yaml of bodyparts3d, right_leg and visible_human_male beside itself, from the data's own tables
+and bones.
 
-usage: make_case.py DATA     (the folder that holds bodyparts3d/; needs python3-vtk9 and python3-numpy)
+usage: make_cases.py DATA     (the folder that holds bodyparts3d/ and visible_human_male/; needs python3-vtk9, python3-numpy)
 
-Joint centres: hips and shoulders are sphere fits of `ecorche preprocess`; the others are measured here, as each rule says.
+Joint centres: where two single bones face each other, hips and shoulders are sphere fits of `ecorche preprocess`; the others
+are measured here, as each rule says.
 """
 import csv
 import pathlib
@@ -27,17 +29,35 @@ def identifier(name):
     return "_".join([word for word in words if word not in ("left", "right")] + sides[:1])[:64]
 
 
-class Bones:
-    def __init__(self, folder):
-        self.folder = folder
+def read_stl(path):
+    reader = vtkSTLReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    return vtk_to_numpy(reader.GetOutput().GetPoints().GetData()).astype(float)
+
+
+class BodyParts3D:
+    """Bones by their names in bones.csv; some in higher resolution."""
+
+    def __init__(self, folder, better=None):
+        self.folder, self.better = folder, better or {}
         self.rows = list(csv.DictReader((folder / "bones.csv").open()))
         self.by_name = {row["name"].lower(): row for row in self.rows}
 
     def vertices(self, name):
-        reader = vtkSTLReader()
-        reader.SetFileName(str(self.folder / self.by_name[name.lower()]["file"]))
-        reader.Update()
-        return vtk_to_numpy(reader.GetOutput().GetPoints().GetData()).astype(float)
+        name = name.lower()
+        return read_stl(self.folder / self.better.get(name, self.by_name[name]["file"]))
+
+
+class VisibleHuman:
+    """x to the left, y up, z to the front: turned into LPS."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def vertices(self, name):
+        v = read_stl(self.folder / f"bones/{identifier(name)}.stl")
+        return np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
 
 
 def sphere(points):
@@ -72,8 +92,8 @@ def text(v):
 
 
 class Skeleton:
-    def __init__(self):
-        self.lines = ["ecorche_skeleton: 1", "name: bodyparts3d", "segments:"]
+    def __init__(self, name):
+        self.lines = ["ecorche_skeleton: 1", f"name: {name}", "segments:"]
 
     def add(self, segment, parent, joint, kind, center, sequence, limits, source, axes=None, rest=None, aliases=()):
         self.lines.append(f"  {segment}:")
@@ -85,7 +105,7 @@ class Skeleton:
             self.lines.append(f"      axes: {{x: {text(axes[:, 0])}, z: {text(axes[:, 2])}}}")
         self.lines.append("      sequence: [" + ", ".join(f"{{{name}: {axis}}}" for name, axis in sequence) + "]")
         if rest:
-            self.lines.append("      rest_deg: {" + ", ".join(f"{k}: {v:.1f}" for k, v in rest.items()) + "}")
+            self.lines.append("      rest_deg: {" + ", ".join(f"{k}: {round(v, 1) + 0.0:g}" for k, v in rest.items()) + "}")
         if limits:
             bounds = ", ".join(f"{k}: [{a}, {b}]" for k, (a, b) in limits.items())
             self.lines.append(f'      limits_deg: {{{bounds}, source: "{source}"}}')
@@ -93,12 +113,15 @@ class Skeleton:
             self.lines.append("    aliases: [" + ", ".join(aliases) + "]")
 
 
-def trunk(skeleton, bones):
-    middle = lambda name: bones.vertices(name).mean(axis=0)  # noqa: E731
-    bend = [("flexion", "x"), ("lateral_bending", "y"), ("rotation", "z")]
+def pelvis(skeleton, bones):
     hips = [sphere(head(bones, side)) for side in ("left", "right")]
     skeleton.add("pelvis", None, "pelvis", "free", np.mean(hips, axis=0), [("tilt", "x"), ("obliquity", "y"), ("rotation", "z")],
                  {}, "", aliases=["Hips", "hips"])
+
+
+def trunk(skeleton, bones):
+    middle = lambda name: bones.vertices(name).mean(axis=0)  # noqa: E731
+    bend = [("flexion", "x"), ("lateral_bending", "y"), ("rotation", "z")]
     skeleton.add("lumbar", "pelvis", "lumbosacral", "ball", middle("Intervertebral disk of fifth lumbar vertebra"), bend,
                  {"flexion": (-30, 60), "lateral_bending": (-25, 25), "rotation": (-10, 10)}, SPINE, aliases=["LowerBack"])
     skeleton.add("thorax", "lumbar", "thoracolumbar", "ball", middle("Intervertebral disk of twelfth thoracic vertebra"), bend,
@@ -165,7 +188,8 @@ def arm(skeleton, bones, side):
                  aliases=[f"{side.capitalize()}Hand", f"{side}Hand"])
 
 
-def leg(skeleton, bones, side):
+def leg(skeleton, bones, side, hip_bone=None, root=False, foot=True):
+    """`hip_bone`: the single bone that holds the head of the femur, for a sphere fit; `root`: the thigh has no parent."""
     s = 1 if side == "left" else -1
     sign = lambda axis, positive: axis if positive * s > 0 else "-" + axis  # noqa: E731
     hip = sphere(head(bones, side))
@@ -178,8 +202,8 @@ def leg(skeleton, bones, side):
     knee = np.mean(condyles, axis=0)
     axes = frame(z=hip - knee)
     angles = np.degrees(turns(axes))
-    skeleton.add(f"thigh_{side}", "pelvis", f"hip_{side}", "ball",
-                 f"{{sphere_fit: {{bone: femur_{side}, facing: hip_bone_{side}}}}}",
+    skeleton.add(f"thigh_{side}", None if root else "pelvis", f"hip_{side}", "free" if root else "ball",
+                 f"{{sphere_fit: {{bone: femur_{side}, facing: {hip_bone}}}}}" if hip_bone else hip,
                  [("flexion", "-x"), ("adduction", sign("y", 1)), ("rotation", sign("z", -1))],
                  {"flexion": (-30, 120), "adduction": (-45, 30), "rotation": (-45, 45)}, LIMBS, axes,
                  {"flexion": -angles[0], "adduction": s * angles[1], "rotation": -s * angles[2]},
@@ -190,6 +214,8 @@ def leg(skeleton, bones, side):
     skeleton.add(f"shank_{side}", f"thigh_{side}", f"knee_{side}", "hinge", knee, [("flexion", "x")], {"flexion": (-5, 140)},
                  LIMBS, frame(s * (condyles[1] - condyles[0]), knee - ankle), None,
                  [f"{side.capitalize()}Leg", f"{side}LowerLeg"])
+    if not foot:
+        return
     heads = []
     for n in ("first", "second", "third", "fourth", "fifth"):
         bone = bones.vertices(f"{side} {n} metatarsal bone")
@@ -202,38 +228,85 @@ def leg(skeleton, bones, side):
                  aliases=[f"{side.capitalize()}ToeBase", f"{side}Toes"])
 
 
-def write_case(folder, bones):
-    lines = ["# Written by make_case.py from bones.csv and muscles.csv: BodyParts3D, (c) The Database Center for Life Science,",
-             "# licensed under CC Attribution-Share Alike 2.1 Japan. Use with --data DIR.", "name: bodyparts3d", "frame: LPS", "unit: mm",
-             "skeleton: skeleton.yaml", "skin: {root: data, file: bodyparts3d/derived/body_envelope_DERIVED.stl}", "bones:"]
-    names = set()
+BODYPARTS3D = ["BodyParts3D, (c) The Database Center for Life Science, licensed under CC Attribution-Share Alike 2.1 Japan."]
+VISIBLE_HUMAN = ["Visible Human Male: HuBMAP Human Reference Atlas (K. Browne et al.), CC BY 4.0."]
 
-    def unique(name):
-        assert name not in names, name
-        names.add(name)
-        return name
 
+class Case:
+    def __init__(self, name, credit, frame):
+        self.name, self.skeleton, self.names = name, Skeleton(name), set()
+        self.lines = ["# Written by ../make_cases.py from the data's own tables; use with --data DIR."]
+        self.lines += [f"# {line}" for line in credit]
+        self.lines += [f"name: {name}", f"frame: {frame}", "unit: mm", "skeleton: skeleton.yaml"]
+
+    def entry(self, name, file, more):
+        assert name not in self.names, name
+        self.names.add(name)
+        self.lines.append(f"  - {{name: {name}, root: data, file: {file}, {more}}}")
+
+    def write(self):
+        folder = HERE / self.name
+        folder.mkdir(exist_ok=True)
+        (folder / "case.yaml").write_text("\n".join(self.lines) + "\n")
+        (folder / "skeleton.yaml").write_text("\n".join(self.skeleton.lines) + "\n")
+
+
+def bodyparts3d(folder):
+    case, bones = Case("bodyparts3d", BODYPARTS3D, "LPS"), BodyParts3D(folder)
+    pelvis(case.skeleton, bones)
+    trunk(case.skeleton, bones)
+    for side in ("left", "right"):
+        arm(case.skeleton, bones, side)
+        leg(case.skeleton, bones, side, f"hip_bone_{side}")
+    case.lines += ["skin: {root: data, file: bodyparts3d/derived/body_envelope_DERIVED.stl}", "bones:"]
     for row in bones.rows:
-        lines.append(f"  - {{name: {unique(identifier(row['name']))}, root: data, file: bodyparts3d/{row['file']}, "
-                     f"segment: {row['segment']}}}")
-    lines.append("tissues:")
+        case.entry(identifier(row["name"]), f"bodyparts3d/{row['file']}", f"segment: {row['segment']}")
+    case.lines.append("tissues:")
     for row in csv.DictReader((folder / "muscles.csv").open()):
-        lines.append(f"  - {{name: {unique(identifier(row['name']))}, root: data, file: bodyparts3d/{row['file']}, group: muscle}}")
-    (HERE / "case.yaml").write_text("\n".join(lines) + "\n")
+        case.entry(identifier(row["name"]), f"bodyparts3d/{row['file']}", "group: muscle")
+    case.write()
+
+
+def right_leg(folder):
+    """A part of a body: the thigh is cut, and the head of the femur sticks out of the cut."""
+    better = {"right femur": "right_leg/FMA24474_right_femur.stl", "right tibia": "right_leg/FMA24477_right_tibia.stl",
+              "right fibula": "right_leg/FMA24480_right_fibula.stl", "right patella": "right_leg/FMA24486_right_patella.stl"}
+    case, bones = Case("right_leg", BODYPARTS3D, "LPS"), BodyParts3D(folder, better)
+    leg(case.skeleton, bones, "right", root=True)
+    case.lines += ["skin: {root: data, file: bodyparts3d/right_leg/right_leg_skin_closed.stl}", "bones:"]
+    for row in bones.rows:
+        if row["segment"] in ("thigh_right", "shank_right", "foot_right", "toes_right"):
+            case.entry(identifier(row["name"]), f"bodyparts3d/{better.get(row['name'].lower(), row['file'])}",
+                       f"segment: {row['segment']}")
+    case.lines.append("tissues:")
+    case.entry("muscles_right", "bodyparts3d/right_leg/right_leg_muscles_union.ply", "group: muscle")
+    case.write()
+
+
+def visible_human_male(folder):
+    """Bones from pelvis to ankle; everything else of the body follows the pelvis and the shanks. Organs in metres."""
+    case, bones = Case("visible_human_male", VISIBLE_HUMAN, "LPS"), VisibleHuman(folder)
+    pelvis(case.skeleton, bones)
+    for side in ("left", "right"):
+        leg(case.skeleton, bones, side, foot=False)
+    case.lines += ["skin: {root: data, file: visible_human_male/skin.stl, frame: LSA}", "bones:"]
+    for row in csv.DictReader((folder / "parts.csv").open()):
+        if row["segment"] != "skin" and row["file"].startswith("bones/"):
+            case.entry(row["name"], f"visible_human_male/{row['file']}", f"segment: {row['segment']}, frame: LSA")
+    case.lines.append("tissues:")
+    for organ in ("Heart", "Kidney_L", "Kidney_R", "Liver", "Pancreas", "Spinal_Cord", "Spleen", "Urinary_Bladder"):
+        name = re.sub("_r$", "_right", re.sub("_l$", "_left", organ.lower()))
+        case.entry(name, f"visible_human_male/glb/VH_M_{organ}.glb", f"group: {'nerve' if organ == 'Spinal_Cord' else 'organ'}")
+    case.write()
 
 
 def main():
     if len(sys.argv) != 2:
         raise SystemExit(__doc__)
-    folder = pathlib.Path(sys.argv[1]) / "bodyparts3d"
-    bones = Bones(folder)
-    skeleton = Skeleton()
-    trunk(skeleton, bones)
-    for side in ("left", "right"):
-        arm(skeleton, bones, side)
-        leg(skeleton, bones, side)
-    (HERE / "skeleton.yaml").write_text("\n".join(skeleton.lines) + "\n")
-    write_case(folder, bones)
+    data = pathlib.Path(sys.argv[1])
+    bodyparts3d(data / "bodyparts3d")
+    right_leg(data / "bodyparts3d")
+    visible_human_male(data / "visible_human_male")
 
 
 if __name__ == "__main__":
