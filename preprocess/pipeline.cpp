@@ -148,7 +148,12 @@ std::vector<Tissue> bind_tissues(std::vector<Tissue> tissues, const Model& model
 std::vector<ModelVolume> gather_volumes(const Case& patient) {
   std::vector<ModelVolume> volumes;
   for (const CaseVolume& v : patient.volumes) volumes.push_back({v.name, v.image, v.background, false, {}});
-  if (patient.labels) volumes.push_back({"labels", patient.labels->image, 0, true, patient.labels->table});
+  if (!patient.labels) return volumes;
+  volumes.push_back({"labels", patient.labels->image, 0, true, patient.labels->table});
+  for (std::size_t layer = 0; layer < patient.labels->overlaps.size(); ++layer) {
+    volumes.push_back({"labels_" + std::to_string(layer + 2), patient.labels->overlaps[layer], 0, true,
+                       patient.labels->table});
+  }
   return volumes;
 }
 

@@ -61,6 +61,7 @@ struct CaseVolume {
 struct CaseLabels {
   Image image;                                ///< integer scalars, one component; 0 is nothing
   std::map<std::int64_t, std::string> table;  ///< id -> name
+  std::vector<Image> overlaps = {};           ///< further layers on the same grid, where labels overlap
 };
 
 struct Case {

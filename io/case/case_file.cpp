@@ -3,12 +3,12 @@
 #include "io/case/case_file.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 
 #include "core/values/error.hpp"
 #include "io/case/digest.hpp"
 #include "io/case/frame.hpp"
+#include "io/case/label_map.hpp"
 #include "io/case/label_sources.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_reader.hpp"
@@ -261,7 +261,8 @@ class CaseReader {
     CaseVolume volume;
     const Value name = entry.at("name");
     volume.name = name.identifier();
-    if (volume.name == "labels") name.fail("'labels' is the label map's name", "give it another name");
+    if (volume.name == "labels" || volume.name.starts_with("labels_"))
+      name.fail("'" + volume.name + "' is the label map's name", "give it another name");
     for (const CaseVolume& other : out_.volumes) {
       if (other.name == volume.name)
         name.fail("another volume is named '" + volume.name + "'", "give it another name");
@@ -274,25 +275,8 @@ class CaseReader {
 
   void read_labels(const Value& entry) {
     entry.allow(kLabelKeys);
-    CaseLabels labels;
-    for (const auto& [id, name] : entry.at("table").pairs()) {
-      std::int64_t number = 0;
-      const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number);
-      if (error != std::errc() || end != id.data() + id.size())
-        name.fail("'" + id + "' is no label id", "ids are whole numbers");
-      if (number == 0) name.fail("label 0 is nothing", "leave it out");
-      if (!labels.table.emplace(number, name.text()).second)
-        name.fail("label " + id + " stands twice", "keep one");
-    }
-    const Value file = entry.at("file");
-    labels.image = read_image(locate(entry, file));
-    const ScalarType type = labels.image.type;
-    if (type == ScalarType::f32 || type == ScalarType::f64 || labels.image.components != 1) {
-      file.fail(
-          "labels are " + std::string(scalar_name(type)) + " x " + std::to_string(labels.image.components),
-          "labels are whole numbers, one a voxel");
-    }
-    out_.labels = std::move(labels);
+    out_.labels =
+        read_label_map(entry, [this](const Value& e, const Value& file) { return locate(e, file); });
     step();
   }
 

@@ -4,6 +4,7 @@
 #include "io/case/case_file.hpp"
 #include "io/case/yaml_text.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/segmentation.hpp"
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::io {
@@ -84,8 +85,17 @@ class CaseWriter {
   }
   void write_labels(const CaseLabels& labels) {
     files::make_folder(folder_ / "volumes");
-    image("volumes/labels.nrrd", labels.image);
-    yaml_ += "labels:\n  file: volumes/labels.nrrd\n  table:";
+    std::string file = "volumes/labels.nrrd";
+    if (labels.overlaps.empty()) {
+      image(file, labels.image);
+    } else {
+      file = "volumes/labels.seg.nrrd";
+      Segmentation segmentation{{labels.image}, labels.table};
+      segmentation.layers.insert(segmentation.layers.end(), labels.overlaps.begin(), labels.overlaps.end());
+      write_segmentation(folder_ / file, segmentation);
+      step();
+    }
+    yaml_ += "labels:\n  file: " + file + "\n  table:";
     if (labels.table.empty()) yaml_ += " {}";
     yaml_ += "\n";
     for (const auto& [id, name] : labels.table)

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,11 +24,18 @@ struct ImageHeader {
   ScalarType type = ScalarType::u8;
   int components = 1;
   bool gzip = false;
-  std::filesystem::path data_file;            ///< the file itself, or a plain name beside it
-  std::uint64_t data_offset = 0;              ///< of the first voxel byte in `data_file`
+  std::filesystem::path data_file;  ///< the file itself, or a plain name beside it
+  std::uint64_t data_offset = 0;    ///< of the first voxel byte, or of the gzip stream, in `data_file`
+  std::uint64_t stream_offset = 0;  ///< of the first voxel byte in what that stream inflates to
   std::optional<std::uint64_t> packed_bytes;  ///< as the header declares, where it does
 
-  /// Bytes of all voxels; the parsers keep it at most `largest_image_bytes`.
+  // NIfTI only.
+  bool swapped = false;  ///< voxels are in the other byte order
+  bool planar = false;   ///< one volume a component
+  bool scaled = false;   ///< stored integers become real values: slope * stored + intercept
+  double slope = 1, intercept = 0;
+
+  /// Bytes of all voxels as stored; the parsers keep it at most `largest_image_bytes`.
   std::uint64_t voxel_bytes() const;
 };
 
@@ -35,8 +43,27 @@ struct ImageHeader {
 /// it). Throws Error{data} for anything but a 3-D image, raw or gzip, of a ScalarType, in mm.
 ImageHeader parse_nrrd_header(std::string_view head, const std::filesystem::path& path);
 
+/// The free `key:=value` pairs of a NRRD's header, nothing of another format's. Throws Error{missing_input}
+/// or Error{data}.
+std::map<std::string, std::string> read_nrrd_keys(const std::filesystem::path& path);
+
+/// The file's first MiB, or all of it. Throws Error{missing_input}.
+std::string read_head(const std::filesystem::path& path);
+
 /// The header of a `.mha` or `.mhd`.
 ImageHeader parse_meta_header(std::string_view head, const std::filesystem::path& path);
+
+/// The header of a `.nii`; of a `.nii.gz`, `head` is inflated already. Beyond what cannot be read anywhere
+/// here, it refuses an image that does not say where it lies (neither qform nor sform).
+ImageHeader parse_nifti_header(std::string_view head, const std::filesystem::path& path);
+
+/// Fills `image`, whose grid and type are set, from the file that `header` was read from and that
+/// `check_payload` has passed. Throws Error{io}.
+void read_nifti_voxels(const ImageHeader& header, Image& image);
+
+/// What a gzip stream at the beginning of `packed` inflates to, at most `limit` bytes of it. Throws
+/// Error{data}.
+std::string inflate_head(std::string_view packed, std::size_t limit, const std::filesystem::path& path);
 
 /// Holds the declared bytes against the data file: its length where raw, its whole inflated stream where gzip
 /// (counted without storing it: teem and MetaIO take a stream that ends early for a whole one). Throws

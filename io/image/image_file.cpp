@@ -26,21 +26,24 @@ bool ends_with(const Path& path, std::string_view ending) {
   return fields::lower(path.filename().string()).ends_with(ending);
 }
 
-// The file's beginning: enough for any header.
-std::string read_head(const Path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw Error(ErrorKind::missing_input, path.string(), "cannot be opened", "check the path and its rights");
+// A `.nii`, or a `.nii.gz` whose stream holds one.
+ImageHeader parse_nifti(const std::string& head, const Path& path) {
+  if (!ends_with(path, ".gz")) {
+    if (head.starts_with("\x1f\x8b")) refuse(path, "is packed by gzip", "name it .nii.gz");
+    return parse_nifti_header(head, path);
   }
-  std::string head(kLargestHeader, '\0');
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(file.gcount()));
-  return head;
+  ImageHeader header = parse_nifti_header(inflate_head(head, 4096, path), path);
+  header.gzip = true;
+  header.stream_offset = header.data_offset;
+  header.data_offset = 0;
+  return header;
 }
 
 // Two readers, one header: where they disagree, neither is believed.
 void check_agreement(const ImageHeader& declared, const Image& seen, const Path& path) {
-  if (declared.size == seen.grid.size && declared.type == seen.type && declared.components == seen.components)
+  const bool real = seen.type == ScalarType::f32 || seen.type == ScalarType::f64;
+  if (declared.size == seen.grid.size && declared.components == seen.components &&
+      (declared.scaled ? real : declared.type == seen.type))
     return;
   refuse(path, "its header can be read in two ways", "write the image again");
 }
@@ -69,21 +72,41 @@ void check_grid(ImageGrid& grid, const Path& path) {
 
 }  // namespace
 
+std::string read_head(const Path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw Error(ErrorKind::missing_input, path.string(), "cannot be opened", "check the path and its rights");
+  }
+  std::string head(kLargestHeader, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return head;
+}
+
 Image read_image(const Path& path) {
-  const bool nrrd = ends_with(path, ".nrrd") || ends_with(path, ".nhdr");
-  const bool meta = ends_with(path, ".mha") || ends_with(path, ".mhd");
-  if (!nrrd && !meta) {
-    refuse(path, "'" + path.extension().string() + "' images cannot be read", "convert it to .nrrd or .mha");
+  Format format = Format::nrrd;
+  if (ends_with(path, ".mha") || ends_with(path, ".mhd")) {
+    format = Format::meta;
+  } else if (ends_with(path, ".nii") || ends_with(path, ".nii.gz")) {
+    format = Format::nifti;
+  } else if (!ends_with(path, ".nrrd") && !ends_with(path, ".nhdr")) {
+    refuse(path, "'" + path.extension().string() + "' images cannot be read",
+           "convert it to .nrrd, .mha or .nii.gz");
   }
   const std::string head = read_head(path);
-  const ImageHeader declared = nrrd ? parse_nrrd_header(head, path) : parse_meta_header(head, path);
+  const ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
+                               : format == Format::meta ? parse_meta_header(head, path)
+                                                        : parse_nifti(head, path);
   check_payload(declared, path);
-  const Format format = nrrd ? Format::nrrd : Format::meta;
   Image image = itk_images::read_header(path, format);
   check_agreement(declared, image, path);
   check_grid(image.grid, path);
-  image.bytes.resize(declared.voxel_bytes());
-  itk_images::read_voxels(path, format, image);
+  if (format == Format::nifti) {
+    read_nifti_voxels(declared, image);
+  } else {
+    image.bytes.resize(declared.voxel_bytes());
+    itk_images::read_voxels(path, format, image);
+  }
   return image;
 }
 

@@ -8,11 +8,11 @@
 
 namespace ecorche::io {
 
-/// Reads `.nrrd`, `.mha` (raw or gzip) and their detached forms `.nhdr`, `.mhd`, whose voxels must lie in one
-/// file beside them: 3-D, scalar type and direction kept whole (also a left-handed one), one or several
-/// components. Before any voxel is allocated the size that the header declares is held against 2^33 bytes and
-/// against the file's own size (raw) or what its stream inflates to (gzip). Throws Error{missing_input} or
-/// Error{data}.
+/// Reads `.nrrd`, `.mha` (raw or gzip), their detached forms `.nhdr`, `.mhd`, whose voxels must lie in one
+/// file beside them, and NIfTI-1 (`.nii`, `.nii.gz`; stored integers with a scale become float): 3-D, scalar
+/// type and direction kept whole (also a left-handed one), one or several components. Before any voxel is
+/// allocated the size that the header declares is held against 2^33 bytes and against the file's own size
+/// (raw) or what its stream inflates to (gzip). Throws Error{missing_input} or Error{data}.
 Image read_image(const std::filesystem::path& path);
 
 /// Writes `.nrrd`, `.mha` or `.nii.gz`, atomically; compressed where `compress`.

@@ -53,7 +53,8 @@ ScalarType type_from(const std::string& name, const Path& path) {
 }
 
 // Reads the lines up to the empty one; `offset` becomes the byte after it.
-Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
+Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset,
+                   Fields* free_keys = nullptr) {
   Fields fields;
   std::size_t at = 0;
   bool ended = false;
@@ -73,7 +74,11 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
       ended = true;
       break;
     }
-    if (text.front() == '#' || text.find(":=") != text.npos) continue;  // a comment, a free key
+    if (text.front() == '#') continue;
+    if (const std::size_t free = text.find(":="); free != text.npos) {
+      if (free_keys != nullptr) free_keys->emplace(text.substr(0, free), fields::trim(text.substr(free + 2)));
+      continue;
+    }
     const std::size_t colon = text.find(": ");
     if (colon == text.npos) {
       refuse(path, "line " + std::to_string(line) + " of its header is no field: '" +
@@ -121,6 +126,14 @@ void check_unit(const Fields& fields, const Path& path) {
 }
 
 }  // namespace
+
+std::map<std::string, std::string> read_nrrd_keys(const Path& path) {
+  Fields keys;
+  const std::string head = read_head(path);
+  std::uint64_t offset = 0;
+  if (head.starts_with("NRRD000")) read_fields(head, path, offset, &keys);
+  return keys;
+}
 
 ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   ImageHeader header;

@@ -58,7 +58,7 @@ class Inflater {
 void check_stream(const ImageHeader& header, std::uint64_t packed, const Path& path) {
   std::ifstream file(header.data_file, std::ios::binary);
   file.seekg(static_cast<std::streamoff>(header.data_offset));
-  const std::uint64_t expected = header.voxel_bytes();
+  const std::uint64_t expected = header.stream_offset + header.voxel_bytes();
   Inflater inflater;
   std::vector<unsigned char> block(kBlock);
   for (std::uint64_t left = packed; left > 0 && inflater.count() <= expected;) {
@@ -81,6 +81,22 @@ void check_stream(const ImageHeader& header, std::uint64_t packed, const Path& p
 std::uint64_t ImageHeader::voxel_bytes() const {
   return static_cast<std::uint64_t>(size[0]) * static_cast<std::uint64_t>(size[1]) *
          static_cast<std::uint64_t>(size[2]) * static_cast<std::uint64_t>(components) * scalar_bytes(type);
+}
+
+std::string inflate_head(std::string_view packed, std::size_t limit, const Path& path) {
+  z_stream stream{};
+  if (!packed.starts_with("\x1f\x8b") || inflateInit2(&stream, 15 + 16) != Z_OK)
+    refuse(path, "is not packed by gzip");
+  std::string out(limit, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(limit);
+  const int code = inflate(&stream, Z_SYNC_FLUSH);
+  out.resize(limit - stream.avail_out);
+  inflateEnd(&stream);
+  if (code != Z_OK && code != Z_STREAM_END && code != Z_BUF_ERROR) refuse(path, "its gzip stream is damaged");
+  return out;
 }
 
 void check_payload(const ImageHeader& header, const Path& path) {

@@ -87,6 +87,7 @@ TEST_F(CaseRefusals, Names) {
           "8:bones[1].name: 'Femur' is no identifier (use 1 to 64 of a-z, 0-9 and _)");
   refused("name: femur_right", "name: " + std::string(65, 'a'), "8:bones[1].name: 'aaaa");
   refused("name: ct", "name: labels", "12:volumes[0].name: 'labels' is the label map's name");
+  refused("name: ct", "name: labels_2", "12:volumes[0].name: 'labels_2' is the label map's name");
   refused("segment: thigh_right", "segment: thigh_rigth",
           "8:bones[1].segment: unknown segment 'thigh_rigth' (did you mean 'thigh_right'?)");
   refused("segment: thigh_right", "segment: head",
@@ -100,8 +101,8 @@ TEST_F(CaseRefusals, Names) {
   refused(" 2:", " 01:", "13:labels.table.01: label 01 stands twice");
   Image field(small_case().labels->image.grid, ScalarType::f32);
   write_image(scratch_ / "volumes" / "field.nrrd", field);
-  refused("labels.nrrd", "field.nrrd",
-          "13:labels.file: labels are f32 x 1 (labels are whole numbers, one a voxel)");
+  expect_error(ErrorKind::data, "field.nrrd: labels are f32 x 1 (labels are whole numbers, one a voxel)",
+               [&] { read(changed(kCase, "labels.nrrd", "field.nrrd")); });
 }
 
 TEST_F(CaseRefusals, Files) {

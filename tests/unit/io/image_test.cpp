@@ -192,7 +192,7 @@ TEST(Image, EveryMistakeInANrrdIsNamed) {
   refused("(1,0,0)", "(nan,0,0)", "ct.nrrd");
   refused("(1,0,0)", "(0,0,0)", "ct.nrrd");
   refused("(5,6,7)", "(5,6,1e300)", "its origin is");
-  expect_error(ErrorKind::data, "'.dcm' images cannot be read (convert it to .nrrd or .mha)",
+  expect_error(ErrorKind::data, "'.dcm' images cannot be read (convert it to .nrrd, .mha or .nii.gz)",
                [&] { read_image(scratch.put("a.dcm", "x")); });
   expect_error(ErrorKind::missing_input, "none.nrrd: cannot be opened",
                [&] { read_image(scratch / "none.nrrd"); });

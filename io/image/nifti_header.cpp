@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h and nifti2.h
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "io/image/header.hpp"
+#include "io/image/header_fields.hpp"
+
+namespace ecorche::io {
+namespace {
+
+using fields::refuse;
+using Path = std::filesystem::path;
+
+// Fixed fields at fixed places, in either byte order.
+class Bytes {
+ public:
+  Bytes(std::string_view head, bool swap) : head_(head), swap_(swap) {}
+
+  template <class T>
+  T at(std::size_t offset) const {
+    std::array<char, sizeof(T)> raw;
+    std::memcpy(raw.data(), head_.data() + offset, sizeof(T));
+    if (swap_) std::reverse(raw.begin(), raw.end());
+    T value;
+    std::memcpy(&value, raw.data(), sizeof(T));
+    return value;
+  }
+
+ private:
+  std::string_view head_;
+  bool swap_;
+};
+
+// What of the two versions matters here.
+struct Fields {
+  std::array<std::int64_t, 8> dim{};
+  int datatype = 0, units = 0, qform = 0, sform = 0;
+  double offset = 0, slope = 0, intercept = 0;
+};
+
+Fields first_version(const Bytes& bytes) {
+  Fields f;
+  for (std::size_t i = 0; i < 8; ++i) f.dim[i] = bytes.at<std::int16_t>(40 + 2 * i);
+  f.datatype = bytes.at<std::int16_t>(70);
+  f.offset = static_cast<double>(bytes.at<float>(108));
+  f.slope = static_cast<double>(bytes.at<float>(112));
+  f.intercept = static_cast<double>(bytes.at<float>(116));
+  f.units = bytes.at<std::uint8_t>(123);
+  f.qform = bytes.at<std::int16_t>(252);
+  f.sform = bytes.at<std::int16_t>(254);
+  return f;
+}
+
+void set_type(ImageHeader& header, int datatype, const Path& path) {
+  switch (datatype) {
+    case 2:
+      header.type = ScalarType::u8;
+      return;
+    case 4:
+      header.type = ScalarType::i16;
+      return;
+    case 8:
+      header.type = ScalarType::i32;
+      return;
+    case 16:
+      header.type = ScalarType::f32;
+      return;
+    case 64:
+      header.type = ScalarType::f64;
+      return;
+    case 128:  // RGB, a byte each
+      header.type = ScalarType::u8;
+      header.components *= 3;
+      return;
+    case 2304:  // RGBA
+      header.type = ScalarType::u8;
+      header.components *= 4;
+      return;
+    case 256:
+      header.type = ScalarType::i8;
+      return;
+    case 512:
+      header.type = ScalarType::u16;
+      return;
+    case 768:
+      header.type = ScalarType::u32;
+      return;
+    default:
+      refuse(path, "voxels of NIfTI type " + std::to_string(datatype) + " cannot be read",
+             "convert them to 8, 16 or 32-bit integers, float, double or RGB");
+  }
+}
+
+void set_size(ImageHeader& header, const Fields& f, const Path& path) {
+  if (f.dim[0] < 1 || f.dim[0] > 7)
+    refuse(path, "has " + std::to_string(f.dim[0]) + " axes", "save a 3-D image");
+  for (std::size_t axis = 1; axis <= static_cast<std::size_t>(f.dim[0]); ++axis) {
+    const std::int64_t size = f.dim[axis];
+    if (size < 1 || size > std::numeric_limits<std::int32_t>::max())
+      refuse(path, "axis " + std::to_string(axis) + " has " + std::to_string(size) + " voxels");
+    if (axis <= 3) header.size[axis - 1] = static_cast<std::int32_t>(size);
+    if (axis == 5) header.components = static_cast<int>(std::min<std::int64_t>(size, 1 << 16));
+    if (axis != 5 && axis > 3 && size != 1) {
+      refuse(path, "has " + std::to_string(size) + " volumes on axis " + std::to_string(axis),
+             "save one 3-D image; components of a voxel are the fifth axis");
+    }
+  }
+  if (f.dim[0] < 3) refuse(path, "has " + std::to_string(f.dim[0]) + " axes", "save a 3-D image");
+}
+
+}  // namespace
+
+ImageHeader parse_nifti_header(std::string_view head, const Path& path) {
+  if (head.size() < 348)
+    refuse(path, "is no NIfTI: it has " + std::to_string(head.size()) + " bytes of header");
+  const Bytes plain(head, false), swapped(head, true);
+  if (plain.at<std::int32_t>(0) == 540 || swapped.at<std::int32_t>(0) == 540)
+    refuse(path, "is a NIfTI-2", "save it as NIfTI-1, .nrrd or .mha");
+  const bool swap = swapped.at<std::int32_t>(0) == 348;
+  if (!swap && plain.at<std::int32_t>(0) != 348)
+    refuse(path, "is no NIfTI: its header does not say 348 bytes");
+  const std::string_view magic = head.substr(344, 4);
+  if (magic == std::string_view("ni1\0", 4))
+    refuse(path, "its voxels are in another file", "save it as one .nii or .nii.gz");
+  if (magic != std::string_view("n+1\0", 4))
+    refuse(path, "is no NIfTI: it lacks the magic 'n+1'",
+           "Analyze files do not say left from right: convert it");
+  ImageHeader header;
+  const Fields f = first_version(swap ? swapped : plain);
+  set_size(header, f, path);
+  set_type(header, f.datatype, path);
+  fields::check_size(header, path);
+  if (!(f.offset >= 352 && f.offset <= 1e6) || f.offset != std::floor(f.offset))
+    refuse(path, "its voxels begin at byte " + std::to_string(f.offset),
+           "they must begin at 352 or a little later");
+  if ((f.units & 7) != 0 && (f.units & 7) != 2)
+    refuse(path, "its unit of length is NIfTI's " + std::to_string(f.units & 7), "write it in mm");
+  // Without either there is a convention for axes, but nobody keeps to it: left and right would be a guess.
+  if (f.qform <= 0 && f.sform <= 0)
+    refuse(path, "does not say where it lies: qform_code and sform_code are 0", "set its sform");
+  header.scaled = f.slope != 0 && std::isfinite(f.slope) && (f.slope != 1 || f.intercept != 0);
+  header.slope = header.scaled ? f.slope : 1;
+  header.intercept = header.scaled && std::isfinite(f.intercept) ? f.intercept : 0;
+  header.swapped = swap;
+  header.planar = f.dim[0] >= 5 && f.datatype != 128 && f.datatype != 2304;
+  header.data_file = path;
+  header.data_offset = static_cast<std::uint64_t>(f.offset);
+  return header;
+}
+
+}  // namespace ecorche::io

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// 3D Slicer's segmentations: a NRRD that names its own segments, in layers where they overlap.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/values/image.hpp"
+#include "io/image/label_table.hpp"
+
+namespace ecorche::io {
+
+/// A label map and what its file says of the ids.
+struct Segmentation {
+  /// One a layer, all of one grid, one component each: whoever is in several segments has an id in each
+  /// layer.
+  std::vector<Image> layers;
+  LabelNames names;  ///< empty where the file names no segment
+};
+
+/// Reads any image that `read_image` reads as labels. Of a NRRD with `Segment0_Name`, ... the segments are
+/// named (by `make_identifiers`), and components are layers. Where two segments of different layers share a
+/// value, all are numbered anew from 1 in the file's order (u16), and values of no segment are dropped: an id
+/// means one thing. Throws Error{missing_input} or Error{data}: real voxels, several components that are no
+/// layers, a segment whose layer is not there.
+Segmentation read_segmentation(const std::filesystem::path& path);
+
+/// Writes a `.seg.nrrd` that names its segments (those ids of `names` that a layer holds), one component a
+/// layer; atomically. Layers are of one grid and type. Throws Error{usage} for another ending,
+/// Error{cannot_create}, Error{io}.
+void write_segmentation(const std::filesystem::path& path, const Segmentation& segmentation);
+
+}  // namespace ecorche::io

@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""NIfTI against nibabel, both ways: frames, types, scales, components, byte orders."""
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import nibabel
+import numpy
+
+IO_FILES = sys.argv.pop(1)
+TYPES = {"u8": "u1", "i8": "i1", "u16": "u2", "i16": "i2", "u32": "u4", "i32": "i4", "f32": "f4", "f64": "f8"}
+LPS = numpy.diag([-1.0, -1, 1, 1])
+# Oblique, with a reversed axis: what a scanner writes.
+TURN = numpy.array([[0, -2.0, 0.0, 5], [1.5, 0, 0, 6], [0, 0, -3, 7], [0, 0, 0, 1]])
+
+
+def oblique():
+    c, s = numpy.cos(0.3), numpy.sin(0.3)
+    return numpy.array([[c, 0, -s, 12], [0, 1, 0, -7], [s, 0, c, 30], [0, 0, 0, 1]]) @ TURN
+
+
+class Nifti(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.random = numpy.random.default_rng(5)
+
+    def describe(self, path):
+        raw = self.folder / "raw"
+        done = subprocess.run([IO_FILES, "describe", str(path), str(raw)], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        grid = json.loads(done.stdout)
+        shape = [grid["components"], *grid["size"]]
+        return grid, numpy.frombuffer(raw.read_bytes(), TYPES[grid["type"]]).reshape(shape, order="F")
+
+    def refused(self, path, *parts):
+        done = subprocess.run([IO_FILES, "describe", str(path), str(self.folder / "raw")], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 65, done.stdout + done.stderr)
+        for part in parts:
+            self.assertIn(part, done.stderr)
+
+    def assert_frame(self, grid, affine):
+        lps = LPS @ affine
+        for key, index in (("origin", [0, 0, 0]), ("i", [1, 0, 0]), ("j", [0, 1, 0]), ("k", [0, 0, 1])):
+            numpy.testing.assert_allclose(grid[key], (lps @ [*index, 1])[:3], atol=2e-5)
+
+    def save(self, array, affine, name, change=None):
+        image = nibabel.Nifti1Image(array, affine)
+        image.set_qform(affine, 1)
+        image.set_sform(affine, 1)
+        if change:
+            change(image)
+        nibabel.save(image, self.folder / name)
+        return self.folder / name
+
+    def test_every_type_and_frame_is_read_as_nibabel_reads_it(self):
+        for affine in (numpy.eye(4), TURN, oblique(), numpy.diag([-1.0, 1, 1, 1])):
+            for name, code in TYPES.items():
+                array = self.random.integers(0, 100, (4, 5, 3)).astype(code)
+                for file in ("a.nii", "a.nii.gz"):  # side by side, niftilib mixes them up
+                    array = self.random.integers(0, 100, (4, 5, 3)).astype(code)
+                    grid, voxels = self.describe(self.save(array, affine, file))
+                    self.assertEqual(grid["type"], name)
+                    self.assert_frame(grid, affine)
+                    numpy.testing.assert_array_equal(voxels[0], array)
+
+    def test_qform_or_sform_alone(self):
+        for which in ("qform", "sform"):
+            def only(image):
+                image.set_qform(oblique() if which == "qform" else None, code=1 if which == "qform" else 0)
+                image.set_sform(oblique() if which == "sform" else None, code=2 if which == "sform" else 0)
+            grid, _ = self.describe(self.save(numpy.zeros((4, 5, 3), "i2"), oblique(), "a.nii", only))
+            self.assert_frame(grid, oblique())
+        self.refused(self.save(numpy.zeros((4, 5, 3), "i2"), TURN, "b.nii",
+                               lambda image: (image.set_qform(None, code=0), image.set_sform(None, code=0))),
+                     "does not say where it lies: qform_code and sform_code are 0")
+
+    def test_scales_big_endian_and_rgb(self):
+        array = self.random.integers(-500, 500, (4, 5, 3)).astype("i2")
+        path = self.save(array, TURN, "scaled.nii", lambda image: image.header.set_slope_inter(0.5, -3))
+        loaded = nibabel.load(path).get_fdata()
+        grid, voxels = self.describe(path)
+        self.assertIn(grid["type"], ("f32", "f64"))
+        numpy.testing.assert_allclose(voxels[0], loaded, atol=1e-4)
+        header = nibabel.Nifti1Header(endianness=">")
+        header.set_data_dtype("i2")
+        nibabel.save(nibabel.Nifti1Image(array, TURN, header), self.folder / "big.nii")
+        numpy.testing.assert_array_equal(self.describe(self.folder / "big.nii")[1][0], array)
+        rgb = numpy.zeros((4, 5, 3), [("R", "u1"), ("G", "u1"), ("B", "u1")])
+        for channel in rgb.dtype.names:
+            rgb[channel] = self.random.integers(0, 255, rgb.shape)
+        grid, voxels = self.describe(self.save(rgb, TURN, "rgb.nii"))
+        self.assertEqual((grid["type"], grid["components"]), ("u8", 3))
+        for i, channel in enumerate(rgb.dtype.names):
+            numpy.testing.assert_array_equal(voxels[i], rgb[channel])
+
+    def test_vectors_are_the_fifth_axis(self):
+        array = self.random.random((4, 5, 3, 1, 3)).astype("f4")
+        path = self.save(array, TURN, "vector.nii.gz", lambda image: image.header.set_intent("vector"))
+        grid, voxels = self.describe(path)
+        self.assertEqual(grid["components"], 3)
+        for i in range(3):
+            numpy.testing.assert_array_equal(voxels[i], array[..., 0, i])
+        self.refused(self.save(numpy.zeros((4, 5, 3, 2), "i2"), TURN, "time.nii"), "has 2 volumes on axis 4")
+
+    def test_what_is_written_nibabel_reads(self):
+        array = self.random.integers(0, 100, (4, 5, 3)).astype("i2")
+        for name in ("a.nii", "a.nii.gz"):
+            source = self.save(array, oblique(), "source.nii")
+            for out in ("copy.nii.gz", "copy.nrrd", "copy.mha"):
+                done = subprocess.run([IO_FILES, "copy", str(source), str(self.folder / out)], capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                source = self.folder / out
+            subprocess.run([IO_FILES, "copy", str(source), str(self.folder / name)], check=True)
+            loaded = nibabel.load(self.folder / name)
+            numpy.testing.assert_array_equal(numpy.asarray(loaded.dataobj), array)
+            numpy.testing.assert_allclose(loaded.affine, oblique(), atol=2e-5)
+
+    def test_wrong_headers_are_named(self):
+        good = self.save(numpy.zeros((4, 5, 3), "i2"), TURN, "a.nii").read_bytes()
+
+        def changed(at, value, name="b.nii"):
+            (self.folder / name).write_bytes(good[:at] + value + good[at + len(value):])
+            return self.folder / name
+        self.refused(changed(344, b"ni1\0"), "its voxels are in another file")
+        self.refused(changed(344, b"\0\0\0\0"), "lacks the magic 'n+1'")
+        self.refused(changed(0, b"xxxx"), "is no NIfTI")
+        self.refused(changed(123, b"\1"), "its unit of length is NIfTI's 1 (write it in mm)")
+        self.refused(changed(70, (1024).to_bytes(2, "little")), "voxels of NIfTI type 1024 cannot be read")
+        self.refused(changed(42, (30000).to_bytes(2, "little")), "declares 900000 bytes of voxels, but has 120")
+        self.refused(changed(42, b"\xff\xff"), "axis 1 has -1 voxels")
+        self.refused(changed(108, b"\0\0\0\0"), "its voxels begin at byte 0")
+        self.refused(changed(0, b"", "c.nii.gz"), "is not packed by gzip")
+        nibabel.save(nibabel.Nifti2Image(numpy.zeros((4, 5, 3), "i2"), TURN), self.folder / "two.nii")
+        self.refused(self.folder / "two.nii", "is a NIfTI-2 (save it as NIfTI-1, .nrrd or .mha)")
+        for size in range(0, len(good), 7):
+            (self.folder / "cut.nii").write_bytes(good[:size])
+            self.refused(self.folder / "cut.nii", "error: ")
+        packed = self.save(numpy.arange(60).reshape(4, 5, 3).astype("i2"), TURN, "a.nii.gz").read_bytes()
+        for size in range(0, len(packed), 7):
+            (self.folder / "cut.nii.gz").write_bytes(packed[:size])
+            self.refused(self.folder / "cut.nii.gz", "error: ")
+
+    def test_flipped_bytes_never_harm(self):
+        for name in ("a.nii", "a.nii.gz"):
+            good = self.save(self.random.integers(0, 9, (4, 5, 3)).astype("i2"), TURN, name).read_bytes()
+            for _ in range(60):
+                wrong = bytearray(good)
+                for _ in range(1 + int(self.random.integers(3))):
+                    wrong[int(self.random.integers(min(len(wrong), 380)))] = int(self.random.integers(256))
+                (self.folder / ("b" + name)).write_bytes(wrong)
+                done = subprocess.run([IO_FILES, "describe", str(self.folder / ("b" + name)), str(self.folder / "raw")],
+                                      capture_output=True, text=True)
+                self.assertIn(done.returncode, (0, 65), done.stderr)
+                self.assertTrue(done.returncode == 0 or done.stderr.startswith("error: "), done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
