@@ -44,6 +44,15 @@ std::vector<std::uint32_t> all_wanted(const PoseJob& job) {
   return rows;
 }
 
+// Quality and volumes look at every tet; meshes alone only at those that their vertices hang on.
+runtime::NodesOf nodes_wanted(const PoseJob& job) {
+  for (const Subscription& subscription : job.subscriptions) {
+    const auto* mesh = std::get_if<MeshWant>(&subscription.want);
+    if (mesh == nullptr || mesh->quality) return runtime::NodesOf::body;
+  }
+  return runtime::NodesOf::tissues;
+}
+
 void describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,
               v1::PoseQuality& out) {
   out.set_verdict(quality.pass ? v1::PoseQuality::VERDICT_PASS : v1::PoseQuality::VERDICT_WARN);
@@ -147,7 +156,8 @@ Status run(const PoseJob& job, runtime::PosedBody& body) {
   outcome.status = guarded([&] {
     // A session's body is made at its first pose: sessions that only wait cost nothing.
     if (body.segments.empty()) body = job.model->poser.make_frame();
-    return job.model->poser.run(job.request.pose, job.request.skinning, all_wanted(job), body);
+    return job.model->poser.run(job.request.pose, job.request.skinning, all_wanted(job), body,
+                                nodes_wanted(job));
   });
   outcome.timings.set_posed(microseconds(Clock::now() - start));
   const v1::ServerTimings timings = outcome.timings;

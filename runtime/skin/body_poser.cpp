@@ -7,60 +7,16 @@
 
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
-#include "runtime/skin/bones_rigid.hpp"
-#include "runtime/skin/skin_nodes_cor.hpp"
-#include "runtime/skin/skin_nodes_dqs.hpp"
-#include "runtime/skin/skin_nodes_lbs.hpp"
-#include "runtime/skin/tissues_by_tet.hpp"
+#include "runtime/skin/body_parts.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
-constexpr float kSmallestWeight = 1e-4F;  // 0.08 mm on the reference body; below it memory traffic is wasted
-constexpr double kUnitTolerance = 1e-2;   // a sender's rounding; anything beyond is not a rotation
+constexpr double kUnitTolerance = 1e-2;  // a sender's rounding; anything beyond is not a rotation
 constexpr std::array<std::string_view, 3> kSkinnings{"lbs", "dqs", "cor"};
 
 [[noreturn]] void unfit(const Model& model, const std::string& what) {
   throw Error(ErrorKind::data, "model " + model.name, what, "preprocess the case again");
-}
-
-// Weights as the kernels read them.
-struct RuntimeWeights {
-  std::vector<std::uint32_t> offsets;
-  std::vector<std::uint16_t> segment;
-  std::vector<float> weight;
-};
-
-RuntimeWeights runtime_weights(const Model& model) {
-  const Weights& stored = model.weights;
-  const std::size_t nodes = model.node_count();
-  if (stored.offsets.size() != nodes + 1 || stored.segment.size() != stored.weight.size() ||
-      stored.offsets.back() != stored.weight.size() || stored.weight.size() > UINT32_MAX) {
-    unfit(model, "its weights do not fit its nodes");
-  }
-  RuntimeWeights out;
-  out.offsets.reserve(nodes + 1);
-  out.offsets.push_back(0);
-  for (std::size_t n = 0; n < nodes; ++n) {
-    if (stored.offsets[n] > stored.offsets[n + 1]) unfit(model, "its weights are out of order");
-    double sum = 0;
-    for (std::size_t e = stored.offsets[n]; e < stored.offsets[n + 1]; ++e) {
-      if (stored.segment[e] >= model.segment_count()) unfit(model, "a weight names an absent segment");
-      if (stored.weight[e] >= kSmallestWeight) sum += static_cast<double>(stored.weight[e]);
-    }
-    if (!(sum > 0)) unfit(model, "node " + std::to_string(n) + " has no weight");
-    for (std::size_t e = stored.offsets[n]; e < stored.offsets[n + 1]; ++e) {
-      if (stored.weight[e] < kSmallestWeight) continue;
-      out.segment.push_back(stored.segment[e]);
-      out.weight.push_back(static_cast<float>(static_cast<double>(stored.weight[e]) / sum));
-    }
-    out.offsets.push_back(static_cast<std::uint32_t>(out.weight.size()));
-  }
-  return out;
-}
-
-std::span<const float> floats(const PointsF& points) {
-  return {points.data(), static_cast<std::size_t>(points.size())};
 }
 
 template <class Index>
@@ -86,9 +42,6 @@ void check_model(const Model& model) {
   if (model.segment_count() == 0 || model.node_count() == 0) unfit(model, "it has no segment or no node");
   if (!below(model.tets.data(), static_cast<std::size_t>(model.tets.size()), model.node_count())) {
     unfit(model, "a tet names an absent node");
-  }
-  if (model.cor.has_centre.size() != model.node_count() || model.cor.centre.rows() != model.nodes.rows()) {
-    unfit(model, "its centres of rotation do not fit its nodes");
   }
   for (const Tissue& tissue : model.tissues) check_tissue(model, tissue);
   // A rig that cannot be constrained is found here, not in the middle of a session.
@@ -137,49 +90,24 @@ Skinning skinning_from_name(std::string_view name) {
 
 struct BodyPoser::Impl {
   std::shared_ptr<const Model> model;
-  RuntimeWeights weights;
-  Vec3f origin{};
-  std::vector<Vec3f> tissue_origin;
+  BodyParts parts;
   std::vector<std::uint32_t> all_tissues;
-
-  void skin(Skinning skinning, PosedBody& out) const {
-    const SkinNodesInput in{floats(model->nodes), weights.offsets,
-                            weights.segment,      weights.weight,
-                            out.motions,          make_motions(out.segments, origin, out.motions)};
-    switch (skinning) {
-      case Skinning::lbs:
-        return SkinNodesLbs{in, out.nodes}.run();
-      case Skinning::dqs:
-        return SkinNodesDqs{in, out.nodes}.run();
-      case Skinning::cor:
-        break;
-    }
-    SkinNodesCor{in, floats(model->cor.centre), model->cor.has_centre, out.nodes}.run();
-  }
-
-  void move_tissue(std::size_t row, PosedBody& out) const {
-    const Tissue& tissue = model->tissues[row];
-    if (tissue.segment != Tissue::by_tets) {
-      BonesRigid{floats(tissue.V), tissue_origin[row], out.segments[static_cast<std::size_t>(tissue.segment)],
-                 out.tissues[row]}
-          .run();
-      return;
-    }
-    TissuesByTet{out.nodes,
-                 {model->tets.data(), static_cast<std::size_t>(model->tets.size())},
-                 tissue.tet,
-                 {tissue.barycentric.data(), static_cast<std::size_t>(tissue.barycentric.size())},
-                 out.tissues[row]}
-        .run();
-  }
 
   // Frames are made by make_frame, so sizes are all that can be wrong with one.
   bool fits(const PosedBody& frame) const {
     bool good =
-        frame.segments.size() == model->segment_count() && frame.motions.size() == model->segment_count() &&
-        frame.nodes.size() == 3 * model->node_count() && frame.tissues.size() == model->tissues.size();
+        frame.segments.size() == model->segment_count() &&
+        frame.scratch.motions.size() == model->segment_count() &&
+        frame.scratch.lanes.size() == parts.lane_floats() && frame.nodes.size() == 3 * model->node_count() &&
+        frame.tissues.size() == model->tissues.size() && frame.quantised.size() == model->tissues.size() &&
+        frame.normals.size() == model->tissues.size();
+    const auto whole_or_none = [](std::size_t found, std::size_t size) {
+      return found == 0 || found == size;
+    };
     for (std::size_t t = 0; good && t < frame.tissues.size(); ++t) {
-      good = frame.tissues[t].size() == static_cast<std::size_t>(model->tissues[t].V.size());
+      const auto size = static_cast<std::size_t>(model->tissues[t].V.size());
+      good = whole_or_none(frame.tissues[t].size(), size) && whole_or_none(frame.quantised[t].size(), size) &&
+             whole_or_none(frame.normals[t].size(), size);
     }
     return good;
   }
@@ -187,10 +115,8 @@ struct BodyPoser::Impl {
 
 BodyPoser::BodyPoser(std::shared_ptr<const Model> model) : impl_(std::make_unique<Impl>()) {
   check_model(*model);
-  impl_->weights = runtime_weights(*model);
-  impl_->origin = middle_of(floats(model->nodes));
+  impl_->parts = BodyParts(*model);
   for (std::size_t t = 0; t < model->tissues.size(); ++t) {
-    impl_->tissue_origin.push_back(middle_of(floats(model->tissues[t].V)));
     impl_->all_tissues.push_back(static_cast<std::uint32_t>(t));
   }
   impl_->model = std::move(model);
@@ -210,22 +136,27 @@ std::span<const std::uint32_t> BodyPoser::all_tissues() const {
   return impl_->all_tissues;
 }
 
-PosedBody BodyPoser::make_frame() const {
+PosedBody BodyPoser::make_frame(const FrameParts& parts) const {
   const Model& model = *impl_->model;
   PosedBody frame;
   frame.pose = Pose::rest(model.segment_count());
   frame.segments.resize(model.segment_count());
-  frame.motions.resize(model.segment_count());
   frame.nodes.assign(model.nodes.data(), model.nodes.data() + model.nodes.size());
   for (const Tissue& tissue : model.tissues) {
-    frame.tissues.emplace_back(tissue.V.data(), tissue.V.data() + tissue.V.size());
+    const auto size = static_cast<std::size_t>(tissue.V.size());
+    frame.tissues.emplace_back();
+    if (parts.positions) frame.tissues.back().assign(tissue.V.data(), tissue.V.data() + size);
+    frame.quantised.emplace_back(parts.quantised ? size : 0);
+    frame.normals.emplace_back(parts.normals ? size : 0);
   }
   frame.clamped.reserve(model.segment_count());
+  impl_->parts.make_scratch(frame.scratch);
+  frame.scratch.motions.resize(model.segment_count());
   return frame;
 }
 
 Status BodyPoser::run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues,
-                      PosedBody& out) const {
+                      PosedBody& out, NodesOf nodes) const {
   const Rig& rig = impl_->model->rig;
   if (Status status = check_pose(rig.skeleton, pose); !status.ok()) return status;
   if (!impl_->fits(out)) return bad("the frame was made for another model");
@@ -235,8 +166,8 @@ Status BodyPoser::run(const Pose& pose, Skinning skinning, std::span<const std::
   out.clamped.clear();
   kinematics::constrain(rig.skeleton, out.pose, out.clamped);
   kinematics::forward(rig, out.pose, out.segments);
-  impl_->skin(skinning, out);
-  for (const std::uint32_t tissue : tissues) impl_->move_tissue(tissue, out);
+  impl_->parts.skin(skinning, tissues, nodes, out);
+  impl_->parts.move(*impl_->model, tissues, out);
   return {};
 }
 

@@ -12,6 +12,8 @@
 #include "core/values/model.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/transform.hpp"
+#include "runtime/skin/aligned.hpp"
+#include "runtime/skin/move_vertices.hpp"
 #include "runtime/skin/segment_motion.hpp"
 
 namespace ecorche::runtime {
@@ -26,15 +28,40 @@ enum class Skinning : std::uint8_t {
 std::string_view skinning_name(Skinning skinning);
 Skinning skinning_from_name(std::string_view name);
 
+/// What a frame holds of its tissues.
+struct FrameParts {
+  bool positions = true;   ///< float32
+  bool quantised = false;  ///< u16 in PosedBody::box
+  bool normals = false;    ///< i16
+};
+
+/// Which nodes a pose is worked out for.
+enum class NodesOf : std::uint8_t {
+  body,     ///< all; quality and volumes need them
+  tissues,  ///< those that the asked tissues hang on: about half of the work. PosedBody::nodes is not written
+};
+
 /// One posed body. Allocated once by BodyPoser::make_frame, then only written.
 struct PosedBody {
   Pose pose;                             ///< what was posed: as asked, within limits, coupled
   std::vector<RigidTransform> segments;  ///< motion of every segment from rest
   std::vector<float> nodes;              ///< 3 * #nodes, LPS mm
   std::vector<std::vector<float>>
-      tissues;                         ///< per tissue of the model, 3 * #V; not written when not asked for
-  std::vector<ClampedJoint> clamped;   ///< reserved for all joints; what limits took away
-  std::vector<SegmentMotion> motions;  ///< scratch of `run`: the segments as the kernels read them
+      tissues;  ///< per tissue of the model, 3 * #V; not written when not asked for
+  std::vector<std::vector<std::uint16_t>> quantised;  ///< per tissue, 3 * #V, in `box`; empty: not a part
+  std::vector<std::vector<std::int16_t>>
+      normals;      ///< per tissue, 3 * #V, unit vectors in 32767ths; empty: not a part
+  QuantiseBox box;  ///< a cube about the body's middle as its root carries it, twice the body's diagonal wide
+  std::vector<ClampedJoint> clamped;  ///< reserved for all joints; what limits took away
+
+  /// Of `run`; means nothing to others.
+  struct Scratch {
+    std::vector<SegmentMotion> motions;   // #segments, as the kernels read them
+    Aligned<float> lanes;                 // posed nodes in the order of NodeClusters, and one float more
+    std::vector<std::uint64_t> mask;      // a bit per cluster
+    std::vector<std::uint32_t> clusters;  // what to skin
+    std::vector<std::uint32_t> blocks;    // what to move
+  } scratch;
 };
 
 /// Shared and immutable: any number of threads may pose different frames at once. Work inside runs in the
@@ -50,7 +77,7 @@ class BodyPoser {
 
   const Model& model() const;
   const std::shared_ptr<const Model>& shared_model() const;
-  PosedBody make_frame() const;
+  PosedBody make_frame(const FrameParts& parts = {}) const;
 
   /// Constrains `pose` (limits, coupling), runs forward kinematics, skins the nodes, then moves the tissues
   /// whose rows of Model::tissues are in `tissues` (ascending). Allocates nothing. invalid_argument when the
@@ -58,8 +85,8 @@ class BodyPoser {
   /// quaternion whose length is not 1 within 1 %, when a tissue is not of the model, or when `out` is no
   /// frame of it. Positions keep 1e-3 mm at rest and under any rigid motion of the whole body within metres:
   /// see segment_motion.hpp.
-  Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues,
-             PosedBody& out) const;
+  Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues, PosedBody& out,
+             NodesOf nodes = NodesOf::body) const;
 
   /// All tissues of the model.
   std::span<const std::uint32_t> all_tissues() const;

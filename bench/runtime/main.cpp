@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+// Times of posing beside the memory's floor and the plain version, all in one run: bench_runtime MODEL.hdf.
+//
+// Every joint moves in every frame. Working sets of at least four last caches: as many copies of the body as
+// that takes are posed in turn, as many bodies would be. The floor is the fewest bytes that the layout needs
+// (what it holds of each node and vertex, and each result once) over the bandwidth measured with as many
+// threads in this run; the time of a store's own fetch of its line is the kernel's loss. Each figure is the
+// median over the walk, the worst beside it.
+#include <hwy/targets.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <functional>
+
+#include "bench/runtime/bandwidth.hpp"
+#include "bench/runtime/plain_eigen.hpp"
+#include "core/kinematics/forward.hpp"
+#include "core/model_file/model_file.hpp"
+#include "runtime/quality/pose_quality.hpp"
+#include "runtime/skin/body_parts.hpp"
+#include "runtime/skin/skin_clusters.hpp"
+#include "runtime/volume/resample.hpp"
+
+namespace ecorche::bench {
+namespace {
+
+using runtime::Skinning;
+constexpr int kFrames = 60;
+constexpr double kMib = 1 << 20;
+constexpr Skinning kAll[] = {Skinning::lbs, Skinning::dqs, Skinning::cor};
+
+// Frame f of a cycle of 60 in which every joint swings about its own axis in its own phase.
+Pose swing(std::size_t joints, int f) {
+  Pose pose = Pose::rest(joints);
+  for (std::size_t j = 0; j < joints; ++j) {
+    const double at = static_cast<double>(j), phase = 2 * EIGEN_PI * f / kFrames + at;
+    const Eigen::Vector3d axis = Eigen::Vector3d(1, 0.3 * std::sin(at), 0.3 * std::cos(at)).normalized();
+    pose.rotation[j] = Eigen::AngleAxisd(0.2 + 0.3 * std::sin(phase), axis);
+  }
+  pose.root_translation = {10.0 * f, 0, 5.0 * f};
+  return pose;
+}
+
+struct Figure {
+  double median, worst;  // ms
+};
+
+Figure time(int frames, const std::function<void(int)>& work) {
+  std::vector<double> ms;
+  for (int f = -3; f < frames; ++f) {
+    const auto start = std::chrono::steady_clock::now();
+    work(f + 3);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    if (f >= 0) ms.push_back(took.count());
+  }
+  std::sort(ms.begin(), ms.end());
+  return {ms[ms.size() / 2], ms.back()};
+}
+
+struct Bytes {
+  double nodes[3], tissues, quantised, normals;
+};
+
+double size_of(std::size_t count, double each) {
+  return static_cast<double>(count) * each;
+}
+
+Bytes bytes_of(const Model& model, const runtime::BodyParts& parts) {
+  const auto& clusters = parts.clusters();
+  const std::size_t needed = (clusters.needed + 63) / 64, lanes = 64 * needed;
+  const double weights = size_of(64 * clusters.begin[needed], 2);
+  Bytes out{};
+  const double lbs = size_of(lanes, 12 + 12) + weights;
+  out.nodes[0] = out.nodes[1] = lbs;
+  out.nodes[2] = lbs + size_of(lanes, 12);
+  std::size_t all = 0;
+  for (std::size_t t = 0; t < model.tissues.size(); ++t) {
+    const auto vertices = static_cast<std::size_t>(model.tissues[t].V.rows());
+    all += vertices;
+    if (model.tissues[t].segment != Tissue::by_tets) {
+      out.tissues += size_of(vertices, 12);
+      out.normals += size_of(vertices, 12);
+      continue;
+    }
+    const auto& g = parts.groups(t);
+    out.tissues += size_of(g.lanes.size(), 4) + size_of(g.corner.size(), 1) + size_of(g.narrow.size(), 2) +
+                   size_of(g.wide.size(), 4) + size_of(g.vertex.size(), 4) + size_of(g.groups.size(), 20);
+    out.normals += size_of(g.normal.size(), 2);
+  }
+  out.tissues += size_of(clusters.needed, 12);  // the posed nodes, once
+  out.quantised = size_of(all, 6);
+  out.normals += size_of(all, 6);
+  return out;
+}
+
+void line(const char* what, int threads, const Figure& figure, double floor_ms, double against = 0) {
+  std::printf("  %-34s %d thread%s %8.3f ms, worst %8.3f", what, threads, threads == 1 ? " " : "s",
+              figure.median, figure.worst);
+  if (floor_ms > 0) std::printf(", floor %7.3f, x%.2f", floor_ms, figure.median / floor_ms);
+  if (against > 0) std::printf(", plain Eigen x%.1f slower", against / figure.median);
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+class Bench {
+ public:
+  explicit Bench(std::shared_ptr<const Model> model)
+      : model_(std::move(model)), parts_(*model_), bytes_(bytes_of(*model_, parts_)), plain_(*model_) {
+    const double frame = bytes_.nodes[2] + bytes_.tissues + bytes_.quantised;
+    copies_ = std::clamp<std::size_t>(static_cast<std::size_t>(4 * last_cache() / frame) + 1, 2, 12);
+    for (std::size_t c = 0; c < copies_; ++c) {
+      posers_.push_back(std::make_unique<runtime::BodyPoser>(model_));
+      clusters_.push_back(parts_.clusters());
+      plain_frames_.push_back(posers_.back()->make_frame());
+      wire_frames_.push_back(posers_.back()->make_frame({.positions = false, .quantised = true}));
+      full_frames_.push_back(
+          posers_.back()->make_frame({.positions = false, .quantised = true, .normals = true}));
+    }
+    for (int f = 0; f < kFrames; ++f) {
+      poses_.push_back(swing(model_->segment_count(), f));
+      segments_.push_back(kinematics::forward(model_->rig, poses_.back()));
+    }
+  }
+
+  void run(int threads) {
+    tbb::task_arena arena(threads);
+    arena.execute([&] { run_here(threads); });
+  }
+
+  void describe() const {
+    const auto& clusters = parts_.clusters();
+    std::size_t vertices = 0;
+    for (const Tissue& tissue : model_->tissues) vertices += static_cast<std::size_t>(tissue.V.rows());
+    std::printf("%s: %zu tets, %zu nodes (%.0f %% needed by tissues), %zu segments, %zu tissue vertices\n",
+                model_->name.c_str(), model_->tet_count(), clusters.nodes,
+                100.0 * static_cast<double>(clusters.needed) / static_cast<double>(clusters.nodes),
+                model_->segment_count(), vertices);
+    std::printf("palette of a cluster %.2f segments; instruction set %s; %zu copies in turn\n",
+                static_cast<double>(clusters.palette.size()) / static_cast<double>(clusters.clusters()),
+                hwy::TargetName(hwy::SupportedAndGeneratedTargets().front()), copies_);
+    std::printf("MiB of a frame: LBS, DQS %.2f, CoR %.2f, tissues %.2f, u16 %.2f, normals %.2f\n",
+                bytes_.nodes[0] / kMib, bytes_.nodes[2] / kMib, bytes_.tissues / kMib,
+                bytes_.quantised / kMib, bytes_.normals / kMib);
+  }
+
+ private:
+  void run_here(int threads) {
+    const double gbs = bandwidth(4 * 3 * last_cache() / kMib);
+    const auto floor_of = [&](double bytes) { return bytes / gbs / 1e6; };
+    std::printf("%d thread%s: memory %.1f GB/s\n", threads, threads == 1 ? "" : "s", gbs);
+    std::vector<std::uint32_t> needed((parts_.clusters().needed + 63) / 64);
+    for (std::size_t c = 0; c < needed.size(); ++c) needed[c] = static_cast<std::uint32_t>(c);
+    for (const Skinning skinning : kAll) {
+      const Figure figure = time(kFrames, [&](int f) { skin(skinning, needed, f); });
+      line((std::string("nodes, ") + std::string(runtime::skinning_name(skinning))).c_str(), threads, figure,
+           floor_of(bytes_.nodes[static_cast<std::size_t>(skinning)]), plain_nodes(skinning));
+    }
+    const double plain = time(9, [&](int f) {
+                           plain_.nodes(segments_[static_cast<std::size_t>(f)], Skinning::cor);
+                           plain_.tissues(segments_[static_cast<std::size_t>(f)]);
+                         }).median;
+    std::size_t all = 0;
+    for (const Tissue& tissue : model_->tissues) all += static_cast<std::size_t>(tissue.V.rows());
+    const double body = bytes_.nodes[2] + bytes_.tissues;
+    line("frame, CoR, float32", threads, frames(plain_frames_), floor_of(body + size_of(all, 12)), plain);
+    line("frame, CoR, u16", threads, frames(wire_frames_), floor_of(body + bytes_.quantised), plain);
+    line("frame, CoR, u16 and normals", threads, frames(full_frames_),
+         floor_of(body + bytes_.quantised + bytes_.normals));
+    line("plain Eigen, CoR, float32", threads, {plain, plain}, 0);
+
+    runtime::PosedBody& frame = plain_frames_[0];
+    const Status status = posers_[0]->run(poses_[7], Skinning::cor, posers_[0]->all_tissues(), frame);
+    if (!status.ok()) throw Error(ErrorKind::internal, "bench", status.message, "mend it");
+    line("quality, all tets and tissues", threads,
+         time(9, [&](int) { runtime::measure(*model_, frame, posers_[0]->all_tissues()); }), 0);
+    if (model_->volumes.empty()) return;
+    const ModelVolume& volume = model_->volumes.front();
+    runtime::InverseMap map;
+    const ImageGrid grid = volume.image.grid;
+    std::printf("  volume %s on its rest grid, %d x %d x %d\n", volume.name.c_str(),
+                static_cast<int>(grid.size[0]), static_cast<int>(grid.size[1]),
+                static_cast<int>(grid.size[2]));
+    line("  inverse map", threads, time(3, [&](int) { runtime::locate(*model_, frame.nodes, grid, map); }),
+         0);
+    line("  trilinear samples", threads,
+         time(3,
+              [&](int) {
+                runtime::resample(*model_, frame.nodes, map, volume, runtime::Sampling::trilinear);
+              }),
+         0);
+  }
+
+  double plain_nodes(Skinning skinning) {
+    return time(9, [&](int f) { plain_.nodes(segments_[static_cast<std::size_t>(f)], skinning); }).median;
+  }
+
+  void skin(Skinning skinning, const std::vector<std::uint32_t>& needed, int f) {
+    const std::size_t copy = static_cast<std::size_t>(f) % copies_;
+    auto& scratch = plain_frames_[copy].scratch;
+    const runtime::NodeClusters& layout = clusters_[copy];
+    const runtime::RootMotion root =
+        runtime::make_motions(segments_[static_cast<std::size_t>(f % kFrames)], {0, 0, 0}, scratch.motions);
+    const runtime::SkinClusters job{
+        layout, scratch.motions, root, needed, std::span(scratch.lanes).first(3 * layout.node.size()), {}};
+    if (skinning == Skinning::lbs) return job.lbs();
+    if (skinning == Skinning::dqs) return job.dqs();
+    job.cor();
+  }
+
+  Figure frames(std::vector<runtime::PosedBody>& bodies) {
+    return time(kFrames, [&](int f) {
+      const std::size_t copy = static_cast<std::size_t>(f) % copies_;
+      const Status status =
+          posers_[copy]->run(poses_[static_cast<std::size_t>(f % kFrames)], Skinning::cor,
+                             posers_[copy]->all_tissues(), bodies[copy], runtime::NodesOf::tissues);
+      if (!status.ok()) throw Error(ErrorKind::internal, "bench", status.message, "mend it");
+    });
+  }
+
+  std::shared_ptr<const Model> model_;
+  runtime::BodyParts parts_;
+  Bytes bytes_;
+  PlainEigen plain_;
+  std::size_t copies_ = 1;
+  std::vector<std::unique_ptr<runtime::BodyPoser>> posers_;
+  std::vector<runtime::NodeClusters> clusters_;
+  std::vector<runtime::PosedBody> plain_frames_, wire_frames_, full_frames_;
+  std::vector<Pose> poses_;
+  std::vector<std::vector<RigidTransform>> segments_;
+};
+
+}  // namespace
+}  // namespace ecorche::bench
+
+int main(int argc, char** argv) {
+  using namespace ecorche;
+  if (argc != 2) {
+    std::fprintf(stderr, "error: bench_runtime: one model is needed (bench_runtime MODEL.hdf)\n");
+    return 64;
+  }
+  try {
+    bench::Bench bench(std::make_shared<const Model>(model_file::read(argv[1], Context{})));
+    bench.describe();
+    bench.run(1);
+    bench.run(2);
+  } catch (const Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return exit_code(error.kind());
+  }
+  return 0;
+}

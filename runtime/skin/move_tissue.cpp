@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vertices of a tissue, a group of 16 at a time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "runtime/skin/move_tissue.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, as Highway asks.
+#include "runtime/skin/sink-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ecorche::runtime::HWY_NAMESPACE {
+
+using U8 = hn::Rebind<std::uint8_t, F>;
+constexpr std::size_t kSize = VertexGroups::size;
+
+// The palette of a group, one coordinate after another.
+struct Table {
+  HWY_ALIGN float x[VertexGroups::most_lanes], y[VertexGroups::most_lanes], z[VertexGroups::most_lanes];
+};
+
+// Four rows of three floats at a time, turned into columns; the fourth float of a row is its neighbour's.
+HWY_INLINE void fetch(const float* posed, const std::uint32_t* lanes, std::size_t count, Table& table) {
+#if HWY_TARGET == HWY_SCALAR
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* x = posed + 3 * std::size_t{lanes[i]};
+    table.x[i] = x[0];
+    table.y[i] = x[1];
+    table.z[i] = x[2];
+  }
+#else
+  const hn::FixedTag<float, 4> d;
+  for (std::size_t i = 0; i < count; i += 4) {
+    const auto a = hn::LoadU(d, posed + 3 * std::size_t{lanes[i]});
+    const auto b = hn::LoadU(d, posed + 3 * std::size_t{lanes[i + 1]});
+    const auto e = hn::LoadU(d, posed + 3 * std::size_t{lanes[i + 2]});
+    const auto f = hn::LoadU(d, posed + 3 * std::size_t{lanes[i + 3]});
+    const auto xy_ab = hn::InterleaveLower(d, a, b), xy_ef = hn::InterleaveLower(d, e, f);
+    const auto z_ab = hn::InterleaveUpper(d, a, b), z_ef = hn::InterleaveUpper(d, e, f);
+    hn::Store(hn::ConcatLowerLower(d, xy_ef, xy_ab), d, table.x + i);
+    hn::Store(hn::ConcatUpperUpper(d, xy_ef, xy_ab), d, table.y + i);
+    hn::Store(hn::ConcatLowerLower(d, z_ef, z_ab), d, table.z + i);
+  }
+#endif
+}
+
+HWY_INLINE V pick(const float* column, hn::Vec<I> at) {
+  return hn::GatherIndex(F(), column, at);
+}
+
+HWY_INLINE V3 corner(const Table& table, const std::uint8_t* corners) {
+  const auto at = hn::PromoteTo(I(), hn::LoadU(U8(), corners));
+  return {pick(table.x, at), pick(table.y, at), pick(table.z, at)};
+}
+
+struct Numbers {
+  V b[3];
+};
+
+HWY_INLINE Numbers barycentric(const VertexGroups& groups, const VertexGroups::Group& group, std::size_t i) {
+  Numbers out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::size_t at = group.data + kSize * c + i;
+    out.b[c] = group.step != 0 ? hn::MulAdd(load_u16(&groups.narrow[at]), all(group.step), all(group.low))
+                               : hn::LoadU(F(), &groups.wide[at]);
+  }
+  return out;
+}
+
+HWY_INLINE V share(const std::int16_t* from) {
+  return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(I16(), from)));
+}
+
+void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
+  const VertexGroups& groups = job.groups;
+  Table table;
+  for (std::size_t g = begin; g < end; ++g) {
+    const VertexGroups::Group& group = groups.groups[g];
+    fetch(job.posed.data(), &groups.lanes[group.lanes], group.count, table);
+    const std::size_t count = groups.group_vertices(g);
+    for (std::size_t i = 0; i < count; i += hn::Lanes(F())) {
+      const std::uint8_t* corners = &groups.corner[4 * kSize * g + i];
+      const V3 x0 = corner(table, corners);
+      const V3 e1 = minus(corner(table, corners + kSize), x0);
+      const V3 e2 = minus(corner(table, corners + 2 * kSize), x0);
+      const V3 e3 = minus(corner(table, corners + 3 * kSize), x0);
+      const Numbers n = barycentric(groups, group, i);
+      const Places places{kSize * g + i, std::min(count - i, hn::Lanes(F())),
+                          groups.in_order ? nullptr : &groups.vertex[kSize * g + i]};
+      put_position(job.out, places,
+                   plus(x0, plus(times(e1, n.b[0]), plus(times(e2, n.b[1]), times(e3, n.b[2])))));
+      if (job.out.normals == nullptr) continue;
+      const std::int16_t* shares = &groups.normal[3 * kSize * g + i];
+      put_normal(
+          job.out, places,
+          plus(times(cross(e2, e3), share(shares)), plus(times(cross(e3, e1), share(shares + kSize)),
+                                                         times(cross(e1, e2), share(shares + 2 * kSize)))));
+    }
+  }
+}
+
+}  // namespace ecorche::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ecorche::runtime::kernels {
+
+HWY_EXPORT(move_tissue);
+
+void tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
+  HWY_DYNAMIC_DISPATCH(move_tissue)(job, begin, end);
+}
+
+}  // namespace ecorche::runtime::kernels
+#endif

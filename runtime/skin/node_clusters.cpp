@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/skin/node_clusters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/values/error.hpp"
+
+namespace ecorche::runtime {
+namespace {
+
+constexpr float kSmallestWeight = 1e-4F;  // 0.08 mm on the reference body; below it memory traffic is wasted
+constexpr std::size_t kSize = NodeClusters::size;
+
+[[noreturn]] void unfit(const Model& model, const std::string& what) {
+  throw Error(ErrorKind::data, "model " + model.name, what, "preprocess the case again");
+}
+
+void check(const Model& model) {
+  const Weights& stored = model.weights;
+  if (stored.offsets.size() != model.node_count() + 1 || stored.segment.size() != stored.weight.size() ||
+      stored.offsets.back() != stored.weight.size()) {
+    unfit(model, "its weights do not fit its nodes");
+  }
+  if (!std::is_sorted(stored.offsets.begin(), stored.offsets.end())) {
+    unfit(model, "its weights are out of order");
+  }
+  for (const std::uint16_t segment : stored.segment) {
+    if (segment >= model.segment_count()) unfit(model, "a weight names an absent segment");
+  }
+  if (model.cor.has_centre.size() != model.node_count() || model.cor.centre.rows() != model.nodes.rows()) {
+    unfit(model, "its centres of rotation do not fit its nodes");
+  }
+}
+
+// What is kept of the weights of one node; reused from node to node.
+struct Row {
+  std::vector<std::uint16_t> segment;
+  std::vector<double> weight;
+  std::vector<std::uint16_t> quantised;
+
+  void read(const Model& model, std::size_t node) {
+    segment.clear();
+    weight.clear();
+    double sum = 0;
+    for (auto e = model.weights.offsets[node]; e < model.weights.offsets[node + 1]; ++e) {
+      if (!(model.weights.weight[e] >= kSmallestWeight)) continue;
+      segment.push_back(model.weights.segment[e]);
+      weight.push_back(static_cast<double>(model.weights.weight[e]));
+      sum += weight.back();
+    }
+    if (!(sum > 0) || !std::isfinite(sum)) unfit(model, "node " + std::to_string(node) + " has no weight");
+    for (double& w : weight) w /= sum;
+    quantised.resize(weight.size());
+    quantise_weights(weight, quantised);
+  }
+};
+
+void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, Row& row, NodeClusters& out) {
+  const std::size_t first = out.palette.size();
+  for (const std::uint32_t node : nodes) {
+    row.read(model, node);
+    out.palette.insert(out.palette.end(), row.segment.begin(), row.segment.end());
+    // Kept short: a node has few segments, but a cluster of many nodes would hold each of them 64 times.
+    std::sort(out.palette.begin() + static_cast<std::ptrdiff_t>(first), out.palette.end());
+    out.palette.erase(
+        std::unique(out.palette.begin() + static_cast<std::ptrdiff_t>(first), out.palette.end()),
+        out.palette.end());
+  }
+  out.begin.push_back(static_cast<std::uint32_t>(out.palette.size()));
+  out.weight.resize(kSize * out.palette.size());
+  for (std::size_t i = 0; i < kSize; ++i) {
+    row.read(model, nodes[i]);
+    for (std::size_t e = 0; e < row.segment.size(); ++e) {
+      const auto place = std::lower_bound(out.palette.begin() + static_cast<std::ptrdiff_t>(first),
+                                          out.palette.end(), row.segment[e]) -
+                         out.palette.begin();
+      // A row that names a segment twice is summed.
+      std::uint16_t& weight = out.weight[kSize * static_cast<std::size_t>(place) + i];
+      weight = static_cast<std::uint16_t>(weight + row.quantised[e]);
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    for (const std::uint32_t node : nodes) out.rest.push_back(model.nodes(node, c));
+    for (const std::uint32_t node : nodes) {
+      out.centre.push_back(model.cor.has_centre[node] != 0 ? model.cor.centre(node, c)
+                                                           : model.nodes(node, c));
+    }
+  }
+}
+
+}  // namespace
+
+void quantise_weights(std::span<const double> weights, std::span<std::uint16_t> out) {
+  constexpr int whole = 65535;
+  int left = whole;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    out[i] = static_cast<std::uint16_t>(std::clamp(std::floor(weights[i] * whole), 0.0, double{whole}));
+    left -= out[i];
+  }
+  // At most one a weight is left over; a row is short, so the largest remainder is looked for each time.
+  for (; left > 0; --left) {
+    std::size_t best = 0;
+    double most = -2;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const double remainder = weights[i] * whole - out[i];
+      if (remainder > most) {
+        most = remainder;
+        best = i;
+      }
+    }
+    ++out[best];
+  }
+}
+
+NodeClusters cluster_nodes(const Model& model, std::span<const std::uint8_t> needed) {
+  check(model);
+  NodeClusters out;
+  out.nodes = model.node_count();
+  for (const bool wanted : {true, false}) {
+    for (std::size_t n = 0; n < out.nodes; ++n) {
+      if ((needed[n] != 0) == wanted) out.node.push_back(static_cast<std::uint32_t>(n));
+    }
+    if (wanted) out.needed = out.node.size();
+  }
+  out.lane.resize(out.nodes);
+  for (std::size_t i = 0; i < out.nodes; ++i) out.lane[out.node[i]] = static_cast<std::uint32_t>(i);
+  out.node.resize((out.nodes + kSize - 1) / kSize * kSize, out.node.back());
+
+  out.begin.push_back(0);
+  out.rest.reserve(3 * out.node.size());
+  out.centre.reserve(3 * out.node.size());
+  Row row;
+  for (std::size_t c = 0; c < out.clusters(); ++c) {
+    add_cluster(model, std::span(out.node).subspan(kSize * c, kSize), row, out);
+  }
+  return out;
+}
+
+}  // namespace ecorche::runtime

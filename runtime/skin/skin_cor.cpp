@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Skinning about optimised centres of rotation (LeHodgins16; Sujar18 4), a vector of nodes at a time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "runtime/skin/skin_cor.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, as Highway asks.
+#include "runtime/skin/quaternions-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ecorche::runtime::HWY_NAMESPACE {
+
+void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
+  const V3 origin = Root(job.root).origin();
+  const SegmentMotion* motions = job.motions.data();
+  const float* centres = job.layout.centre.data();
+  for_clusters(job, begin, end, [&](const Cluster& cluster, std::size_t at, const V3& x) HWY_ATTR {
+    const V3 p = load_planar(centres + at, NodeClusters::size);
+    const V3 y = minus(p, origin);
+    V3 shift{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};
+    Quaternion q = zero_quaternion();
+    for (std::size_t k = 0; k < cluster.count; ++k) {
+      const SegmentMotion& motion = motions[cluster.segments[k]];
+      const V w = load_u16(cluster.weights + NodeClusters::size * k);
+      shift.x = hn::MulAdd(w, row(&motion.turn[0], y, all(motion.shift[0])), shift.x);
+      shift.y = hn::MulAdd(w, row(&motion.turn[3], y, all(motion.shift[1])), shift.y);
+      shift.z = hn::MulAdd(w, row(&motion.turn[6], y, all(motion.shift[2])), shift.z);
+      add(motion.real, w, q);
+    }
+    const V squared = squared_length(q);
+    q = scaled(q, hn::Div(all(1), hn::Sqrt(squared)));
+    if (HWY_UNLIKELY(any_vanished(squared))) {
+      replace_vanished(motions, cluster, squared, &SegmentMotion::real, q);
+    }
+    return plus(times(shift, all(1 / whole)), turn_less_identity(q.w, q.r, minus(x, p)));
+  });
+}
+
+}  // namespace ecorche::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ecorche::runtime::kernels {
+
+HWY_EXPORT(skin_cor);
+
+void cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
+  HWY_DYNAMIC_DISPATCH(skin_cor)(job, begin, end);
+}
+
+}  // namespace ecorche::runtime::kernels
+#endif

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the kernels share, once per instruction set (Highway's foreach_target.h includes this again and
+// again).
+#if defined(ECORCHE_RUNTIME_SKIN_VECTORS_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef ECORCHE_RUNTIME_SKIN_VECTORS_INL
+#undef ECORCHE_RUNTIME_SKIN_VECTORS_INL
+#else
+#define ECORCHE_RUNTIME_SKIN_VECTORS_INL
+#endif
+
+#include <hwy/highway.h>
+
+#include "runtime/skin/skin_clusters.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ecorche::runtime::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F = hn::CappedTag<float, 16>;
+using I = hn::Rebind<std::int32_t, F>;
+using U16 = hn::Rebind<std::uint16_t, F>;
+using V = hn::Vec<F>;
+
+struct V3 {
+  V x, y, z;
+};
+
+HWY_INLINE V all(float value) {
+  return hn::Set(F(), value);
+}
+
+HWY_INLINE V3 load_planar(const float* x, std::size_t stride) {
+  return {hn::LoadU(F(), x), hn::LoadU(F(), x + stride), hn::LoadU(F(), x + 2 * stride)};
+}
+
+HWY_INLINE V3 minus(const V3& a, const V3& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+HWY_INLINE V3 plus(const V3& a, const V3& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
+HWY_INLINE V3 times(const V3& a, V b) {
+  return {hn::Mul(a.x, b), hn::Mul(a.y, b), hn::Mul(a.z, b)};
+}
+
+HWY_INLINE V3 cross(const V3& a, const V3& b) {
+  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
+          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
+}
+
+/// u16 as floats, 0 .. 65535.
+HWY_INLINE V load_u16(const std::uint16_t* from) {
+  return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(U16(), from)));
+}
+
+/// One row of a 3 by 3 matrix times v, plus `shift`.
+HWY_INLINE V row(const float* m, const V3& v, V shift) {
+  return hn::MulAdd(all(m[0]), v.x, hn::MulAdd(all(m[1]), v.y, hn::MulAdd(all(m[2]), v.z, shift)));
+}
+
+HWY_INLINE V3 matrix_times(const float* m, const V3& v) {
+  const V zero = hn::Zero(F());
+  return {row(m, v, zero), row(m + 3, v, zero), row(m + 6, v, zero)};
+}
+
+/// (R - I) y for the unit quaternion (w, r): 2 r x (r x y + w y). Exactly zero for the identity.
+HWY_INLINE V3 turn_less_identity(V w, const V3& r, const V3& y) {
+  const V3 inner = plus(cross(r, y), times(y, w));
+  return times(cross(r, inner), all(2));
+}
+
+/// The last line of segment_motion.hpp, x' = x + e + (R_root - I)(y + e) + t_root, with the sum of x and
+/// t_root made in two floats (Knuth's), so that a body metres away keeps 1e-3 mm and a rest pose every bit.
+class Root {
+ public:
+  explicit Root(const RootMotion& root) : turn_(root.turn) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      origin_[c] = root.origin[c];
+      high_[c] = static_cast<float>(root.shift[c]);
+      low_[c] = static_cast<float>(root.shift[c] - static_cast<double>(high_[c]));
+    }
+  }
+  HWY_INLINE V3 origin() const { return {all(origin_[0]), all(origin_[1]), all(origin_[2])}; }
+  HWY_INLINE V3 carry(const V3& x, const V3& e) const {
+    const V3 d = plus(e, matrix_times(turn_.data(), plus(minus(x, origin()), e)));
+    return {sum(x.x, d.x, 0), sum(x.y, d.y, 1), sum(x.z, d.z, 2)};
+  }
+
+ private:
+  HWY_INLINE V sum(V x, V d, std::size_t c) const {
+    const V high = all(high_[c]), s = hn::Add(x, high), taken = hn::Sub(s, x);
+    const V lost = hn::Add(hn::Sub(x, hn::Sub(s, taken)), hn::Sub(high, taken));
+    return hn::Add(s, hn::Add(hn::Add(lost, all(low_[c])), d));
+  }
+  std::array<float, 9> turn_;
+  float origin_[3], high_[3], low_[3];
+};
+
+/// Calls `skin(cluster view, rest x of a vector of lanes, e)` on every vector of every cluster.
+struct Cluster {
+  const std::uint16_t* segments;
+  std::size_t count;
+  const std::uint16_t* weights;  // of the first lane of the vector; the next segment's 64 further
+};
+
+/// `displace(cluster, first lane, x)` -> displacement in the root's frame.
+template <class Displace>
+HWY_INLINE void for_clusters(const SkinClusters& job, std::size_t begin, std::size_t end, Displace displace) {
+  constexpr std::size_t size = NodeClusters::size;
+  const Root root(job.root);
+  const NodeClusters& layout = job.layout;
+  for (std::size_t i = begin; i < end; ++i) {
+    const std::size_t c = job.clusters[i], first = layout.begin[c];
+    Cluster cluster{&layout.palette[first], layout.begin[c + 1] - first, &layout.weight[size * first]};
+    for (std::size_t lane = 0; lane < size; lane += hn::Lanes(F())) {
+      const V3 x = load_planar(&layout.rest[3 * size * c + lane], size);
+      const V3 posed = root.carry(x, displace(cluster, 3 * size * c + lane, x));
+      hn::StoreInterleaved3(posed.x, posed.y, posed.z, F(), &job.posed[3 * (size * c + lane)]);
+      cluster.weights += hn::Lanes(F());
+    }
+  }
+}
+
+/// 65535 times sum w_i ((R_i - I) y + u_i).
+HWY_INLINE V3 blend_displacements(const SegmentMotion* motions, const Cluster& cluster, const V3& y) {
+  V3 sum{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};
+  for (std::size_t k = 0; k < cluster.count; ++k) {
+    const SegmentMotion& motion = motions[cluster.segments[k]];
+    const V w = load_u16(cluster.weights + NodeClusters::size * k);
+    sum.x = hn::MulAdd(w, row(&motion.turn[0], y, all(motion.shift[0])), sum.x);
+    sum.y = hn::MulAdd(w, row(&motion.turn[3], y, all(motion.shift[1])), sum.y);
+    sum.z = hn::MulAdd(w, row(&motion.turn[6], y, all(motion.shift[2])), sum.z);
+  }
+  return sum;
+}
+
+/// The segment of the largest weight of a lane of the cluster; the first of equal ones.
+inline std::uint16_t heaviest(const Cluster& cluster, std::size_t lane) {
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < cluster.count; ++k) {
+    if (cluster.weights[NodeClusters::size * k + lane] > cluster.weights[NodeClusters::size * best + lane]) {
+      best = k;
+    }
+  }
+  return cluster.segments[best];
+}
+
+inline constexpr float whole = 65535;
+
+}  // namespace ecorche::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

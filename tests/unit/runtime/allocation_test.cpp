@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nothing is allocated in a frame: counted over the whole process, which is why this is a test of its own.
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+#include "runtime/skin/body_poser.hpp"
+#include "tests/support/toy_model.hpp"
+
+namespace {
+
+std::atomic<std::size_t> allocated{0};
+
+void* take(std::size_t bytes, std::size_t alignment) {
+  ++allocated;
+  void* memory = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t bytes) {
+  return take(bytes, alignof(std::max_align_t));
+}
+void* operator new(std::size_t bytes, std::align_val_t line) {
+  return take(bytes, static_cast<std::size_t>(line));
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+
+namespace ecorche::runtime {
+namespace {
+
+TEST(Allocation, NoneInAFrame) {
+  const BodyPoser poser(std::make_shared<const Model>(test::toy_model()));
+  PosedBody body = poser.make_frame({.positions = true, .quantised = true, .normals = true});
+  Pose pose = Pose::rest(3);
+  for (const NodesOf nodes : {NodesOf::body, NodesOf::tissues}) {
+    for (const Skinning skinning : {Skinning::lbs, Skinning::dqs, Skinning::cor}) {
+      tbb::task_arena(1).execute([&] {
+        ASSERT_TRUE(poser.run(pose, skinning, poser.all_tissues(), body, nodes).ok());  // whatever is lazy
+        const std::size_t before = allocated;
+        for (int frame = 1; frame <= 20; ++frame) {
+          pose.rotation[1] =
+              Eigen::AngleAxisd(0.15 * frame, Eigen::Vector3d::UnitX());  // beyond its limit, too
+          ASSERT_TRUE(poser.run(pose, skinning, poser.all_tissues(), body, nodes).ok());
+        }
+        EXPECT_EQ(allocated - before, 0u) << skinning_name(skinning);
+      });
+    }
+  }
+  EXPECT_GT(allocated, 0u) << "the counter counts";
+}
+
+}  // namespace
+}  // namespace ecorche::runtime
