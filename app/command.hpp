@@ -38,6 +38,7 @@ void declare_repair(CLI::App& app, Program& program, Run& chosen);
 void declare_preprocess(CLI::App& app, Program& program, Run& chosen);
 void declare_info(CLI::App& app, Program& program, Run& chosen);
 void declare_verify(CLI::App& app, Program& program, Run& chosen);
+void declare_export(CLI::App& app, Program& program, Run& chosen);
 void declare_pose(CLI::App& app, Program& program, Run& chosen);
 void declare_serve(CLI::App& app, Program& program, Run& chosen);
 void declare_stream(CLI::App& app, Program& program, Run& chosen);

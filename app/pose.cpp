@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "app/command.hpp"
+#include "app/tet_regions.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/kinematics/retarget.hpp"
 #include "core/model_file/model_file.hpp"
@@ -38,6 +39,7 @@ struct Settings {
   std::string sampling = "trilinear";
   std::string grid = "posed";
   bool tets = false, field = false;
+  std::vector<std::string> tet_formats{"vtu"};
 
   bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
 };
@@ -229,7 +231,7 @@ class FrameWriter {
   fs::path next(const std::string& name) {
     context_.check_stop();
     const std::size_t files = plan_.tissues.size() * settings_.formats.size() + plan_.volumes.size() +
-                              (plan_.tets || plan_.field ? 1 : 0) + (plan_.field ? 2 : 0) + 1;
+                              (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) + 1;
     context_.report(static_cast<double>(written_.size()) / static_cast<double>(files));
     written_.push_back((folder_ / name).string());
     return folder_ / name;
@@ -250,10 +252,22 @@ class FrameWriter {
   void write_tets() {
     const PointsF posed = Eigen::Map<const PointsF>(body_.nodes.data(), model_.nodes.rows(), 3);
     const PointsF moved = posed - model_.nodes;
-    io::write_tets(next("body.vtu"), posed, model_.tets,
-                   {{"displacement", 3, {moved.data(), moved.data() + moved.size()}}},
-                   {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}},
-                    {"det_f", 1, runtime::tet_det_f(model_, body_.nodes)}});
+    const auto write = [&](const std::string& ending) {
+      io::write_tets(next("body." + ending), posed, model_.tets,
+                     {{"displacement", 3, {moved.data(), moved.data() + moved.size()}}},
+                     {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}},
+                      {"det_f", 1, runtime::tet_det_f(model_, body_.nodes)}},
+                     tet_regions(model_));
+      if (ending == "ele") written_.push_back((folder_ / "body.node").string());
+    };
+    bool field_written = !plan_.field;  // body.vtu carries the way from rest to posed
+    if (plan_.tets) {
+      for (const std::string& format : settings_.tet_formats) {
+        write(format == "mcnp" ? "mcnp.inp" : format);
+        field_written = field_written || format == "vtu";
+      }
+    }
+    if (!field_written) write("vtu");
   }
 
   const runtime::InverseMap& map_on(const ImageGrid& rest) {
@@ -370,9 +384,9 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
   command->footer(choice);
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');
-  command->add_option("--format", s->formats, "of the tissues: stl, ply, vtp, glb, or several")
+  command->add_option("--format", s->formats, "of the tissues: stl, obj, ply, off, vtp, glb, or several")
       ->delimiter(',')
-      ->check(CLI::IsMember({"stl", "ply", "vtp", "glb"}))
+      ->check(CLI::IsMember({"stl", "obj", "ply", "off", "vtp", "glb"}))
       ->capture_default_str();
   command->add_option("--volumes", s->volumes, "volumes to write: all, none, or names with commas between")
       ->delimiter(',');
@@ -387,7 +401,14 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       ->add_option("--grid", s->grid, "of volumes: posed (the rest lattice grown to the posed body) or rest")
       ->check(CLI::IsMember({"posed", "rest"}))
       ->capture_default_str();
-  command->add_flag("--tets", s->tets, "write body.vtu: posed tets with displacement, label and det F");
+  command->add_flag("--tets", s->tets, "write the posed tets; body.vtu holds displacement, label and det F");
+  command
+      ->add_option(
+          "--tet-format", s->tet_formats,
+          "of the tets: vtu, msh (Gmsh), ele (TetGen), inp (Abaqus), mcnp (checked, in cm), or several")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"vtu", "msh", "ele", "inp", "mcnp"}))
+      ->capture_default_str();
   command->add_flag(
       "--field", s->field,
       "write the displacement field: rest to posed on the nodes of body.vtu, posed to rest as an "

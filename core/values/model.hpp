@@ -91,7 +91,7 @@ struct Model {
   Weights weights;
   CorCentres cor;
   std::vector<Tissue> tissues;       ///< skin first, then bones, then the case's order
-  std::vector<ModelVolume> volumes;  ///< the case's order; the label map last: "labels", then its layers "labels_2", ...
+  std::vector<ModelVolume> volumes;  ///< the case's order; the label map last, under the name "labels"
   Certificate certificate;
   std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
 

@@ -12,6 +12,7 @@
 #include "io/surface/off.hpp"
 #include "io/surface/ply.hpp"
 #include "io/surface/stl.hpp"
+#include "io/surface/tet_formats.hpp"
 #include "io/surface/vtk_files.hpp"
 #include "io/surface/vtk_legacy.hpp"
 #include "io/surface/vtp.hpp"
@@ -84,14 +85,29 @@ void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh) {
 }
 
 void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T,
-                const std::vector<GridArray>& point_data, const std::vector<GridArray>& cell_data) {
-  if (extension_of(path) != ".vtu") {
-    throw Error(ErrorKind::usage, path.string(), "cannot write tets as '" + extension_of(path) + "'",
-                "use .vtu");
+                const std::vector<GridArray>& point_data, const std::vector<GridArray>& cell_data,
+                const TetRegions& regions) {
+  const std::string extension = extension_of(path);
+  if (extension == ".vtu") {
+    files::AtomicFile file(path);
+    vtk_files::write_vtu(file.temporary(), V, T, point_data, cell_data);
+    return file.commit();
   }
-  files::AtomicFile file(path);
-  vtk_files::write_vtu(file.temporary(), V, T, point_data, cell_data);
-  file.commit();
+  if (extension != ".msh" && extension != ".ele" && extension != ".inp") {
+    throw Error(ErrorKind::usage, path.string(), "cannot write tets as '" + extension + "'",
+                "use .vtu, .msh, .ele, .inp or .mcnp.inp");
+  }
+  tet_formats::check_tets(V, T, regions);
+  if (extension == ".msh") return files::write_text(path, tet_formats::encode_msh(V, T, regions));
+  if (extension == ".ele") {
+    std::filesystem::path nodes = path;
+    files::write_text(nodes.replace_extension(".node"), tet_formats::encode_node(V));
+    return files::write_text(path, tet_formats::encode_ele(T, regions));
+  }
+  const bool mcnp = extension_of(path.stem()) == ".mcnp";
+  if (mcnp) tet_formats::refuse_degenerate(V, T, path.string());
+  files::write_text(
+      path, mcnp ? tet_formats::encode_mcnp(V, T, regions) : tet_formats::encode_abaqus(V, T, regions));
 }
 
 }  // namespace ecorche::io

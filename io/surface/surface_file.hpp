@@ -2,6 +2,7 @@
 // Surfaces and tet grids as files, LPS mm in memory; the format is chosen by the extension.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -43,8 +44,19 @@ struct GridArray {
   std::vector<float> values;
 };
 
-/// Writes a `.vtu`, atomically.
+/// What each tet is in.
+struct TetRegions {
+  std::vector<std::uint16_t> label;  ///< one a tet, or none: then all are `body`
+  std::vector<std::string> names;    ///< by label
+};
+
+/// Writes tets (LPS mm, positive) in the format that the name ends in, atomically: `.vtu` with its arrays
+/// (regions are among them, as the caller names them); `.msh` (Gmsh 2.2, binary), `.ele` with its `.node`
+/// beside it (TetGen), `.inp` (Abaqus) and `.mcnp.inp` (MCNP6's unstructured mesh, cm) with their regions.
+/// `.mcnp.inp` refuses degenerate tets by Error{refused}, see tet_formats.hpp. Throws Error{usage} for
+/// another ending, Error{cannot_create}, Error{io}.
 void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T,
-                const std::vector<GridArray>& point_data, const std::vector<GridArray>& cell_data);
+                const std::vector<GridArray>& point_data, const std::vector<GridArray>& cell_data,
+                const TetRegions& regions = {});
 
 }  // namespace ecorche::io

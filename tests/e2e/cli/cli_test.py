@@ -37,9 +37,9 @@ class Cli(unittest.TestCase):
     def test_help_and_version(self):
         self.assertEqual(run("--version").returncode, 0)
         out = run("--help").stdout
-        for word in ("phantom", "check", "preprocess", "info", "verify", "pose", "serve", "stream", "not for planning surgery"):
+        for word in ("phantom", "check", "preprocess", "info", "verify", "export", "pose", "serve", "stream", "not for planning surgery"):
             self.assertIn(word, out)
-        for word in ("phantom", "check", "preprocess", "info", "verify", "pose", "serve", "stream"):
+        for word in ("phantom", "check", "preprocess", "info", "verify", "export", "pose", "serve", "stream"):
             self.assertEqual(run(word, "--help").returncode, 0)
 
     def test_usage_errors(self):
@@ -95,6 +95,26 @@ class Cli(unittest.TestCase):
         pose.write_text(f"ecorche_pose: 1\nskeleton: {skeleton}\njoints: {{third_elbow: {{flexion_deg: 3}}}}\n")
         self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--pose", pose), 78, "third_elbow")
         self.assertFalse((self.folder / "p").exists() and any((self.folder / "p").iterdir()), "nothing may be written")
+
+    def test_tets_go_to_other_programs(self):
+        files = [self.folder / name for name in ("a.vtu", "a.msh", "a.ele", "a.inp", "a.mcnp.inp")]
+        done = run("--json", "export", MODEL, "-o", *files)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        tets = json.loads(done.stdout)["tets"]
+        self.assertIn(f"\n{tets} 4 1\n", files[2].read_text())
+        self.assertTrue((self.folder / "a.node").is_file())
+        self.assertIn("*Elset, elset=Set-material_tally_001", files[4].read_text())
+        self.assert_error(run("export", MODEL, "-o", self.folder / "a.txt"), 64, "cannot write tets as '.txt'")
+        self.assert_error(run("export", self.folder / "none.hdf", "-o", self.folder / "b.msh"), 66)
+        pose = self.folder / "pose.yaml"
+        skeleton = re.search(r"^name: (\S+)", (CASE / "skeleton.yaml").read_text(), re.M).group(1)
+        pose.write_text(f"ecorche_pose: 1\nskeleton: {skeleton}\n")
+        out = self.folder / "posed"
+        done = run("pose", MODEL, "-o", out, "--pose", pose, "--tets", "--tet-format", "msh,ele,mcnp",
+                   "--tissues", "none", "--volumes", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(sorted(path.name for path in out.iterdir()),
+                         ["body.ele", "body.mcnp.inp", "body.msh", "body.node", "quality.json"])
 
     def test_json_is_one_object(self):
         info = json.loads(run("--json", "info", MODEL).stdout)

@@ -6,7 +6,7 @@
 
 #include "core/values/error.hpp"
 #include "io/image/image_file.hpp"
-#include "io/image/segmentation.hpp"
+#include "io/surface/surface_file.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -24,14 +24,43 @@ void describe(const char* path, const char* raw) {
   std::printf("%s\n", out.dump().c_str());
 }
 
+// A row of cubes, six tets each around a diagonal, in three regions, in every format.
+void tets(const std::filesystem::path& folder) {
+  constexpr int cubes = 9;
+  PointsF V(4 * (cubes + 1), 3);
+  for (Eigen::Index i = 0; i < V.rows(); ++i)
+    V.row(i) << 1.1F * static_cast<float>(i / 4), 1.3F * static_cast<float>(i % 4 / 2),
+        0.7F * static_cast<float>(i % 2);
+  Tets T(6 * cubes, 4);
+  TetRegions regions{{}, {"soft", "femur_right", "9th_rib"}};
+  constexpr int around[7]{4, 5, 1, 3, 2, 6, 4};  // the corners between 0 and 7, one edge after the other
+  for (int t = 0; t < T.rows(); ++t) {
+    const int base = 4 * (t / 6);
+    T.row(t) << base, base + around[t % 6], base + around[t % 6 + 1], base + 7;
+    if (tet_det(V.row(T(t, 0)), V.row(T(t, 1)), V.row(T(t, 2)), V.row(T(t, 3))) < 0)
+      std::swap(T(t, 1), T(t, 2));
+    regions.label.push_back(static_cast<std::uint16_t>(t % 7 == 0 ? 2 : t / 40));
+  }
+  for (const char* name : {"a.vtu", "a.msh", "a.ele", "a.inp", "a.mcnp.inp"})
+    write_tets(folder / name, V, T, {}, {{"label", 1, {regions.label.begin(), regions.label.end()}}},
+               regions);
+  nlohmann::json out{
+      {"points", nlohmann::json::array()}, {"tets", nlohmann::json::array()}, {"labels", regions.label}};
+  for (Eigen::Index i = 0; i < V.rows(); ++i) out["points"].push_back({V(i, 0), V(i, 1), V(i, 2)});
+  for (Eigen::Index t = 0; t < T.rows(); ++t) out["tets"].push_back({T(t, 0), T(t, 1), T(t, 2), T(t, 3)});
+  std::printf("%s\n", out.dump().c_str());
+}
+
 int run(int argc, char** argv) {
   const std::string what = argc > 3 ? argv[1] : "";
   if (what == "describe") {
     describe(argv[2], argv[3]);
   } else if (what == "copy") {
     write_image(argv[3], read_image(argv[2]));
+  } else if (what == "tets") {
+    tets(argv[2]);
   } else {
-    std::fprintf(stderr, "usage: io_files describe IMAGE RAW | copy IMAGE IMAGE\n");
+    std::fprintf(stderr, "usage: io_files describe IMAGE RAW | copy IMAGE IMAGE | tets FOLDER .\n");
     return 64;
   }
   return 0;

@@ -166,7 +166,7 @@ TEST(Surface, OtherFilesAreRefused) {
                [&] { write_surface(scratch / "a.fbx", block()); });
   expect_error(ErrorKind::cannot_create, "a.ply",
                [&] { write_surface(scratch / "none" / "a.ply", block()); });
-  expect_error(ErrorKind::usage, "cannot write tets as '.vtk' (use .vtu)",
+  expect_error(ErrorKind::usage, "cannot write tets as '.vtk' (use .vtu, .msh, .ele, .inp or .mcnp.inp)",
                [&] { write_tets(scratch / "a.vtk", {}, {}, {}, {}); });
 }
 
