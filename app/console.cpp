@@ -76,7 +76,8 @@ void Program::result(const std::string& text, const nlohmann::json& object) cons
   const std::string out = json ? object.dump() : text;
   std::fwrite(out.data(), 1, out.size(), stdout);
   if (out.empty() || out.back() != '\n') std::fputc('\n', stdout);
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw Error(ErrorKind::io, "stdout", "the result cannot be written", "check the disk's free space");
 }
 
 }  // namespace ecorche::app

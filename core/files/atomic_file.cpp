@@ -26,6 +26,19 @@ bool flush(const fs::path& path) {
   return good;
 }
 
+// Writers of other libraries may not tell that the disk was full: a file behind which no block fits is not
+// trusted to be whole. Leaves its length alone.
+int room_behind(const fs::path& path) {
+  constexpr ::off_t block = 1 << 16;
+  const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  if (file < 0) return errno;
+  const ::off_t length = ::lseek(file, 0, SEEK_END);
+  int error = length < 0 ? errno : ::posix_fallocate(file, length, block);
+  if (length >= 0 && ::ftruncate(file, length) != 0 && error == 0) error = errno;
+  ::close(file);
+  return error == ENOSPC || error == EFBIG || error == EDQUOT ? error : 0;
+}
+
 fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
@@ -56,6 +69,10 @@ void AtomicFile::commit() {
   if (!flush(temporary_)) {
     throw Error(ErrorKind::io, path_.string(), "cannot flush: " + std::string(std::strerror(errno)),
                 "check the disk's free space");
+  }
+  if (const int full = room_behind(temporary_); full != 0) {
+    throw Error(ErrorKind::io, path_.string(), "cannot be written whole: " + std::string(std::strerror(full)),
+                "free space on the disk, or name another one");
   }
   std::error_code error;
   fs::rename(temporary_, path_, error);

@@ -11,7 +11,8 @@ namespace ecorche::files {
 /// A temporary name beside `path` with the same extension. Write to `temporary()`, then `commit()`: flushed
 /// to the disk and renamed over `path`. Destroyed without a commit (an error, a stop) it removes the
 /// temporary and leaves whatever `path` held before. Throws Error{cannot_create} where the folder cannot be
-/// written to, Error{io} when flushing fails.
+/// written to, Error{io} when flushing fails, or when no 64 KiB more would fit behind the file: whoever wrote
+/// it may not have told that the disk was full.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);

@@ -216,7 +216,8 @@ class Inspector {
     const SurfaceFigures& skin = report_.surfaces.front().figures;
     if (skin.triangles == 0) return;
     const double extent = (skin.high - skin.low).maxCoeff();
-    if (skin.closed() && !(std::abs(skin.volume_mm3) > 1e-6 * extent * extent * extent)) {
+    const bool flat = (skin.high - skin.low).minCoeff() <= 1e-6 * extent;
+    if (flat || (skin.closed() && !(std::abs(skin.volume_mm3) > 1e-6 * extent * extent * extent))) {
       tell(Severity::error, patient_.skin_name, "encloses no volume", {}, "export the skin again");
     }
     if (extent < kSmallestSkin || extent > kLargestSkin) {
