@@ -14,7 +14,9 @@ using Eigen::Vector3d;
 
 constexpr std::array<double, 7> kScales{1, 10, 0.1, 1000, 0.001, 100, 0.01};
 
-// All signed permutations: the identity first, then those that keep handedness, then the mirrored ones.
+// All signed permutations: the identity, RAS and LSA, which most wrong files are in; then those that keep
+// left and right, then the other turns, then the mirrored ones. A body is nearly its own mirror image: the
+// first wins.
 std::vector<Matrix3d> axis_changes() {
   std::vector<Matrix3d> out;
   std::array<int, 3> order{0, 1, 2};
@@ -27,7 +29,12 @@ std::vector<Matrix3d> axis_changes() {
     }
   } while (std::next_permutation(order.begin(), order.end()));
   std::stable_sort(out.begin(), out.end(), [](const Matrix3d& a, const Matrix3d& b) {
-    const auto rank = [](const Matrix3d& m) { return m.isIdentity() ? 0 : m.determinant() > 0 ? 1 : 2; };
+    const auto rank = [](const Matrix3d& m) {
+      if (m.isIdentity()) return 0;
+      const std::string code = Agreement{m, 1, 0}.code();
+      if (code == "RAS" || code == "LSA") return 1;
+      return m.determinant() < 0 ? 4 : m(0, 0) > 0 ? 2 : 3;
+    };
     return rank(a) < rank(b);
   });
   return out;

@@ -18,10 +18,18 @@ Edge edge_of(std::int32_t a, std::int32_t b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
+using Corners = std::array<std::int32_t, 3>;
+
+Corners sorted(Corners corners) {
+  std::sort(corners.begin(), corners.end());
+  return corners;
+}
+
 // The triangulation of a loop of least area, by dynamic programming over its chords.
 class Filling {
  public:
-  Filling(const Soup& soup, const std::vector<std::int32_t>& loop, const std::set<Edge>& taken)
+  Filling(const Soup& soup, const std::vector<std::int32_t>& loop, const std::set<Edge>& taken,
+          const std::set<Corners>& present)
       : soup_(soup), loop_(loop), count_(loop.size()), area_(count_ * count_, 0), apex_(count_ * count_, 0) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     for (std::size_t span = 2; span < count_; ++span) {
@@ -33,6 +41,8 @@ class Filling {
         const bool rim = i == 0 && k == count_ - 1;
         if (!rim && taken.contains(edge_of(loop[i], loop[k]))) continue;
         for (std::size_t j = i + 1; j < k; ++j) {
+          // The back of a triangle that is there fills nothing.
+          if (present.contains(sorted({loop[i], loop[j], loop[k]}))) continue;
           const double area = area_[at(i, j)] + area_[at(j, k)] + triangle(i, j, k);
           if (area < best) best = area, apex_[at(i, k)] = j;
         }
@@ -80,6 +90,10 @@ Filled fill_holes(Soup& soup, double area, const Context& context) {
   for (const geometry::HalfEdge& e : edges) {
     if (rim.contains(e.low) && rim.contains(e.high)) taken.insert({e.low, e.high});
   }
+  std::set<Corners> present;  // triangles of such vertices
+  for (const Corners& t : soup.triangles) {
+    if (rim.contains(t[0]) && rim.contains(t[1]) && rim.contains(t[2])) present.insert(sorted(t));
+  }
   for (const auto& loop : loops) {
     context.check_stop();
     const bool possible = loop.closed && loop.vertices.size() >= 3 && loop.vertices.size() <= kMostEdges;
@@ -87,7 +101,7 @@ Filled fill_holes(Soup& soup, double area, const Context& context) {
       ++out.left;
       continue;
     }
-    const Filling filling(soup, loop.vertices, taken);
+    const Filling filling(soup, loop.vertices, taken, present);
     if (!(filling.area() <= area)) {
       ++out.left;
       continue;
@@ -95,7 +109,8 @@ Filled fill_holes(Soup& soup, double area, const Context& context) {
     const std::size_t before = soup.triangles.size();
     filling.append(soup.triangles);
     for (std::size_t f = before; f < soup.triangles.size(); ++f) {
-      const auto& t = soup.triangles[f];
+      const Corners& t = soup.triangles[f];
+      present.insert(sorted(t));
       for (std::size_t c = 0; c < 3; ++c) taken.insert(edge_of(t[c], t[(c + 1) % 3]));
     }
     ++out.holes;

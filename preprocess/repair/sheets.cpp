@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "preprocess/geometry/surface_edges.hpp"
 #include "preprocess/repair/soup.hpp"
@@ -12,7 +13,42 @@ namespace {
 using Eigen::Vector3d;
 using geometry::HalfEdge;
 
+constexpr int kMiddleRounds = 5;
 constexpr double kApart = 1e-3;  // mm between copies: float32 still tells them apart 8 m from the origin
+
+// Around an edge, behind a triangle that runs downward comes the solid, then a triangle that runs upward:
+// brackets that open and close, on a circle. Pairs of places in `edge`.
+std::vector<std::pair<std::size_t, std::size_t>> wall_pairs(const Soup& soup,
+                                                            std::span<const HalfEdge> edge) {
+  const auto point = [&](std::int32_t v) -> const Vector3d& {
+    return soup.points[static_cast<std::size_t>(v)];
+  };
+  const Vector3d low = point(edge[0].low);
+  const Vector3d along = (point(edge[0].high) - low).normalized();
+  const Vector3d x = along.unitOrthogonal(), y = along.cross(x);
+  std::vector<std::pair<double, std::size_t>> around;
+  for (std::size_t i = 0; i < edge.size(); ++i) {
+    const auto& t = soup.triangles[static_cast<std::size_t>(edge[i].triangle)];
+    const Vector3d apex = point(t[0]) + point(t[1]) + point(t[2]) - low - point(edge[0].high);
+    around.emplace_back(std::atan2((apex - low).dot(y), (apex - low).dot(x)), i);
+  }
+  std::sort(around.begin(), around.end());
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  std::vector<std::size_t> opened;
+  std::set<std::size_t> paired;
+  for (std::size_t n = 0; n < 2 * around.size(); ++n) {
+    const std::size_t i = around[n % around.size()].second;
+    if (paired.contains(i)) continue;
+    if (!edge[i].upward) {
+      if (n < around.size()) opened.push_back(i);
+    } else if (!opened.empty()) {
+      pairs.emplace_back(opened.back(), i);
+      paired.insert({opened.back(), i});
+      opened.pop_back();
+    }
+  }
+  return pairs;
+}
 
 class Splitter {
  public:
@@ -24,7 +60,8 @@ class Splitter {
     const auto edges = geometry::sorted_edges(soup_.F());
     geometry::each_edge(edges, [&](std::span<const HalfEdge> edge) {
       if (edge.size() == 2 && edge[0].upward != edge[1].upward) glue(edge[0], edge[1]);
-      if (edge.size() > 2) pair_walls(edge);
+      if (edge.size() <= 2) return;
+      for (const auto& [a, b] : wall_pairs(soup_, edge)) glue(edge[a], edge[b]);
     });
     return copy_vertices();
   }
@@ -43,37 +80,6 @@ class Splitter {
     for (const std::int32_t vertex : {a.low, a.high}) {
       const std::size_t i = root(corner(a, vertex)), j = root(corner(b, vertex));
       parent_[std::max(i, j)] = std::min(i, j);
-    }
-  }
-
-  // Around the edge, behind a triangle that runs downward comes the solid, then a triangle that runs upward:
-  // brackets that open and close, on a circle.
-  void pair_walls(std::span<const HalfEdge> edge) {
-    const auto point = [&](std::int32_t v) -> const Vector3d& {
-      return soup_.points[static_cast<std::size_t>(v)];
-    };
-    const Vector3d low = point(edge[0].low);
-    const Vector3d along = (point(edge[0].high) - low).normalized();
-    const Vector3d x = along.unitOrthogonal(), y = along.cross(x);
-    std::vector<std::pair<double, std::size_t>> around;
-    for (std::size_t i = 0; i < edge.size(); ++i) {
-      const auto& t = soup_.triangles[static_cast<std::size_t>(edge[i].triangle)];
-      const Vector3d apex = point(t[0]) + point(t[1]) + point(t[2]) - low - point(edge[0].high);
-      around.emplace_back(std::atan2((apex - low).dot(y), (apex - low).dot(x)), i);
-    }
-    std::sort(around.begin(), around.end());
-    std::vector<std::uint8_t> paired(edge.size(), 0);
-    std::vector<std::size_t> opened;
-    for (std::size_t n = 0; n < 2 * around.size(); ++n) {
-      const std::size_t i = around[n % around.size()].second;
-      if (paired[i] != 0) continue;
-      if (!edge[i].upward) {
-        if (n < around.size()) opened.push_back(i);
-      } else if (!opened.empty()) {
-        glue(edge[opened.back()], edge[i]);
-        paired[opened.back()] = paired[i] = 1;
-        opened.pop_back();
-      }
     }
   }
 
@@ -113,10 +119,58 @@ class Splitter {
   std::vector<std::size_t> parent_;  // of corners 3 f + c: those joined across edges share a vertex
 };
 
+// Edges of several sheets whose ends could not be split, since the sheets meet around them: each pair of
+// walls gets a middle of its own.
+std::int64_t split_middles(Soup& soup) {
+  std::int64_t made = 0;
+  for (int round = 0; round < kMiddleRounds; ++round) {
+    const std::int64_t before = made;
+    std::vector<std::uint8_t> touched(soup.triangles.size(), 0);
+    const auto edges = geometry::sorted_edges(soup.F());
+    geometry::each_edge(edges, [&](std::span<const HalfEdge> edge) {
+      if (edge.size() <= 2) return;
+      for (const HalfEdge& e : edge) {
+        if (touched[static_cast<std::size_t>(e.triangle)] != 0) return;  // another round
+      }
+      std::vector<std::vector<std::size_t>> groups;
+      std::set<std::size_t> paired;
+      for (const auto& [a, b] : wall_pairs(soup, edge)) {
+        groups.push_back({a, b});
+        paired.insert({a, b});
+      }
+      for (std::size_t i = 0; i < edge.size(); ++i) {
+        if (!paired.contains(i)) groups.push_back({i});
+      }
+      for (const auto& group : groups) {
+        const std::int32_t low = edge[0].low, high = edge[0].high;
+        const Vector3d middle =
+            0.5 * (soup.points[static_cast<std::size_t>(low)] + soup.points[static_cast<std::size_t>(high)]);
+        Vector3d inward = Vector3d::Zero();
+        const auto m = static_cast<std::int32_t>(soup.points.size());
+        for (const std::size_t i : group) {
+          const auto f = static_cast<std::size_t>(edge[i].triangle);
+          touched[f] = 1;
+          auto second = soup.triangles[f];
+          for (const std::int32_t v : second) inward += soup.points[static_cast<std::size_t>(v)] - middle;
+          std::replace(soup.triangles[f].begin(), soup.triangles[f].end(), low, m);
+          std::replace(second.begin(), second.end(), high, m);
+          soup.triangles.push_back(second);
+        }
+        const double length = inward.norm();
+        soup.points.push_back(length > 0 ? Vector3d(middle + inward * (kApart / length)) : middle);
+        ++made;
+      }
+    });
+    if (made == before) break;
+  }
+  return made;
+}
+
 }  // namespace
 
 std::int64_t split_sheets(Soup& soup) {
-  return Splitter(soup).run();
+  const std::int64_t copies = Splitter(soup).run();
+  return copies + split_middles(soup);
 }
 
 }  // namespace ecorche::repair
