@@ -75,6 +75,19 @@ std::int64_t drop_fins(Soup& soup) {
   return all;
 }
 
+// Triangles that share no edge with any other, unless there is nothing else.
+std::int64_t drop_lone(Soup& soup) {
+  std::vector<std::uint8_t> joined(soup.triangles.size(), 0);
+  const auto edges = geometry::sorted_edges(soup.F());
+  geometry::each_edge(edges, [&](std::span<const HalfEdge> edge) {
+    for (const HalfEdge& e : edge) {
+      if (edge.size() > 1) joined[static_cast<std::size_t>(e.triangle)] = 1;
+    }
+  });
+  if (std::find(joined.begin(), joined.end(), 1) == joined.end()) return 0;
+  return drop_if(soup, [&](std::size_t f) { return joined[f] == 0; });
+}
+
 std::int64_t orient(Soup& soup) {
   const Triangles F = soup.F();
   const geometry::Orientation orientation = geometry::orientation(F, geometry::sorted_edges(F));
@@ -227,6 +240,7 @@ Mended repair_surface(const SurfaceMesh& surface, const Options& options, const 
   done.fins = drop_fins(soup);
   done.turned = orient(soup);
   done.split = split_sheets(soup);
+  done.fins += drop_lone(soup);
   context.check_stop();
   done.specks = drop_parts(soup, [&](const check::SurfaceParts& parts, std::int32_t p) {
     return parts.speck(p, options.speck_mm);

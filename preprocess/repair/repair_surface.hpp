@@ -31,7 +31,7 @@ struct Done {
   std::int64_t welded = 0;      ///< vertices that became another
   std::int64_t degenerate = 0;  ///< triangles dropped: two equal corners
   std::int64_t duplicates = 0;  ///< triangles dropped: the corners of another
-  std::int64_t fins = 0;        ///< triangles dropped: open on one side, on a non-manifold edge on another
+  std::int64_t fins = 0;  ///< triangles dropped: open on one side and on an edge of several sheets, or alone
   std::int64_t turned = 0;      ///< triangles turned to run as the most of their patch
   std::int64_t split = 0;       ///< vertices given a copy where sheets met in a non-manifold edge or corner
   std::int64_t specks = 0;      ///< parts dropped

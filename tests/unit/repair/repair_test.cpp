@@ -117,6 +117,19 @@ TEST(Repair, DropsWhatIsNoSurface) {
   expect_the_box(mended);
 }
 
+TEST(Repair, DropsLoneTrianglesButNeverTheLast) {
+  SurfaceMesh mesh = kBox;
+  mesh.V.conservativeResize(10, 3);
+  mesh.V.bottomRows(2) << 50, 0, 0, 50, 9, 0;
+  add_triangle(mesh, 7, 8, 9);
+  const Mended mended = mend(mesh);
+  EXPECT_EQ(mended.done.fins, 1);
+  expect_the_box(mended);
+  SurfaceMesh one = kBox;
+  one.F.conservativeResize(1, 3);
+  EXPECT_EQ(mend(one).mesh.F.rows(), 1);
+}
+
 TEST(Repair, DropsSpecksAndOnRequestWhatIsInside) {
   SurfaceMesh cavity = box({4, 4, 4}, {8, 8, 8});
   cavity.F.col(0).swap(cavity.F.col(1));
