@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "preprocess/label_surfaces/net_cells.hpp"
@@ -24,6 +25,11 @@ inline Eigen::Vector3d on_square(const Eigen::Vector3d& p, int edge) {
     q[a] = a == axis ? 0.5 : std::clamp(p[a], low, low + 0.5);
   }
   return q;
+}
+
+/// Whether a vertex stays where it was made: one that only keeps sheets apart (SurfaceNet::Home).
+inline bool is_pinned(const SurfaceNet::Home& home) {
+  return std::popcount(home.edges) < 3;
 }
 
 /// Back to within reach of the vertex's squares, and of its cell's middle along each axis.

@@ -132,10 +132,10 @@ class NetMaker {
   }
 
   /// The vertex in the middle of the net's edge that passes the low face of `high` along `across`, round the
-  /// inside end of the edge of `cell` along `axis`.
+  /// outside end of the edge of `cell` along `axis`.
   std::int32_t shared_edge(const Cell& high, int across, const Cell& cell, int axis, bool in) {
-    Cell end = cell;  // the inside voxel
-    if (!in) end[static_cast<std::size_t>(axis)] += 1;
+    Cell end = cell;  // the outside voxel
+    if (in) end[static_cast<std::size_t>(axis)] += 1;
     int corner = 0;  // of `high`
     for (int a = 0; a < 3; ++a)
       corner |= (end[static_cast<std::size_t>(a)] - high[static_cast<std::size_t>(a)]) << a;

@@ -26,7 +26,7 @@ CellLoops loops_of(unsigned inside) {
     for (std::size_t i = 0; i < 4; ++i) {
       const int before = ring[(i + 3) % 4], at = ring[i], after = ring[(i + 1) % 4];
       if (diagonal(ring)) {
-        if (in(at)) join(edge_between(before, at), edge_between(at, after));
+        if (!in(at)) join(edge_between(before, at), edge_between(at, after));
       } else if (in(at) != in(after)) {
         const int edge = edge_between(at, after);
         if (first >= 0) join(edge, first);

@@ -24,7 +24,8 @@ struct CellLoops {
 int edge_between(int a, int b);
 
 /// By the eight bits of the inside corners. On a face whose inside corners are diagonal, the surface goes
-/// round each of them on its own: voxels that touch only by an edge or a corner are apart.
+/// round each of the outside corners on its own: voxels that share an edge are joined, as in a skin one voxel
+/// thick; those that touch only by a corner are apart.
 const std::array<CellLoops, 256>& cell_loops();
 
 }  // namespace ecorche::label_surfaces

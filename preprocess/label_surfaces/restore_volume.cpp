@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Geometry>
-#include <bit>
 #include <numeric>
 
 #include "preprocess/label_surfaces/hold.hpp"
@@ -15,10 +14,9 @@ constexpr int kRounds = 4;  // the bounds take a part of each move back
 // Where a vertex stands on the voxels' own staircase.
 Vector3d on_staircase(const SurfaceNet::Home& home) {
   Vector3d p(home.cell[0], home.cell[1], home.cell[2]);
-  const int squares = std::popcount(home.edges);
   for (int a = 0; a < 3; ++a) {
     const bool along = (home.edges >> (4 * a) & 15) != 0;
-    if (squares > 2 || along) p[a] += 0.5;
+    if (!is_pinned(home) || along) p[a] += 0.5;
   }
   return p;
 }
@@ -93,7 +91,7 @@ void restore_volume(SurfaceNet& net) {
     for (std::size_t v = 0; v < n; ++v) {
       const auto p = static_cast<std::size_t>(piece[v]);
       const double length = normal[v].norm();
-      if (length == 0 || twice_area[p] == 0) continue;
+      if (length == 0 || twice_area[p] == 0 || is_pinned(net.homes[v])) continue;
       const double offset = (wanted[p] - held[p]) / (3 * twice_area[p]);
       net.vertices[v] =
           hold(net.vertices[v] + std::clamp(offset, -kReach, kReach) / length * normal[v], net.homes[v]);

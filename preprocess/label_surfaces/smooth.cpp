@@ -48,6 +48,10 @@ void smooth(SurfaceNet& net, const Context& context) {
     context.check_stop();
     const double weight = pass % 2 == 0 ? kShrink : kSwell;
     for (std::size_t v = 0; v < next.size(); ++v) {
+      if (is_pinned(net.homes[v])) {
+        next[v] = net.vertices[v];
+        continue;
+      }
       const auto from = static_cast<std::size_t>(neighbours.first[v]),
                  to = static_cast<std::size_t>(neighbours.first[v + 1]);
       Vector3d sum = Vector3d::Zero();

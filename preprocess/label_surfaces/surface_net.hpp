@@ -16,7 +16,7 @@ namespace ecorche::label_surfaces {
 /// Vertices in the mask's index space, and what each may do there.
 struct SurfaceNet {
   /// A vertex lies by the squares in which its loop crosses the voxels' faces: three or more for the vertex
-  /// of a loop, two for one that lies on the face between two cells, one for the hub of a fan.
+  /// of a loop, two for one on the face between two cells, one for the hub of a fan; those two kinds stay.
   struct Home {
     std::array<std::int32_t, 3> cell;  ///< its first corner
     std::uint16_t edges;               ///< crossed edges of the cell, one bit each (net_cells.hpp)

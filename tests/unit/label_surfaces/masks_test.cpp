@@ -48,15 +48,27 @@ TEST(LabelMasks, PlatesAndRodsOneVoxelThick) {
                                        }),
                                   "shell");
   EXPECT_EQ(components(shell), 2);
+  // A skin whose voxels hang together by their edges alone is one sheet: outside and inside.
+  const auto in = [](int i, int j, int k) {
+    return (Eigen::Vector3d(i, j, 1.3 * k) - Eigen::Vector3d(12, 12, 15)).norm() <= 9;
+  };
+  const SurfaceMesh skin =
+      solid(draw(cube_grid(25),
+                 [&](int i, int j, int k) {
+                   return in(i, j, k) && !(in(i - 1, j, k) && in(i + 1, j, k) && in(i, j - 1, k) &&
+                                           in(i, j + 1, k) && in(i, j, k - 1) && in(i, j, k + 1));
+                 }),
+            "thin skin");
+  EXPECT_EQ(components(skin), 2);
 }
 
-TEST(LabelMasks, VoxelsThatTouchByAnEdgeOrACornerAreApart) {
+TEST(LabelMasks, VoxelsThatShareAnEdgeAreJoined) {
   const auto two = [](std::array<int, 3> other) {
     return draw(cube_grid(4), [&](int i, int j, int k) {
       return (i == 1 && j == 1 && k == 1) || (i == other[0] && j == other[1] && k == other[2]);
     });
   };
-  EXPECT_EQ(components(solid(two({2, 2, 1}), "edge")), 2);
+  EXPECT_EQ(components(solid(two({2, 2, 1}), "edge")), 1);
   EXPECT_EQ(components(solid(two({2, 2, 2}), "corner")), 2);
   EXPECT_EQ(components(solid(two({2, 1, 1}), "face")), 1);
 }
