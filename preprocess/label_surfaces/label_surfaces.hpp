@@ -12,9 +12,9 @@ namespace ecorche::label_surfaces {
 /// Closed, manifold, triangles counter-clockwise seen from outside, whatever the mask and the image's
 /// direction (also left-handed) and also at the image's border. Every vertex lies within half a voxel, in
 /// index space, of the boundary of the voxels. Smooth: Gibson 1998's constrained elastic surface nets, with
-/// Taubin 1995's filter for the elastic one, which would shrink the body. Voxels that share an edge are
-/// joined, those that touch only by a corner are apart. Where two labels meet face to face both have nearly
-/// the same surface.
+/// the low-pass filter of Taubin, Zhang and Golub 1996 for the elastic one, which would shrink the body.
+/// Voxels that share an edge are joined, those that touch only by a corner are apart. Where two labels meet
+/// face to face both have nearly the same surface.
 SurfaceMesh extract(const CaseLabels& labels, const LabelSource& source, const Context& context);
 
 /// Gives every entry of `patient` that has a source its surface, and forgets the source. Where the skin is

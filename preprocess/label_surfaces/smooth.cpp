@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <numbers>
+
 #include "preprocess/label_surfaces/hold.hpp"
 #include "preprocess/label_surfaces/surface_net.hpp"
 
@@ -7,9 +11,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Taubin's two weights pass waves longer than about a dozen voxels and keep the volume.
-constexpr double kShrink = 0.5, kSwell = -0.52;
-constexpr int kPasses = 20;
+// Waves shorter than about this many voxels go: steps, and terraces of shallow slopes.
+constexpr double kPassedVoxels = 8;
+constexpr int kTerms = 20;  // of the filter's series; its edge is as sharp as they are many
+constexpr int kRounds = 2;  // filtering moves vertices out of their bounds, the bounds leave waves
 
 // The neighbours of every vertex, one after another.
 struct Neighbours {
@@ -39,28 +44,58 @@ Neighbours neighbours_of(const SurfaceNet& net) {
   return out;
 }
 
+// Each vertex' mean of its neighbours. Its eigenvalues lie in [-1, 1]: near 1 for long waves.
+void mean_of_neighbours(const Neighbours& neighbours, const std::vector<Vector3d>& from,
+                        std::vector<Vector3d>& to) {
+  for (std::size_t v = 0; v < from.size(); ++v) {
+    const auto first = static_cast<std::size_t>(neighbours.first[v]),
+               last = static_cast<std::size_t>(neighbours.first[v + 1]);
+    Vector3d sum = Vector3d::Zero();
+    for (std::size_t n = first; n < last; ++n) sum += from[static_cast<std::size_t>(neighbours.list[n])];
+    to[v] = sum / static_cast<double>(last - first);
+  }
+}
+
+// The Chebyshev series of the step that passes eigenvalues above cos(edge), under a Hamming window, 1 at 1.
+std::array<double, kTerms + 1> low_pass() {
+  const double pi = std::numbers::pi;
+  // A wave along one of the net's two directions has the eigenvalue (1 + cos(2 pi / length)) / 2.
+  const double edge = std::acos((1 + std::cos(2 * pi / kPassedVoxels)) / 2);
+  std::array<double, kTerms + 1> terms{};
+  double sum = 0;
+  for (int n = 0; n <= kTerms; ++n) {
+    const double window = 0.54 + 0.46 * std::cos(n * pi / (kTerms + 1));
+    terms[static_cast<std::size_t>(n)] = n == 0 ? edge / pi : window * 2 * std::sin(n * edge) / (n * pi);
+    sum += terms[static_cast<std::size_t>(n)];
+  }
+  for (double& term : terms) term /= sum;
+  return terms;
+}
+
 }  // namespace
 
 void smooth(SurfaceNet& net, const Context& context) {
   const Neighbours neighbours = neighbours_of(net);
-  std::vector<Vector3d> next(net.vertices.size());
-  for (int pass = 0; pass < 2 * kPasses; ++pass) {
-    context.check_stop();
-    const double weight = pass % 2 == 0 ? kShrink : kSwell;
-    for (std::size_t v = 0; v < next.size(); ++v) {
-      if (is_pinned(net.homes[v])) {
-        next[v] = net.vertices[v];
-        continue;
+  const std::array<double, kTerms + 1> terms = low_pass();
+  const std::size_t count = net.vertices.size();
+  std::vector<Vector3d> sum(count), before, at(count), next(count);
+  for (int round = 0; round < kRounds; ++round) {
+    before = net.vertices;  // T_0 and T_1; then T_{n+1} = 2 M T_n - T_{n-1}
+    mean_of_neighbours(neighbours, before, at);
+    for (std::size_t v = 0; v < count; ++v) sum[v] = terms[0] * before[v] + terms[1] * at[v];
+    for (std::size_t n = 2; n < terms.size(); ++n) {
+      context.check_stop();
+      mean_of_neighbours(neighbours, at, next);
+      for (std::size_t v = 0; v < count; ++v) {
+        next[v] = 2 * next[v] - before[v];
+        sum[v] += terms[n] * next[v];
       }
-      const auto from = static_cast<std::size_t>(neighbours.first[v]),
-                 to = static_cast<std::size_t>(neighbours.first[v + 1]);
-      Vector3d sum = Vector3d::Zero();
-      for (std::size_t n = from; n < to; ++n)
-        sum += net.vertices[static_cast<std::size_t>(neighbours.list[n])];
-      const Vector3d step = sum / static_cast<double>(to - from) - net.vertices[v];
-      next[v] = hold(net.vertices[v] + weight * step, net.homes[v]);
+      before.swap(at);
+      at.swap(next);
     }
-    net.vertices.swap(next);
+    for (std::size_t v = 0; v < count; ++v) {
+      if (!is_pinned(net.homes[v])) net.vertices[v] = hold(sum[v], net.homes[v]);
+    }
   }
 }
 

@@ -34,8 +34,8 @@ struct SurfaceNet {
 /// are cut into fans, so that the net is closed and manifold whatever the mask. O(cells).
 SurfaceNet make_net(const Mask& mask, const Context& context);
 
-/// Low-pass filters the net (Taubin 1995), every vertex within 0.45 voxels of its squares, and of its cell's
-/// middle along each axis. O(vertices * passes).
+/// Low-pass filters the net (Taubin, Zhang and Golub 1996: a windowed sinc), every vertex within 0.45 voxels
+/// of its squares, and of its cell's middle along each axis. O(vertices * passes).
 void smooth(SurfaceNet& net, const Context& context);
 
 /// Moves every connected piece of the net along its normals until it holds as much as its voxels do, as far

@@ -28,8 +28,8 @@ TEST(LabelSurfaces, BallsAreSmoothAndKeepTheirVolume) {
                 radius, 100 * (volume(mesh) / voxels - 1), c.mean_deg, c.largest_deg);
     EXPECT_NEAR(volume(mesh) / voxels, 1, radius < 8 ? 0.04 : 0.02);
     // The staircase has 90 degrees at every step; the ball itself about 57 / radius from vertex to vertex.
-    EXPECT_LT(c.mean_deg, 70 / radius + 1);
-    EXPECT_LT(c.largest_deg, 30);
+    EXPECT_LT(c.mean_deg, 57 / radius + 1);
+    EXPECT_LT(c.largest_deg, 25);
     expect_within_half_a_voxel(mesh, labels);
     double worst = 0;
     for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
@@ -110,8 +110,8 @@ TEST(LabelSurfaces, NeighboursAgreeWhereTheyTouch) {
   ASSERT_GT(shared, 300);
   std::printf("between neighbours: %.3f voxels mean, %.3f largest over %d vertices\n", sum / shared, worst,
               shared);
-  EXPECT_LT(sum / shared, 0.05);
-  EXPECT_LT(worst, 0.1);
+  EXPECT_LT(sum / shared, 0.08);
+  EXPECT_LT(worst, 0.4);  // by the rim, which is one body's edge and the other's too
 }
 
 TEST(LabelSurfaces, ShallowSlopesHaveNoTerraces) {
@@ -126,7 +126,7 @@ TEST(LabelSurfaces, ShallowSlopesHaveNoTerraces) {
     worst = std::max(worst, std::abs(p[2] - (10 + 0.1 * p[0] + 0.07 * p[1])));
   }
   std::printf("a slope of 1 in 10: off its plane by at most %.2f voxels\n", worst);
-  EXPECT_LT(worst, 0.35);  // the staircase's is 0.5
+  EXPECT_LT(worst, 0.2);  // the staircase's is 0.5
 }
 
 }  // namespace
