@@ -14,7 +14,7 @@ using yaml::Value;
 constexpr std::size_t kMostIds = 65536;
 constexpr double kWidestGap = 100;  // mm; wider ones fill the space between the legs
 constexpr std::array<std::string_view, 3> kWithinKeys{"file", "ids", "root"};
-constexpr std::array<std::string_view, 3> kRestKeys{"labels", "group", "groups"};
+constexpr std::array<std::string_view, 4> kRestKeys{"labels", "except", "group", "groups"};
 
 std::optional<std::int64_t> whole_number(const std::string& text) {
   std::int64_t number = 0;
@@ -234,12 +234,16 @@ std::vector<CaseTissue> LabelSources::rest(const Value& entry, std::set<std::str
   need_labels(entry.at("labels"));
   Group usual = Group::other;
   if (const auto group = entry.find("group")) usual = tissue_group(*group, group->text());
+  std::vector<std::int64_t> except;  // ids that are absent do no harm here, nor in groups
+  if (const auto listed = entry.find("except")) {
+    for (const Value& item : listed->items()) add_ids(item, except);
+  }
   std::map<std::int64_t, Group> groups;
   if (const auto listed = entry.find("groups")) {
     for (const auto& [word, list] : listed->pairs()) {
       const Group group = tissue_group(list, word);
       std::vector<std::int64_t> ids;
-      for (const Value& item : list.items()) add_ids(item, ids);  // ids that are absent do no harm here
+      for (const Value& item : list.items()) add_ids(item, ids);
       for (const std::int64_t id : ids) {
         if (!groups.emplace(id, group).second)
           list.fail("label " + std::to_string(id) + " stands in two groups", "keep one");
@@ -250,6 +254,7 @@ std::vector<CaseTissue> LabelSources::rest(const Value& entry, std::set<std::str
   std::map<std::string, std::size_t> of_name;
   for (const auto& [id, name] : labels_->table) {
     if (used_.count(id) != 0 || !std::binary_search(present_.begin(), present_.end(), id)) continue;
+    if (std::find(except.begin(), except.end(), id) != except.end()) continue;
     const auto [found, fresh] = of_name.emplace(name, tissues.size());
     if (fresh) {
       CaseTissue tissue;

@@ -33,8 +33,8 @@ class LabelSources {
 
   /// Whether `entry` asks for all labels that no other entry uses: `labels: rest`.
   static bool is_rest(const yaml::Value& entry);
-  /// One tissue for each name of the table whose labels no other entry used and the map holds. Names become
-  /// identifiers, made unique with the id against `taken`.
+  /// One tissue for each name of the table whose labels no other entry used, `except` does not list and the
+  /// map holds. Names become identifiers, made unique with the id against `taken`.
   std::vector<CaseTissue> rest(const yaml::Value& entry, std::set<std::string> taken) const;
 
  private:

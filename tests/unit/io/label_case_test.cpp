@@ -88,6 +88,14 @@ TEST_F(LabelCase, IsRead) {
   EXPECT_TRUE(patient.input_digests.contains("regions.nrrd"));
 }
 
+TEST_F(LabelCase, TheRestMayLeaveLabelsOut) {
+  const Case patient = read(changed(kCase, "{labels: rest,", "{labels: rest, except: [Vessels, 8, 9],"));
+  ASSERT_EQ(patient.tissues.size(), 2u);
+  EXPECT_EQ(patient.tissues[1].name, "muscle_leg");
+  refused("{labels: rest,", "{labels: rest, except: [Vesels],",
+          "10:tissues[1].except[0]: unknown label 'Vesels' (did you mean 'Vessels'?)");
+}
+
 TEST_F(LabelCase, BecomesSurfaces) {
   Case patient = read(kCase);
   label_surfaces::resolve(patient, Context{});
