@@ -5,7 +5,7 @@
 // that takes are posed in turn, as many bodies would be. The floor is the fewest bytes that the layout needs
 // (what it holds of each node and vertex, and each result once) over the bandwidth measured with as many
 // threads in this run; the time of a store's own fetch of its line is the kernel's loss. Each figure is the
-// median over the walk, the worst beside it.
+// median over the walk, with the best and the worst beside it.
 #include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -45,7 +45,7 @@ Pose swing(std::size_t joints, int f) {
 }
 
 struct Figure {
-  double median, worst;  // ms
+  double median, best, worst;  // ms
 };
 
 Figure time(int frames, const std::function<void(int)>& work) {
@@ -57,7 +57,7 @@ Figure time(int frames, const std::function<void(int)>& work) {
     if (f >= 0) ms.push_back(took.count());
   }
   std::sort(ms.begin(), ms.end());
-  return {ms[ms.size() / 2], ms.back()};
+  return {ms[ms.size() / 2], ms.front(), ms.back()};
 }
 
 struct Bytes {
@@ -97,8 +97,8 @@ Bytes bytes_of(const Model& model, const runtime::BodyParts& parts) {
 }
 
 void line(const char* what, int threads, const Figure& figure, double floor_ms, double against = 0) {
-  std::printf("  %-34s %d thread%s %8.3f ms, worst %8.3f", what, threads, threads == 1 ? " " : "s",
-              figure.median, figure.worst);
+  std::printf("  %-34s %d thread%s %8.3f ms (%.3f .. %.3f)", what, threads, threads == 1 ? " " : "s",
+              figure.median, figure.best, figure.worst);
   if (floor_ms > 0) std::printf(", floor %7.3f, x%.2f", floor_ms, figure.median / floor_ms);
   if (against > 0) std::printf(", plain Eigen x%.1f slower", against / figure.median);
   std::printf("\n");
@@ -165,11 +165,21 @@ class Bench {
     std::size_t all = 0;
     for (const Tissue& tissue : model_->tissues) all += static_cast<std::size_t>(tissue.V.rows());
     const double body = bytes_.nodes[2] + bytes_.tissues;
+    const auto move = [&](std::vector<runtime::PosedBody>& bodies) {
+      return time(kFrames, [&](int f) {
+        runtime::PosedBody& frame = bodies[static_cast<std::size_t>(f) % copies_];
+        parts_.move(*model_, posers_[0]->all_tissues(), frame);
+      });
+    };
+    line("tissues, float32, one layout", threads, move(plain_frames_),
+         floor_of(bytes_.tissues + size_of(all, 12)));
+    line("tissues, u16, one layout", threads, move(wire_frames_),
+         floor_of(bytes_.tissues + bytes_.quantised));
     line("frame, CoR, float32", threads, frames(plain_frames_), floor_of(body + size_of(all, 12)), plain);
     line("frame, CoR, u16", threads, frames(wire_frames_), floor_of(body + bytes_.quantised), plain);
     line("frame, CoR, u16 and normals", threads, frames(full_frames_),
          floor_of(body + bytes_.quantised + bytes_.normals));
-    line("plain Eigen, CoR, float32", threads, {plain, plain}, 0);
+    line("plain Eigen, CoR, float32", threads, {plain, plain, plain}, 0);
 
     runtime::PosedBody& frame = plain_frames_[0];
     const Status status = posers_[0]->run(poses_[7], Skinning::cor, posers_[0]->all_tissues(), frame);
