@@ -20,6 +20,7 @@
 #include "core/kinematics/forward.hpp"
 #include "core/model_file/model_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/quality/quality_meter.hpp"
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
 #include "runtime/volume/resample.hpp"
@@ -186,6 +187,9 @@ class Bench {
     if (!status.ok()) throw Error(ErrorKind::internal, "bench", status.message, "mend it");
     line("quality, all tets and tissues", threads,
          time(9, [&](int) { runtime::measure(*model_, frame, posers_[0]->all_tissues()); }), 0);
+    const runtime::QualityMeter meter(model_);
+    line("quality, subset of tets", threads,
+         time(kFrames, [&](int) { meter.measure(frame, posers_[0]->all_tissues()); }), 0);
     if (model_->volumes.empty()) return;
     const ModelVolume& volume = model_->volumes.front();
     runtime::InverseMap map;

@@ -120,10 +120,18 @@ double rigid_residual(std::span<const float> rest, std::span<const float> posed)
   return worst;
 }
 
+void judge(const QualityThresholds& thresholds, PoseQuality& quality) {
+  quality.thresholds = thresholds;
+  quality.pass = quality.inverted_share <= thresholds.max_inverted_share &&
+                 std::abs(quality.volume_change) <= thresholds.max_volume_change &&
+                 quality.bone_rigidity_mm <= thresholds.max_bone_rigidity_mm;
+}
+
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
                     const QualityThresholds& thresholds) {
   PoseQuality out;
   const TetSums sums = sum_tets(model, body.nodes);
+  out.tets_measured = model.tet_count();
   out.inverted_tets = sums.inverted;
   out.inverted_rest_mm3 = sums.inverted_rest / 6;
   out.min_det_f = sums.min_det_f;
@@ -147,10 +155,7 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
   for (const double residual : residuals) out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, residual);
 
   out.clamped = body.clamped;
-  out.thresholds = thresholds;
-  out.pass = out.inverted_share <= thresholds.max_inverted_share &&
-             std::abs(out.volume_change) <= thresholds.max_volume_change &&
-             out.bone_rigidity_mm <= thresholds.max_bone_rigidity_mm;
+  judge(thresholds, out);
   return out;
 }
 

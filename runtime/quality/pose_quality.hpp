@@ -29,8 +29,11 @@ struct PoseQuality {
   std::uint64_t inverted_tets = 0;  ///< of posed volume zero or less
   double inverted_rest_mm3 = 0;
   double inverted_share = 0;
-  double min_det_f = 1;      ///< of F, the deformation gradient: posed over rest volume of a tet
-  double volume_change = 0;  ///< of the tets, all together
+  double min_det_f = 1;             ///< of F, the deformation gradient: posed over rest volume of a tet
+  double volume_change = 0;         ///< of the tets, all together
+  std::uint64_t tets_measured = 0;  ///< all, or the subset that the figures above are estimated from
+  double inverted_share_error = 0;  ///< standard error of the estimate; 0 where all tets were measured
+  double volume_change_error = 0;   ///< likewise
   std::vector<TissueChange> tissues;
   double bone_rigidity_mm = 0;  ///< largest distance of a bone vertex from its bone's best rigid fit
   std::vector<ClampedJoint> clamped;
@@ -42,6 +45,9 @@ struct PoseQuality {
 /// thread count.
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
                     const QualityThresholds& thresholds = {});
+
+/// Sets `pass` and the thresholds that it was judged by.
+void judge(const QualityThresholds& thresholds, PoseQuality& quality);
 
 /// Posed over rest volume of every tet, det F; #T. `nodes`: 3 * #nodes, posed, LPS mm.
 std::vector<float> tet_det_f(const Model& model, std::span<const float> nodes);
