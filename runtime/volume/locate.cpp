@@ -29,9 +29,25 @@ struct Corners {
   double det() const { return (x[1] - x[0]).cross(x[2] - x[0]).dot(x[3] - x[0]); }
 };
 
-Corners corners(const Affine& index, const Model& model, std::span<const float> nodes, std::int64_t t) {
+// Nodes in continuous indices of the posed grid: once each, since about twenty tets share one.
+std::vector<Vector3d> index_nodes(const ImageGrid& grid, std::span<const float> nodes) {
+  const Affine index = to_index(grid);
+  std::vector<Vector3d> out(nodes.size() / 3);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, out.size(), 16384), [&](const auto& range) {
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      out[n] = index * Vector3d(static_cast<double>(nodes[3 * n]), static_cast<double>(nodes[3 * n + 1]),
+                                static_cast<double>(nodes[3 * n + 2]));
+    }
+  });
+  return out;
+}
+
+Corners corners(const Tets& tets, const std::vector<Vector3d>& nodes, std::size_t t) {
   Corners out;
-  for (int c = 0; c < 4; ++c) out.x[static_cast<std::size_t>(c)] = index * corner_of(model.tets, nodes, t, c);
+  for (int c = 0; c < 4; ++c) {
+    const auto node = static_cast<std::size_t>(tets(static_cast<Eigen::Index>(t), c));
+    out.x[static_cast<std::size_t>(c)] = nodes[node];
+  }
   return out;
 }
 
@@ -50,11 +66,16 @@ struct Extent {
   Round round = Round::never;
 };
 
+// Both by truncation: ceil and floor are calls where the processor is not known to have them.
 std::int32_t first_index(double low, std::int32_t size) {
-  return static_cast<std::int32_t>(std::clamp(std::ceil(low), 0.0, static_cast<double>(size)));
+  const double at = std::clamp(low, 0.0, static_cast<double>(size));
+  const auto whole = static_cast<std::int32_t>(at);
+  return whole < at ? whole + 1 : whole;
 }
 std::int32_t last_index(double high, std::int32_t size) {
-  return static_cast<std::int32_t>(std::clamp(std::floor(high), -1.0, static_cast<double>(size) - 1));
+  const double at = std::clamp(high, -1.0, static_cast<double>(size) - 1);
+  const auto whole = static_cast<std::int32_t>(at);
+  return whole > at ? whole - 1 : whole;
 }
 
 // The tet's box in indices, a little wider than the margin of its planes.
@@ -75,14 +96,15 @@ Box box_of(const Corners& c) {
 
 // `handed`: -1 where the grid's axes are left-handed, which turns the sign of every volume.
 Extent extent_of(const Corners& c, double handed, const ImageGrid& grid) {
-  const double det = handed * c.det();
-  const double edge = longest_edge(c);
-  if (!(std::abs(det) > kFlat * edge * edge * edge)) return {};
+  // Most tets of a fine mesh hold no voxel centre: those cost no more than their box.
   const auto [low, high] = box_of(c);
-  for (int axis = 0; axis < 2; ++axis) {
+  for (int axis = 0; axis < 3; ++axis) {
     const std::int32_t size = grid.size[static_cast<std::size_t>(axis)];
     if (first_index(low[axis], size) > last_index(high[axis], size)) return {};
   }
+  const double det = handed * c.det();
+  const double edge = longest_edge(c);
+  if (!(std::abs(det) > kFlat * edge * edge * edge)) return {};
   return {first_index(low.z(), grid.size[2]), last_index(high.z(), grid.size[2]),
           det > 0 ? Round::positive : Round::inverted};
 }
@@ -207,12 +229,12 @@ void locate(const Model& model, std::span<const float> nodes, const ImageGrid& g
             const Context& context) {
   out.grid = grid;
   out.tet.resize(grid.voxels());
-  const Affine index = to_index(grid);
-  const double handed = index.linear.determinant() < 0 ? -1 : 1;
+  const double handed = to_index(grid).linear.determinant() < 0 ? -1 : 1;
+  const std::vector<Vector3d> placed = index_nodes(grid, nodes);
   std::vector<Extent> extents(model.tet_count());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, extents.size(), 16384), [&](const auto& range) {
     for (std::size_t t = range.begin(); t < range.end(); ++t) {
-      extents[t] = extent_of(corners(index, model, nodes, static_cast<std::int64_t>(t)), handed, grid);
+      extents[t] = extent_of(corners(model.tets, placed, t), handed, grid);
     }
   });
   context.check_stop();
@@ -224,7 +246,8 @@ void locate(const Model& model, std::span<const float> nodes, const ImageGrid& g
     std::fill(out.tet.begin() + static_cast<std::ptrdiff_t>(grid.offset(0, 0, z0)),
               out.tet.begin() + static_cast<std::ptrdiff_t>(grid.offset(0, 0, z1 + 1)), InverseMap::none);
     for (std::size_t i = slabs.begin[slab]; i < slabs.begin[slab + 1]; ++i) {
-      draw(corners(index, model, nodes, slabs.tet[i]), slabs.tet[i], z0, z1, out);
+      const std::int32_t t = slabs.tet[i];
+      draw(corners(model.tets, placed, static_cast<std::size_t>(t)), t, z0, z1, out);
     }
   });
   context.check_stop();

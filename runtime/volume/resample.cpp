@@ -67,8 +67,10 @@ void for_held_voxels(const Model& model, std::span<const float> nodes, const Inv
 template <class T>
 T to_scalar(double value) {
   if constexpr (std::is_integral_v<T>) {
-    return static_cast<T>(std::clamp(std::round(value), static_cast<double>(std::numeric_limits<T>::min()),
-                                     static_cast<double>(std::numeric_limits<T>::max())));
+    // Half away from zero, as std::round, but without a call: the value fits once it is clamped.
+    const double fits = std::clamp(value, static_cast<double>(std::numeric_limits<T>::min()),
+                                   static_cast<double>(std::numeric_limits<T>::max()));
+    return static_cast<T>(fits < 0 ? fits - 0.5 : fits + 0.5);
   } else {
     return static_cast<T>(value);
   }
@@ -95,9 +97,32 @@ struct Sampler {
     std::copy_n(at(whole.x(), whole.y(), whole.z()), components, out);
   }
 
+  // All eight corners are there: the same sum in the same order.
+  void within(const T* first, const Vector3d& part, T* out) const {
+    const std::size_t row = components * static_cast<std::size_t>(grid.size[0]);
+    const std::size_t slice = row * static_cast<std::size_t>(grid.size[1]);
+    const double x1 = part.x(), y1 = part.y(), z1 = part.z(), x0 = 1 - x1, y0 = 1 - y1, z0 = 1 - z1;
+    for (std::size_t c = 0; c < components; ++c) {
+      const T *p = first + c, *q = p + slice;
+      const auto value = [](const T* sample) { return static_cast<double>(*sample); };
+      double sum = x0 * y0 * z0 * value(p) + x1 * y0 * z0 * value(p + components);
+      sum += x0 * y1 * z0 * value(p + row);
+      sum += x1 * y1 * z0 * value(p + row + components);
+      sum += x0 * y0 * z1 * value(q);
+      sum += x1 * y0 * z1 * value(q + components);
+      sum += x0 * y1 * z1 * value(q + row);
+      sum += x1 * y1 * z1 * value(q + row + components);
+      out[c] = to_scalar<T>(sum);
+    }
+  }
+
   void trilinear(const Vector3d& index, T* out) const {
     const Vector3d low = index.array().floor();
     const Vector3d part = index - low;
+    if (std::is_integral_v<T> && inside(low.x(), low.y(), low.z()) &&
+        inside(low.x() + 1, low.y() + 1, low.z() + 1)) {
+      return within(at(low.x(), low.y(), low.z()), part, out);
+    }
     for (std::size_t c = 0; c < components; ++c) {
       double sum = 0;
       for (int corner = 0; corner < 8; ++corner) {
