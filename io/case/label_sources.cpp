@@ -80,7 +80,14 @@ Group tissue_group(const Value& value, const std::string& word) {
 
 LabelSources::LabelSources(const CaseLabels* labels, std::optional<double> mid_plane, ReadImage read_image)
     : labels_(labels), mid_plane_(mid_plane), read_image_(std::move(read_image)) {
-  if (labels_ != nullptr) present_ = distinct_values(labels_->image, kMostIds);
+  if (labels_ == nullptr) return;
+  present_ = distinct_values(labels_->image, kMostIds);
+  for (const Image& layer : labels_->overlaps) {
+    const std::vector<std::int64_t> more = distinct_values(layer, kMostIds);
+    present_.insert(present_.end(), more.begin(), more.end());
+  }
+  std::sort(present_.begin(), present_.end());
+  present_.erase(std::unique(present_.begin(), present_.end()), present_.end());
 }
 
 const CaseLabels& LabelSources::need_labels(const Value& value) const {

@@ -34,83 +34,93 @@ void number(std::span<const T> voxels, const std::vector<std::int64_t>& ids,
 
 }  // namespace
 
-LabelBlocks::LabelBlocks(const CaseLabels& labels, const Context& context) : labels_(labels) {
-  const Image& image = labels.image;
-  index_.resize(image.grid.voxels());
-  ids_ = distinct_values(image, kMostIds);
-  if (ids_.size() > kMostIds) {
+LabelBlocks::Layer LabelBlocks::read_layer(const Image& image, const Context& context) {
+  Layer layer;
+  layer.index.resize(image.grid.voxels());
+  layer.ids = distinct_values(image, kMostIds);
+  if (layer.ids.size() > kMostIds) {
     throw Error(ErrorKind::data, "labels", "the label map has more than 65536 ids",
                 "is it a label map, or a picture?");
   }
   context.check_stop();
   with_scalar_type(image.type, [&](auto zero) {
     using T = decltype(zero);
-    number(image.scalars<T>(), ids_, index_);
+    number(image.scalars<T>(), layer.ids, layer.index);
   });
   context.check_stop();
   const auto& n = image.grid.size;
-  boxes_.assign(ids_.size(), {{n[0], n[1], n[2]}, {-1, -1, -1}});
+  layer.boxes.assign(layer.ids.size(), {{n[0], n[1], n[2]}, {-1, -1, -1}});
   std::size_t at = 0;
   for (int k = 0; k < n[2]; ++k) {
     for (int j = 0; j < n[1]; ++j) {
       for (int i = 0; i < n[0];) {  // by runs of one id
-        const std::uint16_t id = index_[at];
+        const std::uint16_t id = layer.index[at];
         int end = i + 1;
         ++at;
-        for (; end < n[0] && index_[at] == id; ++end) ++at;
-        Box& b = boxes_[id];
+        for (; end < n[0] && layer.index[at] == id; ++end) ++at;
+        Box& b = layer.boxes[id];
         b.low = {std::min(b.low[0], i), std::min(b.low[1], j), std::min(b.low[2], k)};
         b.high = {std::max(b.high[0], end - 1), std::max(b.high[1], j), std::max(b.high[2], k)};
         i = end;
       }
     }
   }
+  return layer;
 }
 
-std::vector<std::uint8_t> LabelBlocks::chosen(const LabelSource& source) const {
-  std::vector<std::uint8_t> chosen(ids_.size(), 0);
-  for (std::size_t i = 0; i < ids_.size(); ++i) {
+LabelBlocks::LabelBlocks(const CaseLabels& labels, const Context& context) : grid_(labels.image.grid) {
+  layers_.push_back(read_layer(labels.image, context));
+  for (const Image& overlap : labels.overlaps) layers_.push_back(read_layer(overlap, context));
+}
+
+std::vector<std::uint8_t> LabelBlocks::chosen(const LabelSource& source, const Layer& layer) {
+  std::vector<std::uint8_t> chosen(layer.ids.size(), 0);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
     chosen[i] = source.ids.empty()
-                    ? ids_[i] != 0
-                    : std::find(source.ids.begin(), source.ids.end(), ids_[i]) != source.ids.end();
+                    ? layer.ids[i] != 0
+                    : std::find(source.ids.begin(), source.ids.end(), layer.ids[i]) != source.ids.end();
   }
   return chosen;
 }
 
-LabelBlocks::Box LabelBlocks::box(const std::vector<std::uint8_t>& chosen) const {
-  const auto& n = labels_.image.grid.size;
+LabelBlocks::Box LabelBlocks::box(const LabelSource& source) const {
+  const auto& n = grid_.size;
   Box all{{n[0], n[1], n[2]}, {-1, -1, -1}};
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (chosen[i] == 0) continue;
-    for (std::size_t a = 0; a < 3; ++a) {
-      all.low[a] = std::min(all.low[a], boxes_[i].low[a]);
-      all.high[a] = std::max(all.high[a], boxes_[i].high[a]);
+  for (const Layer& layer : layers_) {
+    const std::vector<std::uint8_t> take = chosen(source, layer);
+    for (std::size_t i = 0; i < take.size(); ++i) {
+      if (take[i] == 0) continue;
+      for (std::size_t a = 0; a < 3; ++a) {
+        all.low[a] = std::min(all.low[a], layer.boxes[i].low[a]);
+        all.high[a] = std::max(all.high[a], layer.boxes[i].high[a]);
+      }
     }
   }
   return all;
 }
 
 void LabelBlocks::keep_within(const Mask& body) {
-  const auto nothing = std::lower_bound(ids_.begin(), ids_.end(), 0) - ids_.begin();
-  if (nothing == std::ssize(ids_) || ids_[static_cast<std::size_t>(nothing)] != 0)
-    return;  // no voxel is outside
-  const auto& n = labels_.image.grid.size;
-  std::size_t at = 0;
-  for (int k = 0; k < n[2]; ++k) {
-    for (int j = 0; j < n[1]; ++j) {
-      for (int i = 0; i < n[0]; ++i, ++at) {
-        const std::array<int, 3> v{i - body.low[0], j - body.low[1], k - body.low[2]};
-        bool in = true;
-        for (std::size_t a = 0; a < 3; ++a) in = in && v[a] >= 0 && v[a] < body.size[a];
-        if (!in || body.inside[body.offset(v[0], v[1], v[2])] == 0)
-          index_[at] = static_cast<std::uint16_t>(nothing);
+  for (Layer& layer : layers_) {
+    const auto nothing = std::lower_bound(layer.ids.begin(), layer.ids.end(), 0) - layer.ids.begin();
+    if (nothing == std::ssize(layer.ids) || layer.ids[static_cast<std::size_t>(nothing)] != 0)
+      continue;  // no voxel is outside
+    std::size_t at = 0;
+    for (int k = 0; k < grid_.size[2]; ++k) {
+      for (int j = 0; j < grid_.size[1]; ++j) {
+        for (int i = 0; i < grid_.size[0]; ++i, ++at) {
+          const std::array<int, 3> v{i - body.low[0], j - body.low[1], k - body.low[2]};
+          bool in = true;
+          for (std::size_t a = 0; a < 3; ++a) in = in && v[a] >= 0 && v[a] < body.size[a];
+          if (!in || body.inside[body.offset(v[0], v[1], v[2])] == 0)
+            layer.index[at] = static_cast<std::uint16_t>(nothing);
+        }
       }
     }
   }
 }
 
 std::size_t LabelBlocks::work(const LabelSource& source) const {
-  const Box b = box(chosen(source));
+  const Box b = box(source);
   std::size_t voxels = 1;
   for (std::size_t a = 0; a < 3; ++a)
     voxels *= static_cast<std::size_t>(std::max(0, b.high[a] - b.low[a] + 1));
@@ -118,9 +128,8 @@ std::size_t LabelBlocks::work(const LabelSource& source) const {
 }
 
 Mask LabelBlocks::mask(const LabelSource& source, const Context& context) const {
-  const ImageGrid& grid = labels_.image.grid;
-  const std::vector<std::uint8_t> take = chosen(source);
-  const Box b = box(take);
+  const ImageGrid& grid = grid_;
+  const Box b = box(source);
   Mask mask;
   if (b.high[0] < b.low[0]) return mask;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -139,19 +148,23 @@ Mask LabelBlocks::mask(const LabelSource& source, const Context& context) const 
     return (x >= source.plane_mm) == (source.side == Side::left);
   };
   bool any = false;
-  const auto fill = [&](const auto& allowed) {
+  const auto fill_from = [&](const Layer& layer, const auto& allowed) {
+    const std::vector<std::uint8_t> take = chosen(source, layer);
     for (int k = b.low[2]; k <= b.high[2]; ++k) {
       context.check_stop();
       for (int j = b.low[1]; j <= b.high[1]; ++j) {
         std::size_t from = grid.offset(b.low[0], j, k);
         std::size_t to = mask.offset(b.low[0] - mask.low[0], j - mask.low[1], k - mask.low[2]);
         for (int i = b.low[0]; i <= b.high[0]; ++i, ++from, ++to) {
-          if (take[index_[from]] == 0 || !allowed(from) || !on_side(i, j, k)) continue;
+          if (take[layer.index[from]] == 0 || !allowed(from) || !on_side(i, j, k)) continue;
           mask.inside[to] = 1;
           any = true;
         }
       }
     }
+  };
+  const auto fill = [&](const auto& allowed) {
+    for (const Layer& layer : layers_) fill_from(layer, allowed);
   };
   if (source.within) {
     with_scalar_type(source.within->type, [&](auto zero) {

@@ -25,7 +25,8 @@ struct Mask {
   }
 };
 
-/// A label map made ready to be asked for many masks: ids numbered from 0, and the box of each.
+/// A label map made ready to be asked for many masks: ids numbered from 0, and the box of each, in every
+/// layer.
 class LabelBlocks {
  public:
   /// `labels` must outlive this. Throws Error{data} for more than 65536 ids. O(voxels).
@@ -43,13 +44,17 @@ class LabelBlocks {
   struct Box {
     std::array<std::int32_t, 3> low, high;  // inclusive; empty where low > high
   };
-  std::vector<std::uint8_t> chosen(const LabelSource& source) const;
-  Box box(const std::vector<std::uint8_t>& chosen) const;
+  struct Layer {
+    std::vector<std::int64_t> ids;     // ascending
+    std::vector<std::uint16_t> index;  // of each voxel's id in ids
+    std::vector<Box> boxes;            // of each id
+  };
+  static Layer read_layer(const Image& image, const Context& context);
+  static std::vector<std::uint8_t> chosen(const LabelSource& source, const Layer& layer);
+  Box box(const LabelSource& source) const;
 
-  const CaseLabels& labels_;
-  std::vector<std::int64_t> ids_;     // ascending
-  std::vector<std::uint16_t> index_;  // of each voxel's id in ids_
-  std::vector<Box> boxes_;            // of each id
+  const ImageGrid& grid_;
+  std::vector<Layer> layers_;
 };
 
 }  // namespace ecorche::label_surfaces

@@ -138,6 +138,26 @@ TEST(LabelMasks, WithinAnotherImage) {
   EXPECT_EQ(extract(labels, source, {}).F.rows(), 0);
 }
 
+TEST(LabelMasks, OverlappingLayersAreLookedAtTogether) {
+  const ImageGrid grid = cube_grid(24);
+  CaseLabels labels = ball(grid, {8, 12, 12}, 6);
+  const CaseLabels other = draw(grid, [](int i, int j, int k) {
+    return (Eigen::Vector3d(i, j, k) - Eigen::Vector3d(14, 12, 12)).norm() <= 6 ? 2 : 0;
+  });
+  labels.overlaps.push_back(other.image);
+  const SurfaceMesh second = extract(labels, ids({2}), {});
+  expect_solid(second, "second layer");
+  EXPECT_NEAR(volume(second), static_cast<double>(count(other, 2)), 20)
+      << "whole, also where the first layer covers it";
+  EXPECT_NEAR(second.V.col(0).minCoeff(), 8, 1);
+  const SurfaceMesh both = extract(labels, ids({1, 2}), {}), all = extract(labels, ids({}), {});
+  expect_solid(both, "both");
+  EXPECT_EQ(components(both), 1);
+  EXPECT_GT(volume(both), volume(second) + 300);
+  EXPECT_LT(volume(both), 2 * volume(second) - 100) << "what both cover counts once";
+  EXPECT_NEAR(volume(all), volume(both), 1e-6);
+}
+
 TEST(LabelMasks, TheOutsideOfEverythingHasNoHollowsAndNoSpecks) {
   const CaseLabels labels = draw(cube_grid(25), [](int i, int j, int k) {
     const double r = (Eigen::Vector3d(i, j, k) - Eigen::Vector3d(12, 12, 12)).norm();
