@@ -3,6 +3,7 @@
 """Every mistake of table.py by the real command: its exit code, one error line that says what and how to mend, no result,
 nothing left behind, and never longer than a minute."""
 import concurrent.futures
+import json
 import os
 import pathlib
 import re
@@ -72,6 +73,34 @@ class Mistakes(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             wrong = [problem for problem in pool.map(self.wrong, table.ROWS) if problem]
         self.assertEqual(wrong, [], f"\n{len(wrong)} of {len(names)} rows:\n" + "\n".join(wrong))
+
+    def test_what_repair_mends(self):
+        """Two lids off, a triangle turned over, one twice: check names them, repair mends them, and the rest goes along."""
+        case, out = body.write(self.folder / "broken"), self.folder / "mended"
+        skin = list(body.SURFACES["skin.stl"])
+        bone = list(body.SURFACES["femur_right.stl"])
+        (case / "skin.stl").write_bytes(body.stl(skin[1:]))
+        (case / "femur_right.stl").write_bytes(body.stl([bone[0][::-1], *bone[1:], bone[5]]))
+        before = {p.name: p.read_bytes() for p in case.iterdir()}
+        found = json.loads(run(("--json", "check", case)).stdout)
+        surfaces = {surface["name"]: surface for surface in found["surfaces"]}
+        self.assertEqual(surfaces["skin"]["holes"][0]["edges"], 3)
+        self.assertEqual(surfaces["femur_right"]["flipped_triangles"]["count"], 1)
+        self.assertEqual(surfaces["femur_right"]["duplicate_triangles"]["count"], 1)
+        self.assertEqual(json.loads(run(("--json", "repair", case, "-o", out, "--dry-run")).stdout)["written"], False)
+        self.assertFalse(out.exists())
+        done = json.loads(run(("--json", "repair", case, "-o", out, "--holes", "500")).stdout)
+        lines = {line["name"]: line for line in done["surfaces"]}
+        self.assertEqual((lines["skin"]["holes_filled"], lines["skin"]["filling_triangles"]), (1, 1))
+        self.assertEqual((lines["femur_right"]["triangles_turned"], lines["femur_right"]["duplicates_dropped"]), (1, 1))
+        self.assertEqual((lines["muscle_a"]["changed"], lines["skin"]["open_edges_left"]), (False, 0))
+        self.assertEqual(before, {p.name: p.read_bytes() for p in case.iterdir()}, "the input stays as it was")
+        again = json.loads(run(("--json", "check", out)).stdout)
+        self.assertEqual([f for f in again["findings"] if f["severity"] != "note"], [])
+        self.assertEqual(len(again["surfaces"]), 4)
+        made = run(("preprocess", out, "-o", self.folder / "mended.hdf", "--mesher", "lattice", "--max-tets", "5000"))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn("labels", run(("info", self.folder / "mended.hdf")).stdout + made.stdout)
 
     def test_the_good_case_is_good(self):
         """Or else every row above would prove nothing."""
