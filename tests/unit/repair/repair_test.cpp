@@ -172,19 +172,6 @@ TEST(Repair, SolidsThatShareAnEdgeComeApart) {
   EXPECT_NEAR(figures.volume_mm3, 6000 + 750 + 125, 1);
 }
 
-TEST(Repair, SheetsThatMeetAroundAnEdgeGetMiddles) {
-  // Two tets on the edge from 0 to 1, joined at both ends: each end has one fan through a third tet's faces.
-  // Simplest such soup: an edge of four triangles whose ends cannot be split, made by gluing by hand.
-  SurfaceMesh mesh = together({kBox, box({10, 20, 0}, {15, 25, 30})});
-  mesh = as_read(mesh);
-  Soup soup;
-  for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) soup.points.emplace_back(mesh.V.row(v).transpose());
-  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f)
-    soup.triangles.push_back({mesh.F(f, 0), mesh.F(f, 1), mesh.F(f, 2)});
-  EXPECT_EQ(split_sheets(soup), 2);
-  EXPECT_EQ(check::measure(soup.mesh()).nonmanifold.count, 0);
-}
-
 // All ways to cut a polygon of these corners into triangles.
 double least_area(const std::vector<Vector3d>& p, std::size_t i, std::size_t k) {
   if (k < i + 2) return 0;
