@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Times of posing beside the memory's floor and the plain version, all in one run: bench_runtime MODEL.hdf.
 //
-// Every joint moves in every frame. Working sets of at least four last caches: as many copies of the body as
-// that takes are posed in turn, as many bodies would be. The floor is the fewest bytes that the layout needs
-// (what it holds of each node and vertex, and each result once) over the bandwidth measured with as many
-// threads in this run; the time of a store's own fetch of its line is the kernel's loss. Each figure is the
-// median over the walk, with the best and the worst beside it.
+// Every joint moves in every frame. Working sets of whole frames of at least four last caches: as many copies
+// of the body as that takes, but no more than twelve, are posed in turn; the number is printed. The floor is
+// the fewest bytes that the layout needs (what it holds of each node and vertex, and each result once) over
+// the bandwidth measured with as many threads in this run; the time of a store's own fetch of its line is the
+// kernel's loss. Each figure is the median over the walk, with the best and the worst beside it.
 #include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
