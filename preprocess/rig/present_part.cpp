@@ -45,9 +45,7 @@ Skeleton present_part(const Case& patient, const Context& context) {
     }
   }
   for (Segment& segment : part.segments) {
-    std::erase_if(segment.joint.coupled, [&](const Coupling& c) {
-      return part.find_joint(c.joint) < 0 || part.find_joint(c.drives) < 0;
-    });
+    std::erase_if(segment.joint.coupled, [&](const Coupling& c) { return part.find_joint(c.joint) < 0; });
   }
   return part;
 }

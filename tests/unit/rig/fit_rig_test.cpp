@@ -113,8 +113,8 @@ TEST(FitRig, segments_without_bones_go_into_their_nearest_present_ancestor) {
   patient.skeleton.segments = {segment("pelvis", -1), segment("thigh", 0, {0, 0, 1}),
                                segment("shank", 1, {0, 0, 2}), segment("foot", 2, {0, 0, 3}),
                                segment("toes", 3, {0, 0, 4})};
-  patient.skeleton.segments[1].joint.coupled = {{"thigh_joint", "flexion", "toes_joint", 0.5},
-                                                {"thigh_joint", "flexion", "foot_joint", 0.5}};
+  patient.skeleton.segments[4].joint.coupled = {{"thigh_joint", "flexion", "bend", 0.5},
+                                                {"foot_joint", "flexion", "bend", 0.5}};
   patient.bones = {{"femur", "thigh", test::ball({0, 0, 0}, 5, 4)},
                    {"toe", "toes", test::ball({0, 0, 9}, 5, 4)}};
   Heard heard;
@@ -124,8 +124,8 @@ TEST(FitRig, segments_without_bones_go_into_their_nearest_present_ancestor) {
   EXPECT_EQ(rig.skeleton.segments[2].name, "toes");
   EXPECT_EQ(rig.skeleton.segments[2].parent, 1);
   EXPECT_EQ(rig.skeleton.segments[2].joint.center, Eigen::Vector3d(0, 0, 4));
-  ASSERT_EQ(rig.skeleton.segments[1].joint.coupled.size(), 1U);
-  EXPECT_EQ(rig.skeleton.segments[1].joint.coupled[0].drives, "toes_joint");
+  ASSERT_EQ(rig.skeleton.segments[2].joint.coupled.size(), 1U);  // the foot, a leader, is gone
+  EXPECT_EQ(rig.skeleton.segments[2].joint.coupled[0].joint, "thigh_joint");
   ASSERT_EQ(heard.warnings.size(), 2U);
   EXPECT_NE(heard.warnings[0].find("shank"), std::string::npos);
   EXPECT_NE(heard.warnings[0].find("thigh"), std::string::npos);
