@@ -93,7 +93,7 @@ def text(v):
 
 class Skeleton:
     def __init__(self, name):
-        self.lines = ["ecorche_skeleton: 1", f"name: {name}", "segments:"]
+        self.lines = ["# SPDX-License-Identifier: Apache-2.0", "ecorche_skeleton: 1", f"name: {name}", "segments:"]
 
     def add(self, segment, parent, joint, kind, center, sequence, limits, source, axes=None, rest=None, aliases=()):
         self.lines.append(f"  {segment}:")
@@ -235,7 +235,8 @@ VISIBLE_HUMAN = ["Visible Human Male: HuBMAP Human Reference Atlas (K. Browne et
 class Case:
     def __init__(self, name, credit, frame):
         self.name, self.skeleton, self.names = name, Skeleton(name), set()
-        self.lines = ["# Written by ../make_cases.py from the data's own tables; use with --data DIR."]
+        self.lines = ["# SPDX-License-Identifier: Apache-2.0",
+                      "# Written by ../make_cases.py from the data's own tables; use with --data DIR."]
         self.lines += [f"# {line}" for line in credit]
         self.lines += [f"name: {name}", f"frame: {frame}", "unit: mm", "skeleton: skeleton.yaml"]
 
