@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche pose`: offline posing, from a pose file or frames of a motion clip, into files.
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -10,13 +9,13 @@
 #include <optional>
 
 #include "app/command.hpp"
+#include "app/pose_frames.hpp"
+#include "app/posed_case.hpp"
 #include "app/tet_regions.hpp"
 #include "core/files/atomic_file.hpp"
-#include "core/kinematics/retarget.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
 #include "io/image/image_file.hpp"
-#include "io/motion/bvh.hpp"
 #include "io/surface/surface_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/volume/resample.hpp"
@@ -29,30 +28,28 @@ using nlohmann::json;
 
 // As the command line says it.
 struct Settings {
-  fs::path model, output, pose, motion;
-  std::string frames;
-  std::string motion_unit = "cm";
+  fs::path model, output;
+  FrameChoice frames;
   std::string skinning = "cor";
   std::vector<std::string> tissues, volumes;
   std::vector<std::string> formats{"stl"};
   std::string volume_format = "nrrd";
   std::string sampling = "trilinear";
   std::string grid = "posed";
-  bool tets = false, field = false;
+  bool tets = false, field = false, as_case = false;
   std::vector<std::string> tet_formats{"vtu"};
 
   bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
 };
 
+runtime::Sampling sampling_of(const Settings& settings) {
+  return settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
+}
+
 // What to write, in rows of the model.
 struct Plan {
   std::vector<std::uint32_t> tissues, volumes;
   bool tets = false, field = false;
-};
-
-struct Frame {
-  std::string name;  // empty for a single pose, which needs no folder of its own
-  Pose pose;
 };
 
 [[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
@@ -85,6 +82,13 @@ std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::st
 
 // What is not named is not written; naming nothing writes everything.
 Plan plan_of(const Settings& settings, const Model& model) {
+  if (settings.as_case) {
+    if (settings.chooses())
+      usage("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
+    if (settings.formats != Settings{}.formats || settings.volume_format != Settings{}.volume_format)
+      usage("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
+    return {{}, {}, true, false};  // the case itself, and the tets beside it
+  }
   const std::vector<std::string> all{"all"};
   const bool everything = !settings.chooses();
   Plan plan;
@@ -102,73 +106,8 @@ Plan plan_of(const Settings& settings, const Model& model) {
   return plan;
 }
 
-// A, A:B or A:B:STEP -> frames A, A + STEP, ... below B.
-std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t frames) {
-  std::vector<std::size_t> parts;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (bool more = true; more;) {
-    std::size_t value = 0;
-    const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || parts.size() == 3 || (next != end && *next != ':')) {
-      usage("--frames", "'" + text + "' is not A, A:B or A:B:STEP", "for example --frames 0:60:30");
-    }
-    parts.push_back(value);
-    more = next != end;
-    at = more ? next + 1 : end;
-  }
-  const std::size_t first = parts[0];
-  const std::size_t past = parts.size() > 1 ? parts[1] : first + 1;
-  const std::size_t step = parts.size() > 2 ? parts[2] : 1;
-  if (first >= past || past > frames || step == 0) {
-    usage("--frames", "'" + text + "' names no frames of this clip",
-          "it has frames 0 to " + std::to_string(frames - 1) + "; B is one past the last");
-  }
-  std::vector<std::size_t> numbers;
-  for (std::size_t f = first; f < past; f += step) numbers.push_back(f);
-  return numbers;
-}
-
 double degrees(double radians) {
   return radians * 180 / std::numbers::pi;
-}
-
-// Where the clip's zero pose is not the scan's.
-void note_alignment(const Program& program, const Rig& rig, const kinematics::Retarget& match) {
-  for (std::size_t s = 0; s < match.alignment.size(); ++s) {
-    const int parent = rig.skeleton.segments[s].parent;
-    if (parent < 0) continue;
-    const double angle =
-        match.alignment[s].angularDistance(match.alignment[static_cast<std::size_t>(parent)]);
-    if (angle < 1e-6) continue;
-    program.note("note: in the clip's zero pose " + rig.skeleton.segments[s].name + " is turned by " +
-                 std::to_string(std::lround(degrees(angle))) + " degrees from the scan's; aligned");
-  }
-}
-
-std::vector<Frame> read_frames(const Program& program, const Settings& settings, const Rig& rig) {
-  if (settings.pose.empty() == settings.motion.empty()) {
-    usage("pose", settings.pose.empty() ? "nothing to pose" : "both --pose and --motion are given",
-          "give either --pose FILE, or --motion CLIP.bvh --frames A:B");
-  }
-  if (!settings.pose.empty()) return {{"", io::read_pose(settings.pose, rig)}};
-  if (settings.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
-  const double unit = settings.motion_unit == "mm" ? 1 : settings.motion_unit == "cm" ? 10 : 1000;
-  const Clip clip = io::read_bvh(settings.motion, unit);
-  const kinematics::Retarget match = kinematics::match(rig, clip);
-  for (const std::string& joint : match.unused_joints) {
-    program.note("warning: " + settings.motion.string() + ": joint '" + joint +
-                 "' moves nothing of this model");
-  }
-  note_alignment(program, rig, match);
-  std::vector<Frame> frames;
-  const std::vector<std::size_t> numbers = frame_numbers(settings.frames, clip.frames());
-  for (const std::size_t f : numbers) {
-    char name[32] = "";
-    if (numbers.size() > 1) std::snprintf(name, sizeof name, "frame_%04zu", f);
-    frames.push_back({name, kinematics::pose_at(rig, clip, match, f)});
-  }
-  return frames;
 }
 
 json quality_json(const Model& model, const runtime::PoseQuality& quality) {
@@ -277,9 +216,8 @@ class FrameWriter {
   }
 
   void write_volume(const ModelVolume& volume) {
-    const auto sampling =
-        settings_.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
-    const Image posed = runtime::resample(model_, body_.nodes, map_on(volume.image.grid), volume, sampling);
+    const Image posed =
+        runtime::resample(model_, body_.nodes, map_on(volume.image.grid), volume, sampling_of(settings_));
     io::write_image(next(volume.name + "." + settings_.volume_format), posed);
   }
 
@@ -333,7 +271,7 @@ std::string line_of(const json& frame) {
 int run(const Program& program, const Settings& settings) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   const Plan plan = plan_of(settings, *model);
-  const std::vector<Frame> frames = read_frames(program, settings, model->rig);
+  const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
   const runtime::BodyPoser poser(model);
   const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
   runtime::PosedBody body = poser.make_frame();
@@ -347,10 +285,16 @@ int run(const Program& program, const Settings& settings) {
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
     const runtime::PoseQuality quality = runtime::measure(*model, body, poser.all_tissues());
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
+    if (settings.as_case)
+      io::write_case(folder,
+                     posed_case(*model, body, {sampling_of(settings), settings.grid == "posed"}, context),
+                     context);
     FrameWriter writer(settings, plan, *model, body, folder, context);
+    json written = writer.write(quality);
+    if (settings.as_case) written.push_back((folder / "case.yaml").string());
     result["frames"].push_back({{"name", frame.name},
                                 {"folder", folder.string()},
-                                {"files", writer.write(quality)},
+                                {"files", std::move(written)},
                                 {"quality", quality_json(*model, quality)}});
     text += line_of(result["frames"].back());
   }
@@ -366,13 +310,13 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
   command->add_option("MODEL", s->model, "a model that preprocess made")->required();
   command->add_option("-o,--output", s->output, "folder to write into, made where absent")->required();
-  command->add_option("--pose", s->pose, "a pose file");
-  command->add_option("--motion", s->motion, "a motion clip, .bvh");
+  command->add_option("--pose", s->frames.pose, "a pose file");
+  command->add_option("--motion", s->frames.motion, "a motion clip, .bvh");
   command->add_option(
-      "--frames", s->frames,
+      "--frames", s->frames.frames,
       "frames of the clip from 0: A, A:B or A:B:STEP, B is one past the last; several go into "
       "folders of their own");
-  command->add_option("--motion-unit", s->motion_unit, "length of one unit of the clip")
+  command->add_option("--motion-unit", s->frames.unit, "length of one unit of the clip")
       ->check(CLI::IsMember({"mm", "cm", "m"}))
       ->capture_default_str();
   command->add_option("--skinning", s->skinning, "how segments blend: cor, dqs or lbs")
@@ -413,6 +357,10 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       "--field", s->field,
       "write the displacement field: rest to posed on the nodes of body.vtu, posed to rest as an "
       "image with a mask");
+  command->add_flag(
+      "--as-case", s->as_case,
+      "write the posed patient as a new case, ready for preprocess: surfaces, label map, volumes, "
+      "skeleton in its new rest pose; and body.vtu");
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
 }
 

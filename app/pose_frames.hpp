@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which poses `ecorche pose` was asked for.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "app/command.hpp"
+#include "core/values/pose.hpp"
+#include "core/values/skeleton.hpp"
+
+namespace ecorche::app {
+
+/// As the command line says it: a pose file, or frames of a clip.
+struct FrameChoice {
+  std::filesystem::path pose, motion;
+  std::string frames;       ///< A, A:B or A:B:STEP
+  std::string unit = "cm";  ///< of the clip: mm, cm, m
+};
+
+struct Frame {
+  std::string name;  ///< empty for a single pose, which needs no folder of its own
+  Pose pose;
+};
+
+/// The poses, in order; notes what the clip moves nothing by, and where its zero pose was aligned. Throws
+/// Error{usage} for a choice that names no pose, and as the readers do.
+std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig);
+
+}  // namespace ecorche::app

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/posed_case.hpp"
+
+#include "core/kinematics/posed_rest.hpp"
+
+namespace ecorche::app {
+namespace {
+
+SurfaceMesh posed_surface(const Tissue& tissue, const std::vector<float>& posed) {
+  SurfaceMesh mesh;
+  mesh.V =
+      Eigen::Map<const PointsF>(posed.data(), static_cast<Eigen::Index>(posed.size() / 3), 3).cast<double>();
+  mesh.F = tissue.F;
+  return mesh;
+}
+
+void add_volume(Case& patient, const ModelVolume& volume, Image image) {
+  if (!volume.labels) {
+    patient.volumes.push_back({volume.name, std::move(image), volume.background});
+  } else if (!patient.labels) {
+    patient.labels = CaseLabels{std::move(image), volume.table};
+  } else {
+    patient.labels->overlaps.push_back(std::move(image));
+  }
+}
+
+}  // namespace
+
+Case posed_case(const Model& model, const runtime::PosedBody& body, const PosedVolumes& volumes,
+                const Context& context) {
+  Case patient;
+  patient.name = model.name;
+  patient.skeleton = kinematics::posed_rest(model.rig, body.pose);
+  for (std::size_t t = 0; t < model.tissues.size(); ++t) {
+    const Tissue& tissue = model.tissues[t];
+    SurfaceMesh surface = posed_surface(tissue, body.tissues[t]);
+    if (t == 0) {  // the skin
+      patient.skin_name = tissue.name;
+      patient.skin = std::move(surface);
+    } else if (tissue.segment == Tissue::by_tets) {
+      patient.tissues.push_back({tissue.name, tissue.group, std::move(surface)});
+    } else {
+      const auto segment = static_cast<std::size_t>(tissue.segment);
+      patient.bones.push_back({tissue.name, patient.skeleton.segments[segment].name, std::move(surface)});
+    }
+  }
+  runtime::InverseMap map;
+  for (const ModelVolume& volume : model.volumes) {
+    context.check_stop();
+    const ImageGrid grid = volumes.grow ? runtime::grow_to(volume.image.grid, body.nodes) : volume.image.grid;
+    if (!(map.grid == grid)) runtime::locate(model, body.nodes, grid, map, context);
+    add_volume(patient, volume, runtime::resample(model, body.nodes, map, volume, volumes.sampling));
+  }
+  return patient;
+}
+
+}  // namespace ecorche::app

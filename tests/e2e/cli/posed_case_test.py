@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`pose --as-case`: the posed patient is a patient. It is checked, prepared and posed back to how the first one lay."""
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+ECORCHE = os.environ["ECORCHE_BIN"]
+CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
+MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
+AWAY = "ecorche_pose: 1\nskeleton: phantom\njoints:\n" \
+       "  knee_right: {flexion_deg: 80}\n  hip_right: {flexion_deg: 60}\n  elbow_left: {flexion_deg: 70}\n"
+BACK = "ecorche_pose: 1\nskeleton: phantom\njoints:\n" \
+       "  knee_right: {flexion_deg: 0}\n  hip_right: {flexion_deg: 0}\n  elbow_left: {flexion_deg: 17}\n"
+
+
+def run(*words):
+    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+def corners(path):
+    """The triangles of a binary STL, in their order: #F x 3 x 3."""
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    rows = np.frombuffer(data, np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]), count, 84)
+    return rows["v"].astype(float)
+
+
+class PosedCase(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def ok(self, *words):
+        result = run(*words)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def test_goes_there_and_back(self):
+        posed, back = self.folder / "posed", self.folder / "back"
+        (self.folder / "away.yaml").write_text(AWAY)
+        (self.folder / "back.yaml").write_text(BACK)
+        self.ok("pose", MODEL, "-o", posed, "--pose", self.folder / "away.yaml", "--as-case")
+        self.assertTrue((posed / "body.vtu").is_file())
+        self.ok("check", posed)
+        model = self.folder / "posed.hdf"
+        self.ok("preprocess", posed, "-o", model, "--mesher", "lattice", "--max-tets", "200000")
+        self.ok("verify", model)
+        self.ok("pose", model, "-o", back, "--pose", self.folder / "back.yaml", "--tissues", "all")
+        # Bones come back exactly: the skeleton's new rest pose and its angles are right.
+        for bone in sorted((CASE / "bones").glob("*.stl")):
+            first, again = corners(bone), corners(back / bone.name)
+            self.assertLess(np.abs(first - again).max(), 5e-3, bone.name)
+            if bone.name.startswith("tibia_right"):
+                self.assertGreater(np.abs(first - corners(posed / "bones" / bone.name)).max(), 100)
+        # Soft tissues nearly: between the two lies another mesh, with its own weights.
+        for tissue in ("liver", "biceps_brachii_right"):
+            first, again = corners(CASE / f"tissues/{tissue}.stl"), corners(back / f"{tissue}.stl")
+            self.assertLess(np.abs(first - again).max(), 0.5, f"{tissue}: far from every joint that moved")
+        muscle = "rectus_femoris_right"
+        distance = np.linalg.norm(corners(CASE / f"tissues/{muscle}.stl") - corners(back / f"{muscle}.stl"), axis=2)
+        self.assertLess(distance.mean(), 5)
+        # The label map went along.
+        self.assertIn("labels:", (posed / "case.yaml").read_text())
+
+    def test_a_case_is_whole(self):
+        (self.folder / "away.yaml").write_text(AWAY)
+        for more in (("--tissues", "skin"), ("--format", "ply"), ("--volume-format", "mha")):
+            result = run("pose", MODEL, "-o", self.folder / "x", "--pose", self.folder / "away.yaml", "--as-case", *more)
+            self.assertEqual(result.returncode, 64, result.stderr)
+            self.assertIn("--as-case", result.stderr)
+            self.assertFalse((self.folder / "x").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
