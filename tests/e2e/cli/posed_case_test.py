@@ -62,9 +62,13 @@ class PosedCase(unittest.TestCase):
         for tissue in ("liver", "biceps_brachii_right"):
             first, again = corners(CASE / f"tissues/{tissue}.stl"), corners(back / f"{tissue}.stl")
             self.assertLess(np.abs(first - again).max(), 0.5, f"{tissue}: far from every joint that moved")
-        muscle = "rectus_femoris_right"
-        distance = np.linalg.norm(corners(CASE / f"tissues/{muscle}.stl") - corners(back / f"{muscle}.stl"), axis=2)
-        self.assertLess(distance.mean(), 5)
+        # Those that cross a joint which moved went through another mesh, folded there, with its own weights.
+        means = {path.stem: np.linalg.norm(corners(path) - corners(back / path.name), axis=2).mean()
+                 for path in sorted((CASE / "tissues").glob("*.stl"))}
+        worst = max(means, key=means.get)
+        print(f"posed and back: median tissue {np.median(list(means.values())):.2f} mm, worst {worst} {means[worst]:.1f} mm")
+        self.assertLess(np.median(list(means.values())), 1)
+        self.assertLess(means[worst], 30)
         # The label map went along.
         self.assertIn("labels:", (posed / "case.yaml").read_text())
 
