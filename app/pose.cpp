@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "app/command.hpp"
+#include "app/inverted_tets.hpp"
 #include "app/pose_frames.hpp"
 #include "app/posed_case.hpp"
 #include "app/tet_regions.hpp"
@@ -110,7 +111,11 @@ double degrees(double radians) {
   return radians * 180 / std::numbers::pi;
 }
 
-json quality_json(const Model& model, const runtime::PoseQuality& quality) {
+json quality_json(const Model& model, const runtime::PosedBody& body, const runtime::PoseQuality& quality) {
+  const InvertedTets inverted = inverted_tets(model, runtime::tet_det_f(model, body.nodes));
+  json near = json::array();
+  for (const InvertedNear& at : inverted.near)
+    near.push_back({{"joint", at.joint}, {"tets", at.tets}, {"rest_mm3", at.rest_mm3}});
   json tissues = json::array();
   for (std::size_t t = 0; t < quality.tissues.size(); ++t) {
     const runtime::TissueChange& change = quality.tissues[t];
@@ -130,6 +135,8 @@ json quality_json(const Model& model, const runtime::PoseQuality& quality) {
           {"inverted_tets", quality.inverted_tets},
           {"inverted_rest_mm3", quality.inverted_rest_mm3},
           {"inverted_share", quality.inverted_share},
+          {"inverted_near", near},
+          {"inverted_in_tissues", inverted.in_tissues},
           {"min_det_f", quality.min_det_f},
           {"volume_change", quality.volume_change},
           {"bone_rigidity_mm", quality.bone_rigidity_mm},
@@ -161,7 +168,7 @@ class FrameWriter {
     if (plan_.tets || plan_.field) write_tets();
     for (const std::uint32_t row : plan_.volumes) write_volume(model_.volumes[row]);
     if (plan_.field) write_field();
-    files::write_text(next("quality.json"), quality_json(model_, quality).dump(2) + "\n");
+    files::write_text(next("quality.json"), quality_json(model_, body_, quality).dump(2) + "\n");
     return written_;
   }
 
@@ -295,7 +302,7 @@ int run(const Program& program, const Settings& settings) {
     result["frames"].push_back({{"name", frame.name},
                                 {"folder", folder.string()},
                                 {"files", std::move(written)},
-                                {"quality", quality_json(*model, quality)}});
+                                {"quality", quality_json(*model, body, quality)}});
     text += line_of(result["frames"].back());
   }
   program.result(text, result);

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """`pose --as-case`: the posed patient is a patient. It is checked, prepared and posed back to how the first one lay."""
+import json
 import os
 import pathlib
 import shutil
@@ -47,6 +48,12 @@ class PosedCase(unittest.TestCase):
         (self.folder / "back.yaml").write_text(BACK)
         self.ok("pose", MODEL, "-o", posed, "--pose", self.folder / "away.yaml", "--as-case")
         self.assertTrue((posed / "body.vtu").is_file())
+        quality = json.loads((posed / "quality.json").read_text())
+        near = quality["inverted_near"]
+        self.assertEqual(sum(joint["tets"] for joint in near), quality["inverted_tets"])
+        self.assertAlmostEqual(sum(joint["rest_mm3"] for joint in near), quality["inverted_rest_mm3"], delta=1)
+        self.assertIn(near[0]["joint"], ("knee_right", "hip_right", "elbow_left"), "where the pose bends")
+        self.assertLessEqual(quality["inverted_in_tissues"], quality["inverted_tets"])
         self.ok("check", posed)
         model = self.folder / "posed.hdf"
         self.ok("preprocess", posed, "-o", model, "--mesher", "lattice", "--max-tets", "200000")
