@@ -66,14 +66,15 @@ struct Extent {
   Round round = Round::never;
 };
 
-// Both by truncation: ceil and floor are calls where the processor is not known to have them.
+// Both by truncation: ceil and floor are calls where the processor is not known to have them. What is no
+// number gives an empty range.
 std::int32_t first_index(double low, std::int32_t size) {
-  const double at = std::clamp(low, 0.0, static_cast<double>(size));
+  const double at = low <= size ? std::max(low, 0.0) : size;
   const auto whole = static_cast<std::int32_t>(at);
   return whole < at ? whole + 1 : whole;
 }
 std::int32_t last_index(double high, std::int32_t size) {
-  const double at = std::clamp(high, -1.0, static_cast<double>(size) - 1);
+  const double at = high >= -1 ? std::min(high, size - 1.0) : -1.0;
   const auto whole = static_cast<std::int32_t>(at);
   return whole > at ? whole - 1 : whole;
 }
