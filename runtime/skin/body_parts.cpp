@@ -33,6 +33,8 @@ float diagonal(const PointsF& points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
 
+constexpr Eigen::Index kWorthThreads = 20'000;  // vertices; fewer are done before a thread wakes
+
 template <class T>
 T* data_or_null(std::vector<T>& rows) {
   return rows.empty() ? nullptr : rows.data();
@@ -45,7 +47,7 @@ BodyParts::BodyParts(const Model& model)
       tissues_(model.tissues.size()),
       origin_(middle_of(floats(model.nodes))),
       reach_(std::max(1.0F, diagonal(model.nodes))) {
-  tbb::parallel_for(std::size_t{0}, tissues_.size(), [&](std::size_t t) {
+  const auto build = [&](std::size_t t) {
     const Tissue& tissue = model.tissues[t];
     Part& part = tissues_[t];
     if (tissue.segment != Tissue::by_tets) {
@@ -59,7 +61,14 @@ BodyParts::BodyParts(const Model& model)
       const std::size_t cluster = lane / NodeClusters::size;
       part.mask[cluster / 64] |= std::uint64_t{1} << cluster % 64;
     }
-  });
+  };
+  Eigen::Index vertices = 0;
+  for (const Tissue& tissue : model.tissues) vertices += tissue.V.rows();
+  if (vertices < kWorthThreads) {
+    for (std::size_t t = 0; t < tissues_.size(); ++t) build(t);
+  } else {
+    tbb::parallel_for(std::size_t{0}, tissues_.size(), build);
+  }
   for (std::size_t t = 0; t < tissues_.size(); ++t) {
     const bool bone = model.tissues[t].segment != Tissue::by_tets;
     const auto count =
