@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "io/case/case_file.hpp"
 #include "preprocess/check/inspect_case.hpp"
@@ -117,10 +118,7 @@ void declare_check(CLI::App& app, Program& program, Run& chosen) {
   CLI::App* command =
       app.add_subcommand("check", "read a whole case and say what is wrong with it; changes nothing");
   command->add_option("CASE", settings->path, "a case.yaml, or the folder that holds one")->required();
-  command->add_option("--data", settings->input.data,
-                      "the folder that `root: data` paths of the case are in");
-  command->add_option("--frame", settings->input.frame,
-                      "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+  add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
 }

@@ -163,12 +163,12 @@ class FrameWriter {
     files::make_folder(folder_);
   }
 
-  json write(const runtime::PoseQuality& quality) {
+  json write(const json& quality) {
     for (const std::uint32_t row : plan_.tissues) write_tissue(row);
     if (plan_.tets || plan_.field) write_tets();
     for (const std::uint32_t row : plan_.volumes) write_volume(model_.volumes[row]);
     if (plan_.field) write_field();
-    files::write_text(next("quality.json"), quality_json(model_, body_, quality).dump(2) + "\n");
+    files::write_text(next("quality.json"), quality.dump(2) + "\n");
     return written_;
   }
 
@@ -290,7 +290,7 @@ int run(const Program& program, const Settings& settings) {
     // Quality looks at every tissue, whichever are written.
     const Status status = poser.run(frame.pose, skinning, poser.all_tissues(), body);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
-    const runtime::PoseQuality quality = runtime::measure(*model, body, poser.all_tissues());
+    const json quality = quality_json(*model, body, runtime::measure(*model, body, poser.all_tissues()));
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
     if (settings.as_case)
       io::write_case(folder,
@@ -302,7 +302,7 @@ int run(const Program& program, const Settings& settings) {
     result["frames"].push_back({{"name", frame.name},
                                 {"folder", folder.string()},
                                 {"files", std::move(written)},
-                                {"quality", quality_json(*model, body, quality)}});
+                                {"quality", quality}});
     text += line_of(result["frames"].back());
   }
   program.result(text, result);

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/model_report.hpp"
 #include "core/files/atomic_file.hpp"
@@ -179,10 +180,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--cor-sigma", o.cor_sigma, "width of the similarity of weights (LeHodgins16 eq. 1)")
       ->check(CLI::Range(Options::sigma_range.low, Options::sigma_range.high))
       ->capture_default_str();
-  command->add_option("--data", settings->input.data,
-                      "the folder that `root: data` paths of the case are in");
-  command->add_option("--frame", settings->input.frame,
-                      "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+  add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
 }

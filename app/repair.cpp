@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <mutex>
 
+#include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "core/values/error.hpp"
 #include "io/case/case_file.hpp"
@@ -163,10 +164,7 @@ void declare_repair(CLI::App& app, Program& program, Run& chosen) {
          "mm: parts smaller than this across are dropped; 0: none");
   command->add_flag("--drop-inner", o.drop_inner, "drop closed parts inside others: fills cavities");
   command->add_flag("--dry-run", settings->dry_run, "say what would be done; write nothing");
-  command->add_option("--data", settings->input.data,
-                      "the folder that `root: data` paths of the case are in");
-  command->add_option("--frame", settings->input.frame,
-                      "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+  add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
 }

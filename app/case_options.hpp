@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every subcommand that reads a case lets its user say about it.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "io/case/case_file.hpp"
+
+namespace ecorche::app {
+
+/// `--data` and `--frame`. `options` must outlive the command line's parsing.
+inline void add_case_options(CLI::App& command, io::CaseOptions& options) {
+  command.add_option("--data", options.data, "the folder that `root: data` paths of the case are in");
+  command.add_option("--frame", options.frame,
+                     "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+}
+
+}  // namespace ecorche::app
