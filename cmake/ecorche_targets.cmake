@@ -1,6 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 include(GoogleTest OPTIONAL)
 
+# ecorche_precompiled(TARGET PCH): the target reads PCH's headers precompiled, where ECORCHE_PCH is on.
+function(ecorche_precompiled name pch)
+  if(ECORCHE_PCH)
+    target_precompile_headers(${name} REUSE_FROM ${pch})
+  endif()
+endfunction()
+
+if(ECORCHE_PCH)
+  find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+  find_package(GTest REQUIRED)
+  file(WRITE ${CMAKE_BINARY_DIR}/pch.cpp "")
+  set(_common <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <filesystem> <functional> <map> <optional> <span>
+    <string> <vector>)
+  add_library(ecorche_pch OBJECT ${CMAKE_BINARY_DIR}/pch.cpp)
+  target_link_libraries(ecorche_pch PRIVATE ecorche_flags ecorche_sanitizers Eigen3::Eigen)
+  target_precompile_headers(ecorche_pch PRIVATE ${_common})
+  add_library(ecorche_test_pch OBJECT ${CMAKE_BINARY_DIR}/pch.cpp)
+  target_link_libraries(ecorche_test_pch PRIVATE ecorche_flags ecorche_sanitizers Eigen3::Eigen GTest::gtest)
+  target_precompile_headers(ecorche_test_pch PRIVATE ${_common} <gtest/gtest.h>)
+  # Without the time of making: what reads it can then be found in the cache again.
+  target_compile_options(ecorche_flags INTERFACE "SHELL:-Xclang -fno-pch-timestamp")
+endif()
+
 # ecorche_library(NAME [FOREIGN] [CGAL] SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
 #   FOREIGN: mostly somebody else's templates (CGAL, ITK, VTK): built without sanitizers and with -O2 at most.
 #   CGAL:    compiled in the job pool of one.
@@ -10,6 +33,7 @@ function(ecorche_library name)
   target_link_libraries(${name} PUBLIC ${A_PUBLIC} PRIVATE ecorche_flags ${A_PRIVATE})
   if(NOT A_FOREIGN)
     target_link_libraries(${name} PRIVATE ecorche_sanitizers)
+    ecorche_precompiled(${name} ecorche_pch)
   endif()
   if(A_CGAL)
     set_property(TARGET ${name} PROPERTY JOB_POOL_COMPILE cgal_pool)
@@ -29,6 +53,7 @@ function(ecorche_test name)
   find_package(GTest REQUIRED)
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE ecorche_flags ecorche_sanitizers ${A_LIBS} GTest::gtest GTest::gtest_main)
+  ecorche_precompiled(${name} ecorche_test_pch)
   if(name MATCHES "^unit_" AND NOT A_LABELS MATCHES "release_only|slow")
     add_dependencies(unit_tests ${name})
   endif()
