@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which ball owns each voxel of any box of the lattice, a tile at a time: what refilling, losses and the
+// search for tears are made of.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+
+#include "core/values/context.hpp"
+#include "runtime/spheres/balls.hpp"
+#include "runtime/spheres/tile_owners.hpp"
+
+namespace ecorche::runtime {
+
+/// A box of lattice voxels, which may lie beyond the lattice's own extent.
+struct LatticeBox {
+  std::array<std::int32_t, 3> first{0, 0, 0};
+  std::array<std::int32_t, 3> size{0, 0, 0};
+
+  bool operator==(const LatticeBox&) const = default;
+};
+
+/// The grid whose voxels are those of the box.
+ImageGrid grid_of(const ImageGrid& lattice, const LatticeBox& box);
+
+/// The smallest box that holds the lattice and every voxel that some ball may hold. Throws Error{data} beyond
+/// 2^31 voxels, for a ball that is not finite or larger than kMostRadius.
+LatticeBox grown_box(const BallSet& set);
+
+/// The voxels whose centres lie in the LPS box from `low` to `high`, mm, both ends included: empty where none
+/// do.
+LatticeBox box_within(const ImageGrid& lattice, const Vec3& low, const Vec3& high);
+
+/// A tile that something lies in.
+struct Tile {
+  std::array<std::int32_t, 3> first;  ///< voxel of the box
+  std::array<std::int32_t, 3> size;   ///< at most kTileEdge; less at the far sides of the box
+  const TileOwners* owners;
+
+  std::int32_t owner(std::int32_t i, std::int32_t j, std::int32_t k) const {
+    return owners->owner[static_cast<std::size_t>(i + kTileEdge * (j + kTileEdge * k))];
+  }
+};
+
+/// Calls `f` once for every tile of the box that holds an owned voxel, from any thread and in any order.
+/// Throws as grown_box, and Error{interrupted} on a stop.
+void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context,
+               const std::function<void(const Tile&)>& f);
+
+}  // namespace ecorche::runtime
