@@ -75,74 +75,86 @@ bool fix(const Ball& ball, const LatticeBox& box, FixedBall& out) {
   return true;
 }
 
-std::int32_t tiles_along(std::int32_t voxels) {
-  return (voxels + kTileEdge - 1) / kTileEdge;
+// The first cubes.
+constexpr std::int32_t kCube = 16;
+
+std::int32_t cubes_along(std::int32_t voxels) {
+  return (voxels + kCube - 1) / kCube;
 }
 
 using Rows = std::vector<std::int32_t>;
 
-// As the tile at `first` sees the ball; false where it holds nothing of it.
-bool seen_from(const FixedBall& ball, std::int32_t row, const std::array<std::int32_t, 3>& first,
-               TileBall& out) {
-  std::array<std::int64_t, 3> at{};
-  std::int64_t least = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    at[a] = ball.centre[a] - 16 * std::int64_t{first[a]};
-    const std::int64_t beyond = at[a] < 0 ? -at[a] : std::max<std::int64_t>(at[a] - 16 * (kTileEdge - 1), 0);
-    least += beyond * beyond;
-  }
-  if (least >= ball.limit) return false;
-  out = {static_cast<std::int32_t>(at[0]),
-         static_cast<std::int32_t>(at[1]),
-         static_cast<std::int32_t>(at[2]),
-         ball.limit,
-         row,
-         static_cast<std::int32_t>(least)};
-  return true;
-}
-
-// The balls of every slab of tiles along `axis`, rows ascending.
-std::vector<Rows> in_slabs(const std::vector<FixedBall>& balls, std::int32_t slabs, std::size_t axis) {
+// The balls of every slab of cubes along the last axis, rows ascending.
+std::vector<Rows> in_slabs(const std::vector<FixedBall>& balls, std::int32_t slabs) {
   std::vector<Rows> out(static_cast<std::size_t>(slabs));
   for (std::size_t b = 0; b < balls.size(); ++b) {
     if (balls[b].limit <= 0) continue;
-    for (std::int32_t s = balls[b].low[axis] / kTileEdge; s <= balls[b].high[axis] / kTileEdge; ++s) {
+    for (std::int32_t s = balls[b].low[2] / kCube; s <= balls[b].high[2] / kCube; ++s) {
       out[static_cast<std::size_t>(s)].push_back(static_cast<std::int32_t>(b));
     }
   }
   return out;
 }
 
-// One thread's storage.
-struct Scratch {
-  Rows row;
-  std::vector<TileBall> tile;
-  TileOwners owners;
-};
+// One thread's work on one box.
+class Descent {
+ public:
+  Descent(const std::vector<FixedBall>& balls, const LatticeBox& box,
+          const std::function<void(const Tile&)>& f)
+      : balls_(balls), box_(box), f_(f) {}
 
-void draw_row(const std::vector<FixedBall>& balls, const Rows& slab, const LatticeBox& box, std::int32_t j,
-              std::int32_t k, Scratch& scratch, const std::function<void(const Tile&)>& f) {
-  scratch.row.clear();
-  for (const std::int32_t b : slab) {
-    const FixedBall& ball = balls[static_cast<std::size_t>(b)];
-    if (ball.low[1] < j + kTileEdge && ball.high[1] >= j) scratch.row.push_back(b);
-  }
-  if (scratch.row.empty()) return;
-  for (std::int32_t i = 0; i < box.size[0]; i += kTileEdge) {
-    scratch.tile.clear();
-    TileBall seen{};
-    for (const std::int32_t b : scratch.row) {
-      const FixedBall& ball = balls[static_cast<std::size_t>(b)];
-      if (ball.low[0] >= i + kTileEdge || ball.high[0] < i) continue;
-      if (seen_from(ball, b, {i, j, k}, seen)) scratch.tile.push_back(seen);
+  // The cubes of a row along i, of the slab's balls.
+  void row(const Rows& slab, std::int32_t j, std::int32_t k) {
+    row_.clear();
+    for (const std::int32_t b : slab) {
+      const FixedBall& ball = balls_[static_cast<std::size_t>(b)];
+      if (ball.low[1] < j + kCube && ball.high[1] >= j) row_.push_back(b);
     }
-    if (scratch.tile.empty() || !draw_tile(scratch.tile, scratch.owners)) continue;
-    f({{i, j, k},
-       {std::min(kTileEdge, box.size[0] - i), std::min(kTileEdge, box.size[1] - j),
-        std::min(kTileEdge, box.size[2] - k)},
-       &scratch.owners});
+    if (row_.empty()) return;
+    for (std::int32_t i = 0; i < box_.size[0]; i += kCube) {
+      reaching_.clear();
+      for (const std::int32_t b : row_) {
+        const FixedBall& ball = balls_[static_cast<std::size_t>(b)];
+        if (ball.low[0] >= i + kCube || ball.high[0] < i) continue;
+        const auto seen = [&](std::size_t a, std::int32_t first) {
+          return static_cast<std::int32_t>(ball.centre[a] - 16 * std::int64_t{first});
+        };
+        reaching_.push(seen(0, i), seen(1, j), seen(2, k), ball.limit, b);
+      }
+      kernels::narrow(reaching_, {0, 0, 0}, kCube, level_[0]);
+      halve(0, kCube, {i, j, k});
+    }
   }
-}
+
+ private:
+  // `level_[depth]` are the balls of the cube of `edge` voxels at `first`.
+  void halve(std::size_t depth, std::int32_t edge, const std::array<std::int32_t, 3>& first) {
+    if (level_[depth].size == 0) return;
+    if (edge == kTileEdge) {
+      if (!kernels::draw(level_[depth], owners_)) return;
+      Tile tile{first, {}, &owners_};
+      for (std::size_t a = 0; a < 3; ++a) tile.size[a] = std::min(kTileEdge, box_.size[a] - first[a]);
+      return f_(tile);
+    }
+    const std::int32_t half = edge / 2;
+    for (int eighth = 0; eighth < 8; ++eighth) {
+      const std::array<std::int32_t, 3> offset{half * (eighth & 1), half * (eighth >> 1 & 1),
+                                               half * (eighth >> 2)};
+      const std::array<std::int32_t, 3> at{first[0] + offset[0], first[1] + offset[1], first[2] + offset[2]};
+      if (at[0] >= box_.size[0] || at[1] >= box_.size[1] || at[2] >= box_.size[2]) continue;
+      kernels::narrow(level_[depth], offset, half, level_[depth + 1]);
+      halve(depth + 1, half, at);
+    }
+  }
+
+  const std::vector<FixedBall>& balls_;
+  const LatticeBox& box_;
+  const std::function<void(const Tile&)>& f_;
+  Rows row_;
+  CubeBalls reaching_;
+  std::array<CubeBalls, 3> level_;
+  TileOwners owners_;
+};
 
 }  // namespace
 
@@ -213,16 +225,16 @@ void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context
       if (!fix(set.balls[b], box, balls[b])) balls[b].limit = 0;
     }
   });
-  const std::vector<Rows> slabs = in_slabs(balls, tiles_along(box.size[2]), 2);
-  tbb::enumerable_thread_specific<Scratch> storage;
-  const std::int32_t across = tiles_along(box.size[1]);
+  const std::vector<Rows> slabs = in_slabs(balls, cubes_along(box.size[2]));
+  tbb::enumerable_thread_specific<Descent> descents([&] { return Descent(balls, box, f); });
+  const std::int32_t across = cubes_along(box.size[1]);
   std::atomic<std::int64_t> done{0};
   const std::int64_t all = std::int64_t{across} * static_cast<std::int64_t>(slabs.size());
   tbb::parallel_for(std::int64_t{0}, all, [&](std::int64_t task) {
     if (context.stop.stop_requested()) return;
     const auto slab = static_cast<std::size_t>(task / across);
-    draw_row(balls, slabs[slab], box, static_cast<std::int32_t>(task % across) * kTileEdge,
-             static_cast<std::int32_t>(slab) * kTileEdge, storage.local(), f);
+    descents.local().row(slabs[slab], static_cast<std::int32_t>(task % across) * kCube,
+                         static_cast<std::int32_t>(slab) * kCube);
     const std::int64_t now = ++done;
     if (now % 64 == 0) context.report(static_cast<double>(now) / static_cast<double>(all));
   });

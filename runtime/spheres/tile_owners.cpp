@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The proximity buffer of a tile, a row of voxels at a time.
+// The proximity buffer: vectors of balls while cubes are halved, vectors of voxels in the smallest.
 #include "runtime/spheres/tile_owners.hpp"
 
 #include <algorithm>
@@ -16,58 +16,102 @@ namespace ecorche::runtime::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Lanes = hn::CappedTag<std::int32_t, kTileEdge>;
-using Vector = hn::Vec<Lanes>;
+using Balls = hn::ScalableTag<std::int32_t>;
+using BallVector = hn::Vec<Balls>;
+// Two rows of a cube of 4, so that every instruction set finds whole vectors.
+using Voxels = hn::CappedTag<std::int32_t, 8>;
+using VoxelVector = hn::Vec<Voxels>;
+
+constexpr std::int32_t kMost = std::numeric_limits<std::int32_t>::max();
+
+// Squares of the distances to the nearest and the farthest voxel of the cube, along one axis.
+HWY_INLINE void add_squares(BallVector at, BallVector last, BallVector& least, BallVector& most) {
+  const Balls d;
+  const BallVector past = hn::Sub(at, last), before = hn::Neg(at);
+  const BallVector near = hn::Max(hn::Max(past, before), hn::Zero(d));
+  const BallVector far = hn::Max(at, hn::Neg(past));
+  least = hn::Add(least, hn::Mul(near, near));
+  most = hn::Add(most, hn::Mul(far, far));
+}
 
 }  // namespace
 
-// With i the voxel's place in its row, the squared distance is 256 i^2 - 32 i x + (x^2 + y^2 + z^2): what two
-// balls differ by is linear in i, so a row costs an addition.
-void draw(std::span<const TileBall> balls, TileOwners& out) {
-  const Lanes d;
-  constexpr std::int32_t kStep = 16;
+void narrow(CubeBalls& in, const std::array<std::int32_t, 3>& offset, std::int32_t edge, CubeBalls& out) {
+  const Balls d;
   const std::size_t lanes = hn::Lanes(d);
-  for (const TileBall& ball : balls) {
-    const Vector row = hn::Set(d, ball.row);
-    for (std::size_t first = 0; first < kTileEdge; first += lanes) {
-      const Vector i = hn::Iota(d, static_cast<std::int32_t>(first));
-      const Vector slope = hn::Mul(i, hn::Set(d, -2 * kStep * ball.x));
-      const Vector limit = hn::Sub(hn::Set(d, ball.limit), hn::Mul(hn::Mul(i, i), hn::Set(d, kStep * kStep)));
-      for (std::int32_t k = 0; k < kTileEdge; ++k) {
-        const std::int32_t dz = kStep * k - ball.z;
-        if (dz * dz >= ball.limit) continue;
-        for (std::int32_t j = 0; j < kTileEdge; ++j) {
-          const std::int32_t dy = kStep * j - ball.y;
-          const std::int32_t aside = dz * dz + dy * dy;
-          if (aside >= ball.limit) continue;
-          const Vector value = hn::Add(slope, hn::Set(d, aside + ball.x * ball.x));
-          const std::size_t at = first + static_cast<std::size_t>(kTileEdge * (j + kTileEdge * k));
-          const Vector best = hn::Load(d, &out.proximity[at]);
-          const Vector owner = hn::Load(d, &out.owner[at]);
-          const auto nearer = hn::Or(hn::Lt(value, best), hn::And(hn::Eq(value, best), hn::Lt(row, owner)));
-          const auto taken = hn::And(nearer, hn::Lt(value, limit));
-          hn::Store(hn::IfThenElse(taken, value, best), d, &out.proximity[at]);
-          hn::Store(hn::IfThenElse(taken, row, owner), d, &out.owner[at]);
-        }
-      }
-    }
+  out.reserve(in.size);
+  out.clear();
+  const BallVector last = hn::Set(d, 16 * (edge - 1)), everything = hn::Set(d, kMost);
+  const BallVector ox = hn::Set(d, 16 * offset[0]), oy = hn::Set(d, 16 * offset[1]),
+                   oz = hn::Set(d, 16 * offset[2]);
+  BallVector bound = everything;
+  for (std::size_t b = 0; b < in.size; b += lanes) {
+    BallVector least = hn::Zero(d), most = hn::Zero(d);
+    add_squares(hn::Sub(hn::LoadU(d, &in.x[b]), ox), last, least, most);
+    add_squares(hn::Sub(hn::LoadU(d, &in.y[b]), oy), last, least, most);
+    add_squares(hn::Sub(hn::LoadU(d, &in.z[b]), oz), last, least, most);
+    hn::StoreU(least, d, &in.least[b]);
+    const auto whole = hn::And(hn::Lt(most, hn::LoadU(d, &in.limit[b])), hn::FirstN(d, in.size - b));
+    bound = hn::Min(bound, hn::IfThenElse(whole, most, everything));
+  }
+  bound = hn::MinOfLanes(d, bound);
+  for (std::size_t b = 0; b < in.size; b += lanes) {
+    const BallVector least = hn::LoadU(d, &in.least[b]), limit = hn::LoadU(d, &in.limit[b]);
+    const auto kept =
+        hn::And(hn::And(hn::Lt(least, limit), hn::Not(hn::Lt(bound, least))), hn::FirstN(d, in.size - b));
+    if (hn::AllFalse(d, kept)) continue;
+    const std::size_t at = out.size;
+    out.size += hn::CompressStore(hn::Sub(hn::LoadU(d, &in.x[b]), ox), kept, d, &out.x[at]);
+    hn::CompressStore(hn::Sub(hn::LoadU(d, &in.y[b]), oy), kept, d, &out.y[at]);
+    hn::CompressStore(hn::Sub(hn::LoadU(d, &in.z[b]), oz), kept, d, &out.z[at]);
+    hn::CompressStore(limit, kept, d, &out.limit[at]);
+    hn::CompressStore(hn::LoadU(d, &in.row[b]), kept, d, &out.row[at]);
   }
 }
 
-std::int32_t farthest(const TileOwners& tile) {
-  const Lanes d;
-  Vector most = hn::Zero(d);
+// The squared distance of voxel (i, j, k) is 256 (i^2 + j^2 + k^2) + (x^2 + y^2 + z^2) - 32 (i x + j y + k
+// z): what two balls differ by is linear, so a vector of voxels costs an addition. Rows ascend, so that the
+// first of those as near stays.
+bool draw(const CubeBalls& balls, TileOwners& out) {
+  const Voxels d;
   const std::size_t lanes = hn::Lanes(d);
-  for (std::size_t first = 0; first < kTileEdge; first += lanes) {
-    const Vector i = hn::Iota(d, static_cast<std::int32_t>(first));
-    const Vector square = hn::Mul(hn::Mul(i, i), hn::Set(d, 256));
-    const Vector none = hn::Set(d, std::numeric_limits<std::int32_t>::max());
-    for (std::size_t at = first; at < kTileVoxels; at += kTileEdge) {
-      const Vector value = hn::Load(d, &tile.proximity[at]);
-      most = hn::Max(most, hn::IfThenElse(hn::Eq(value, none), none, hn::Add(value, square)));
+  const std::size_t vectors = kTileVoxels / lanes;
+  HWY_ALIGN std::int32_t proximity[kTileVoxels];
+  HWY_ALIGN std::int32_t square[kTileVoxels];
+  const VoxelVector ones = hn::Set(d, kTileEdge - 1);
+  for (std::size_t v = 0; v < vectors; ++v) {
+    const VoxelVector at = hn::Iota(d, static_cast<std::int32_t>(v * lanes));
+    const VoxelVector i = hn::And(at, ones), j = hn::And(hn::ShiftRight<2>(at), ones),
+                      k = hn::ShiftRight<4>(at);
+    const VoxelVector sum = hn::Add(hn::Add(hn::Mul(i, i), hn::Mul(j, j)), hn::Mul(k, k));
+    hn::Store(hn::ShiftLeft<8>(sum), d, &square[v * lanes]);
+    hn::Store(hn::Set(d, kMost), d, &proximity[v * lanes]);
+    hn::Store(hn::Set(d, TileOwners::none), d, &out.owner[v * lanes]);
+  }
+  const std::size_t in_slice = 16 / lanes;
+  for (std::size_t b = 0; b < balls.size; ++b) {
+    const std::int32_t x = balls.x[b], y = balls.y[b], z = balls.z[b];
+    const VoxelVector row = hn::Set(d, balls.row[b]), limit = hn::Set(d, balls.limit[b]);
+    const VoxelVector dx = hn::Set(d, -32 * x), dy = hn::Set(d, -32 * y);
+    for (std::size_t s = 0; s < in_slice; ++s) {
+      const VoxelVector at = hn::Iota(d, static_cast<std::int32_t>(s * lanes));
+      const VoxelVector i = hn::And(at, ones), j = hn::ShiftRight<2>(at);
+      const VoxelVector flat =
+          hn::Add(hn::Add(hn::Mul(i, dx), hn::Mul(j, dy)), hn::Set(d, x * x + y * y + z * z));
+      for (std::size_t k = 0; k < kTileEdge; ++k) {
+        const std::size_t voxel = 16 * k + s * lanes;
+        const VoxelVector value = hn::Sub(flat, hn::Set(d, static_cast<std::int32_t>(32 * k) * z));
+        const VoxelVector best = hn::Load(d, &proximity[voxel]);
+        const auto taken =
+            hn::And(hn::Lt(value, best), hn::Lt(value, hn::Sub(limit, hn::Load(d, &square[voxel]))));
+        hn::Store(hn::IfThenElse(taken, value, best), d, &proximity[voxel]);
+        hn::Store(hn::IfThenElse(taken, row, hn::Load(d, &out.owner[voxel])), d, &out.owner[voxel]);
+      }
     }
   }
-  return hn::GetLane(hn::MaxOfLanes(d, most));
+  VoxelVector least = hn::Set(d, kMost);
+  for (std::size_t v = 0; v < vectors; ++v) least = hn::Min(least, hn::Load(d, &proximity[v * lanes]));
+  return hn::GetLane(hn::MinOfLanes(d, least)) < kMost;
 }
 
 }  // namespace ecorche::runtime::HWY_NAMESPACE
@@ -75,59 +119,41 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace ecorche::runtime {
-namespace kernels {
-
-HWY_EXPORT(draw);
-HWY_EXPORT(farthest);
-
-void draw(std::span<const TileBall> balls, TileOwners& out) {
-  HWY_DYNAMIC_DISPATCH(draw)(balls, out);
-}
-
-std::int32_t farthest(const TileOwners& tile) {
-  return HWY_DYNAMIC_DISPATCH(farthest)(tile);
-}
-
-void clear(TileOwners& out) {
-  out.proximity.fill(std::numeric_limits<std::int32_t>::max());
-  out.owner.fill(TileOwners::none);
-}
-
-}  // namespace kernels
 
 namespace {
 
-// So many balls are drawn between two looks at what is still open.
-constexpr std::size_t kBatch = 8;
-
-std::int32_t most_of(const TileBall& ball) {
-  const auto far = [](std::int32_t at) { return std::max(at, 16 * (kTileEdge - 1) - at); };
-  const std::int32_t x = far(ball.x), y = far(ball.y), z = far(ball.z);
-  return x * x + y * y + z * z;
-}
+// The longest vector of any processor that Highway knows is 2048 bits here.
+constexpr std::size_t kBeyond = 64;
 
 }  // namespace
 
-bool draw_tile(std::vector<TileBall>& balls, TileOwners& out) {
-  kernels::clear(out);
-  // A ball that holds the whole tile bounds every voxel's distance: what is farther never counts.
-  std::int32_t bound = std::numeric_limits<std::int32_t>::max();
-  for (const TileBall& ball : balls) {
-    const std::int32_t most = most_of(ball);
-    if (most < ball.limit) bound = std::min(bound, most);
-  }
-  std::erase_if(balls, [bound](const TileBall& ball) { return ball.least > bound; });
-  std::sort(balls.begin(), balls.end(), [](const TileBall& a, const TileBall& b) {
-    return a.least != b.least ? a.least < b.least : a.row < b.row;
-  });
-  for (std::size_t first = 0; first < balls.size(); first += kBatch) {
-    if (first > 0) bound = std::min(bound, kernels::farthest(out));
-    if (balls[first].least > bound) break;
-    kernels::draw(std::span(balls).subspan(first, std::min(kBatch, balls.size() - first)), out);
-  }
-  return std::any_of(out.owner.begin(), out.owner.end(),
-                     [](std::int32_t o) { return o != TileOwners::none; });
+void CubeBalls::reserve(std::size_t count) {
+  if (row.size() >= count + kBeyond) return;
+  const std::size_t room = 2 * count + kBeyond;
+  for (auto* array : {&x, &y, &z, &limit, &row, &least}) array->resize(room);
 }
+
+void CubeBalls::push(std::int32_t x_, std::int32_t y_, std::int32_t z_, std::int32_t limit_,
+                     std::int32_t row_) {
+  reserve(size + 1);
+  x[size] = x_, y[size] = y_, z[size] = z_, limit[size] = limit_, row[size] = row_;
+  ++size;
+}
+
+namespace kernels {
+
+HWY_EXPORT(narrow);
+HWY_EXPORT(draw);
+
+void narrow(CubeBalls& in, const std::array<std::int32_t, 3>& offset, std::int32_t edge, CubeBalls& out) {
+  HWY_DYNAMIC_DISPATCH(narrow)(in, offset, edge, out);
+}
+
+bool draw(const CubeBalls& balls, TileOwners& out) {
+  return HWY_DYNAMIC_DISPATCH(draw)(balls, out);
+}
+
+}  // namespace kernels
 
 }  // namespace ecorche::runtime
 #endif
