@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Values for a batch of drawn voxels.
+#pragma once
+
+#include <cstdint>
+
+#include "core/values/image.hpp"
+#include "runtime/volume/draw_tets.hpp"
+#include "runtime/volume/resample.hpp"
+
+namespace ecorche::runtime {
+
+/// Where batches are sampled from and written to; `posed` has the type and components of `volume`.
+struct SampleJob {
+  const Image& volume;
+  double background = 0;
+  Image& posed;
+};
+
+/// A sink for `job`, which must outlive it. Nearest copies; trilinear as Sampler does, for one component of
+/// u8, u16 or i16 a vector at a time in float32: within 1e-4 of the value's range of Sampler's doubles.
+BatchSink sink_for(const SampleJob& job, Sampling sampling);
+
+namespace kernels {
+/// One component; trilinear. False: not for this image (its bytes are out of reach of 32-bit gathers).
+bool gathers_reach(const Image& volume);
+void trilinear_u8(const void* job, const VoxelBatch& batch);
+void trilinear_u16(const void* job, const VoxelBatch& batch);
+void trilinear_i16(const void* job, const VoxelBatch& batch);
+}  // namespace kernels
+
+}  // namespace ecorche::runtime

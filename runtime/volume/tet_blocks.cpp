@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/volume/tet_blocks.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace ecorche::runtime {
+
+TetBlocks::TetBlocks(const Model& model) : nodes_(model.node_count()), begin_{0} {
+  const std::size_t tets = model.tet_count();
+  std::vector<std::uint32_t> of_block;
+  for (std::size_t first = 0; first < tets; first += size) {
+    of_block.clear();
+    for (std::size_t t = first; t < std::min(tets, first + size); ++t) {
+      for (int c = 0; c < 4; ++c) {
+        const auto node = static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(t), c));
+        of_block.push_back(static_cast<std::uint32_t>(node / size));
+      }
+    }
+    std::sort(of_block.begin(), of_block.end());
+    of_block.erase(std::unique(of_block.begin(), of_block.end()), of_block.end());
+    group_.insert(group_.end(), of_block.begin(), of_block.end());
+    begin_.push_back(static_cast<std::uint32_t>(group_.size()));
+  }
+}
+
+void TetBlocks::bound_groups(std::span<const float> nodes, std::span<float> low_high) const {
+  constexpr float far = std::numeric_limits<float>::infinity();
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, groups(), 256), [&](const auto& range) {
+    for (std::size_t g = range.begin(); g < range.end(); ++g) {
+      std::array<float, 3> low{far, far, far}, high{-far, -far, -far};
+      for (std::size_t n = size * g; n < std::min(nodes_, size * (g + 1)); ++n) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          // Written so that what is no number changes nothing.
+          const float x = nodes[3 * n + c];
+          low[c] = x < low[c] ? x : low[c];
+          high[c] = x > high[c] ? x : high[c];
+        }
+      }
+      std::copy(low.begin(), low.end(), low_high.begin() + static_cast<std::ptrdiff_t>(6 * g));
+      std::copy(high.begin(), high.end(), low_high.begin() + static_cast<std::ptrdiff_t>(6 * g + 3));
+    }
+  });
+}
+
+std::array<float, 6> box_of(std::span<const float> low_high) {
+  constexpr float far = std::numeric_limits<float>::infinity();
+  std::array<float, 6> box{far, far, far, -far, -far, -far};
+  for (std::size_t i = 0; i + 5 < low_high.size(); i += 6) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      box[c] = std::min(box[c], low_high[i + c]);
+      box[c + 3] = std::max(box[c + 3], low_high[i + c + 3]);
+    }
+  }
+  return box;
+}
+
+}  // namespace ecorche::runtime
