@@ -42,5 +42,6 @@ void declare_export(CLI::App& app, Program& program, Run& chosen);
 void declare_pose(CLI::App& app, Program& program, Run& chosen);
 void declare_serve(CLI::App& app, Program& program, Run& chosen);
 void declare_stream(CLI::App& app, Program& program, Run& chosen);
+void declare_thin(CLI::App& app, Program& program, Run& chosen);
 
 }  // namespace ecorche::app
