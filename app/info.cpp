@@ -71,6 +71,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"rig", Json::array()},
            {"tissues", Json::array()},
            {"volumes", Json::array()},
+           {"spheres", Json::array()},
            {"provenance", model.provenance}};
   char identity[17];
   std::snprintf(identity, sizeof identity, "%016llx",
@@ -97,6 +98,13 @@ Json to_json(const std::string& path, const Model& model) {
                               {"background", volume.background},
                               {"labels", volume.labels},
                               {"names", volume.table.size()}});
+  }
+  for (const VolumetricSkeleton& skeleton : model.spheres) {
+    out["spheres"].push_back({{"name", skeleton.name},
+                              {"size", skeleton.grid.size},
+                              {"voxel_mm", skeleton.grid.spacing[0]},
+                              {"tp", skeleton.thinness},
+                              {"voxels", skeleton.size()}});
   }
   model_file::for_each_figure(model.certificate, [&](std::string_view name, auto value) {
     out["certificate"][std::string(name)] = value;

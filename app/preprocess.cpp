@@ -16,6 +16,7 @@
 #include "io/case/case_file.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
+#include "preprocess/thin/thinning.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::app {
@@ -53,6 +54,13 @@ std::string stage_table(const std::vector<StageTime>& stages) {
   return out + line;
 }
 
+std::string spheres_line(const Model& model) {
+  std::ostringstream out;
+  for (const VolumetricSkeleton& s : model.spheres)
+    out << "spheres of '" << s.name << "': " << s.size() << " at TP " << s.thinness << "\n";
+  return out.str();
+}
+
 std::string text_report(const Model& model, const Settings& settings, const std::vector<StageTime>& stages) {
   const Certificate& c = model.certificate;
   std::ostringstream out;
@@ -63,8 +71,8 @@ std::string text_report(const Model& model, const Settings& settings, const std:
       << " rows repaired by at most " << c.repaired_largest_change << "\ndihedral angles "
       << c.min_dihedral_deg << " to " << c.max_dihedral_deg << " deg, positive off-diagonals "
       << c.positive_offdiagonal_share * 100 << " %\n"
-      << c.outside_vertices << " tissue vertices outside the mesh, the farthest " << c.max_outside_mm
-      << " mm\n";
+      << spheres_line(model) << c.outside_vertices << " tissue vertices outside the mesh, the farthest "
+      << c.max_outside_mm << " mm\n";
   return out.str();
 }
 
@@ -180,6 +188,11 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--cor-sigma", o.cor_sigma, "width of the similarity of weights (LeHodgins16 eq. 1)")
       ->check(CLI::Range(Options::sigma_range.low, Options::sigma_range.high))
       ->capture_default_str();
+  command
+      ->add_option("--spheres", o.spheres_tp,
+                   "also thin the body to a volumetric skeleton of this thinness (0.48 is the paper's), for "
+                   "pose --deformer spheres")
+      ->check(CLI::Range(thin::least_thinness, thin::most_thinness));
   add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

@@ -3,13 +3,15 @@
 #include "preprocess/thin/thinning.hpp"
 
 #include <charconv>
-#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <sstream>
 
 #include "app/command.hpp"
+#include "app/hang_skeleton.hpp"
+#include "app/step_clock.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
@@ -29,20 +31,8 @@ struct Settings {
   std::string metric = "euclidean";
   // What the paper poses with: a third of a percent of a body's voxels.
   double thinness = 0.48;
-};
-
-// Times of the steps, as they end.
-class Clock {
- public:
-  template <class F>
-  auto time(const char* step, F&& f) {
-    const auto start = std::chrono::steady_clock::now();
-    auto result = f();
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-    seconds[step] = spent.count();
-    return result;
-  }
-  nlohmann::json seconds = nlohmann::json::object();
+  HangSettings hang;
+  std::vector<std::string> for_images;  // options that were given and have no meaning for a skeleton
 };
 
 [[noreturn]] void refuse(const char* option, const std::string& what, const std::string& mend) {
@@ -95,9 +85,9 @@ Image isotropic(const Program& program, const Settings& settings, Image image, n
   return out;
 }
 
-// A fresh skeleton of an image.
-VolumetricSkeleton from_image(const Program& program, const Settings& settings, Clock& clock,
-                              nlohmann::json& report) {
+// A fresh skeleton of an image, and the object that it is of.
+VolumetricSkeleton from_image(const Program& program, const Settings& settings, thin::Mask& mask,
+                              StepClock& clock, nlohmann::json& report) {
   thin::Segmentation how = settings.segmentation;
   read_threshold(settings.threshold, how);
   how.boundary = settings.boundary == 6 ? thin::Boundary::faces_6 : thin::Boundary::all_26;
@@ -106,8 +96,7 @@ VolumetricSkeleton from_image(const Program& program, const Settings& settings, 
   image = clock.time("resample", [&] { return isotropic(program, settings, std::move(image), report); });
   if (image.components < components) how.component = 0;  // resampling has taken the one
   const bool largest = std::exchange(how.largest, false);
-  thin::Mask mask =
-      clock.time("segment", [&] { return thin::segment(image, how, program.context("segmenting")); });
+  mask = clock.time("segment", [&] { return thin::segment(image, how, program.context("segmenting")); });
   image = {};
   const thin::Pieces found =
       clock.time("pieces", [&] { return thin::pieces(mask, how.boundary, program.context("pieces")); });
@@ -136,20 +125,25 @@ int run(const Program& program, const Settings& settings) {
   if (settings.output.extension() != ".vtp")
     refuse("--output", "'" + settings.output.string() + "' does not end in .vtp", "name it so");
   { const files::AtomicFile probe(settings.output); }
+  check_hang_options(settings.hang);
   nlohmann::json report;
-  Clock clock;
+  StepClock clock;
+  thin::Mask mask;
   io::VolumetricSkeletonFile file;
   if (is_skeleton(settings.input)) {
+    if (!settings.for_images.empty())
+      refuse(settings.for_images[0].c_str(), "has no meaning for a skeleton", "thin the image again");
     file = clock.time("read", [&] { return io::read_volumetric_skeleton(settings.input); });
     file.skeleton = clock.time("thinning", [&] { return thin::thinner(file.skeleton, settings.thinness); });
   } else {
-    file.skeleton = from_image(program, settings, clock, report);
+    file.skeleton = from_image(program, settings, mask, clock, report);
     file.skeleton.name = settings.output.stem().string();
   }
   if (file.skeleton.size() == 0) {
     throw Error(ErrorKind::data, settings.input.string(), "no voxel is left at this thinness",
                 "choose a lower --tp");
   }
+  hang(program, settings.hang, mask, file, clock, report);
   clock.time("write", [&] { return io::write_volumetric_skeleton(settings.output, file), 0; });
   const VolumetricSkeleton& s = file.skeleton;
   report["skeletal"] = s.size();
@@ -157,16 +151,24 @@ int run(const Program& program, const Settings& settings) {
   report["metric"] = s.metric == DistanceMetric::euclidean ? "euclidean" : "chamfer345";
   report["size"] = s.grid.size;
   report["voxel_mm"] = s.grid.spacing[0];
-  report["seconds"] = clock.seconds;
+  report["seconds"] = clock.json();
   std::ostringstream text;
   text << settings.output.string() << ": " << s.size() << " skeletal voxels at TP " << s.thinness;
   if (report.contains("share_percent")) {
     text << ", " << report["share_percent"].get<double>() << " % of " << report["voxels"]["object"] << " in "
          << report["voxels"]["pieces"] << " piece(s)";
   }
-  for (const auto& [step, seconds] : clock.seconds.items()) {
+  if (report.contains("tree")) {
+    text << "\ntree of " << report["tree"]["edges"] << " edges in " << report["tree"]["components"]
+         << " component(s)";
+  }
+  if (report.contains("attached")) {
+    text << "\nattached: " << report["attached"]["first_pass"] << " to a bone that they see, "
+         << report["attached"]["second_pass"] << " along the tree";
+  }
+  for (const auto& [step, seconds] : clock.seconds()) {
     char line[80];
-    std::snprintf(line, sizeof line, "\n%-12s %8.3f s", step.c_str(), seconds.get<double>());
+    std::snprintf(line, sizeof line, "\n%-12s %8.3f s", step, seconds);
     text << line;
   }
   program.result(text.str(), report);
@@ -206,7 +208,14 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--tp", s->thinness, "thinness, voxels: -2 keeps every voxel, 2 none")
       ->check(CLI::Range(thin::least_thinness, thin::most_thinness))
       ->capture_default_str();
-  command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
+  add_hang_options(*command, s->hang);
+  command->callback([&program, &chosen, s, command] {
+    for (const char* option : {"--threshold", "--labels", "--component", "--largest", "--boundary",
+                               "--isotropic", "--metric", "--skeleton", "--model"}) {
+      if (command->count(option) > 0) s->for_images.emplace_back(option);
+    }
+    chosen = [&program, s] { return run(program, *s); };
+  });
 }
 
 }  // namespace ecorche::app

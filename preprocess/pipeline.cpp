@@ -16,28 +16,35 @@
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/relax_slivers.hpp"
+#include "preprocess/thin/body_spheres.hpp"
+#include "preprocess/thin/thinning.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::preprocess {
 namespace {
 
-constexpr std::array<std::string_view, 7> kStages{"rig", "voxelize", "mesh",       "weights",
-                                                  "cor", "mapping",  "certificate"};
+// The stages of a run, in order; spheres only where they are asked for.
+std::vector<std::string_view> stage_names(const Options& options) {
+  std::vector<std::string_view> names{"rig", "voxelize", "mesh", "weights", "cor", "mapping", "certificate"};
+  if (options.spheres_tp) names.insert(names.begin() + 2, "spheres");
+  return names;
+}
 
 // A tissue this many voxels away from the body is probably in another frame.
 constexpr double kFarVoxels = 5;
 
-// Announces, times and measures the stages, in the order of kStages.
+// Announces, times and measures the stages, in the order of their names.
 class Stages {
  public:
-  Stages(const Context& context, const StageCallback& on_stage, std::vector<StageTime>& times)
-      : context_(context), on_stage_(on_stage), times_(times) {}
+  Stages(std::vector<std::string_view> names, const Context& context, const StageCallback& on_stage,
+         std::vector<StageTime>& times)
+      : names_(std::move(names)), context_(context), on_stage_(on_stage), times_(times) {}
 
   template <class F>
   auto operator()(F&& stage) {
-    const std::string_view name = kStages.at(times_.size());
-    if (on_stage_) on_stage_(name, static_cast<int>(times_.size()), static_cast<int>(kStages.size()));
+    const std::string_view name = names_.at(times_.size());
+    if (on_stage_) on_stage_(name, static_cast<int>(times_.size()), static_cast<int>(names_.size()));
     context_.check_stop();
     const auto start = std::chrono::steady_clock::now();
     auto made = stage();
@@ -48,6 +55,7 @@ class Stages {
   }
 
  private:
+  std::vector<std::string_view> names_;
   const Context& context_;
   const StageCallback& on_stage_;
   std::vector<StageTime>& times_;
@@ -76,6 +84,8 @@ void check_options(const Options& options) {
   check_range("--max-tets", options.max_tets, Options::tets_range);
   check_range("--max-nodes", options.max_nodes, Options::nodes_range);
   check_range("--cor-sigma", options.cor_sigma, Options::sigma_range);
+  constexpr Options::Range<double> tp_range{thin::least_thinness, thin::most_thinness};
+  if (options.spheres_tp) check_range("--spheres", *options.spheres_tp, tp_range);
 }
 
 // The row of the segment that moves each bone.
@@ -200,7 +210,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
     if (level == LogLevel::warning) result.warnings.emplace_back(line);
     if (outer.log) outer.log(level, line);
   };
-  Stages stage(context, on_stage, result.stages);
+  Stages stage(stage_names(options), context, on_stage, result.stages);
 
   model.name = patient.name;
   model.rig = stage([&] { return rig::fit(patient, context); });
@@ -213,6 +223,10 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
     return std::optional(voxel::voxelize(patient, o, context));
   });
   const double voxel_mm = labels->grid.spacing[0];
+  if (options.spheres_tp) {
+    model.spheres.push_back(
+        stage([&] { return thin::body_spheres(*labels, model.rig.skeleton, *options.spheres_tp, context); }));
+  }
 
   std::optional<TetMesh> mesh = stage([&] {
     tet::Options o;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,9 @@ struct Options {
   std::int64_t max_nodes = 800'000;
   std::string solver = "auto";
   double cor_sigma = 0.05;  ///< half of LeHodgins16's 0.1
+  /// Thinness of the body's volumetric skeleton. None is made without it: only the deformer of spheres reads
+  /// one, and a model is posed by tets unless told otherwise.
+  std::optional<double> spheres_tp;
 };
 
 struct StageTime {

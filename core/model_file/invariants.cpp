@@ -7,6 +7,8 @@
 #include <set>
 #include <span>
 
+#include "core/values/volumetric_skeleton_check.hpp"
+
 namespace ecorche::model_file {
 namespace {
 
@@ -32,6 +34,8 @@ class Checker {
     for (const Tissue& tissue : model_.tissues) check_tissue(tissue);
     check_names(model_.volumes, "/ecorche/volumes");
     for (const ModelVolume& volume : model_.volumes) check_volume(volume);
+    check_names(model_.spheres, "/ecorche/spheres");
+    for (const VolumetricSkeleton& skeleton : model_.spheres) check_spheres(skeleton);
   }
 
  private:
@@ -255,6 +259,19 @@ class Checker {
     require(direction.allFinite() && gram.isApprox(Eigen::Matrix3d::Identity(), kDirection), at + "direction",
             "is not orthonormal");
     require(std::isfinite(volume.background), at + "background", "is not finite");
+  }
+
+  void check_spheres(const VolumetricSkeleton& skeleton) const {
+    const std::string at = "/ecorche/spheres/" + skeleton.name;
+    context_.check_stop();
+    const std::string defect = first_defect(skeleton);
+    require(defect.empty(), at, defect);
+    require(skeleton.parent.size() == skeleton.size(), at + "/parent", "is not one row per voxel");
+    require(skeleton.segment.size() == skeleton.size(), at + "/segment", "is not one row per voxel");
+    for (std::size_t r = 0; r < skeleton.size(); ++r) {
+      look(r);
+      require_row(is_segment(skeleton.segment[r]), at + "/segment", "names no segment", r);
+    }
   }
 
   const Model& model_;

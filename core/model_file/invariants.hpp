@@ -16,7 +16,8 @@ bool is_identifier(std::string_view name);
 /// Throws Error{kind, WHERE:DATASET} at the first invariant that does not hold: sizes agree, indices are in
 /// range, values are finite; parents come first; names are unique identifiers; joint frames and image
 /// directions are orthonormal; tets are positive; weight rows are sorted, lie in [0, 1] and sum to 1 within
-/// 1e-6; barycentric coordinates sum to 1 within 1e-4. Linear in the size of the model.
+/// 1e-6; barycentric coordinates sum to 1 within 1e-4; spheres
+/// have no defect (`first_defect`), a tree, and a segment for every voxel. Linear in the size of the model.
 void check_invariants(const Model& model, const std::string& where, ErrorKind kind, const Context& context);
 
 }  // namespace ecorche::model_file

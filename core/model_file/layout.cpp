@@ -140,6 +140,14 @@ void add_tissue(Layout& out, const Tissue& tissue, std::size_t index) {
   out.view(at + "barycentric", elements(tissue.barycentric), {count(tissue.barycentric.rows()), 4});
 }
 
+void add_grid(Layout& out, const std::string& at, std::size_t index, const ImageGrid& grid) {
+  out.scalar(at + "index", static_cast<std::int32_t>(index));
+  out.copy(at + "size", std::vector<std::int32_t>(grid.size.begin(), grid.size.end()));
+  out.copy(at + "origin", std::vector<double>(grid.origin.begin(), grid.origin.end()));
+  out.copy(at + "spacing", std::vector<double>(grid.spacing.begin(), grid.spacing.end()));
+  out.copy(at + "direction", std::vector<double>(grid.direction.begin(), grid.direction.end()), {3, 3});
+}
+
 void add_volume(Layout& out, const ModelVolume& volume, std::size_t index) {
   const std::string at = "/ecorche/volumes/" + volume.name + "/";
   const ImageGrid& grid = volume.image.grid;
@@ -152,17 +160,27 @@ void add_volume(Layout& out, const ModelVolume& volume, std::size_t index) {
     ids.push_back(id);
     names.push_back(name);
   }
-  out.scalar(at + "index", static_cast<std::int32_t>(index));
-  out.copy(at + "size", std::vector<std::int32_t>(grid.size.begin(), grid.size.end()));
-  out.copy(at + "origin", std::vector<double>(grid.origin.begin(), grid.origin.end()));
-  out.copy(at + "spacing", std::vector<double>(grid.spacing.begin(), grid.spacing.end()));
-  out.copy(at + "direction", std::vector<double>(grid.direction.begin(), grid.direction.end()), {3, 3});
+  add_grid(out, at, index, grid);
   out.scalar(at + "components", std::int32_t{volume.image.components});
   out.scalar(at + "background", volume.background);
   out.scalar(at + "labels", static_cast<std::uint8_t>(volume.labels));
   out.copy(at + "table_id", ids);
   out.texts(at + "table_name", names);
   out.raw(at + "voxels", element_type(volume.image.type), volume.image.bytes, shape);
+}
+
+void add_spheres(Layout& out, const VolumetricSkeleton& skeleton, std::size_t index) {
+  const std::string at = "/ecorche/spheres/" + skeleton.name + "/";
+  const auto rows = std::uint64_t{skeleton.size()};
+  add_grid(out, at, index, skeleton.grid);
+  out.scalar(at + "metric", static_cast<std::uint8_t>(skeleton.metric));
+  out.scalar(at + "thinness", skeleton.thinness);
+  const auto* first = reinterpret_cast<const std::uint16_t*>(skeleton.voxel.data());
+  out.view<std::uint16_t>(at + "voxel", {first, 3 * skeleton.size()}, {rows, 3});
+  out.view<std::uint32_t>(at + "distance", skeleton.distance, {rows});
+  out.view<float>(at + "deficit", skeleton.deficit, {rows});
+  out.view<std::int32_t>(at + "parent", skeleton.parent, {rows});
+  out.view<std::int32_t>(at + "segment", skeleton.segment, {rows});
 }
 
 void add_provenance(Layout& out, const std::map<std::string, std::string>& provenance) {
@@ -201,6 +219,7 @@ Layout lay_out(const Model& model) {
   add_skinning(out, model);
   for (std::size_t i = 0; i < model.tissues.size(); ++i) add_tissue(out, model.tissues[i], i);
   for (std::size_t i = 0; i < model.volumes.size(); ++i) add_volume(out, model.volumes[i], i);
+  for (std::size_t i = 0; i < model.spheres.size(); ++i) add_spheres(out, model.spheres[i], i);
   for_each_figure(model.certificate, [&](std::string_view name, const auto& value) {
     out.scalar("/ecorche/quality/" + std::string(name), value);
   });

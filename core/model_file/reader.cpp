@@ -180,15 +180,20 @@ std::array<T, N> read_array(const Source& source, const std::string& path, const
   return values;
 }
 
-ModelVolume read_volume(const Source& source, const std::string& name) {
-  const std::string at = "/ecorche/volumes/" + name + "/";
-  ModelVolume volume;
-  volume.name = name;
-  ImageGrid& grid = volume.image.grid;
+ImageGrid read_grid(const Source& source, const std::string& at) {
+  ImageGrid grid;
   grid.size = read_array<3, std::int32_t>(source, at + "size", {3});
   grid.origin = read_array<3, double>(source, at + "origin", {3});
   grid.spacing = read_array<3, double>(source, at + "spacing", {3});
   grid.direction = read_array<9, double>(source, at + "direction", {3, 3});
+  return grid;
+}
+
+ModelVolume read_volume(const Source& source, const std::string& name) {
+  const std::string at = "/ecorche/volumes/" + name + "/";
+  ModelVolume volume;
+  volume.name = name;
+  const ImageGrid& grid = volume.image.grid = read_grid(source, at);
   volume.image.components = source.scalar<std::int32_t>(at + "components");
   volume.background = source.scalar<double>(at + "background");
   const auto labels = source.scalar<std::uint8_t>(at + "labels");
@@ -212,6 +217,25 @@ ModelVolume read_volume(const Source& source, const std::string& name) {
   return volume;
 }
 
+VolumetricSkeleton read_spheres(const Source& source, const std::string& name) {
+  const std::string at = "/ecorche/spheres/" + name + "/";
+  VolumetricSkeleton skeleton;
+  skeleton.name = name;
+  skeleton.grid = read_grid(source, at);
+  skeleton.metric = read_codes(source, at + "metric", 1, DistanceMetric::chamfer345).front();
+  skeleton.thinness = source.scalar<double>(at + "thinness");
+  const auto voxels = source.vector<std::uint16_t>(at + "voxel", {Source::any, 3});
+  const std::uint64_t rows = voxels.size() / 3;
+  skeleton.voxel.resize(rows);
+  for (std::size_t r = 0; r < rows; ++r)
+    skeleton.voxel[r] = {voxels[3 * r], voxels[3 * r + 1], voxels[3 * r + 2]};
+  skeleton.distance = source.vector<std::uint32_t>(at + "distance", {rows});
+  skeleton.deficit = source.vector<float>(at + "deficit", {rows});
+  skeleton.parent = source.vector<std::int32_t>(at + "parent", {rows});
+  skeleton.segment = source.vector<std::int32_t>(at + "segment", {rows});
+  return skeleton;
+}
+
 Model read_model(const Source& source) {
   Model model;
   model.name = source.text("/ecorche/name");
@@ -233,6 +257,9 @@ Model read_model(const Source& source) {
   }
   for (const std::string& name : source.ordered_members("/ecorche/volumes")) {
     model.volumes.push_back(read_volume(source, name));
+  }
+  for (const std::string& name : source.ordered_members("/ecorche/spheres")) {
+    model.spheres.push_back(read_spheres(source, name));
   }
   for_each_figure(model.certificate, [&](std::string_view name, auto& value) {
     value = source.scalar<std::decay_t<decltype(value)>>("/ecorche/quality/" + std::string(name));

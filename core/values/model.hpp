@@ -12,6 +12,7 @@
 #include "core/values/image.hpp"
 #include "core/values/mesh.hpp"
 #include "core/values/skeleton.hpp"
+#include "core/values/volumetric_skeleton.hpp"
 
 namespace ecorche {
 
@@ -92,6 +93,9 @@ struct Model {
   CorCentres cor;
   std::vector<Tissue> tissues;       ///< skin first, then bones, then the case's order
   std::vector<ModelVolume> volumes;  ///< the case's order; the label map last, under the name "labels"
+  /// Bodies as balls, for the deformer that needs no tets; each with its tree, and every voxel hung on a
+  /// segment of the rig. Empty unless asked for.
+  std::vector<VolumetricSkeleton> spheres;
   Certificate certificate;
   std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
 

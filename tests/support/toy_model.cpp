@@ -245,6 +245,35 @@ void make_volumes(Model& model) {
   model.volumes = {ct, labels};
 }
 
+// Every voxel of the bar as a ball, on the volumes' grid, in one chain.
+void make_spheres(Model& model) {
+  VolumetricSkeleton body;
+  body.name = "body";
+  body.grid = model.volumes[0].image.grid;
+  body.thinness = -2;
+  const auto& n = body.grid.size;
+  const auto distance = [&](int i, int j, int k) {  // of a box: to its nearest face
+    return std::max(0, std::min({i, n[0] - 1 - i, j, n[1] - 1 - j, k, n[2] - 1 - k}));
+  };
+  for (int k = 1; k < n[2] - 1; ++k) {
+    for (int j = 1; j < n[1] - 1; ++j) {
+      for (int i = 1; i < n[0] - 1; ++i) {
+        int around = -distance(i, j, k);
+        for (int d = 0; d < 27; ++d) around += distance(i + d % 3 - 1, j + d / 3 % 3 - 1, k + d / 9 - 1);
+        body.parent.push_back(static_cast<std::int32_t>(body.size()) - 1);
+        body.segment.push_back(
+            static_cast<std::int32_t>(std::clamp(body.grid.point(i, j, k)[2] / 100, 0.0, 2.0)));
+        body.voxel.push_back(
+            {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j), static_cast<std::uint16_t>(k)});
+        const int own = distance(i, j, k);
+        body.distance.push_back(static_cast<std::uint32_t>(own * own));
+        body.deficit.push_back(static_cast<float>(own) - static_cast<float>(around) / 26);
+      }
+    }
+  }
+  model.spheres = {body};
+}
+
 }  // namespace
 
 Model toy_model() {
@@ -256,6 +285,7 @@ Model toy_model() {
   make_centres(model);
   make_tissues(model);
   make_volumes(model);
+  make_spheres(model);
   model.certificate.max_weight = 1;
   model.provenance = {{"ecorche", "toy"}, {"mesher", "by hand"}};
   return model;

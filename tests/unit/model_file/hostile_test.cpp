@@ -443,12 +443,12 @@ TEST_F(Hostile, UnknownGroupsAreLeftAlone) {
   {
     Forge forge(file("a.hdf"));
     set_format(forge.file(), {1, 7});
-    for (const char* path : {"/mine", "/mine/deep", "/ecorche/spheres", "/ecorche/spheres/ct",
+    for (const char* path : {"/mine", "/mine/deep", "/ecorche/later", "/ecorche/later/ct",
                              "/VTKHDF/FieldData", "/ecorche/weights/later"}) {
       forge.group(path);
     }
     H5Lcreate_soft("/nowhere", forge.file(), "/mine/soft", H5P_DEFAULT, H5P_DEFAULT);
-    H5Lcreate_external("/etc/passwd", "/", forge.file(), "/ecorche/spheres/ct/external", H5P_DEFAULT,
+    H5Lcreate_external("/etc/passwd", "/", forge.file(), "/ecorche/later/ct/external", H5P_DEFAULT,
                        H5P_DEFAULT);
     forge.dataset("/mine/huge", H5T_IEEE_F64LE, {hsize_t{1} << 50},
                   [](hid_t creation) { H5Pset_alloc_time(creation, H5D_ALLOC_TIME_LATE); });

@@ -113,6 +113,16 @@ const std::vector<Break> kBreaks{
     {"/ecorche/volumes/ct/spacing", [](Model& m) { m.volumes[0].image.grid.spacing[2] = 0; }},
     {"/ecorche/volumes/ct/direction", [](Model& m) { m.volumes[0].image.grid.direction[0] = 1.01; }},
     {"/ecorche/volumes/ct/background", [](Model& m) { m.volumes[0].background = kNan; }},
+    {"/ecorche/spheres", [](Model& m) { m.spheres[0].name = "body"; }},
+    {"/ecorche/spheres", [](Model& m) { m.spheres[0].name = "../x"; }},
+    {"/ecorche/spheres/few", [](Model& m) { m.spheres[0].distance[1] = 7; }},
+    {"/ecorche/spheres/body", [](Model& m) { m.spheres[1].grid.spacing[1] = 11; }},
+    {"/ecorche/spheres/body", [](Model& m) { std::swap(m.spheres[1].voxel[3], m.spheres[1].voxel[4]); }},
+    {"/ecorche/spheres/body", [](Model& m) { m.spheres[1].parent[0] = 7; }},
+    {"/ecorche/spheres/body/parent", [](Model& m) { m.spheres[1].parent.clear(); }},
+    {"/ecorche/spheres/body/segment", [](Model& m) { m.spheres[1].segment.clear(); }},
+    {"/ecorche/spheres/body/segment", [](Model& m) { m.spheres[1].segment[5] = VolumetricSkeleton::none; }},
+    {"/ecorche/spheres/body/segment", [](Model& m) { m.spheres[1].segment[5] = 3; }},
 };
 
 TEST(Invariants, HoldForAGoodModel) {

@@ -18,6 +18,7 @@ TEST_F(RoundTrip, KeepsTheOrderOfTissuesAndVolumes) {
   Model model = full_model();
   std::swap(model.tissues[1], model.tissues[4]);
   std::swap(model.volumes[0], model.volumes[1]);
+  std::swap(model.spheres[0], model.spheres[1]);
   model_file::write(model, file("a.hdf"), {});
   expect_same(model_file::read(file("a.hdf"), {}), model);
 }
@@ -26,6 +27,7 @@ TEST_F(RoundTrip, TakesABodyWithoutVolumesOrTissues) {
   Model model = toy_model();
   model.volumes.clear();
   model.tissues.clear();
+  model.spheres.clear();
   model.provenance.clear();
   model_file::write(model, file("a.hdf"), {});
   expect_same(model_file::read(file("a.hdf"), {}), model);

@@ -66,6 +66,16 @@ Model full_model() {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i) / 7;
   field.image.grid.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
   model.volumes.insert(model.volumes.begin() + 1, field);
+  VolumetricSkeleton few = model.spheres[0];
+  few.name = "few";
+  few.metric = DistanceMetric::chamfer345;
+  few.grid.origin = {1, 2, 3};
+  few.voxel.resize(2);
+  few.distance = {3, 3};
+  few.deficit = {0.5F, 0.25F};
+  few.parent = {VolumetricSkeleton::none, VolumetricSkeleton::none};
+  few.segment = {2, 0};
+  model.spheres.insert(model.spheres.begin(), few);
   double figure = 1;
   Certificate& c = model.certificate;
   for (double* value :
@@ -197,6 +207,18 @@ void expect_same(const Model& a, const Model& b) {
     EXPECT_EQ(a.volumes[i].background, b.volumes[i].background);
     EXPECT_EQ(a.volumes[i].labels, b.volumes[i].labels);
     EXPECT_EQ(a.volumes[i].table, b.volumes[i].table);
+  }
+  ASSERT_EQ(a.spheres.size(), b.spheres.size());
+  for (std::size_t i = 0; i < a.spheres.size(); ++i) {
+    EXPECT_EQ(a.spheres[i].name, b.spheres[i].name);
+    EXPECT_EQ(a.spheres[i].grid, b.spheres[i].grid);
+    EXPECT_EQ(a.spheres[i].metric, b.spheres[i].metric);
+    EXPECT_EQ(a.spheres[i].thinness, b.spheres[i].thinness);
+    EXPECT_EQ(a.spheres[i].voxel, b.spheres[i].voxel);
+    EXPECT_EQ(a.spheres[i].distance, b.spheres[i].distance);
+    EXPECT_EQ(a.spheres[i].deficit, b.spheres[i].deficit);
+    EXPECT_EQ(a.spheres[i].parent, b.spheres[i].parent);
+    EXPECT_EQ(a.spheres[i].segment, b.spheres[i].segment);
   }
   expect_same(a.certificate, b.certificate);
   EXPECT_EQ(a.provenance, b.provenance);

@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "core/model_file/model_file.hpp"
+#include "core/values/volumetric_skeleton_check.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"
 
@@ -45,6 +46,36 @@ Error refusal(const Case& patient, const Options& options, const Context& contex
   }
   ADD_FAILURE() << "accepted";
   return Error(ErrorKind::internal, "", "", "");
+}
+
+TEST(Pipeline, spheres_are_a_stage_where_they_are_asked_for) {
+  Options options = coarse("lattice");
+  options.spheres_tp = 0.3;
+  std::vector<std::string> announced;
+  const Result with = run(test::two_bones(), options, {}, [&](std::string_view name, int, int count) {
+    EXPECT_EQ(count, 8);
+    announced.emplace_back(name);
+  });
+  ASSERT_EQ(announced.size(), 8U);
+  EXPECT_EQ(announced[2], "spheres");
+  ASSERT_EQ(with.model.spheres.size(), 1U);
+  const VolumetricSkeleton& body = with.model.spheres[0];
+  EXPECT_EQ(body.name, "body");
+  EXPECT_EQ(first_defect(body), "");
+  EXPECT_EQ(std::count(body.parent.begin(), body.parent.end(), VolumetricSkeleton::none), 1);
+  EXPECT_GT(std::count(body.segment.begin(), body.segment.end(), 0), 0);
+  EXPECT_GT(std::count(body.segment.begin(), body.segment.end(), 1), 0);
+  EXPECT_EQ(with.model.provenance.at("option/spheres_tp"), "0.3");
+  // Nothing else of the model knows of it.
+  Model other = with.model;
+  other.spheres.clear();
+  EXPECT_EQ(model_file::identity(other),
+            model_file::identity(run(test::two_bones(), coarse("lattice"), {}, {}).model));
+
+  options.spheres_tp = 2.5;
+  EXPECT_EQ(refusal(test::two_bones(), options).kind(), ErrorKind::usage);
+  options.spheres_tp = 2;
+  EXPECT_EQ(refusal(test::two_bones(), options).kind(), ErrorKind::data);  // leaves no voxel
 }
 
 class EveryMesher : public testing::TestWithParam<std::string> {};

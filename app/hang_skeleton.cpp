@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/hang_skeleton.hpp"
+
+#include "core/files/atomic_file.hpp"
+#include "core/model_file/model_file.hpp"
+#include "io/case/attachment_file.hpp"
+#include "io/case/case_file.hpp"
+#include "preprocess/thin/attach.hpp"
+
+namespace ecorche::app {
+namespace {
+
+[[noreturn]] void refuse(const char* option, const std::string& what, const std::string& mend) {
+  throw Error(ErrorKind::usage, option, what, mend);
+}
+
+Skeleton read_rig(const Program& program, const HangSettings& settings) {
+  if (!settings.model.empty())
+    return model_file::read(settings.model, program.context("reading the model")).rig.skeleton;
+  Skeleton skeleton = io::read_skeleton(settings.skeleton);
+  for (const Segment& segment : skeleton.segments) {
+    if (segment.joint.rule == CenterRule::given) continue;
+    throw Error(ErrorKind::config, settings.skeleton.string(),
+                "joint '" + segment.joint.name + "' is found by a sphere fit, which needs bones",
+                "write its center, or give a prepared --model");
+  }
+  return skeleton;
+}
+
+void check_joints(const std::vector<std::string>& outside) {
+  if (outside.empty()) return;
+  std::string names;
+  for (std::size_t i = 0; i < std::min<std::size_t>(outside.size(), 5); ++i)
+    names += (i > 0 ? ", " : "") + outside[i];
+  if (outside.size() > 5) names += ", ...";
+  throw Error(ErrorKind::config, "joints",
+              std::to_string(outside.size()) + " lie outside the object: " + names,
+              "correct their centres, or move all to the nearest skeletal voxels by --snap");
+}
+
+void attach(const Program& program, const HangSettings& settings, const thin::Mask& mask,
+            io::VolumetricSkeletonFile& file, StepClock& clock, nlohmann::json& report) {
+  VolumetricSkeleton& s = file.skeleton;
+  Skeleton rig = read_rig(program, settings);
+  if (settings.snap) {
+    double farthest = 0;
+    for (const thin::Snapped& joint : thin::snap_joints(s, rig)) {
+      report["snapped_mm"][joint.joint] = joint.moved_mm;
+      farthest = std::max(farthest, joint.moved_mm);
+    }
+    program.note("joints moved to skeletal voxels by at most " + std::to_string(farthest) + " mm");
+    if (!settings.snapped.empty()) files::write_text(settings.snapped, io::skeleton_to_yaml(rig));
+  } else {
+    check_joints(thin::joints_outside(mask, rig));
+  }
+  const thin::Attachment attachment =
+      clock.time("attach", [&] { return thin::attach(s, mask, rig, program.context("attaching")); });
+  s.segment = attachment.segment;
+  for (const Segment& segment : rig.segments) file.segments.push_back(segment.name);
+  report["attached"] = {{"first_pass", attachment.near},
+                        {"second_pass", s.size() - attachment.near},
+                        {"far_components", attachment.far_components}};
+  if (!settings.reassign.empty()) {
+    report["attached"]["reassigned"] =
+        thin::reassign(s, rig, io::read_attachment(settings.reassign, rig), s.segment);
+  }
+  std::vector<std::size_t> voxels(rig.segments.size(), 0);
+  for (const std::int32_t row : s.segment) ++voxels[static_cast<std::size_t>(row)];
+  for (std::size_t i = 0; i < voxels.size(); ++i) report["segments"][rig.segments[i].name] = voxels[i];
+}
+
+}  // namespace
+
+void add_hang_options(CLI::App& command, HangSettings& settings) {
+  using thin::TreeOptions;
+  command.add_flag("--tree", settings.tree, "make the skeleton tree, a minimum spanning tree");
+  command
+      .add_option("--alpha", settings.options.alpha, "what a step counts beside the change of the distance")
+      ->check(CLI::Range(TreeOptions::least_alpha, TreeOptions::most_alpha))
+      ->capture_default_str();
+  command.add_option("--reach", settings.options.reach, "voxels at most this far apart are neighbours")
+      ->check(CLI::Range(TreeOptions::least_reach, TreeOptions::most_reach))
+      ->capture_default_str();
+  command.add_flag("--connect", settings.options.connect,
+                   "join the components that are left, reaching farther");
+  command.add_option("--skeleton", settings.skeleton,
+                     "a skeleton file (LPS mm): hang every voxel on one of its segments");
+  command.add_option("--model", settings.model, "or the fitted rig of this model");
+  command.add_flag("--snap", settings.snap, "first move every joint to the nearest skeletal voxel");
+  command.add_option("--snapped", settings.snapped, "write the skeleton file with the joints so moved");
+  command.add_option("--reassign", settings.reassign, "splits and regions that say otherwise, by hand");
+}
+
+void check_hang_options(const HangSettings& settings) {
+  if (!settings.skeleton.empty() && !settings.model.empty())
+    refuse("--model", "stands beside --skeleton", "give one of the two");
+  if (!settings.attaches() && settings.snap)
+    refuse("--snap", "there are no joints to move", "give --skeleton or --model");
+  if (!settings.attaches() && !settings.reassign.empty())
+    refuse("--reassign", "nothing is attached", "give --skeleton or --model");
+  if (!settings.snap && !settings.snapped.empty())
+    refuse("--snapped", "joints are not moved", "give --snap as well");
+}
+
+void hang(const Program& program, const HangSettings& settings, const thin::Mask& mask,
+          io::VolumetricSkeletonFile& file, StepClock& clock, nlohmann::json& report) {
+  if (!settings.tree && !settings.attaches()) return;
+  VolumetricSkeleton& s = file.skeleton;
+  s.parent = clock.time(
+      "tree", [&] { return thin::spanning_tree(s, settings.options, program.context("skeleton tree")); });
+  const std::size_t components = thin::component_count(s.parent);
+  report["tree"] = {{"components", components},
+                    {"edges", s.size() - components},
+                    {"alpha", settings.options.alpha},
+                    {"reach", settings.options.reach}};
+  if (components > 1) {
+    program.note("the skeleton tree is in " + std::to_string(components) +
+                 " components; --connect joins them");
+  }
+  if (settings.attaches()) attach(program, settings, mask, file, clock, report);
+}
+
+}  // namespace ecorche::app

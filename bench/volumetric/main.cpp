@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Figures of thinning, one JSON object on stdout; bench/volumetric/run calls it for every body.
+//   bench_volumetric times BODY           distance transform beside ITK's and VTK's, thinning, extraction
+//   bench_volumetric curve BODY           voxels against TP, its exponential fit, the paper's counts
+// BODY: ellipsoid, surface FILE, labels FILE, or above LOW FILE (an image; resampled to its finest edge).
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "bench/volumetric/foreign_distance.hpp"
+#include "io/image/image_file.hpp"
+#include "io/surface/surface_file.hpp"
+#include "preprocess/thin/isotropic.hpp"
+#include "preprocess/thin/thinning.hpp"
+#include "preprocess/thin/tree.hpp"
+#include "preprocess/voxel/voxelize.hpp"
+
+namespace ecorche::bench {
+namespace {
+
+using Json = nlohmann::json;
+using thin::Mask;
+
+Mask ellipsoid() {  // half axes of 120, 80 and 60 voxels
+  Mask mask;
+  mask.grid.size = {243, 163, 123};
+  const auto& n = mask.grid.size;
+  for (int k = 0; k < n[2]; ++k) {
+    for (int j = 0; j < n[1]; ++j) {
+      for (int i = 0; i < n[0]; ++i) {
+        const double x = (i - 121) / 120.0, y = (j - 81) / 80.0, z = (k - 61) / 60.0;
+        mask.inside.push_back(x * x + y * y + z * z < 1 ? 1 : 0);
+      }
+    }
+  }
+  return mask;
+}
+
+Mask body(const std::vector<std::string>& words) {
+  if (words.at(0) == "ellipsoid") return ellipsoid();
+  if (words[0] == "surface") {
+    Case patient;
+    patient.skin = io::read_surface(words.at(1));
+    return thin::segment(voxel::voxelize(patient, {}, {}), {}, {});
+  }
+  thin::Segmentation how;
+  how.largest = true;
+  if (words[0] == "above") how.low = std::stod(words.at(1));
+  Image image = io::read_image(words.back());
+  if (!thin::is_isotropic(image.grid)) {
+    image =
+        thin::to_isotropic(image, 0, 0, how.low ? thin::Sampling::trilinear : thin::Sampling::nearest, {});
+  }
+  return thin::segment(image, how, {});
+}
+
+std::size_t object_voxels(const Mask& mask) {
+  return static_cast<std::size_t>(std::count(mask.inside.begin(), mask.inside.end(), 1));
+}
+
+// Seconds: the median of `runs` after one that is not counted, with the best and the worst.
+Json time(int runs, const std::function<void()>& work) {
+  std::vector<double> seconds;
+  for (int r = -1; r < runs; ++r) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    if (r >= 0) seconds.push_back(spent.count());
+  }
+  std::sort(seconds.begin(), seconds.end());
+  return {
+      {"median_s", seconds[seconds.size() / 2]}, {"best_s", seconds.front()}, {"worst_s", seconds.back()}};
+}
+
+std::size_t differing(const thin::DistanceMap& map, const std::vector<float>& squares) {
+  std::size_t count = 0;
+  for (std::size_t v = 0; v < squares.size(); ++v)
+    count += static_cast<float>(map.at(v)) != squares[v] ? 1 : 0;
+  return count;
+}
+
+Json times(const Mask& mask) {
+  constexpr double kPaper = 0.48, kLow = 0.2;
+  Json out{{"size", mask.grid.size},
+           {"object", object_voxels(mask)},
+           {"threads", tbb::info::default_concurrency()}};
+  thin::DistanceMap map;
+  out["distance"] = time(9, [&] { map = thin::distance_map(mask, DistanceMetric::euclidean, {}); });
+  VolumetricSkeleton skeleton;
+  out["thinning"] = time(9, [&] { skeleton = thin::thin(map, mask.grid, kPaper, {}); });
+  out["in_all"] = time(9, [&] {
+    map = thin::distance_map(mask, DistanceMetric::euclidean, {});
+    skeleton = thin::thin(map, mask.grid, kPaper, {});
+  });
+  out["thinning_at_another_tp"] = time(9, [&] { skeleton = thin::thin(map, mask.grid, 0.9, {}); });
+  const VolumetricSkeleton thick = thin::thin(map, mask.grid, kLow, {});
+  out["thinner"] = time(9, [&] { skeleton = thin::thinner(thick, kPaper); });
+  out["thinner"]["from_tp"] = kLow;
+  out["thinner"]["from_voxels"] = thick.size();
+  out["skeletal"] = skeleton.size();
+  out["tree"] = time(3, [&] { thin::spanning_tree(skeleton, {}, {}); });
+  out["chamfer"] = time(3, [&] { thin::distance_map(mask, DistanceMetric::chamfer345, {}); });
+  // Distances of the others end at the image; this body does not touch it, or they differ there.
+  for (const auto& [name, transform] : {std::pair("itk", &itk_distance), std::pair("vtk", &vtk_distance)}) {
+    const ForeignDistance first = transform(mask.grid.size, mask.inside);
+    const ForeignDistance second = transform(mask.grid.size, mask.inside);
+    out[name] = {{"best_s", std::min(first.seconds, second.seconds)},
+                 {"differing", differing(map, first.squares)}};
+    out[name]["times_ours"] = out[name]["best_s"].get<double>() / out["distance"]["median_s"].get<double>();
+  }
+  return out;
+}
+
+// log(count) = log(a) - b tp by least squares over the counts of at least ten.
+Json exponential_fit(const Json& points) {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (const Json& p : points) {
+    if (p[1].get<double>() < 10) continue;
+    const double u = p[0].get<double>(), v = std::log(p[1].get<double>());
+    n += 1, x += u, y += v, xx += u * u, xy += u * v, yy += v * v;
+  }
+  const double slope = (n * xy - x * y) / (n * xx - x * x), level = (y - slope * x) / n;
+  const double r = (n * xy - x * y) / std::sqrt((n * xx - x * x) * (n * yy - y * y));
+  return {{"a", std::exp(level)}, {"b", -slope}, {"r2", r * r}};
+}
+
+Json curve(const Mask& mask) {
+  const auto object = static_cast<double>(object_voxels(mask));
+  const thin::DistanceMap map = thin::distance_map(mask, DistanceMetric::euclidean, {});
+  const VolumetricSkeleton thick = thin::thin(map, mask.grid, 0, {});
+  Json out{{"size", mask.grid.size}, {"object", object_voxels(mask)}, {"voxels_against_tp", Json::array()}};
+  for (int step = 2; step <= 24; ++step) {
+    const double tp = 0.05 * step;
+    out["voxels_against_tp"].push_back({tp, thin::thinner(thick, tp).size()});
+  }
+  out["fit"] = exponential_fit(out["voxels_against_tp"]);
+  // The paper's skeletons at the same share: 42298 were 0.33 % of its body, of which the others are taken
+  // too.
+  std::vector<float> deficits = thick.deficit;
+  std::sort(deficits.begin(), deficits.end(), std::greater<>());
+  for (const double paper : {42298.0, 33630.0, 20000.0, 9666.0, 3980.0, 1017.0, 231.0}) {
+    const double share = 0.33 / 42298 * paper;  // percent
+    const auto want = std::min(deficits.size() - 1, static_cast<std::size_t>(share / 100 * object));
+    const VolumetricSkeleton s = thin::thinner(thick, std::max(0.0, static_cast<double>(deficits[want])));
+    const auto parent = thin::spanning_tree(s, {}, {});
+    const std::size_t components = thin::component_count(parent);
+    out["at_the_papers_shares"].push_back({{"paper", paper},
+                                           {"share_percent", share},
+                                           {"tp", s.thinness},
+                                           {"voxels", s.size()},
+                                           {"edges", s.size() - components},
+                                           {"components", components}});
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace ecorche::bench
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.size() < 2) return 64;
+  try {
+    const ecorche::thin::Mask mask = ecorche::bench::body({words.begin() + 1, words.end()});
+    const auto out = words[0] == "times" ? ecorche::bench::times(mask) : ecorche::bench::curve(mask);
+    std::printf("%s\n", out.dump(1).c_str());
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 70;
+  }
+}
