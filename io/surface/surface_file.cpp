@@ -16,6 +16,7 @@
 #include "io/surface/vtk_files.hpp"
 #include "io/surface/vtk_legacy.hpp"
 #include "io/surface/vtp.hpp"
+#include "io/surface/vtu.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -82,6 +83,13 @@ void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh) {
   files::AtomicFile file(path);
   write(file.temporary(), mesh);
   file.commit();
+}
+
+TetFile read_tets(const std::filesystem::path& path) {
+  if (extension_of(path) != ".vtu")
+    throw Error(ErrorKind::data, path.string(), "'" + extension_of(path) + "' tets cannot be read",
+                "give a .vtu");
+  return vtu::decode(files::read_text(path, kLargestFile), path.string());
 }
 
 void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T,

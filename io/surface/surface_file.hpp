@@ -44,6 +44,19 @@ struct GridArray {
   std::vector<float> values;
 };
 
+/// Tets out of a file, with what it holds of each node. Nothing is said of the tets' volumes: posed ones may
+/// be inverted.
+struct TetFile {
+  PointsF V;
+  Tets T;
+  std::vector<GridArray> point_data;
+};
+
+/// Reads tets as `write_tets` writes `.vtu` (or VTK: text, base64 or appended, plain or zlib). Throws
+/// Error{missing_input} or Error{data}: another format, a cell that is no tet, values that are not there or
+/// not finite.
+TetFile read_tets(const std::filesystem::path& path);
+
 /// What each tet is in.
 struct TetRegions {
   std::vector<std::uint16_t> label;  ///< one a tet, or none: then all are `body`

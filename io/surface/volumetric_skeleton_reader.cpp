@@ -5,7 +5,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/values/volumetric_skeleton_check.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
-#include "io/surface/vtp_document.hpp"
+#include "io/surface/vtk_xml.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -17,7 +17,9 @@ constexpr double kOffVoxel = 0.01;  // of a voxel: points are float32
 class Reader {
  public:
   Reader(std::string_view bytes, const std::string& where)
-      : where_(where), document_(vtp::parse(bytes, {"Points", "PointData", "Lines"}, where)) {}
+      : where_(where),
+        document_(vtk_xml::parse(bytes, "PolyData", {"Points", "PointData", "Lines"},
+                                 "save it as XML PolyData (.vtp)", where)) {}
 
   VolumetricSkeletonFile read() {
     if (const auto version = field("ecorche_volumetric_skeleton", 1); version[0] != 1)
@@ -36,7 +38,7 @@ class Reader {
     bytes::refuse(where_, std::move(what), std::move(mend));
   }
 
-  const vtp::DataArray& field_array(const std::string& name) const {
+  const vtk_xml::DataArray& field_array(const std::string& name) const {
     const auto found = document_.fields.find(name);
     if (found == document_.fields.end())
       refuse("has no field '" + name + "'", "is it a skeleton that 'ecorche thin' wrote?");
@@ -50,7 +52,7 @@ class Reader {
   }
   // The strings of a field, without their NULs.
   std::vector<std::string> words(const std::string& name, std::uint64_t most) const {
-    const std::string all = vtp::letters(field_array(name), document_.storage, most * 256, where_);
+    const std::string all = vtk_xml::letters(field_array(name), document_.storage, most * 256, where_);
     std::vector<std::string> out;
     for (std::size_t at = 0; at < all.size();) {
       const std::size_t end = all.find('\0', at);
@@ -93,13 +95,13 @@ class Reader {
     if (document_.fields.contains("segments")) out_.segments = words("segments", kMostNames);
   }
 
-  const vtp::Piece& piece() const { return document_.pieces[0]; }
+  const vtk_xml::Piece& piece() const { return document_.pieces[0]; }
 
   // A point array of whole numbers within `least` and `most`.
   template <class T>
   std::vector<T> point_array(const std::string& name, std::uint64_t components, std::int64_t least,
                              std::int64_t most) const {
-    const vtp::DataArray* array = piece().find("PointData", name);
+    const vtk_xml::DataArray* array = piece().find("PointData", name);
     if (array == nullptr) refuse("has no point array '" + name + "'");
     const auto values = vtp::wholes(*array, document_.storage, components * rows_, where_);
     check_length(name, values.size(), components);
@@ -119,12 +121,12 @@ class Reader {
 
   void read_voxels() {
     VolumetricSkeleton& s = out_.skeleton;
-    rows_ = vtp::count(document_, piece(), "NumberOfPoints", where_);
+    rows_ = vtk_xml::count_of(piece(), "NumberOfPoints", document_, where_);
     const auto ijk = point_array<std::uint16_t>("ijk", 3, 0, 65535);
     s.voxel.resize(rows_);
     for (std::size_t r = 0; r < rows_; ++r) s.voxel[r] = {ijk[3 * r], ijk[3 * r + 1], ijk[3 * r + 2]};
     s.distance = point_array<std::uint32_t>("distance", 1, 1, 0xffffffff);
-    const vtp::DataArray* deficit = piece().find("PointData", "deficit");
+    const vtk_xml::DataArray* deficit = piece().find("PointData", "deficit");
     if (deficit == nullptr) refuse("has no point array 'deficit'");
     const auto values = vtp::reals(*deficit, document_.storage, rows_, where_);
     check_length("deficit", values.size(), 1);
@@ -138,7 +140,7 @@ class Reader {
   }
 
   std::vector<std::int64_t> line_array(const std::string& name, std::uint64_t count) const {
-    const vtp::DataArray* array = piece().find("Lines", name);
+    const vtk_xml::DataArray* array = piece().find("Lines", name);
     if (array == nullptr) refuse("its lines have no array '" + name + "'");
     auto values = vtp::wholes(*array, document_.storage, count, where_);
     if (values.size() != count)
@@ -147,7 +149,7 @@ class Reader {
   }
 
   void read_tree() {
-    const std::uint64_t lines = vtp::count(document_, piece(), "NumberOfLines", where_);
+    const std::uint64_t lines = vtk_xml::count_of(piece(), "NumberOfLines", document_, where_);
     const double tree = field("tree", 1)[0];
     if (tree != 0 && tree != 1) refuse("its field 'tree' is neither 0 nor 1");
     if (tree == 0 && lines > 0) refuse("has lines, but says that it has no tree");
@@ -170,7 +172,7 @@ class Reader {
 
   void check_points() const {
     const VolumetricSkeleton& s = out_.skeleton;
-    const vtp::DataArray* array = piece().find("Points", "");
+    const vtk_xml::DataArray* array = piece().find("Points", "");
     const auto x =
         array == nullptr ? std::vector<double>() : vtp::reals(*array, document_.storage, 3 * rows_, where_);
     check_length("Points", x.size(), 3);
@@ -186,7 +188,7 @@ class Reader {
   }
 
   const std::string& where_;
-  vtp::Document document_;
+  vtk_xml::Document document_;
   std::uint64_t rows_ = 0;
   VolumetricSkeletonFile out_;
 };

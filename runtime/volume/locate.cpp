@@ -194,11 +194,15 @@ void draw(const Corners& c, std::int32_t t, std::int32_t z0, std::int32_t z1, In
   }
 }
 
-}  // namespace
+// Whole indices between which all nodes lie.
+struct Bounds {
+  Eigen::Array3d low, high;
+};
 
-ImageGrid grow_to(const ImageGrid& rest, std::span<const float> nodes) {
-  const Affine index = to_index(rest);
-  Vector3d low = Vector3d::Zero(), high(rest.size[0] - 1, rest.size[1] - 1, rest.size[2] - 1);
+Bounds bounds_of(const ImageGrid& lattice, std::span<const float> nodes) {
+  const Affine index = to_index(lattice);
+  constexpr double far = std::numeric_limits<double>::infinity();
+  Bounds bounds{Eigen::Array3d::Constant(far), Eigen::Array3d::Constant(-far)};
   for (std::size_t n = 0; n + 2 < nodes.size(); n += 3) {
     const Vector3d at = index * Vector3d(static_cast<double>(nodes[n]), static_cast<double>(nodes[n + 1]),
                                          static_cast<double>(nodes[n + 2]));
@@ -206,36 +210,54 @@ ImageGrid grow_to(const ImageGrid& rest, std::span<const float> nodes) {
       throw Error(ErrorKind::data, "posed volume", "node " + std::to_string(n / 3) + " is not finite",
                   "pose the model again");
     }
-    low = low.cwiseMin(at);
-    high = high.cwiseMax(at);
+    bounds.low = bounds.low.min(at.array());
+    bounds.high = bounds.high.max(at.array());
   }
   // A node on a voxel centre must not grow the grid because of rounding.
-  low = (low.array() + 1e-6).floor().min(0.0);
-  high = (high.array() - 1e-6).ceil();
-  const Vector3d size = high - low + Vector3d::Ones();
-  if (size.prod() > kMostVoxels) {
+  bounds.low = (bounds.low + 1e-6).floor();
+  bounds.high = (bounds.high - 1e-6).ceil();
+  return bounds;
+}
+
+ImageGrid piece_of(const ImageGrid& lattice, const Bounds& bounds) {
+  const Eigen::Array3d size = bounds.high - bounds.low + 1;
+  if (!(size.minCoeff() >= 1 && size.prod() <= kMostVoxels)) {
     throw Error(ErrorKind::data, "posed volume",
                 "the posed body needs " + std::to_string(size.prod()) + " voxels, more than 2^31",
                 "use --grid rest, or a pose nearer to the scanned place");
   }
-  ImageGrid out = rest;
-  out.origin = rest.point(low.x(), low.y(), low.z());
+  ImageGrid out = lattice;
+  out.origin = lattice.point(bounds.low.x(), bounds.low.y(), bounds.low.z());
   for (int axis = 0; axis < 3; ++axis) {
     out.size[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::lround(size[axis]));
   }
   return out;
 }
 
-void locate(const Model& model, std::span<const float> nodes, const ImageGrid& grid, InverseMap& out,
-            const Context& context) {
+}  // namespace
+
+ImageGrid grow_to(const ImageGrid& rest, std::span<const float> nodes) {
+  Bounds bounds = bounds_of(rest, nodes);
+  bounds.low = bounds.low.min(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    bounds.high[axis] = std::max(bounds.high[axis], rest.size[static_cast<std::size_t>(axis)] - 1.0);
+  }
+  return piece_of(rest, bounds);
+}
+
+ImageGrid lattice_over(const ImageGrid& lattice, std::span<const float> nodes) {
+  return piece_of(lattice, bounds_of(lattice, nodes));
+}
+
+void locate(const Deformation& body, const ImageGrid& grid, InverseMap& out, const Context& context) {
   out.grid = grid;
   out.tet.resize(grid.voxels());
   const double handed = to_index(grid).linear.determinant() < 0 ? -1 : 1;
-  const std::vector<Vector3d> placed = index_nodes(grid, nodes);
-  std::vector<Extent> extents(model.tet_count());
+  const std::vector<Vector3d> placed = index_nodes(grid, body.posed);
+  std::vector<Extent> extents(static_cast<std::size_t>(body.tets.rows()));
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, extents.size(), 16384), [&](const auto& range) {
     for (std::size_t t = range.begin(); t < range.end(); ++t) {
-      extents[t] = extent_of(corners(model.tets, placed, t), handed, grid);
+      extents[t] = extent_of(corners(body.tets, placed, t), handed, grid);
     }
   });
   context.check_stop();
@@ -248,7 +270,7 @@ void locate(const Model& model, std::span<const float> nodes, const ImageGrid& g
               out.tet.begin() + static_cast<std::ptrdiff_t>(grid.offset(0, 0, z1 + 1)), InverseMap::none);
     for (std::size_t i = slabs.begin[slab]; i < slabs.begin[slab + 1]; ++i) {
       const std::int32_t t = slabs.tet[i];
-      draw(corners(model.tets, placed, static_cast<std::size_t>(t)), t, z0, z1, out);
+      draw(corners(body.tets, placed, static_cast<std::size_t>(t)), t, z0, z1, out);
     }
   });
   context.check_stop();

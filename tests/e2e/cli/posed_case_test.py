@@ -2,34 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """`pose --as-case`: the posed patient is a patient. It is checked, prepared and posed back to how the first one lay."""
 import json
-import os
 import pathlib
 import shutil
-import subprocess
 import tempfile
 import unittest
 
 import numpy as np
 
-ECORCHE = os.environ["ECORCHE_BIN"]
-CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
-MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
+from posed_files import CASE, MODEL, corners, run
+
 AWAY = "ecorche_pose: 1\nskeleton: phantom\njoints:\n" \
        "  knee_right: {flexion_deg: 80}\n  hip_right: {flexion_deg: 60}\n  elbow_left: {flexion_deg: 70}\n"
 BACK = "ecorche_pose: 1\nskeleton: phantom\njoints:\n" \
        "  knee_right: {flexion_deg: 0}\n  hip_right: {flexion_deg: 0}\n  elbow_left: {flexion_deg: 17}\n"
-
-
-def run(*words):
-    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120)
-
-
-def corners(path):
-    """The triangles of a binary STL, in their order: #F x 3 x 3."""
-    data = path.read_bytes()
-    count = int.from_bytes(data[80:84], "little")
-    rows = np.frombuffer(data, np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]), count, 84)
-    return rows["v"].astype(float)
 
 
 class PosedCase(unittest.TestCase):

@@ -5,21 +5,10 @@
 #include "io/surface/surface_file.hpp"
 #include "io/surface/tet_formats.hpp"
 #include "tests/unit/io/scratch.hpp"
+#include "tests/unit/io/two_tets.hpp"
 
 namespace ecorche::io {
 namespace {
-
-PointsF points() {
-  PointsF V(5, 3);
-  V << 0, 0, 0, 10, 0, 0, 0, 10, 0, 0, 0, 10, 10, 10, 10.125F;
-  return V;
-}
-
-Tets two() {
-  Tets T(2, 4);
-  T << 0, 1, 2, 3, 1, 2, 3, 4;
-  return T;
-}
 
 TEST(TetFormats, McnpIsInCentimetresWithNumberedSets) {
   const Scratch scratch;

@@ -201,6 +201,66 @@ TEST(Locate, StopsWhenAsked) {
   }
 }
 
+// The way back is posing with rest and posed exchanged: where nothing overlaps, smooth values come home.
+TEST(Resample, TheWayBackBringsValuesHome) {
+  const Model model = test::toy_model();
+  const auto bent = bent_nodes(model, 0.3, 0.4);
+  const Deformation there = deformation(model, bent), back = there.back();
+  // A value that is linear in space survives trilinear sampling: what comes back is the rest position itself.
+  ModelVolume where{"where", Image(model.volumes[0].image.grid, ScalarType::f32, 3), 0, false, {}};
+  where.image.grid.size = {25, 25, 70};
+  where.image.grid.spacing = {5, 5, 5};
+  where.image.grid.origin = {-60, -60, -20};
+  where.image = Image(where.image.grid, ScalarType::f32, 3);
+  const auto fill = where.image.scalars<float>();
+  for (int k = 0; k < 70; ++k) {
+    for (int j = 0; j < 25; ++j) {
+      for (int i = 0; i < 25; ++i) {
+        const auto p = where.image.grid.point(i, j, k);
+        for (std::size_t c = 0; c < 3; ++c)
+          fill[3 * where.image.grid.offset(i, j, k) + c] = static_cast<float>(p[c]);
+      }
+    }
+  }
+  const ImageGrid fine = grow_to(where.image.grid, bent);
+  InverseMap map;
+  locate(there, fine, map);
+  ModelVolume posed = where;
+  posed.image = resample(there, map, where, Sampling::trilinear);
+  const ImageGrid home = lattice_over(fine, back.posed);
+  locate(back, home, map);
+  const Image again = resample(back, map, posed, Sampling::trilinear);
+  const auto values = again.scalars<float>();
+  std::size_t compared = 0;
+  for (int k = 0; k < home.size[2]; ++k) {
+    for (int j = 0; j < home.size[1]; ++j) {
+      for (int i = 0; i < home.size[0]; ++i) {
+        const auto p = home.point(i, j, k);
+        // A voxel and a half below the surface no sample takes the background.
+        if (std::abs(p[0]) > 10 || std::abs(p[1]) > 10 || p[2] < 10 || p[2] > 290) continue;
+        ++compared;
+        for (std::size_t c = 0; c < 3; ++c)
+          EXPECT_NEAR(values[3 * home.offset(i, j, k) + c], p[c], 0.35) << i << " " << j << " " << k;
+      }
+    }
+  }
+  EXPECT_GT(compared, 1000u);
+}
+
+TEST(LatticeOver, JustHoldsTheNodes) {
+  const Model model = test::toy_model();
+  ImageGrid lattice;
+  lattice.spacing = {10, 10, 10};
+  lattice.origin = {1000, 1000, 1003};
+  lattice.size = {2, 2, 2};
+  const ImageGrid piece = lattice_over(lattice, rest_nodes(model));  // |x|, |y| <= 20, 0 <= z <= 300
+  EXPECT_EQ(piece.size, (std::array<std::int32_t, 3>{5, 5, 32}));
+  EXPECT_EQ(piece.origin, (std::array<double, 3>{-20, -20, -7}));
+  std::vector<float> broken(3, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THROW(lattice_over(lattice, broken), Error);
+  EXPECT_THROW(lattice_over(lattice, {}), Error) << "no nodes, no piece";
+}
+
 TEST(GrowTo, KeepsTheLattice) {
   const Model model = test::toy_model();
   const ImageGrid rest = model.volumes[0].image.grid;

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/mapping/round_trip.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "preprocess/geometry/closest_point.hpp"
+#include "preprocess/mapping/tet_grid.hpp"
+
+namespace ecorche::mapping {
+namespace {
+
+using Eigen::Vector3d;
+using Range = tbb::blocked_range<Eigen::Index>;
+
+constexpr Eigen::Index kBlock = 4096;
+
+std::array<Vector3d, 4> corners_of(const PointsF& nodes, const Tets& tets, Eigen::Index t) {
+  std::array<Vector3d, 4> out;
+  for (int c = 0; c < 4; ++c)
+    out[static_cast<std::size_t>(c)] = nodes.row(tets(t, c)).transpose().cast<double>();
+  return out;
+}
+
+Vector3d centroid(const std::array<Vector3d, 4>& x) {
+  return (x[0] + x[1] + x[2] + x[3]) / 4;
+}
+
+struct Sums {
+  double volume = 0, moved = 0, elsewhere = 0, worst = 0;
+};
+
+}  // namespace
+
+RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets, const Context& context) {
+  const TetGrid grid(posed, tets, context);
+  // Summed block by block in order, so that threads change nothing.
+  std::vector<Sums> blocks(static_cast<std::size_t>((tets.rows() + kBlock - 1) / kBlock));
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+    context.check_stop();
+    Sums& sums = blocks[b];
+    const Eigen::Index begin = static_cast<Eigen::Index>(b) * kBlock,
+                       end = std::min(tets.rows(), begin + kBlock);
+    for (Eigen::Index t = begin; t < end; ++t) {
+      const std::array<Vector3d, 4> before = corners_of(rest, tets, t);
+      const double volume = tet_det(before[0], before[1], before[2], before[3]);
+      const Vector3d at = centroid(corners_of(posed, tets, t));
+      const std::int32_t holder = grid.find(at);
+      sums.volume += volume;
+      if (holder < 0 || holder == t) continue;
+      const Eigen::Vector4d share = geometry::barycentric(at, grid.corners(holder));
+      const std::array<Vector3d, 4> there = corners_of(rest, tets, holder);
+      Vector3d back = Vector3d::Zero();
+      for (std::size_t c = 0; c < 4; ++c) back += share[static_cast<Eigen::Index>(c)] * there[c];
+      const double moved = (back - centroid(before)).norm();
+      sums.moved += volume * moved;
+      sums.elsewhere += volume;
+      sums.worst = std::max(sums.worst, moved);
+    }
+  });
+  RoundTrip out;
+  out.points = static_cast<std::uint64_t>(tets.rows());
+  double volume = 0;
+  for (const Sums& sums : blocks) {
+    volume += sums.volume;
+    out.mean_mm += sums.moved;
+    out.elsewhere_share += sums.elsewhere;
+    out.max_mm = std::max(out.max_mm, sums.worst);
+  }
+  if (volume > 0) {
+    out.mean_mm /= volume;
+    out.elsewhere_share /= volume;
+  }
+  return out;
+}
+
+}  // namespace ecorche::mapping

@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`ecorche unpose`: posed files, and nothing else, come back to the scan."""
+import gzip
+import json
+import pathlib
+import re
+import shutil
+import tempfile
+import unittest
+
+import numpy as np
+
+from posed_files import CASE, MODEL, corners, run
+
+AWAY = "ecorche_pose: 1\nskeleton: phantom\nroot: {translation_mm: [40, -3, 7], rotation: [0.9, 0.1, 0.3, 0.3]}\n" \
+       "joints:\n  knee_right: {flexion_deg: 50}\n  hip_right: {flexion_deg: 30}\n  elbow_left: {flexion_deg: 60}\n"
+
+
+def image(path):
+    """Values [k, j, i] and origin of one of our NRRDs on cubic voxels, and the edge of a voxel."""
+    head, body = path.read_bytes().split(b"\n\n", 1)
+    field = dict(line.split(": ", 1) for line in head.decode().splitlines() if ": " in line and line[0] != "#")
+    size = [int(n) for n in field["sizes"].split()]
+    kind = {"unsigned char": "u1", "short": "<i2"}[field["type"]]
+    origin = np.array([float(x) for x in field["space origin"].strip("()").split(",")])
+    return np.frombuffer(gzip.decompress(body), kind).reshape(size[::-1]), origin, float(field["space directions"].split(",")[0][1:])
+
+
+class Unpose(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        (self.folder / "away.yaml").write_text(AWAY)
+
+    def ok(self, *words):
+        result = run(*words)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def assert_error(self, result, code, *parts):
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertRegex(result.stderr, re.compile(r"^error: .+: .+ \(.+\)$", re.M))
+        for part in parts:
+            self.assertIn(part, result.stderr)
+
+    def pose(self, *more):
+        self.ok("pose", MODEL, "-o", self.folder / "posed", "--pose", self.folder / "away.yaml", *more)
+        return self.folder / "posed"
+
+    def labels_that_differ(self, back):
+        rest, at, edge = image(CASE / "volumes/labels.nrrd")
+        again, origin, _ = image(back)
+        low = np.rint((origin - at) / edge).astype(int)[::-1]
+        whole = np.zeros_like(rest)
+        whole[tuple(slice(a, a + n) for a, n in zip(low, again.shape))] = again
+        return ((whole != rest) & (rest != 0)).sum() / (rest != 0).sum()
+
+    def test_a_posed_folder_comes_back(self):
+        posed, back = self.pose("--tissues", "all", "--volumes", "all", "--field"), self.folder / "back"
+        out = json.loads(self.ok("--json", "unpose", posed, "-o", back).stdout)
+        self.assertTrue(out["ok"])
+        self.assertLess(out["round_trip"]["mean_mm"], 0.05 * 6)
+        self.assertLess(out["round_trip"]["elsewhere_share"], 0.01)
+        self.assertFalse((back / "displacement.nrrd").exists(), "a field lies in no body")
+        self.assertEqual(len(out["files"]), len(list(back.iterdir())))
+        self.assertLess(np.abs(corners(CASE / "tissues/liver.stl") - corners(back / "liver.stl")).max(), 0.01)
+        self.assertGreater(np.abs(corners(CASE / "tissues/liver.stl") - corners(posed / "liver.stl")).max(), 40)
+        # 6 mm voxels, three quarters of them on a boundary, sampled twice.
+        self.assertLess(self.labels_that_differ(back / "labels.nrrd"), 0.06)
+        self.assertEqual(image(back / "ct.nrrd")[0].min(), -1024, "what lies outside the body stays outside")
+
+    def test_a_posed_case_comes_back(self):
+        back = self.folder / "back"
+        self.ok("unpose", self.pose("--as-case"), "-o", back)
+        for bone in ("femur_right", "tibia_right"):  # they went rigidly, and come back through the tets that they cut
+            self.assertLess(np.abs(corners(CASE / f"bones/{bone}.stl") - corners(back / f"bones/{bone}.stl")).mean(), 1)
+        self.assertLess(self.labels_that_differ(back / "volumes/labels.nrrd"), 0.06)
+
+    def test_what_is_drawn_on_the_posed_body_comes_back(self):
+        posed = self.pose("--tissues", "liver", "--format", "ply", "--volumes", "ct", "--volume-format", "mha", "--tets")
+        drawn = self.folder / "target.ply"
+        shutil.copy(posed / "liver.ply", drawn)
+        self.ok("unpose", posed / "body.vtu", drawn, posed / "ct.mha", "-o", self.folder / "back", "--labels", "ct")
+        self.assertEqual(sorted(path.name for path in (self.folder / "back").iterdir()), ["ct.mha", "target.ply"])
+
+    def test_refusals(self):
+        posed, back = self.pose("--tissues", "liver", "--tets"), self.folder / "back"
+        self.assert_error(run("unpose", self.folder, "-o", back), 66, "body.vtu")
+        self.assert_error(run("unpose", posed, posed / "quality.json", "-o", back), 64, "quality.json", "neither a surface nor an image")
+        self.assert_error(run("unpose", posed, self.folder / "none.stl", "-o", back), 66, "none.stl")
+        self.assert_error(run("unpose", posed, "-o", back, "--sampling", "cubic"), 64, "cubic")
+        rest = self.folder / "rest.vtu"
+        self.ok("export", MODEL, "-o", rest)
+        self.assert_error(run("unpose", rest, "-o", back), 65, "carry no displacement", "give the body.vtu that ecorche pose wrote")
+        # The displacement of other tets: as many nodes, other places.
+        data = bytearray((posed / "body.vtu").read_bytes())
+        offset = int(re.search(rb'Name="displacement"[^>]*offset="(\d+)"', bytes(data)).group(1))
+        at = data.index(b"_", data.index(b"<AppendedData")) + 1 + offset + 8
+        count = int.from_bytes(data[at - 8:at], "little") // 4
+        data[at:at + 4 * count] = np.random.default_rng(1).normal(0, 50, count).astype("<f4").tobytes()
+        (self.folder / "other.vtu").write_bytes(data)
+        self.assert_error(run("unpose", self.folder / "other.vtu", "-o", back), 65, "have no volume at rest")
+        self.assertFalse(back.exists() and list(back.iterdir()))
+
+
+if __name__ == "__main__":
+    unittest.main()
