@@ -119,11 +119,12 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
   json tissues = json::array();
   for (std::size_t t = 0; t < quality.tissues.size(); ++t) {
     const runtime::TissueChange& change = quality.tissues[t];
+    const auto if_closed = [&](double figure) { return change.closed ? json(figure) : json(); };
     tissues.push_back({{"name", change.name},
                        {"group", group_name(model.tissues[t].group)},
-                       {"rest_mm3", change.rest_mm3},
-                       {"posed_mm3", change.posed_mm3},
-                       {"volume_change", change.share}});
+                       {"rest_mm3", if_closed(change.rest_mm3)},
+                       {"posed_mm3", if_closed(change.posed_mm3)},
+                       {"volume_change", if_closed(change.share)}});
   }
   json clamped = json::array();
   for (const ClampedJoint& joint : quality.clamped) {

@@ -102,6 +102,25 @@ double enclosed_volume(std::span<const float> vertices, const Triangles& F) {
   return sum / 6;
 }
 
+bool is_closed(const Triangles& F) {
+  std::vector<std::pair<std::int32_t, std::int32_t>> forward, backward;
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    if (F(f, 0) == F(f, 1) || F(f, 1) == F(f, 2) || F(f, 2) == F(f, 0)) continue;
+    for (int c = 0; c < 3; ++c) {
+      const std::int32_t a = F(f, c), b = F(f, (c + 1) % 3);
+      if (a < b) {
+        forward.emplace_back(a, b);
+      } else {
+        backward.emplace_back(b, a);
+      }
+    }
+  }
+  std::sort(forward.begin(), forward.end());
+  std::sort(backward.begin(), backward.end());
+  return !forward.empty() && forward == backward &&
+         std::adjacent_find(forward.begin(), forward.end()) == forward.end();
+}
+
 double rigid_residual(std::span<const float> rest, std::span<const float> posed) {
   if (rest.empty()) return 0;
   const Vector3d from = mean_of(rest), to = mean_of(posed);
@@ -147,8 +166,11 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
     const std::vector<float>& posed = body.tissues[tissues[i]];
     TissueChange& change = out.tissues[i];
     change.name = tissue.name;
-    change.rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
-    change.posed_mm3 = enclosed_volume(posed, tissue.F);
+    change.closed = is_closed(tissue.F);
+    if (change.closed) {
+      change.rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
+      change.posed_mm3 = enclosed_volume(posed, tissue.F);
+    }
     if (change.rest_mm3 != 0) change.share = (change.posed_mm3 - change.rest_mm3) / change.rest_mm3;
     if (tissue.segment != Tissue::by_tets) residuals[i] = rigid_residual(floats(tissue.V), posed);
   });

@@ -21,6 +21,7 @@ struct QualityThresholds {
 
 struct TissueChange {
   std::string name;
+  bool closed = true;  ///< an open surface encloses nothing: then the figures below mean nothing and are 0
   double rest_mm3 = 0, posed_mm3 = 0;
   double share = 0;  ///< (posed - rest) / rest; enclosed volumes of the surfaces
 };
@@ -55,6 +56,10 @@ std::vector<float> tet_det_f(const Model& model, std::span<const float> nodes);
 /// Volume, mm^3, that a closed surface encloses (divergence theorem, about the surface's first vertex);
 /// positive where its triangles run counter-clockwise seen from outside. `vertices`: 3 * #V.
 double enclosed_volume(std::span<const float> vertices, const Triangles& F);
+
+/// Whether the surface is watertight: at least one triangle, and every edge is run along once each way.
+/// Triangles with two equal corners count for nothing. O(#F log #F).
+bool is_closed(const Triangles& F);
 
 /// Largest distance, mm, of a posed vertex from the best rigid motion of the rest vertices (Kabsch). Both 3 *
 /// #V.

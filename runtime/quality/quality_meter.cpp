@@ -89,7 +89,8 @@ QualityMeter::QualityMeter(std::shared_ptr<const Model> model, std::size_t most_
   }
   for (std::size_t t = 0; t < parts_.size(); ++t) {
     const Tissue& tissue = model_->tissues[t];
-    parts_[t].rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
+    parts_[t].closed = is_closed(tissue.F);
+    if (parts_[t].closed) parts_[t].rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
     if (tissue.segment == Tissue::by_tets) continue;
     const auto vertices = static_cast<std::size_t>(tissue.V.rows());
     for (std::size_t i = 0; i < std::min(vertices, kBoneVertices); ++i) {
@@ -127,7 +128,7 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
   std::vector<TriangleBlock> triangles;
   for (std::size_t i = 0; i < tissues.size(); ++i) {
     const Tissue& tissue = model_->tissues[tissues[i]];
-    if (tissue.segment != Tissue::by_tets) continue;
+    if (tissue.segment != Tissue::by_tets || !parts_[tissues[i]].closed) continue;
     for (Eigen::Index f = 0; f < tissue.F.rows(); f += kTrianglesPerBlock) triangles.push_back({i, f, 0});
   }
   tbb::parallel_for(std::size_t{0}, blocks.size() + triangles.size(), [&](std::size_t b) {
@@ -173,6 +174,7 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
     const Part& part = parts_[tissues[i]];
     TissueChange& change = out.tissues[i];
     change.name = tissue.name;
+    change.closed = part.closed;
     change.rest_mm3 = change.posed_mm3 = part.rest_mm3;
     if (tissue.segment == Tissue::by_tets) {
       change.posed_mm3 = 0;

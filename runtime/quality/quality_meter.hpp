@@ -33,6 +33,7 @@ class QualityMeter {
 
  private:
   struct Part {
+    bool closed = false;
     double rest_mm3 = 0;
     std::vector<std::uint32_t> sample;  // of a bone's vertices
     std::vector<float> sample_rest;

@@ -63,7 +63,7 @@ void describe(const runtime::PoseQuality& quality, const std::vector<std::uint32
   for (std::size_t i = 0; i < quality.tissues.size(); ++i) {
     v1::TissueChange& change = *out.add_tissues();
     change.set_tissue(tissues[i]);
-    change.set_share(quality.tissues[i].share);
+    if (quality.tissues[i].closed) change.set_share(quality.tissues[i].share);
   }
   out.set_bone_rigidity(quality.bone_rigidity_mm);
   out.set_max_inverted_share(quality.thresholds.max_inverted_share);

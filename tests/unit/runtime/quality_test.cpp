@@ -7,6 +7,7 @@
 #include <random>
 
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/quality/quality_meter.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -149,6 +150,45 @@ TEST(RigidResidual, FindsTheMotionAndWhatIsLeft) {
   EXPECT_LT(rigid_residual(rest, posed), 1e-3);
   posed[30] += 2;  // one vertex out of place takes the fit along by a 200th
   EXPECT_NEAR(rigid_residual(rest, posed), 2, 0.05);
+}
+
+TEST(IsClosed, EveryEdgeOnceEachWay) {
+  Triangles tet(4, 3);
+  tet << 0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3;
+  EXPECT_TRUE(is_closed(tet));
+  EXPECT_FALSE(is_closed(Triangles(0, 3)));
+  EXPECT_FALSE(is_closed(tet.topRows(3))) << "a hole";
+  Triangles flipped = tet;
+  std::swap(flipped(2, 0), flipped(2, 1));
+  EXPECT_FALSE(is_closed(flipped)) << "one triangle turned over";
+  Triangles twice(8, 3);
+  twice << tet, tet;
+  EXPECT_FALSE(is_closed(twice)) << "edges of four triangles";
+  Triangles flat(5, 3);
+  flat << tet, 1, 1, 2;
+  EXPECT_TRUE(is_closed(flat)) << "a triangle without area has no edges";
+  Triangles none(1, 3);
+  none << 1, 1, 1;
+  EXPECT_FALSE(is_closed(none));
+}
+
+// What an open surface encloses depends on where it lies: nothing is said of it.
+TEST(PoseQuality, OpenSurfacesHaveNoVolume) {
+  Model model = test::toy_model();
+  Triangles open = model.tissues[4].F.bottomRows(model.tissues[4].F.rows() - 1);
+  model.tissues[4].F = open;
+  Posed posed;
+  posed.model = std::make_shared<const Model>(model);
+  deform(posed.body, [](const Vector3d& p) { return Vector3d(1.2 * p.x(), p.y(), p.z()); });
+  const QualityMeter meter(posed.model);
+  for (const PoseQuality& q : {posed.measured(), meter.measure(posed.body, posed.poser.all_tissues())}) {
+    EXPECT_TRUE(q.tissues[0].closed);
+    EXPECT_NEAR(q.tissues[0].share, 0.2, 1e-4);
+    EXPECT_FALSE(q.tissues[4].closed);
+    EXPECT_EQ(q.tissues[4].rest_mm3, 0);
+    EXPECT_EQ(q.tissues[4].posed_mm3, 0);
+    EXPECT_EQ(q.tissues[4].share, 0);
+  }
 }
 
 TEST(EnclosedVolume, OfABoxAnywhere) {

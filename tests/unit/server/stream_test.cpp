@@ -203,7 +203,9 @@ TEST(Stream, QualityComesWhereItWasAskedFor) {
   EXPECT_EQ(quality.inverted_tets(), expected.inverted_tets);
   EXPECT_EQ(quality.min_det_f(), expected.min_det_f);
   EXPECT_EQ(quality.volume_change(), expected.volume_change);
-  EXPECT_EQ(quality.tissues_size(), static_cast<int>(expected.tissues.size()));
+  ASSERT_EQ(quality.tissues_size(), static_cast<int>(expected.tissues.size()));
+  for (std::size_t t = 0; t < expected.tissues.size(); ++t)
+    EXPECT_EQ(quality.tissues(static_cast<int>(t)).has_share(), expected.tissues[t].closed) << t;
   EXPECT_GT(quality.max_volume_change(), 0);
 }
 
