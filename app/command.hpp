@@ -40,6 +40,7 @@ void declare_info(CLI::App& app, Program& program, Run& chosen);
 void declare_verify(CLI::App& app, Program& program, Run& chosen);
 void declare_export(CLI::App& app, Program& program, Run& chosen);
 void declare_pose(CLI::App& app, Program& program, Run& chosen);
+void declare_motion(CLI::App& app, Program& program, Run& chosen);
 void declare_unpose(CLI::App& app, Program& program, Run& chosen);
 void declare_serve(CLI::App& app, Program& program, Run& chosen);
 void declare_stream(CLI::App& app, Program& program, Run& chosen);

@@ -17,7 +17,8 @@ namespace {
 
 constexpr Declare kCommands[] = {declare_phantom, declare_check,  declare_repair, declare_preprocess,
                                  declare_info,    declare_verify, declare_export, declare_pose,
-                                 declare_unpose,  declare_thin,   declare_serve,  declare_stream};
+                                 declare_motion,  declare_unpose, declare_thin,   declare_serve,
+                                 declare_stream};
 
 int run_command(int argc, char** argv) {
   Program program;

@@ -318,15 +318,14 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
   command->add_option("MODEL", s->model, "a model that preprocess made")->required();
   command->add_option("-o,--output", s->output, "folder to write into, made where absent")->required();
-  command->add_option("--pose", s->frames.pose, "a pose file");
-  command->add_option("--motion", s->frames.motion, "a motion clip, .bvh");
+  command->add_option(
+      "--pose", s->frames.pose,
+      "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
+  add_motion_options(*command, s->frames.motion);
   command->add_option(
       "--frames", s->frames.frames,
-      "frames of the clip from 0: A, A:B or A:B:STEP, B is one past the last; several go into "
+      "frames of the motion from 0: A, A:B or A:B:STEP, B is one past the last; several go into "
       "folders of their own");
-  command->add_option("--motion-unit", s->frames.unit, "length of one unit of the clip")
-      ->check(CLI::IsMember({"mm", "cm", "m"}))
-      ->capture_default_str();
   command->add_option("--skinning", s->skinning, "how segments blend: cor, dqs or lbs")
       ->check(CLI::IsMember({"cor", "dqs", "lbs"}))
       ->capture_default_str();

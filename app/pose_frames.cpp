@@ -2,14 +2,11 @@
 #include "app/pose_frames.hpp"
 
 #include <charconv>
-#include <cmath>
 #include <cstdio>
-#include <numbers>
 
-#include "core/kinematics/retarget.hpp"
 #include "core/values/error.hpp"
 #include "io/case/case_file.hpp"
-#include "io/motion/bvh.hpp"
+#include "io/case/pose_library.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -37,7 +34,7 @@ std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t fram
   const std::size_t past = parts.size() > 1 ? parts[1] : first + 1;
   const std::size_t step = parts.size() > 2 ? parts[2] : 1;
   if (first >= past || past > frames || step == 0) {
-    usage("--frames", "'" + text + "' names no frames of this clip",
+    usage("--frames", "'" + text + "' names no frames of this motion",
           "it has frames 0 to " + std::to_string(frames - 1) + "; B is one past the last");
   }
   std::vector<std::size_t> numbers;
@@ -45,43 +42,30 @@ std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t fram
   return numbers;
 }
 
-// Where the clip's zero pose is not the scan's.
-void note_alignment(const Program& program, const Rig& rig, const kinematics::Retarget& match) {
-  for (std::size_t s = 0; s < match.alignment.size(); ++s) {
-    const int parent = rig.skeleton.segments[s].parent;
-    if (parent < 0) continue;
-    const double angle =
-        match.alignment[s].angularDistance(match.alignment[static_cast<std::size_t>(parent)]);
-    if (angle < 1e-6) continue;
-    program.note("note: in the clip's zero pose " + rig.skeleton.segments[s].name + " is turned by " +
-                 std::to_string(std::lround(angle * 180 / std::numbers::pi)) +
-                 " degrees from the scan's; aligned");
-  }
+Pose named_pose(const Program& program, const std::string& name, const Rig& rig) {
+  if (!name.starts_with(io::library_prefix)) return io::read_pose(name, rig);
+  io::LibraryPose pose = io::library_pose(std::string_view(name).substr(io::library_prefix.size()), rig);
+  for (const std::string& angle : pose.left_out)
+    program.note("note: the model has no " + angle + "; it stays as scanned");
+  return std::move(pose.pose);
 }
 
 }  // namespace
 
 std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig) {
-  if (choice.pose.empty() == choice.motion.empty()) {
+  if (choice.pose.empty() == choice.motion.file.empty()) {
     usage("pose", choice.pose.empty() ? "nothing to pose" : "both --pose and --motion are given",
-          "give either --pose FILE, or --motion CLIP.bvh --frames A:B");
+          "give either --pose FILE, or --motion CLIP --frames A:B");
   }
-  if (!choice.pose.empty()) return {{"", io::read_pose(choice.pose, rig)}};
+  if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig)}};
   if (choice.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
-  const double unit = choice.unit == "mm" ? 1 : choice.unit == "cm" ? 10 : 1000;
-  const Clip clip = io::read_bvh(choice.motion, unit);
-  const kinematics::Retarget match = kinematics::match(rig, clip);
-  for (const std::string& joint : match.unused_joints) {
-    program.note("warning: " + choice.motion.string() + ": joint '" + joint +
-                 "' moves nothing of this model");
-  }
-  note_alignment(program, rig, match);
+  const auto motion = open_motion(program, choice.motion, rig);
   std::vector<Frame> frames;
-  const std::vector<std::size_t> numbers = frame_numbers(choice.frames, clip.frames());
+  const std::vector<std::size_t> numbers = frame_numbers(choice.frames, motion->frames());
   for (const std::size_t f : numbers) {
     char name[32] = "";
     if (numbers.size() > 1) std::snprintf(name, sizeof name, "frame_%04zu", f);
-    frames.push_back({name, kinematics::pose_at(rig, clip, match, f)});
+    frames.push_back({name, motion->at(f)});
   }
   return frames;
 }

@@ -7,16 +7,17 @@
 #include <vector>
 
 #include "app/command.hpp"
+#include "app/motion_source.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/skeleton.hpp"
 
 namespace ecorche::app {
 
-/// As the command line says it: a pose file, or frames of a clip.
+/// As the command line says it: a pose, or frames of a motion.
 struct FrameChoice {
-  std::filesystem::path pose, motion;
-  std::string frames;       ///< A, A:B or A:B:STEP
-  std::string unit = "cm";  ///< of the clip: mm, cm, m
+  std::string pose;  ///< a pose file, or lib:NAME
+  MotionChoice motion;
+  std::string frames;  ///< A, A:B or A:B:STEP
 };
 
 struct Frame {

@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "app/command.hpp"
+#include "app/motion_source.hpp"
 #include "app/stream_check.hpp"
 #include "clients/cpp/client.hpp"
-#include "core/kinematics/retarget.hpp"
 #include "core/model_file/model_file.hpp"
-#include "io/motion/bvh.hpp"
 #include "proto/convert.hpp"
 
 namespace ecorche::app {
@@ -24,7 +23,7 @@ using client::Clock;
 struct Settings {
   std::string address;
   std::string open, session;
-  std::string motion, motion_unit = "cm";
+  MotionChoice motion;
   double rate = 90, seconds = 10;
   std::vector<std::string> tissues;
   std::string volume;
@@ -34,7 +33,6 @@ struct Settings {
   std::uint64_t check_every = 1;
 };
 
-const std::map<std::string, double> kUnits{{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}};
 // After the last pose: how long a silence ends the wait for its frames.
 constexpr std::chrono::seconds kSilence{3};
 
@@ -70,33 +68,29 @@ v1::Skinning skinning_to_proto(runtime::Skinning skinning) {
   return v1::SKINNING_COR;
 }
 
-// The clip's poses, or the rest pose alone; one after another, `rate` times a second.
+// The motion's poses, or the rest pose alone; one after another, `rate` times a second.
 class Motion {
  public:
-  Motion(const Settings& settings, const Rig& rig, const Program& program) : rate_(settings.rate) {
-    if (settings.motion.empty()) {
-      poses_.push_back(Pose::rest(rig.skeleton.segments.size()));
-      return;
-    }
-    const Clip clip = io::read_bvh(settings.motion, kUnits.at(settings.motion_unit));
-    const kinematics::Retarget retarget = kinematics::match(rig, clip);
-    for (const std::string& segment : retarget.still_segments)
+  Motion(const Settings& settings, const Rig& rig, const Program& program)
+      : rate_(settings.rate), rest_(Pose::rest(rig.skeleton.segments.size())) {
+    if (settings.motion.file.empty()) return;
+    source_ = open_motion(program, settings.motion, rig);
+    if (source_->retarget() == nullptr) return;
+    for (const std::string& segment : source_->retarget()->still_segments)
       program.note("note: nothing in the clip moves " + segment);
-    for (std::size_t frame = 0; frame < clip.frames(); ++frame)
-      poses_.push_back(kinematics::pose_at(rig, clip, retarget, frame));
-    frame_seconds_ = clip.frame_seconds;
   }
 
-  // The clip loops; a pose stays until the next frame of the clip is due.
-  const Pose& at(std::uint64_t sequence) const {
+  // The motion loops; a pose stays until the next frame is due.
+  Pose at(std::uint64_t sequence) const {
+    if (!source_) return rest_;
     const double seconds = static_cast<double>(sequence) / rate_;
-    return poses_[static_cast<std::size_t>(seconds / frame_seconds_) % poses_.size()];
+    return source_->at(static_cast<std::size_t>(seconds / source_->frame_seconds()) % source_->frames());
   }
 
  private:
   double rate_;
-  double frame_seconds_ = 1;
-  std::vector<Pose> poses_;
+  Pose rest_;
+  std::unique_ptr<MotionSource> source_;
 };
 
 // One run of the command.
@@ -348,10 +342,7 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--open", settings->open, "the server's name of the model; its first by default");
   command->add_option("--session", settings->session,
                       "a name that others can watch; one of one's own by default");
-  command->add_option("--motion", settings->motion, "a BVH clip, looped; the rest pose by default");
-  command->add_option("--motion-unit", settings->motion_unit, "unit of the clip's lengths")
-      ->check(CLI::IsMember(kUnits))
-      ->capture_default_str();
+  add_motion_options(*command, settings->motion);
   command->add_option("--rate", settings->rate, "poses per second")
       ->check(CLI::Range(0.1, 1e5))
       ->capture_default_str();

@@ -2,57 +2,153 @@
 #include "core/kinematics/rest_alignment.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
+#include <string>
+
+#include "core/values/error.hpp"
 
 namespace ecorche::kinematics {
 namespace {
 
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
 constexpr double kLimb = 0.12;                           // of the skeleton's extent
 constexpr double kAnatomy = 5 * std::numbers::pi / 180;  // angles that differ between any two bodies
 
-// The only child of each segment, or -1.
-std::vector<int> only_children(const Skeleton& skeleton) {
-  std::vector<int> child(skeleton.segments.size(), -1), count(skeleton.segments.size(), 0);
+// How many children each segment has, and the last of them, or -1.
+struct Children {
+  std::vector<int> last, count;
+};
+
+Children children_of(const Skeleton& skeleton) {
+  Children out{std::vector<int>(skeleton.segments.size(), -1), std::vector<int>(skeleton.segments.size(), 0)};
   for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
     const int parent = skeleton.segments[s].parent;
     if (parent < 0) continue;
-    child[static_cast<std::size_t>(parent)] =
-        ++count[static_cast<std::size_t>(parent)] == 1 ? static_cast<int>(s) : -1;
+    ++out.count[static_cast<std::size_t>(parent)];
+    out.last[static_cast<std::size_t>(parent)] = static_cast<int>(s);
   }
-  return child;
+  return out;
+}
+
+double extent(const Skeleton& skeleton) {
+  Eigen::AlignedBox3d box;
+  for (const Segment& segment : skeleton.segments) box.extend(segment.joint.center);
+  return box.diagonal().norm();
+}
+
+// A limb as scanned and as the clip has it; nothing where the segment is none.
+struct Limb {
+  bool is = false;
+  Vector3d scanned, drawn;
+};
+
+Limb limb_of(const Skeleton& skeleton, const Children& children, double shortest, const ClipPlaces& reference,
+             const std::vector<int>& clip_joint, std::size_t s) {
+  if (children.count[s] != 1) return {};
+  const auto c = static_cast<std::size_t>(children.last[s]);
+  if (clip_joint[s] < 0 || clip_joint[c] < 0) return {};
+  Limb limb;
+  limb.scanned = skeleton.segments[c].joint.center - skeleton.segments[s].joint.center;
+  limb.drawn = reference.point[static_cast<std::size_t>(clip_joint[c])] -
+               reference.point[static_cast<std::size_t>(clip_joint[s])];
+  limb.is = limb.scanned.norm() >= shortest && limb.drawn.norm() > 0;
+  return limb;
+}
+
+// The turn about the vertical that brings what stands beside the trunk onto the clip's (Procrustes in the
+// plane).
+Quaterniond facing(const Skeleton& skeleton, const Children& children, const ClipPlaces& reference,
+                   const std::vector<int>& clip_joint) {
+  double cosine = 0, sine = 0;
+  for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
+    if (skeleton.segments[s].parent < 0) continue;
+    const auto parent = static_cast<std::size_t>(skeleton.segments[s].parent);
+    if (children.count[parent] < 2 || clip_joint[s] < 0 || clip_joint[parent] < 0) continue;
+    const Vector3d a = skeleton.segments[s].joint.center - skeleton.segments[parent].joint.center;
+    const Vector3d b = reference.point[static_cast<std::size_t>(clip_joint[s])] -
+                       reference.point[static_cast<std::size_t>(clip_joint[parent])];
+    cosine += a.x() * b.x() + a.y() * b.y();
+    sine += a.x() * b.y() - a.y() * b.x();
+  }
+  const double angle = std::atan2(sine, cosine);
+  // A zero pose faces somewhere on purpose; what is left of a frame's is where the person looked.
+  const bool zero = std::all_of(reference.turn.begin(), reference.turn.end(),
+                                [](const Quaterniond& q) { return q.vec().isZero(0); });
+  if (zero && std::abs(angle) < kAnatomy) return Quaterniond::Identity();
+  return Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitZ()));
 }
 
 }  // namespace
 
-Eigen::Vector3d zero_point(const Clip& clip, int joint) {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  for (; joint >= 0; joint = clip.joints[static_cast<std::size_t>(joint)].parent)
-    point += clip.joints[static_cast<std::size_t>(joint)].offset;
-  return point;
+ClipPlaces places(const Clip& clip, const ClipFrame& frame) {
+  if (frame.rotation.size() != clip.joints.size()) {
+    throw Error(ErrorKind::internal, "motion " + clip.name,
+                "a frame of " + std::to_string(frame.rotation.size()) + " rotations for " +
+                    std::to_string(clip.joints.size()) + " joints",
+                "read the frame from this clip");
+  }
+  ClipPlaces out;
+  for (std::size_t j = 0; j < clip.joints.size(); ++j) {
+    if (clip.joints[j].parent < 0) {
+      out.point.push_back(frame.root_position);
+      out.turn.push_back(frame.rotation[j]);
+      continue;
+    }
+    const auto parent = static_cast<std::size_t>(clip.joints[j].parent);
+    out.point.push_back(out.point[parent] + out.turn[parent] * clip.joints[j].offset);
+    out.turn.push_back(out.turn[parent] * frame.rotation[j]);
+  }
+  return out;
 }
 
-std::vector<Eigen::Quaterniond> align_rest(const Rig& rig, const Clip& clip,
-                                           const std::vector<int>& clip_joint) {
-  const auto& segments = rig.skeleton.segments;
-  Eigen::AlignedBox3d box;
-  for (const Segment& segment : segments) box.extend(segment.joint.center);
-  const double shortest = kLimb * box.diagonal().norm();
-  const std::vector<int> child = only_children(rig.skeleton);
+ClipPlaces zero_places(const Clip& clip) {
+  ClipFrame zero;
+  if (!clip.joints.empty()) zero.root_position = clip.joints[0].offset;
+  zero.rotation.assign(clip.joints.size(), Quaterniond::Identity());
+  return places(clip, zero);
+}
 
-  std::vector<Eigen::Quaterniond> turn(segments.size(), Eigen::Quaterniond::Identity());
+std::vector<Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
+                                    const std::vector<int>& clip_joint) {
+  const auto& segments = rig.skeleton.segments;
+  const double shortest = kLimb * extent(rig.skeleton);
+  const Children children = children_of(rig.skeleton);
+  std::vector<Quaterniond> turn(segments.size(), Quaterniond::Identity());
   for (std::size_t s = 0; s < segments.size(); ++s) {
-    if (segments[s].parent >= 0) turn[s] = turn[static_cast<std::size_t>(segments[s].parent)];
-    if (child[s] < 0) continue;
-    const auto c = static_cast<std::size_t>(child[s]);
-    if (clip_joint[s] < 0 || clip_joint[c] < 0) continue;
-    const Eigen::Vector3d scanned = segments[c].joint.center - segments[s].joint.center;
-    const Eigen::Vector3d drawn = zero_point(clip, clip_joint[c]) - zero_point(clip, clip_joint[s]);
-    if (scanned.norm() < shortest || drawn.norm() == 0) continue;
-    const auto more = Eigen::Quaterniond::FromTwoVectors(turn[s] * scanned, drawn);
-    if (more.angularDistance(Eigen::Quaterniond::Identity()) >= kAnatomy)
-      turn[s] = (more * turn[s]).normalized();
+    turn[s] = segments[s].parent < 0 ? facing(rig.skeleton, children, reference, clip_joint)
+                                     : turn[static_cast<std::size_t>(segments[s].parent)];
+    const Limb limb = limb_of(rig.skeleton, children, shortest, reference, clip_joint, s);
+    if (!limb.is) continue;
+    const auto more = Quaterniond::FromTwoVectors(turn[s] * limb.scanned, limb.drawn);
+    if (more.angularDistance(Quaterniond::Identity()) >= kAnatomy) turn[s] = (more * turn[s]).normalized();
   }
   return turn;
+}
+
+LimbCheck check_limbs(const Rig& rig, const ClipPlaces& reference, const std::vector<int>& clip_joint) {
+  const double shortest = kLimb * extent(rig.skeleton);
+  const Children children = children_of(rig.skeleton);
+  const Quaterniond turn = facing(rig.skeleton, children, reference, clip_joint);
+  LimbCheck out;
+  double scanned = 0, drawn = 0;
+  for (std::size_t s = 0; s < rig.skeleton.segments.size(); ++s) {
+    const Limb limb = limb_of(rig.skeleton, children, shortest, reference, clip_joint, s);
+    if (!limb.is) continue;
+    const Vector3d a = turn * limb.scanned;
+    const double angle = std::atan2(a.cross(limb.drawn).norm(), a.dot(limb.drawn));
+    out.rms += angle * angle;
+    out.worst = std::max(out.worst, angle);
+    scanned += limb.scanned.norm();
+    drawn += limb.drawn.norm();
+    ++out.limbs;
+  }
+  if (out.limbs == 0) return out;
+  out.rms = std::sqrt(out.rms / out.limbs);
+  out.figure = drawn / scanned;
+  return out;
 }
 
 }  // namespace ecorche::kinematics

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the scan's pose to a clip's zero pose.
+// From the scan's pose to a pose of a clip that both can be held against.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -10,17 +10,40 @@
 
 namespace ecorche::kinematics {
 
-/// Where a joint of the clip is in its zero pose, mm LPS; the origin for -1.
-Eigen::Vector3d zero_point(const Clip& clip, int joint);
+/// One frame of a clip, as Clip holds them.
+struct ClipFrame {
+  Eigen::Vector3d root_position = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Quaterniond> rotation;  ///< #joints
+};
 
-/// Global turns, one a segment, that bring the scanned rest pose to the clip's zero pose: a motion file's
-/// zero pose is its maker's (often arms out, or legs apart), the scan's is how the patient lay. Down the
-/// tree, a segment first takes its parent's turn; where it is a limb, so that its direction means the same
-/// thing in both, it is then turned the shortest way onto the clip's direction. A limb has one child, which
-/// the clip moves too, at least 12 % of the skeleton's extent away: shorter segments (clavicle, hand, foot)
-/// and those with several children (pelvis, chest) have directions that are the maker's choice. Differences
-/// below 5 degrees are anatomy, and left. `clip_joint`: as in Retarget.
-std::vector<Eigen::Quaterniond> align_rest(const Rig& rig, const Clip& clip,
+/// Where a clip's joints stand, and how they are turned, in space.
+struct ClipPlaces {
+  std::vector<Eigen::Vector3d> point;    ///< mm LPS
+  std::vector<Eigen::Quaterniond> turn;  ///< from the clip's zero pose
+};
+
+/// Of a frame, or of the zero pose. Throws Error{internal} where the frame has not one rotation a joint.
+ClipPlaces places(const Clip& clip, const ClipFrame& frame);
+ClipPlaces zero_places(const Clip& clip);
+
+/// Global turns, one a segment, that bring the scanned rest pose to `reference`: a motion file's zero pose is
+/// its maker's (often arms out, or legs apart), the scan's is how the patient lay. The root turns about the
+/// vertical until the joints beside it (hips, shoulders) face as the clip's do; both stand upright there,
+/// which is what makes it a reference. Down the tree, a segment first takes its parent's turn; where it is a
+/// limb, so that its direction means the same thing in both, it is then turned the shortest way onto the
+/// clip's direction. A limb has one child, which the clip moves too, at least 12 % of the skeleton's extent
+/// away: shorter segments (clavicle, hand, foot) and those with several children (pelvis, chest) have
+/// directions that are the maker's choice. Differences below 5 degrees are anatomy, and left. `clip_joint`:
+/// as in Retarget.
+std::vector<Eigen::Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
                                            const std::vector<int>& clip_joint);
+
+/// How the limbs of a clip stand beside the scan's, the root's turn about the vertical taken out.
+struct LimbCheck {
+  double rms = 0, worst = 0;  ///< radians between the directions of limbs that both have
+  double figure = 1;          ///< length of those limbs in the clip over that in the scan
+  int limbs = 0;
+};
+LimbCheck check_limbs(const Rig& rig, const ClipPlaces& reference, const std::vector<int>& clip_joint);
 
 }  // namespace ecorche::kinematics

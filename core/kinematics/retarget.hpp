@@ -3,30 +3,51 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/kinematics/rest_alignment.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/skeleton.hpp"
 
 namespace ecorche::kinematics {
 
 /// Which clip joint moves which segment. Names are compared without case, spaces, '_' and ':' prefixes; a
-/// segment's own name, its joint's name and its aliases count.
+/// segment's own name, its joint's name and its aliases count, then what other skeletons call them
+/// (joint_names.hpp).
 struct Retarget {
   std::vector<int> clip_joint;  ///< #segments; -1 where the clip has none: follows its parent
-  std::vector<Eigen::Quaterniond>
-      alignment;                            ///< #segments, from the scan to the clip's zero pose (align_rest)
+  /// #segments: with G the global turn of the clip's joint, G * alignment is the segment's from the scan.
+  std::vector<Eigen::Quaterniond> alignment;
+  std::vector<Eigen::Quaterniond> rest_turn;  ///< #segments, from the scan to the reference (align_rest)
+  /// Where the clip's joint of the root is when the patient stands where it was scanned, mm LPS.
+  Eigen::Vector3d home = Eigen::Vector3d::Zero();
+  double scale = 1;  ///< of the root's way; 1 / limbs.figure fits it to the patient's size
+  LimbCheck limbs;   ///< at the reference
   std::vector<std::string> unused_joints;   ///< clip joints that move nothing (end sites excepted)
   std::vector<std::string> still_segments;  ///< segments that no clip joint moves
 };
 
-/// Throws Error{data} when nothing matches, naming both sides' joints.
-Retarget match(const Rig& rig, const Clip& clip);
+/// Clip joints by the segments they move, as the user says; a clip joint that moves nothing on purpose has
+/// "".
+using NameMap = std::map<std::string, std::string>;
+
+/// Matches names, and aligns at the clip's zero pose; `home` is the root's zero offset, lifted where that
+/// pose reaches below the floor (z = 0) until its legs, straight, stand on it. Throws Error{data} when
+/// nothing matches, naming both sides' joints, and Error{config} for names of the map that neither side has.
+Retarget match(const Rig& rig, const Clip& clip, const NameMap& names = {});
+
+/// `match` at a frame of a clip with the same joints in which the person stands as the patient was scanned
+/// but for its limbs' directions: for rigs whose zero pose is no pose of a body. `home` is where the root is
+/// there.
+void align_at(const Rig& rig, const Clip& clip, const ClipFrame& reference, Retarget& retarget);
 
 /// The pose of `rig` at a frame: global turns of the clip's joints become turns of the segments, so that clip
-/// joints without a segment are folded into their descendants; the root's translation is its way from its own
-/// zero offset. Not clamped: see angles.hpp.
+/// joints without a segment are folded into their descendants; the root's translation is its way from home.
+/// Not clamped: see angles.hpp. Throws Error{internal} for a frame that is not this clip's.
+Pose pose_at(const Rig& rig, const Clip& clip, const Retarget& retarget, const ClipFrame& frame);
 Pose pose_at(const Rig& rig, const Clip& clip, const Retarget& retarget, std::size_t frame);
 
 }  // namespace ecorche::kinematics

@@ -5,6 +5,7 @@
 
 #include "core/kinematics/angles.hpp"
 #include "io/case/case_file.hpp"
+#include "io/case/pose_file.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/case/yaml_text.hpp"
 
@@ -64,13 +65,8 @@ void read_joint(const Value& value, const Joint& joint, std::size_t row, Pose& p
 
 }  // namespace
 
-Pose read_pose(const std::filesystem::path& path, const Rig& rig) {
-  constexpr std::array<std::string_view, 4> keys{"ecorche_pose", "skeleton", "root", "joints"};
-  constexpr std::array<std::string_view, 2> root_keys{"translation_mm", "rotation"};
-  const Skeleton& skeleton = rig.skeleton;
-  const Value file = Value::read(path);
-  file.allow(keys);
-  const Value version = file.at("ecorche_pose");
+void check_head(const Value& file, std::string_view kind, const Skeleton& skeleton) {
+  const Value version = file.at(kind);
   if (version.text() != "1")
     version.fail("version '" + version.text() + "' is not known", "this ecorche reads version 1");
   const Value name = file.at("skeleton");
@@ -78,6 +74,11 @@ Pose read_pose(const std::filesystem::path& path, const Rig& rig) {
     name.fail("this pose is for the skeleton '" + name.text() + "', the model has '" + skeleton.name + "'",
               "write skeleton: " + skeleton.name + " if the joints are the same");
   }
+}
+
+Pose parse_pose(const Value& file, const Rig& rig) {
+  constexpr std::array<std::string_view, 2> root_keys{"translation_mm", "rotation"};
+  const Skeleton& skeleton = rig.skeleton;
   Pose pose = Pose::rest(skeleton.segments.size());
   bool root_turned = false;
   if (const auto root = file.find("root")) {
@@ -103,6 +104,14 @@ Pose read_pose(const std::filesystem::path& path, const Rig& rig) {
                pose);
   }
   return pose;
+}
+
+Pose read_pose(const std::filesystem::path& path, const Rig& rig) {
+  constexpr std::array<std::string_view, 4> keys{"ecorche_pose", "skeleton", "root", "joints"};
+  const Value file = Value::read(path);
+  file.allow(keys);
+  check_head(file, "ecorche_pose", rig.skeleton);
+  return parse_pose(file, rig);
 }
 
 std::string pose_to_yaml(const Pose& pose, const Rig& rig) {

@@ -8,6 +8,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/values/error.hpp"
 #include "io/motion/bvh_parser.hpp"
+#include "io/motion/frame_rows.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -16,18 +17,12 @@ using bvh::Channel;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr std::size_t kLargestFile = std::size_t{512} << 20;
+constexpr double kCentimetre = 10;
 constexpr double kDegree = std::numbers::pi / 180;
 
-// Between the file's frame, x Left, y Superior, z Anterior, and LPS: a quarter turn about x.
-Vector3d to_lps(const Vector3d& v) {
-  return {v.x(), -v.z(), v.y()};
-}
+// From LPS to the file's frame, x Left, y Superior, z Anterior: a quarter turn about x.
 Vector3d to_lsa(const Vector3d& v) {
   return {v.x(), v.z(), -v.y()};
-}
-Quaterniond to_lps(const Quaterniond& q) {
-  return {q.w(), q.x(), -q.z(), q.y()};
 }
 Quaterniond to_lsa(const Quaterniond& q) {
   return {q.w(), q.x(), q.z(), -q.y()};
@@ -122,13 +117,6 @@ class Writer {
   std::string out_;
 };
 
-void check_unit(double unit_mm) {
-  if (!(unit_mm > 0 && unit_mm < 1e9)) {
-    throw Error(ErrorKind::usage, "unit", std::to_string(unit_mm) + " mm is no unit of length",
-                "give a positive length");
-  }
-}
-
 void check_clip(const Clip& clip, const std::filesystem::path& path) {
   bool whole =
       !clip.joints.empty() && clip.rotation.size() == clip.frames() * clip.joints.size() && clip.frames() > 0;
@@ -141,30 +129,59 @@ void check_clip(const Clip& clip, const std::filesystem::path& path) {
                 "report this");
 }
 
-}  // namespace
-
-Clip read_bvh(const std::filesystem::path& path, double unit_mm) {
-  check_unit(unit_mm);
-  const bvh::File file = bvh::parse(files::read_text(path, kLargestFile), path.string());
-  Clip clip;
-  clip.name = path.stem().string();
-  clip.frame_seconds = file.frame_seconds;
-  for (const bvh::FileJoint& joint : file.joints) {
-    const Vector3d offset(joint.offset[0], joint.offset[1], joint.offset[2]);
-    clip.joints.push_back({joint.name, joint.parent, unit_mm * to_lps(offset)});
+class BvhFile final : public ClipFile {
+ public:
+  BvhFile(TextStream stream, const std::string& name, const MotionSpace& space)
+      : space_(space), header_(bvh::read_header(stream)), rows_(rows(std::move(stream))) {
+    head_.name = name;
+    head_.frame_seconds = header_.frame_seconds;
+    for (const bvh::FileJoint& joint : header_.joints) {
+      const Vector3d offset(joint.offset[0], joint.offset[1], joint.offset[2]);
+      head_.joints.push_back({joint.name, joint.parent, unit() * space_.direction(offset)});
+    }
+    frames_ = rows_.frames();
   }
-  clip.root_position.reserve(file.frames);
-  clip.rotation.reserve(file.frames * file.joints.size());
-  const double* values = file.values.data();
-  for (std::size_t frame = 0; frame < file.frames; ++frame) {
-    for (const bvh::FileJoint& joint : file.joints) {
-      const Motion motion = read_motion(joint, values);
-      if (joint.parent < 0) clip.root_position.push_back(unit_mm * to_lps(motion.position));
-      clip.rotation.push_back(to_lps(motion.rotation));
-      values += joint.channels.size();
+
+  void read(std::size_t frame, Vector3d& root, std::span<Quaterniond> rotation) override {
+    const double* values = rows_.row(frame).data();
+    for (std::size_t j = 0; j < header_.joints.size(); ++j) {
+      const Motion motion = read_motion(header_.joints[j], values);
+      if (j == 0) root = unit() * space_.direction(motion.position);
+      rotation[j] = space_.turn(motion.rotation);
+      values += header_.joints[j].channels.size();
     }
   }
-  return clip;
+
+ private:
+  double unit() const { return space_.unit_mm.value_or(kCentimetre); }
+  FrameRows rows(TextStream stream) {
+    return {std::move(stream), header_.channels,
+            [this](TextStream& in, std::size_t frame, std::span<double> values) {
+              return bvh::read_frame(in, header_, frame, values);
+            }};
+  }
+
+  MotionSpace space_;
+  bvh::Header header_;
+  FrameRows rows_;
+};
+
+}  // namespace
+
+std::unique_ptr<ClipFile> open_bvh(TextStream stream, const std::string& name, const MotionSpace& space) {
+  check_unit(space.unit_mm.value_or(kCentimetre));
+  return std::make_unique<BvhFile>(std::move(stream), name, space);
+}
+
+std::unique_ptr<ClipFile> open_bvh(const std::filesystem::path& path, const MotionSpace& space) {
+  check_unit(space.unit_mm.value_or(kCentimetre));
+  return open_bvh(TextStream::open(path), path.stem().string(), space);
+}
+
+Clip read_bvh(const std::filesystem::path& path, double unit_mm) {
+  MotionSpace space;
+  space.unit_mm = unit_mm;
+  return read_whole(*open_bvh(path, space));
 }
 
 void write_bvh(const std::filesystem::path& path, const Clip& clip, double unit_mm) {

@@ -5,14 +5,19 @@
 #include <filesystem>
 
 #include "core/values/pose.hpp"
+#include "io/motion/clip_file.hpp"
+#include "io/motion/text_stream.hpp"
 
 namespace ecorche::io {
 
-/// Reads a `.bvh`, any order of rotations. Files are y up, facing +z (LSA), as DESIGN 5 says; `unit_mm` is
-/// the length of one unit of the file. End sites are left out; positions of joints other than the root are
-/// not read: a joint stays at its offset. Throws Error{missing_input}, Error{data}: not a BVH, no frame,
-/// fewer or more values than its frames take, values that are not finite, joint names given twice, more than
-/// 512 MiB.
+/// Opens a `.bvh`, any order of rotations; `space` says its frame (default: y up, facing +z) and unit
+/// (default: cm). End sites are left out; positions of joints other than the root are not read: a joint stays
+/// at its offset. Throws Error{missing_input}, Error{data}: not a BVH, no frame, fewer or more values than
+/// its frames take, values that are not finite, joint names given twice.
+std::unique_ptr<ClipFile> open_bvh(const std::filesystem::path& path, const MotionSpace& space = {});
+std::unique_ptr<ClipFile> open_bvh(TextStream stream, const std::string& name, const MotionSpace& space = {});
+
+/// All of it, in LSA; `unit_mm` is the length of one unit of the file.
 Clip read_bvh(const std::filesystem::path& path, double unit_mm = 10.0);
 
 /// Writes `clip` as `.bvh`, LSA, ZXY rotations (root also XYZ position), atomically.

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
-#include <string_view>
 #include <vector>
+
+#include "io/motion/text_stream.hpp"
 
 namespace ecorche::io::bvh {
 
@@ -18,17 +20,18 @@ struct FileJoint {
   std::vector<Channel> channels;  ///< in the order of the file's values
 };
 
-struct File {
+struct Header {
   std::vector<FileJoint> joints;  ///< parents first, without end sites
   std::size_t channels = 0;       ///< of all joints
-  std::size_t frames = 0;
+  std::size_t frames = 0;         ///< as the file says
   double frame_seconds = 0;
-  std::vector<double> values;  ///< frames * channels, degrees and file units
 };
 
-/// Throws Error{data} naming `where` and the line: anything but one hierarchy and all of its frames, names or
-/// channels that stand twice, numbers that are not finite, and files that would need more than 2^26
-/// rotations.
-File parse(std::string_view text, const std::string& where);
+/// Everything before the first frame. Throws Error{data} naming the line: anything but one hierarchy, names
+/// or channels that stand twice, numbers that are not finite, more frames than the file can hold.
+Header read_header(TextStream& stream);
+
+/// The values of one frame, degrees and file units; false after the last, where the file must end.
+bool read_frame(TextStream& stream, const Header& header, std::size_t frame, std::span<double> values);
 
 }  // namespace ecorche::io::bvh

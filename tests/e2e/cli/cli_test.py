@@ -37,9 +37,11 @@ class Cli(unittest.TestCase):
     def test_help_and_version(self):
         self.assertEqual(run("--version").returncode, 0)
         out = run("--help").stdout
-        for word in ("phantom", "check", "repair", "preprocess", "info", "verify", "export", "pose", "unpose", "serve", "stream", "not for planning surgery"):
+        commands = ("phantom", "check", "repair", "preprocess", "info", "verify", "export", "pose", "motion", "unpose",
+                    "thin", "serve", "stream")
+        for word in (*commands, "not for planning surgery"):
             self.assertIn(word, out)
-        for word in ("phantom", "check", "repair", "preprocess", "info", "verify", "export", "pose", "unpose", "serve", "stream"):
+        for word in commands:
             self.assertEqual(run(word, "--help").returncode, 0)
 
     def test_usage_errors(self):

@@ -18,7 +18,7 @@ ARROWS = {
     "core/model_file": ["core/values", "core/files"],
     "io/surface": ["core/values", "core/files"],
     "io/image": ["core/values", "core/files"],
-    "io/motion": ["core/values", "core/files"],
+    "io/motion": ["core/values", "core/files", "io/surface"],
     "io/case": ["core/values", "core/files", "core/kinematics", "io/surface", "io/image"],
     "phantom": ["core/values"],
     "preprocess": ["core"],

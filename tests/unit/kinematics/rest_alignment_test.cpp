@@ -68,7 +68,7 @@ TEST(RestAlignment, LimbsTakeTheClipsDirections) {
 TEST(RestAlignment, ShortSegmentsAndTrunkStayWithTheirParent) {
   const Rig rig = hanging_arms();
   const Clip clip = stretched_arms();
-  const auto turn = align_rest(rig, clip, match(rig, clip).clip_joint);
+  const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
   EXPECT_EQ(turn[0].angularDistance(Quaterniond::Identity()), 0);
   EXPECT_EQ(turn[1].angularDistance(Quaterniond::Identity()), 0)
       << "a collar bone's direction is the maker's";
@@ -88,10 +88,11 @@ TEST(RestAlignment, AFewDegreesAreAnatomy) {
   Clip clip = stretched_arms();
   const Vector3d scanned(20, 0, -280);
   clip.joints[3].offset = test::turn(Vector3d::UnitY(), 4 * std::numbers::pi / 180) * scanned;
-  const auto turn = align_rest(rig, clip, match(rig, clip).clip_joint);
+  const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
   EXPECT_EQ(turn[2].angularDistance(Quaterniond::Identity()), 0);
   clip.joints[3].offset = test::turn(Vector3d::UnitY(), 6 * std::numbers::pi / 180) * scanned;
-  EXPECT_NEAR(align_rest(rig, clip, match(rig, clip).clip_joint)[2].angularDistance(Quaterniond::Identity()),
+  EXPECT_NEAR(align_rest(rig, zero_places(clip), match(rig, clip).clip_joint)[2].angularDistance(
+                  Quaterniond::Identity()),
               6 * std::numbers::pi / 180, 1e-9);
 }
 
@@ -99,9 +100,9 @@ TEST(RestAlignment, JointsThatTheClipLacksOrPlacesNowhereAreLeft) {
   const Rig rig = hanging_arms();
   Clip clip = stretched_arms();
   clip.joints[3].offset.setZero();
-  const auto turn = align_rest(rig, clip, match(rig, clip).clip_joint);
+  const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
   EXPECT_EQ(turn[2].angularDistance(Quaterniond::Identity()), 0);
-  const auto none = align_rest(rig, clip, {0, 1, -1, -1, -1});
+  const auto none = align_rest(rig, zero_places(clip), {0, 1, -1, -1, -1});
   for (const Quaterniond& q : none) EXPECT_EQ(q.angularDistance(Quaterniond::Identity()), 0);
 }
 

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/motion_source.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "core/values/error.hpp"
+#include "io/case/frame.hpp"
+#include "io/case/motion_map.hpp"
+#include "io/case/pose_sequence.hpp"
+#include "io/motion/clip_file.hpp"
+#include "io/motion/table_file.hpp"
+
+namespace ecorche::app {
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kStrangeSize = 3, kWrongSize = 20;  // times the patient
+constexpr double kNoBody = 120 / kDegrees;           // a limb that points so far off is in no zero pose
+constexpr std::size_t kTried = 64;                   // frames in which a reference is looked for
+
+[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
+  throw Error(ErrorKind::usage, where, what, mend);
+}
+
+std::string degrees(double radians) {
+  return std::to_string(std::lround(radians * kDegrees));
+}
+
+// The first names of a long list.
+std::string some(const std::vector<std::string>& names) {
+  std::string out;
+  for (std::size_t i = 0; i < names.size() && i < 6; ++i) out += (i == 0 ? "" : ", ") + names[i];
+  return names.size() > 6 ? out + " and " + std::to_string(names.size() - 6) + " more" : out;
+}
+
+io::MotionSpace space_of(const MotionChoice& choice) {
+  io::MotionSpace space;
+  if (!choice.frame.empty()) {
+    const auto axes = io::axes_from_code(choice.frame);
+    if (!axes)
+      usage("--motion-frame", "'" + choice.frame + "' names no axes", "use three letters such as LSA or RAS");
+    space.axes = *axes;
+  }
+  if (!choice.unit.empty() && choice.unit != "body") {
+    space.unit_mm = io::unit_from_name(choice.unit);
+    if (!space.unit_mm)
+      usage("--motion-unit", "'" + choice.unit + "' is no unit",
+            "use um, mm, cm, m, in, millimetres a unit such as 56.44, or body");
+  }
+  return space;
+}
+
+std::optional<std::size_t> whole(std::string_view text) {
+  std::size_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+kinematics::ClipFrame frame_of(io::ClipFile& clip, std::size_t frame) {
+  kinematics::ClipFrame out;
+  out.rotation.resize(clip.head().joints.size());
+  clip.read(frame, out.root_position, out.rotation);
+  return out;
+}
+
+// A clip of joints, retargeted.
+class ClipSource final : public MotionSource {
+ public:
+  ClipSource(const Program& program, const MotionChoice& choice, const Rig& rig)
+      : rig_(rig),
+        path_(choice.file.string()),
+        clip_(io::open_clip(choice.file, space_of(choice), choice.asf)) {
+    kinematics::NameMap names;
+    if (!choice.map.empty()) names = io::read_motion_map(choice.map, rig).joints;
+    match_ = kinematics::match(rig, clip_->head(), names);
+    if (!match_.unused_joints.empty())
+      program.note("warning: " + path_ + ": " + some(match_.unused_joints) + " moves nothing of this model");
+    align(choice);
+    note_alignment(program);
+    check_size(program, choice);
+  }
+
+  std::size_t frames() const override { return clip_->frames(); }
+  double frame_seconds() const override { return clip_->head().frame_seconds; }
+  Pose at(std::size_t frame) override {
+    return kinematics::pose_at(rig_, clip_->head(), match_, frame_of(*clip_, frame));
+  }
+  const kinematics::Retarget* retarget() const override { return &match_; }
+
+ private:
+  void align(const MotionChoice& choice) {
+    reference = "the zero pose";
+    if (choice.rest == "zero") return;
+    if (choice.rest == "auto") {
+      if (match_.limbs.worst > kNoBody) align_at_best();
+      return;
+    }
+    const std::size_t colon = choice.rest.rfind(':');
+    const auto frame = whole(colon == std::string::npos ? choice.rest : choice.rest.substr(colon + 1));
+    if (!frame)
+      usage("--motion-rest", "'" + choice.rest + "' is no reference", "use auto, zero, FRAME or CLIP:FRAME");
+    if (colon == std::string::npos) return align_at(*clip_, *frame, "frame " + std::to_string(*frame));
+    const auto other = io::open_clip(choice.rest.substr(0, colon), space_of(choice), choice.asf);
+    // The same joints in another order, or with others beside them, are found by their names.
+    const Clip& head = clip_->head();
+    kinematics::ClipFrame named;
+    if (*frame >= other->frames())
+      usage("--motion-rest", "the clip has " + std::to_string(other->frames()) + " frames", "count from 0");
+    const kinematics::ClipFrame read = frame_of(*other, *frame);
+    const kinematics::ClipPlaces places = kinematics::places(other->head(), read);
+    named.root_position = read.root_position;
+    std::vector<Eigen::Quaterniond> global(head.joints.size(), Eigen::Quaterniond::Identity());
+    for (std::size_t j = 0; j < head.joints.size(); ++j) {
+      const auto parent = head.joints[j].parent;
+      const Eigen::Quaterniond above =
+          parent < 0 ? Eigen::Quaterniond::Identity() : global[static_cast<std::size_t>(parent)];
+      global[j] = above;
+      for (std::size_t k = 0; k < other->head().joints.size(); ++k) {
+        if (other->head().joints[k].name == head.joints[j].name) global[j] = places.turn[k];
+      }
+      named.rotation.push_back((above.conjugate() * global[j]).normalized());
+    }
+    kinematics::align_at(rig_, head, named, match_);
+    reference = choice.rest;
+  }
+
+  void align_at(io::ClipFile& clip, std::size_t frame, const std::string& name) {
+    if (frame >= clip.frames())
+      usage("--motion-rest", "the clip has frames 0 to " + std::to_string(clip.frames() - 1),
+            "name one of them");
+    kinematics::align_at(rig_, clip_->head(), frame_of(clip, frame), match_);
+    reference = name;
+  }
+
+  // The zero pose is no pose of a body: the frame that is nearest to the scan's.
+  void align_at_best() {
+    std::size_t best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    const std::size_t step = std::max<std::size_t>(1, clip_->frames() / kTried);
+    for (std::size_t f = 0; f < clip_->frames(); f += step) {
+      const auto places = kinematics::places(clip_->head(), frame_of(*clip_, f));
+      const auto limbs = kinematics::check_limbs(rig_, places, match_.clip_joint);
+      if (limbs.rms >= least) continue;
+      least = limbs.rms;
+      best = f;
+    }
+    align_at(*clip_, best, "frame " + std::to_string(best));
+  }
+
+  // Where the reference is not the scan's pose.
+  void note_alignment(const Program& program) const {
+    for (std::size_t s = 0; s < match_.rest_turn.size(); ++s) {
+      const int parent = rig_.skeleton.segments[s].parent;
+      if (parent < 0) continue;
+      const double angle =
+          match_.rest_turn[s].angularDistance(match_.rest_turn[static_cast<std::size_t>(parent)]);
+      if (angle < 1e-6) continue;
+      program.note("note: in " + (reference == "the zero pose" ? "the clip's zero pose" : reference) + " " +
+                   rig_.skeleton.segments[s].name + " is turned by " + degrees(angle) +
+                   " degrees from the scan's; aligned");
+    }
+  }
+
+  void check_size(const Program& program, const MotionChoice& choice) {
+    const double figure = match_.limbs.figure;
+    if (match_.limbs.limbs == 0) return;
+    if (choice.unit == "body") {
+      match_.scale = 1 / figure;
+      return;
+    }
+    char size[64];
+    std::snprintf(size, sizeof size, "%.3g times as long as the patient's", figure);
+    if (figure > kWrongSize || figure < 1 / kWrongSize) {
+      throw Error(ErrorKind::data, path_,
+                  std::string("the limbs of its figure are ") + size + ": its unit is another",
+                  "say it by --motion-unit, or fit it to the patient by --motion-unit body");
+    }
+    if (figure > kStrangeSize || figure < 1 / kStrangeSize)
+      program.note("warning: " + path_ + ": the limbs of its figure are " + size +
+                   ": is --motion-unit right? (body fits it to the patient)");
+  }
+
+  const Rig& rig_;
+  std::string path_;
+  std::unique_ptr<io::ClipFile> clip_;
+  kinematics::Retarget match_;
+};
+
+// OpenSim's coordinates on the rig's own angles.
+class AngleSource final : public MotionSource {
+ public:
+  AngleSource(const Program& program, const MotionChoice& choice, const Rig& rig)
+      : rig_(rig), file_(io::TextStream::open(choice.file)) {
+    if (!choice.unit.empty() || !choice.frame.empty() || !choice.asf.empty())
+      usage("--motion", choice.file.string() + " is a table of angles: it has no unit, frame or skeleton",
+            "leave out --motion-unit, --motion-frame and --asf");
+    reference = "the anatomical zero";
+    io::MotionMap map = io::opensim_map(rig);
+    if (!choice.map.empty()) {
+      for (auto& [column, shares] : io::read_motion_map(choice.map, rig).angles) map.angles[column] = shares;
+    }
+    std::vector<std::string> unused;
+    std::size_t used = 0;
+    for (std::size_t c = 0; c < file_.columns().size(); ++c) {
+      const std::string& name = file_.columns()[c];
+      const auto root = std::find(kRoot.begin(), kRoot.end(), name);
+      root_.push_back(root == kRoot.end() ? -1 : static_cast<int>(root - kRoot.begin()));
+      const auto found = map.angles.find(name);
+      shares_.push_back(found == map.angles.end() ? std::vector<io::AngleShare>() : found->second);
+      if (shares_.back().empty() && root_.back() < 0) unused.push_back(name);
+      used += shares_.back().empty() ? 0 : 1;
+    }
+    if (used == 0)
+      throw Error(ErrorKind::data, choice.file.string(),
+                  "none of its columns (" + some(file_.columns()) + ") is an angle of this model",
+                  "say by --map FILE what they mean");
+    if (!unused.empty())
+      program.note("warning: " + choice.file.string() + ": " + some(unused) + " moves nothing of this model");
+    // The pelvis of OpenSim stands in the ground's frame: its way is told from the first frame.
+    const auto first = file_.read(0);
+    for (std::size_t c = 0; c < root_.size(); ++c) {
+      if (root_[c] >= 0) home_[static_cast<std::size_t>(root_[c])] = first[c];
+    }
+  }
+
+  std::size_t frames() const override { return file_.frames(); }
+  double frame_seconds() const override { return file_.frame_seconds(); }
+
+  Pose at(std::size_t frame) override {
+    const auto row = file_.read(frame);
+    const double unit = file_.in_degrees() ? 1 / kDegrees : 1;
+    std::array<double, 6> root{0, 0, 0, 0, 0, 0};
+    std::vector<kinematics::AngleValue> values;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (root_[c] >= 0) root[static_cast<std::size_t>(root_[c])] = row[c];
+      for (const io::AngleShare& share : shares_[c])
+        values.push_back({share.angle, share.scale * unit * row[c]});
+    }
+    Pose pose = kinematics::pose_of(rig_.skeleton, values);
+    // OpenSim: x Anterior, y Superior, z Right; the pelvis turns about z, then x, then y.
+    const io::MotionSpace space{*io::axes_from_code("ASR"), 1000.0};
+    const auto about = [&](std::size_t k, int axis) {
+      return Eigen::Quaterniond(Eigen::AngleAxisd(unit * root[k], Eigen::Vector3d::Unit(axis)));
+    };
+    const Eigen::Quaterniond turn = space.turn(about(3, 2) * about(4, 0) * about(5, 1));
+    const Eigen::Vector3d v = rig_.skeleton.segments[0].joint.axes.transpose() * turn.vec();
+    pose.rotation[0] = Eigen::Quaterniond(turn.w(), v.x(), v.y(), v.z());
+    pose.root_translation =
+        *space.unit_mm * space.direction({root[0] - home_[0], root[1] - home_[1], root[2] - home_[2]});
+    return pose;
+  }
+
+ private:
+  static constexpr std::array<std::string_view, 6> kRoot{"pelvis_tx",   "pelvis_ty",   "pelvis_tz",
+                                                         "pelvis_tilt", "pelvis_list", "pelvis_rotation"};
+  const Rig& rig_;
+  io::AngleFile file_;
+  std::vector<int> root_;
+  std::vector<std::vector<io::AngleShare>> shares_;
+  std::array<double, 6> home_{0, 0, 0, 0, 0, 0};
+};
+
+class SequenceSource final : public MotionSource {
+ public:
+  SequenceSource(const Program& program, const MotionChoice& choice, const Rig& rig)
+      : sequence_(io::read_pose_sequence(choice.file, rig)) {
+    reference = "the scan";
+    if (!sequence_.left_out.empty()) program.note("warning: the model has no " + some(sequence_.left_out));
+  }
+  std::size_t frames() const override { return sequence_.frames(); }
+  double frame_seconds() const override { return sequence_.frame_seconds; }
+  Pose at(std::size_t frame) override { return sequence_.at(frame); }
+
+ private:
+  io::PoseSequence sequence_;
+};
+
+}  // namespace
+
+void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file) {
+  if (with_file)
+    command.add_option("--motion", choice.file,
+                       "a motion: .bvh, .amc, .gltf, .glb, .mot, or a pose sequence .yaml");
+  command.add_option(
+      "--motion-unit", choice.unit,
+      "length of one unit of the clip: um, mm, cm, m, in, millimetres, or body (its figure as long as "
+      "the patient); default: the file's own, cm for .bvh");
+  command.add_option("--motion-frame", choice.frame,
+                     "axes of the clip: three letters, default LSA (y up, facing z)");
+  command
+      .add_option(
+          "--motion-rest", choice.rest,
+          "the clip's pose that is held against the scan: zero, FRAME, CLIP:FRAME, or auto (the zero pose, "
+          "or the frame nearest to the scan where that is no pose of a body)")
+      ->capture_default_str();
+  command.add_option("--asf", choice.asf, "skeleton of an .amc; default: the one beside it");
+  command.add_option("--map", choice.map,
+                     "a motion map: which joint, angle or marker of the file moves what");
+}
+
+std::unique_ptr<MotionSource> open_motion(const Program& program, const MotionChoice& choice,
+                                          const Rig& rig) {
+  const std::string ending = choice.file.extension().string();
+  if (ending == ".mot" || ending == ".sto") return std::make_unique<AngleSource>(program, choice, rig);
+  if (ending == ".yaml" || ending == ".yml") return std::make_unique<SequenceSource>(program, choice, rig);
+  return std::make_unique<ClipSource>(program, choice, rig);
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/kinematics/motion_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/kinematics/angles.hpp"
+#include "core/kinematics/forward.hpp"
+#include "core/kinematics/interpolate.hpp"
+#include "core/kinematics/joint_names.hpp"
+
+namespace ecorche::kinematics {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kContact = 25;  // mm
+
+std::vector<std::size_t> feet(const Skeleton& skeleton) {
+  std::vector<std::size_t> out;
+  for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
+    std::vector<std::string> names = skeleton.segments[s].aliases;
+    names.insert(names.begin(), {skeleton.segments[s].name, skeleton.segments[s].joint.name});
+    std::vector<std::string> all = synonyms(names);
+    for (const std::string& name : names) all.push_back(plain_name(name));
+    const bool foot = std::any_of(all.begin(), all.end(), [](const std::string& name) {
+      return name == "leftfoot" || name == "rightfoot" || name == "lefttoebase" || name == "righttoebase";
+    });
+    if (foot) out.push_back(s);
+  }
+  return out;
+}
+
+// The mean of turns that lie near each other: normalised sum, signs made alike.
+struct MeanTurn {
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  void add(const Quaterniond& q) { sum += (sum.dot(q.coeffs()) < 0 ? -1 : 1) * q.coeffs(); }
+  Quaterniond mean() const { return sum.isZero() ? Quaterniond::Identity() : Quaterniond(sum.normalized()); }
+};
+
+}  // namespace
+
+MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
+                    const std::function<Pose(std::size_t)>& pose) {
+  const std::size_t joints = rig.skeleton.segments.size();
+  const std::vector<std::size_t> foot = feet(rig.skeleton);
+  std::vector<RigidTransform> motion(joints);
+  std::vector<ClampedJoint> clamped;
+  MotionReport out;
+  std::vector<LimitViolation> limits(joints);
+  std::vector<double> lowest(foot.size(), std::numeric_limits<double>::infinity());
+  const auto place = [&](std::size_t f) -> Vector3d {
+    return motion[foot[f]] * rig.skeleton.segments[foot[f]].joint.center;
+  };
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    Pose now = pose(frame);
+    clamped.clear();
+    constrain(rig.skeleton, now, clamped);
+    for (const ClampedJoint& c : clamped) {
+      LimitViolation& limit = limits[static_cast<std::size_t>(c.joint)];
+      ++limit.share;
+      limit.mean += c.removed;
+      if (c.removed > limit.worst) limit.worst_frame = frame;
+      limit.worst = std::max(limit.worst, c.removed);
+    }
+    forward(rig, now, motion);
+    for (std::size_t f = 0; f < foot.size(); ++f) lowest[f] = std::min(lowest[f], place(f).z());
+  }
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (limits[j].share == 0) continue;
+    limits[j].joint = rig.skeleton.segments[j].joint.name;
+    limits[j].mean /= limits[j].share;
+    limits[j].share /= static_cast<double>(frames);
+    out.limits.push_back(limits[j]);
+  }
+  std::stable_sort(out.limits.begin(), out.limits.end(),
+                   [](const LimitViolation& a, const LimitViolation& b) { return a.worst > b.worst; });
+
+  for (const std::size_t s : foot) out.feet.push_back({rig.skeleton.segments[s].joint.name, 0, 0, 0});
+  std::vector<Vector3d> before(foot.size());
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    Pose now = pose(frame);
+    clamped.clear();
+    constrain(rig.skeleton, now, clamped);
+    forward(rig, now, motion);
+    for (std::size_t f = 0; f < foot.size(); ++f) {
+      const Vector3d at = place(f);
+      const double height = at.z() - lowest[f];
+      if (height < kContact) {
+        ++out.feet[f].contact_share;
+        if (frame > 0) {
+          const double step = (at - before[f]).head<2>().norm() * (2 - std::exp2(height / kContact));
+          out.feet[f].mean_mm_per_s += step / frame_seconds;
+          out.feet[f].worst_mm_per_s = std::max(out.feet[f].worst_mm_per_s, step / frame_seconds);
+        }
+      }
+      before[f] = at;
+    }
+  }
+  for (FootSliding& f : out.feet) {
+    if (f.contact_share > 0) f.mean_mm_per_s /= f.contact_share;
+    f.contact_share /= static_cast<double>(frames);
+  }
+  return out;
+}
+
+std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double frame_seconds,
+                                     const std::function<Pose(std::size_t)>& one, std::size_t other_frames,
+                                     double other_seconds, const std::function<Pose(std::size_t)>& other) {
+  const std::size_t joints = rig.skeleton.segments.size();
+  std::vector<JointDifference> out(joints);
+  std::vector<MeanTurn> means(joints);
+  std::size_t compared = 0;
+  Quaterniond first_one = Quaterniond::Identity(), first_other = first_one;
+  // Two passes: the mean turn first.
+  for (const bool second : {false, true}) {
+    compared = 0;
+    for (std::size_t frame = 0; frame < frames; ++frame) {
+      const double at = static_cast<double>(frame) * frame_seconds / other_seconds;
+      const auto k = static_cast<std::size_t>(at);
+      if (k + 1 >= other_frames && at > static_cast<double>(k) + 1e-9) break;
+      if (k >= other_frames) break;
+      Pose a = one(frame);
+      const Pose b = between(other(k), other(std::min(k + 1, other_frames - 1)), at - static_cast<double>(k));
+      if (frame == 0) {
+        first_one = a.rotation[0];
+        first_other = b.rotation[0];
+      }
+      ++compared;
+      for (std::size_t j = 0; j < joints; ++j) {
+        Quaterniond p = a.rotation[j], q = b.rotation[j];
+        if (j == 0) {
+          p = p * first_one.conjugate();
+          q = q * first_other.conjugate();
+        }
+        const Quaterniond apart = p.conjugate() * q;
+        if (!second) {
+          means[j].add(apart);
+          out[j].mean += p.angularDistance(q);
+          out[j].worst = std::max(out[j].worst, p.angularDistance(q));
+        } else {
+          out[j].varying += apart.angularDistance(means[j].mean());
+        }
+      }
+    }
+  }
+  for (std::size_t j = 0; j < joints; ++j) {
+    out[j].joint = rig.skeleton.segments[j].joint.name;
+    if (compared == 0) continue;
+    out[j].mean /= static_cast<double>(compared);
+    out[j].varying /= static_cast<double>(compared);
+  }
+  return out;
+}
+
+}  // namespace ecorche::kinematics

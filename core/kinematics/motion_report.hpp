@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a motion does that a body would not: feet that slide, joints beyond their limits.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/values/pose.hpp"
+#include "core/values/skeleton.hpp"
+
+namespace ecorche::kinematics {
+
+/// Sliding of one point near the ground, after Zhang et al., Mode-Adaptive Neural Networks for Quadruped
+/// Motion Control (2018): a step of the point over the ground counts by 2 - 2^(h / 25 mm), with h its height
+/// over the lowest place it comes to, and not at all above 25 mm.
+struct FootSliding {
+  std::string joint;          ///< whose centre is the point: ankle, or toes
+  double contact_share = 0;   ///< of the frames, h < 25 mm
+  double mean_mm_per_s = 0;   ///< over the frames in contact
+  double worst_mm_per_s = 0;  ///< of one step
+};
+
+/// What the limits of one joint would take away.
+struct LimitViolation {
+  std::string joint;
+  double share = 0;  ///< of the frames
+  double mean = 0;   ///< radians, over those frames
+  double worst = 0;  ///< radians
+  std::size_t worst_frame = 0;
+};
+
+struct MotionReport {
+  std::vector<FootSliding> feet;
+  std::vector<LimitViolation> limits;  ///< joints that are ever beyond theirs, the worst first
+};
+
+/// Looks at every frame, twice: `pose(frame)` is called for 0 to frames - 1, then again. Angles are told as
+/// asked, feet as they stand after the limits. Feet are the segments with the names of feet and toes
+/// (joint_names.hpp).
+MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
+                    const std::function<Pose(std::size_t)>& pose);
+
+/// One joint in two motions.
+struct JointDifference {
+  std::string joint;
+  double mean = 0, worst = 0;  ///< radians between the rotations
+  double varying = 0;          ///< mean, when the constant turn between the two (their mean) is taken out
+};
+
+/// Joint by joint over the frames of the first motion; the root's heading counts from the first frame. Both
+/// begin together; the second is interpolated.
+std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double frame_seconds,
+                                     const std::function<Pose(std::size_t)>& one, std::size_t other_frames,
+                                     double other_seconds, const std::function<Pose(std::size_t)>& other);
+
+}  // namespace ecorche::kinematics

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// The files of io/case/data as they are, in the program.
+#pragma once
+
+namespace ecorche::io::embedded {
+
+extern const char* const poses;    ///< the pose library
+extern const char* const opensim;  ///< the motion map of OpenSim's coordinates
+
+}  // namespace ecorche::io::embedded

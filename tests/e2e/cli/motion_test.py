@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Motion files of every kind through the command: the way through, and each refusal with exit code and message."""
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ECORCHE = os.environ["ECORCHE_BIN"]
+CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
+MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
+WALK = CASE / "motion" / "walk.bvh"
+ERROR_LINE = re.compile(r"^error: .+: .+ \(.+\)$", re.M)
+
+MOT = "walk\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime knee_angle_r pelvis_ty\n0 10 1\n0.1 20 1\n0.2 30 1.1\n"
+ASF = """:version 1.10
+:units
+  length 0.45
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name rhip
+    direction -1 -0.2 0
+    length 1.5
+    axis 0 0 0 XYZ
+  end
+  begin
+    id 2
+    name rfemur
+    direction 0 -1 0
+    length 7.2
+    axis 0 0 0 XYZ
+    dof rx ry rz
+  end
+  begin
+    id 3
+    name rtibia
+    direction 0 -1 0
+    length 7.2
+    axis 0 0 0 XYZ
+    dof rx
+  end
+  begin
+    id 4
+    name rfoot
+    direction 0 0 1
+    length 2
+    axis 0 0 0 XYZ
+  end
+:hierarchy
+  begin
+    root rhip
+    rhip rfemur
+    rfemur rtibia
+    rtibia rfoot
+  end
+"""
+AMC = ":DEGREES\n1\nroot 0 17 0 0 0 0\nrfemur 0 0 0\nrtibia 0\n2\nroot 0 17 0 0 0 0\nrfemur -30 0 0\nrtibia 40\n"
+
+
+def run(*words):
+    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+class Motion(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def put(self, name, text):
+        (self.folder / name).write_text(text)
+        return self.folder / name
+
+    def ok(self, *words):
+        result = run(*words, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout)
+
+    def refused(self, code, part, *words):
+        result = run(*words)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, "")
+        self.assertRegex(result.stderr, ERROR_LINE)
+        self.assertIn(part, result.stderr)
+
+    def motion(self, file, *more):
+        return ("motion", file, "--model", MODEL, *more)
+
+    def test_report(self):
+        report = self.ok(*self.motion(WALK))
+        self.assertEqual(report["frames"], 72)
+        self.assertTrue(all(segment["moved"] for segment in report["match"]["segments"]))
+        self.assertAlmostEqual(report["match"]["figure_to_patient"], 1, delta=0.05)
+        self.assertEqual(len(report["foot_sliding"]), 4)
+        self.assertIn("beyond limits", run(*self.motion(WALK)).stdout)
+
+    def test_against(self):
+        same = self.ok(*self.motion(WALK, "--against", WALK, "--most-deg", "1"))
+        self.assertLess(max(joint["worst_deg"] for joint in same["differences"]), 1e-5)
+        apart = run(*self.motion(WALK, "--against", CASE / "motion" / "bend.bvh", "--most-deg", "5"))
+        self.assertEqual(apart.returncode, 1, apart.stderr)
+        self.assertIn("mean without a constant turn", apart.stdout)
+
+    def test_every_format_poses(self):
+        self.put("subject.asf", ASF)
+        for file in (self.put("subject_1.amc", AMC), self.put("walk.mot", MOT)):
+            out = self.folder / file.stem
+            done = self.ok("pose", MODEL, "-o", out, "--motion", file, "--frames", "0:2", "--tissues", "skin")
+            self.assertEqual([frame["name"] for frame in done["frames"]], ["frame_0000", "frame_0001"])
+        # 40 degrees are asked of the knee; the zero pose of that skeleton is a straight leg.
+        report = self.ok(*self.motion(self.folder / "subject_1.amc"))
+        self.assertIn("shank_right", [s["segment"] for s in report["match"]["segments"] if s["moved"]])
+
+    def test_library_and_sequence(self):
+        done = self.ok("pose", MODEL, "-o", self.folder / "sit", "--pose", "lib:sitting", "--tissues", "skin")
+        self.assertTrue((self.folder / "sit" / "quality.json").exists())
+        self.assertEqual(len(done["frames"]), 1)
+        name = self.ok("info", MODEL)["skeleton"]
+        keys = f"ecorche_pose_sequence: 1\nskeleton: {name}\nframes_per_second: 4\nkeys:\n" \
+               "  - {time_s: 0}\n  - {time_s: 1, pose: lib:arms_up}\n"
+        file = self.put("up.yaml", keys)
+        self.assertEqual(self.ok(*self.motion(file))["frames"], 5)
+        self.ok("pose", MODEL, "-o", self.folder / "up", "--motion", file, "--frames", "4", "--tissues", "skin")
+        self.refused(78, "keys[0].pose", *self.motion(self.put("bad.yaml", keys.replace("time_s: 0", "time_s: 0, pose: a.yaml, root: {}"))))
+
+    def test_refusals(self):
+        text = WALK.read_text()
+        self.refused(66, "none.bvh", *self.motion(self.folder / "none.bvh"))
+        self.refused(64, "is no ending of a motion file", *self.motion(self.put("a.fbx", "x")))
+        lines = text.rstrip().splitlines(keepends=True)
+        self.refused(65, "expected a number, the file ends", *self.motion(self.put("cut.bvh", "".join(lines[:-5]))))
+        self.refused(65, "is not finite", *self.motion(self.put("nan.bvh", text.rstrip().rsplit(" ", 1)[0] + " nan\n")))
+        self.refused(65, "times as long as the patient's: its unit is another", *self.motion(WALK, "--motion-unit", "m"))
+        self.refused(65, "is no glTF", *self.motion(self.put("a.gltf", "hello")))
+        self.refused(65, "no 'endheader'", *self.motion(self.put("a.mot", "hello\n")))
+        self.refused(65, "none of its columns", *self.motion(self.put("b.mot", MOT.replace("knee_angle_r", "wing"))))
+        self.refused(66, "its skeleton is not beside it", *self.motion(self.put("alone.amc", AMC)))
+        asf = self.put("bad.asf", ASF.replace("rhip rfemur", "rhip rhip"))
+        self.refused(65, "has two parents", *self.motion(self.put("bad.amc", AMC)))
+        self.refused(65, "has two parents", *self.motion(WALK.parent.parent / "motion" / "walk.bvh", "--motion-rest", f"{self.folder}/bad.amc:0", "--asf", asf))
+        self.refused(64, "is no unit", *self.motion(WALK, "--motion-unit", "ell"))
+        self.refused(64, "names no axes", *self.motion(WALK, "--motion-frame", "XYZ"))
+        self.refused(64, "is no reference", *self.motion(WALK, "--motion-rest", "first"))
+        self.refused(64, "the clip has frames 0 to 71", *self.motion(WALK, "--motion-rest", "72"))
+        self.refused(78, "the clip has no joint 'Knee'",
+                     *self.motion(WALK, "--map", self.put("map.yaml", "ecorche_motion_map: 1\njoints: {Knee: pelvis}\n")))
+        self.refused(64, "has no pose 'siting'", "pose", MODEL, "-o", self.folder / "x", "--pose", "lib:siting")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+// Motions of any kind: names, references that are no zero pose, keys, named angles, reports.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "core/kinematics/angles.hpp"
+#include "core/kinematics/forward.hpp"
+#include "core/kinematics/interpolate.hpp"
+#include "core/kinematics/joint_names.hpp"
+#include "core/kinematics/motion_report.hpp"
+#include "core/kinematics/named_angles.hpp"
+#include "core/kinematics/retarget.hpp"
+#include "core/values/error.hpp"
+#include "tests/unit/kinematics/rigs.hpp"
+
+namespace ecorche::kinematics {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+TEST(JointNames, ForeignSkeletonsMeanTheSame) {
+  const auto has = [](const std::vector<std::string>& names, const char* name) {
+    const auto all = synonyms(names);
+    return std::find(all.begin(), all.end(), name) != all.end();
+  };
+  EXPECT_TRUE(has({"thigh_left"}, "lfemur"));
+  EXPECT_TRUE(has({"LeftUpLeg"}, "ccbaselthigh"));
+  EXPECT_FALSE(has({"thigh_left"}, "rfemur"));
+  EXPECT_TRUE(has({"upper_arm_right"}, "rhumerus"));
+  EXPECT_TRUE(synonyms({"tail"}).empty());
+}
+
+TEST(JointNames, ACollarMakesTheShoulderAnArm) {
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(plain_names({"LeftCollar", "LeftShoulder", "LeftElbow", "RightHip", "Neck", "Chest2"}),
+            (Names{"leftshoulder", "leftarm", "leftforearm", "rightupleg", "neck", "spine1"}));
+  EXPECT_EQ(plain_names({"LeftShoulder", "LeftArm"}), (Names{"leftshoulder", "leftarm"}));
+}
+
+// A body with trunk, two legs, and a clip of it under foreign names.
+Rig legs() {
+  Rig rig;
+  const auto add = [&](const char* name, int parent, const Vector3d& center) {
+    Segment segment;
+    segment.name = name;
+    segment.parent = parent;
+    segment.joint.name = std::string(name) + "_joint";
+    segment.joint.center = center;
+    segment.joint.sequence = test::sequence({0, 1, 2});
+    rig.skeleton.segments.push_back(segment);
+    rig.fits.push_back({segment.joint.name, CenterRule::given, 0, 0, 1, 0});
+  };
+  add("pelvis", -1, {0, 0, 900});
+  add("thigh_left", 0, {90, 0, 880});
+  add("shank_left", 1, {90, 10, 480});
+  add("foot_left", 2, {90, 20, 80});
+  add("thigh_right", 0, {-90, 0, 880});
+  add("shank_right", 4, {-90, 10, 480});
+  add("foot_right", 5, {-90, 20, 80});
+  return rig;
+}
+
+Clip walking(std::size_t frames) {
+  std::mt19937 random(4);
+  Clip clip;
+  clip.name = "walk";
+  clip.joints = {{"Hips", -1, {0, 0, 900}},        {"LeftUpLeg", 0, {90, 0, -20}},
+                 {"LeftLeg", 1, {0, 10, -400}},    {"LeftFoot", 2, {0, 10, -400}},
+                 {"RightUpLeg", 0, {-90, 0, -20}}, {"RightLeg", 4, {0, 10, -400}},
+                 {"RightFoot", 5, {0, 10, -400}}};
+  for (std::size_t f = 0; f < frames; ++f) {
+    clip.root_position.emplace_back(0, -10.0 * static_cast<double>(f), 900);
+    for (std::size_t j = 0; j < clip.joints.size(); ++j)
+      clip.rotation.push_back(f == 0 ? Quaterniond::Identity()
+                                     : Quaterniond::Identity().slerp(0.2, test::random_turn(random)));
+  }
+  return clip;
+}
+
+// The same motion of a rig whose every joint has axes of its own, so that its zero pose is no pose of a body.
+Clip with_own_axes(const Clip& clip, std::mt19937& random) {
+  Clip out = clip;
+  std::vector<Quaterniond> bind;
+  for (std::size_t j = 0; j < clip.joints.size(); ++j) bind.push_back(test::random_turn(random));
+  const auto above = [&](std::size_t j) {
+    return clip.joints[j].parent < 0 ? Quaterniond::Identity()
+                                     : bind[static_cast<std::size_t>(clip.joints[j].parent)];
+  };
+  for (std::size_t j = 0; j < clip.joints.size(); ++j)
+    out.joints[j].offset = above(j).conjugate() * clip.joints[j].offset;
+  for (std::size_t i = 0; i < out.rotation.size(); ++i) {
+    const std::size_t j = i % clip.joints.size();
+    out.rotation[i] = above(j).conjugate() * clip.rotation[i] * bind[j];
+  }
+  return out;
+}
+
+ClipFrame frame_of(const Clip& clip, std::size_t f) {
+  const auto begin = clip.rotation.begin() + static_cast<std::ptrdiff_t>(f * clip.joints.size());
+  return {clip.root_position[f], {begin, begin + static_cast<std::ptrdiff_t>(clip.joints.size())}};
+}
+
+TEST(Retarget, AxesOfTheFileDoNotMatterAtAReference) {
+  std::mt19937 random(8);
+  const Rig rig = legs();
+  const Clip plain = walking(20), odd = with_own_axes(plain, random);
+  const Retarget zero = match(rig, plain);
+  EXPECT_LT(zero.limbs.worst, 1e-6);
+  EXPECT_NEAR(zero.limbs.figure, 1, 1e-9);
+  Retarget at = match(rig, odd);
+  EXPECT_GT(at.limbs.worst, 30 * kDegree) << "its zero pose is no pose of a body";
+  align_at(rig, odd, frame_of(odd, 0), at);
+  for (std::size_t f = 0; f < 20; ++f) {
+    const Pose a = pose_at(rig, plain, zero, f), b = pose_at(rig, odd, at, f);
+    EXPECT_LT((a.root_translation - b.root_translation).norm(), 1e-9);
+    for (std::size_t j = 0; j < 7; ++j)
+      EXPECT_LT(a.rotation[j].angularDistance(b.rotation[j]), 1e-7) << f << " " << j;
+  }
+}
+
+TEST(Retarget, AReferenceThatLooksAsideTurnsTheScan) {
+  const Rig rig = legs();
+  Clip clip = walking(2);
+  const Quaterniond aside = test::turn(Vector3d::UnitZ(), 70 * kDegree);
+  clip.rotation[0] = aside;
+  Retarget at = match(rig, clip);
+  align_at(rig, clip, frame_of(clip, 0), at);
+  // At the reference itself the patient stands so, straight.
+  const Pose pose = pose_at(rig, clip, at, 0);
+  EXPECT_LT(pose.rotation[0].angularDistance(aside), 1e-6);
+  for (std::size_t j = 1; j < 7; ++j)
+    EXPECT_LT(pose.rotation[j].angularDistance(Quaterniond::Identity()), 1e-6);
+}
+
+TEST(Retarget, TheUserSaysWhatMovesWhat) {
+  const Rig rig = legs();
+  Clip clip = walking(1);
+  clip.joints[2].name = "KneeOfMine";
+  EXPECT_EQ(match(rig, clip).clip_joint[2], -1);
+  const Retarget map = match(rig, clip, {{"KneeOfMine", "shank_left"}, {"RightFoot", ""}});
+  EXPECT_EQ(map.clip_joint[2], 2);
+  EXPECT_EQ(map.clip_joint[6], -1);
+  EXPECT_TRUE(map.unused_joints.empty());
+  const auto refused = [&](const NameMap& names, const std::string& part) {
+    try {
+      match(rig, clip, names);
+      FAIL() << part;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::config);
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  };
+  refused({{"Knee", "shank_left"}}, "the clip has no joint 'Knee'");
+  refused({{"LeftFoot", "paw"}}, "the skeleton has no segment 'paw'");
+  refused({{"LeftFoot", "pelvis"}, {"RightFoot", "pelvis"}}, "two joints move the segment 'pelvis'");
+}
+
+TEST(Retarget, AZeroPoseBelowTheFloorStandsOnIt) {
+  const Rig rig = legs();
+  Clip clip = walking(1);
+  clip.joints[0].offset.setZero();  // as CMU's
+  clip.root_position[0] = {0, 0, 20 + 2 * std::hypot(10, 400)};
+  EXPECT_LT(pose_at(rig, clip, match(rig, clip), 0).root_translation.norm(), 1e-9);
+}
+
+TEST(Interpolate, TurnsAtAnEvenPaceTheShorterWay) {
+  Pose a = Pose::rest(2), b = a;
+  b.root_translation = {10, 20, 30};
+  b.rotation[1] = test::turn(Vector3d(1, 2, 3), 100 * kDegree);
+  b.rotation[1].coeffs() *= -1;  // the same turn
+  const Pose half = between(a, b, 0.3);
+  EXPECT_LT(half.rotation[1].angularDistance(test::turn(Vector3d(1, 2, 3), 30 * kDegree)), 1e-9);
+  EXPECT_LT((half.root_translation - Vector3d(3, 6, 9)).norm(), 1e-12);
+  EXPECT_THROW(between(a, Pose::rest(3), 0.5), Error);
+  PoseKeys keys{{1, 3}, {a, b}, Ease::linear};
+  EXPECT_LT(at(keys, 1.6).rotation[1].angularDistance(half.rotation[1]), 1e-9);
+  EXPECT_LT(at(keys, 0).rotation[1].angularDistance(a.rotation[1]), 1e-9);
+  EXPECT_LT(at(keys, 9).rotation[1].angularDistance(b.rotation[1]), 1e-9);
+  keys.ease = Ease::smooth;
+  EXPECT_NEAR(at(keys, 1.6).root_translation.x(), 10 * (3 * 0.09 - 2 * 0.027), 1e-12);
+}
+
+TEST(NamedAngles, OppositesAreTurnedRound) {
+  Rig rig = test::chain(2);
+  rig.skeleton.segments[1].joint.sequence[1].name = "abduction";
+  rig.skeleton.segments[1].joint.sequence[2].rest = 0.3;
+  const auto found = find_named_angle(rig.skeleton, "j1", "adduction");
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->sign, -1);
+  EXPECT_FALSE(find_named_angle(rig.skeleton, "j1", "tilt"));
+  EXPECT_FALSE(find_named_angle(rig.skeleton, "j7", "flexion"));
+  const auto flexion = find_named_angle(rig.skeleton, "j1", "flexion");
+  const Pose pose = pose_of(rig.skeleton, {{*found, 0.4}, {*flexion, 0.1}, {*flexion, 0.2}});
+  const auto angles = angles_from_rotation(rig.skeleton.segments[1].joint, pose.rotation[1]);
+  EXPECT_NEAR(angles[0], 0.3, 1e-12);
+  EXPECT_NEAR(angles[1], -0.4, 1e-12);
+  EXPECT_NEAR(angles[2], 0.3, 1e-12) << "what is not named is at rest";
+}
+
+// A body that glides by 100 mm/s on straight legs, then hangs in the air.
+TEST(MotionReport, GlidingFeetAndBentLimits) {
+  Rig rig = legs();
+  AngleAxis& flexion = rig.skeleton.segments[2].joint.sequence[0];
+  flexion.min = 0;
+  flexion.max = 60 * kDegree;
+  const auto pose = [&](std::size_t frame) {
+    Pose p = Pose::rest(7);
+    p.root_translation = {0, -1.0 * static_cast<double>(frame), frame < 50 ? 0.0 : 300.0};
+    if (frame == 20)
+      p.rotation[2] = rotation_from_angles(rig.skeleton.segments[2].joint, {80 * kDegree, 0, 0});
+    if (frame == 30)
+      p.rotation[2] = rotation_from_angles(rig.skeleton.segments[2].joint, {70 * kDegree, 0, 0});
+    return p;
+  };
+  const MotionReport made = report(rig, 100, 0.01, pose);
+  ASSERT_EQ(made.feet.size(), 2U);
+  EXPECT_EQ(made.feet[1].joint, "foot_right_joint");
+  EXPECT_NEAR(made.feet[1].contact_share, 0.5, 1e-12);
+  EXPECT_NEAR(made.feet[1].mean_mm_per_s, 100 * 49.0 / 50, 1e-9);
+  EXPECT_NEAR(made.feet[1].worst_mm_per_s, 100, 1e-9);
+  ASSERT_EQ(made.limits.size(), 1U);
+  EXPECT_EQ(made.limits[0].joint, "shank_left_joint");
+  EXPECT_NEAR(made.limits[0].share, 0.02, 1e-12);
+  EXPECT_NEAR(made.limits[0].worst, 20 * kDegree, 1e-9);
+  EXPECT_NEAR(made.limits[0].mean, 15 * kDegree, 1e-9);
+  EXPECT_EQ(made.limits[0].worst_frame, 20U);
+}
+
+TEST(MotionReport, ConstantTurnsAreToldFromOthers) {
+  const Rig rig = legs();
+  const auto one = [&](std::size_t frame) {
+    Pose p = Pose::rest(7);
+    p.rotation[1] = test::turn(Vector3d::UnitX(), 0.01 * static_cast<double>(frame));
+    return p;
+  };
+  // Twice as many frames; the left hip turned by 20 degrees throughout.
+  const auto other = [&](std::size_t frame) {
+    Pose p = Pose::rest(7);
+    p.rotation[1] = test::turn(Vector3d::UnitX(), 0.005 * static_cast<double>(frame)) *
+                    test::turn(Vector3d::UnitY(), 20 * kDegree);
+    return p;
+  };
+  const auto apart = compare(rig, 50, 0.02, one, 100, 0.01, other);
+  EXPECT_NEAR(apart[1].mean, 20 * kDegree, 1e-9);
+  EXPECT_NEAR(apart[1].worst, 20 * kDegree, 1e-9);
+  EXPECT_NEAR(apart[1].varying, 0, 1e-7);
+  EXPECT_EQ(apart[2].mean, 0);
+}
+
+}  // namespace
+}  // namespace ecorche::kinematics
