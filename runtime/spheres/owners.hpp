@@ -38,8 +38,17 @@ struct Tile {
   std::array<std::int32_t, 3> size;   ///< at most kTileEdge; less at the far sides of the box
   const TileOwners* owners;
 
-  std::int32_t owner(std::int32_t i, std::int32_t j, std::int32_t k) const {
-    return owners->owner[static_cast<std::size_t>(i + kTileEdge * (j + kTileEdge * k))];
+  /// Calls f(i, j, k, owner) for every owned voxel, indices of the box.
+  template <class F>
+  void for_owned(F&& f) const {
+    for (std::int32_t k = 0; k < size[2]; ++k) {
+      for (std::int32_t j = 0; j < size[1]; ++j) {
+        const std::int32_t* row = &owners->owner[static_cast<std::size_t>(kTileEdge * (j + kTileEdge * k))];
+        for (std::int32_t i = 0; i < size[0]; ++i) {
+          if (row[i] != TileOwners::none) f(first[0] + i, first[1] + j, first[2] + k, row[i]);
+        }
+      }
+    }
   }
 };
 

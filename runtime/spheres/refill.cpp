@@ -7,35 +7,10 @@
 
 #include "core/values/error.hpp"
 #include "runtime/spheres/lookup.hpp"
-#include "runtime/volume/grid_affine.hpp"
 #include "runtime/volume/sampler.hpp"
 
 namespace ecorche::runtime {
 namespace {
-
-// Rest lattice -> index of the volume: axis by axis where both have the same axes.
-class ToVolume {
- public:
-  ToVolume(const ImageGrid& lattice, const ImageGrid& volume) : map_(to_index(volume) * to_space(lattice)) {
-    same_ = true;
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      for (Eigen::Index j = 0; j < 3; ++j) same_ = same_ && std::abs(map_.linear(i, j) - (i == j)) < 1e-9;
-      same_ = same_ && std::abs(map_.at[i] - std::round(map_.at[i])) < 1e-9;
-    }
-    // The same lattice up to whole voxels, so that rest stays exact.
-    if (same_) map_.at = map_.at.array().round();
-  }
-
-  Vec3 operator()(const Vec3& p) const {
-    if (same_) return {p[0] + map_.at[0], p[1] + map_.at[1], p[2] + map_.at[2]};
-    const Eigen::Vector3d q = map_ * Eigen::Vector3d(p[0], p[1], p[2]);
-    return {q[0], q[1], q[2]};
-  }
-
- private:
-  Affine map_;
-  bool same_ = false;
-};
 
 template <class T>
 void fill(const BallSet& set, const LatticeBox& box, const Image& volume, double background, bool nearest,
@@ -49,21 +24,14 @@ void fill(const BallSet& set, const LatticeBox& box, const Image& volume, double
   const Sampler<T> sampler{volume.grid, volume.scalars<T>(), components, background};
   const ToVolume to_volume(set.lattice, volume.grid);
   for_tiles(set, box, context, [&](const Tile& tile) {
-    for (std::int32_t k = 0; k < tile.size[2]; ++k) {
-      for (std::int32_t j = 0; j < tile.size[1]; ++j) {
-        T* voxel = &posed[components * out.grid.offset(tile.first[0], tile.first[1] + j, tile.first[2] + k)];
-        for (std::int32_t i = 0; i < tile.size[0]; ++i, voxel += components) {
-          const std::int32_t owner = tile.owner(i, j, k);
-          if (owner == TileOwners::none) continue;
-          const Ball& ball = set.balls[static_cast<std::size_t>(owner)];
-          const Vec3 at =
-              to_volume(rest_place(set, ball, box.first[0] + tile.first[0] + i,
-                                   box.first[1] + tile.first[1] + j, box.first[2] + tile.first[2] + k));
-          nearest ? sampler.nearest(at[0], at[1], at[2], voxel)
-                  : sampler.trilinear(at[0], at[1], at[2], voxel);
-        }
-      }
-    }
+    tile.for_owned([&](std::int32_t i, std::int32_t j, std::int32_t k, std::int32_t owner) {
+      const Ball& ball = set.balls[static_cast<std::size_t>(owner)];
+      const Vec3& c = ball.centre;
+      const Vec3 at = to_volume(
+          rest_place(set, ball, box.first[0] + i - c[0], box.first[1] + j - c[1], box.first[2] + k - c[2]));
+      T* voxel = &posed[components * out.grid.offset(i, j, k)];
+      nearest ? sampler.nearest(at[0], at[1], at[2], voxel) : sampler.trilinear(at[0], at[1], at[2], voxel);
+    });
   });
 }
 

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// The union of balls on the grid: what a skeleton would refill, without refilling.
+#pragma once
+
+#include "core/values/context.hpp"
+#include "runtime/spheres/owners.hpp"
+
+namespace ecorche::runtime {
+
+/// Voxels of the box that some ball holds. The reconstruction loss of a skeleton is what its object has more.
+std::size_t covered_voxels(const BallSet& set, const LatticeBox& box, const Context& context = {});
+
+/// 1 where some ball holds the voxel, else 0: u8.
+Image covered(const BallSet& set, const LatticeBox& box, const Context& context = {});
+
+/// Pieces of the nonzero voxels of a u8 image that hang together by faces, edges or corners, of at least
+/// `least` voxels. O(voxels).
+std::size_t parts_of(const Image& mask, std::size_t least);
+
+}  // namespace ecorche::runtime
