@@ -12,7 +12,7 @@ namespace {
 
 // The protocol of proto/ecorche/v1.
 constexpr std::uint32_t kProtocol = 1;
-constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY};
+constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY, v1::FEATURE_SPHERES};
 
 void describe(const Limits& limits, v1::Limits& out) {
   out.set_hello_bytes(limits.hello_bytes);

@@ -44,11 +44,13 @@ std::vector<std::uint32_t> all_wanted(const PoseJob& job) {
   return rows;
 }
 
-// Quality and volumes look at every tet; meshes alone only at those that their vertices hang on.
+// Quality and volumes by tets look at every tet; meshes only at those that their vertices hang on, spheres at
+// none.
 runtime::NodesOf nodes_wanted(const PoseJob& job) {
   for (const Subscription& subscription : job.subscriptions) {
     const auto* mesh = std::get_if<MeshWant>(&subscription.want);
-    if (mesh == nullptr || mesh->quality) return runtime::NodesOf::body;
+    const auto* volume = std::get_if<VolumeWant>(&subscription.want);
+    if ((mesh && mesh->quality) || (volume && !volume->by_spheres)) return runtime::NodesOf::body;
   }
   return runtime::NodesOf::tissues;
 }
@@ -103,20 +105,32 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, cons
           std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
 }
 
+Status check_size(const ImageGrid& grid, const PoseJob& job) {
+  if (grid.voxels() <= job.volume_voxels) return {};
+  return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(grid.voxels()) +
+                                              " voxels (at most " + std::to_string(job.volume_voxels) +
+                                              "; keep the body nearer to the scan)"};
+}
+
 // The voxels of `frame` and its description; a status where there can be none.
 Status fill_volume(const PoseJob& job, const VolumeWant& want, const runtime::PosedBody& body,
                    v1::VolumeFrame& frame, std::shared_ptr<const wire::Payload>& payload) {
   const Model& model = job.model->model();
   const ModelVolume& volume = model.volumes[want.volume];
-  const ImageGrid grid = runtime::grow_to(volume.image.grid, body.nodes);
-  if (grid.voxels() > job.volume_voxels) {
-    return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(grid.voxels()) +
-                                                " voxels (at most " + std::to_string(job.volume_voxels) +
-                                                "; keep the body nearer to the scan)"};
+  Image image;
+  if (want.by_spheres) {
+    const runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
+    const runtime::LatticeBox box = runtime::box_for(set, want.region);
+    if (const Status status = check_size(grid_of(set.lattice, box), job); !status.ok()) return status;
+    image = runtime::refill(set, box, volume.image, volume.background, want.sampling);
+  } else {
+    const ImageGrid grid = runtime::grow_to(volume.image.grid, body.nodes);
+    if (const Status status = check_size(grid, job); !status.ok()) return status;
+    runtime::InverseMap map;
+    runtime::locate(model, body.nodes, grid, map);
+    image = runtime::resample(model, body.nodes, map, volume, want.sampling);
   }
-  runtime::InverseMap map;
-  runtime::locate(model, body.nodes, grid, map);
-  Image image = runtime::resample(model, body.nodes, map, volume, want.sampling);
+  const ImageGrid grid = image.grid;
   wire::to_proto(grid, *frame.mutable_grid());
   v1::Array& voxels = *frame.mutable_voxels();
   voxels.set_type(wire::to_proto(image.type));

@@ -2,6 +2,7 @@
 #include "runtime/server/subscription.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <string>
 
@@ -43,8 +44,37 @@ Status read_mesh(const v1::MeshSelection& mesh, const Model& model, MeshWant& ou
   return {};
 }
 
+Status read_deformer(const v1::VolumeSelection& volume, const Model& model, VolumeWant& out) {
+  out.by_spheres = volume.deformer() == v1::DEFORMER_SPHERES;
+  if (!out.by_spheres) {
+    if (volume.deformer() > v1::DEFORMER_TETS)
+      return unimplemented("deformer " + std::to_string(volume.deformer()));
+    return volume.has_region() ? unimplemented("regions of volumes by tets") : Status{};
+  }
+  if (model.spheres.empty()) {
+    return {StatusCode::failed_precondition,
+            "subscribe: the model holds no spheres (deform by tets, or preprocess it with spheres)"};
+  }
+  if (!volume.has_region()) return {};
+  const auto corner = [](const v1::Vector3& v) { return runtime::Vec3{v.x(), v.y(), v.z()}; };
+  out.region = {corner(volume.region().min()), corner(volume.region().max())};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double low = out.region->low[a], high = out.region->high[a];
+    if (!(low <= high && std::isfinite(low) && std::isfinite(high)))
+      return {StatusCode::invalid_argument,
+              "subscribe: the region is no box (let every min be at most its max)"};
+  }
+  const ModelVolume& shown = model.volumes[out.volume];
+  const ImageGrid lattice = runtime::posed_lattice(runtime::spheres_for(model, shown), shown);
+  for (const std::int32_t size : runtime::box_within(lattice, out.region->low, out.region->high).size) {
+    if (size < 1)
+      return {StatusCode::invalid_argument,
+              "subscribe: no voxel centre lies in the region (make it larger than a voxel)"};
+  }
+  return {};
+}
+
 Status read_volume(const v1::VolumeSelection& volume, const Model& model, VolumeWant& out) {
-  if (volume.has_region()) return unimplemented("regions");
   if (volume.slices_size() > 0) return unimplemented("slices");
   if (volume.compressed()) return unimplemented("compression");
   const int row = find_row(model.volumes, volume.volume());
@@ -55,7 +85,7 @@ Status read_volume(const v1::VolumeSelection& volume, const Model& model, Volume
   out.volume = static_cast<std::uint32_t>(row);
   const bool nearest = volume.nearest() || model.volumes[out.volume].labels;
   out.sampling = nearest ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
-  return {};
+  return read_deformer(volume, model, out);
 }
 
 }  // namespace

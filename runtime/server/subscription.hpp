@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <variant>
 #include <vector>
 
 #include "core/values/error.hpp"
 #include "core/values/model.hpp"
 #include "ecorche/v1/envelope.pb.h"
+#include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/resample.hpp"
 
 namespace ecorche::server {
@@ -22,6 +24,8 @@ struct MeshWant {
 struct VolumeWant {
   std::uint32_t volume = 0;  ///< row of Model::volumes
   runtime::Sampling sampling = runtime::Sampling::trilinear;
+  bool by_spheres = false;
+  std::optional<runtime::Region> region;  ///< by spheres only
   bool operator==(const VolumeWant&) const = default;
 };
 

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes by the spheres deformer, over a real socket, beside offline refilling: byte for byte.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "proto/arrays.hpp"
+#include "proto/convert.hpp"
+#include "runtime/server/subscription.hpp"
+#include "runtime/skin/body_poser.hpp"
+#include "runtime/spheres/pose_volume.hpp"
+#include "tests/support/toy_model.hpp"
+#include "tests/unit/server/test_server.hpp"
+
+namespace ecorche::server {
+namespace {
+
+v1::Envelope request_for(const std::string& volume) {
+  v1::Envelope envelope;
+  v1::VolumeSelection& selection = *envelope.mutable_subscribe()->mutable_volume();
+  selection.set_volume(volume);
+  selection.set_deformer(v1::DEFORMER_SPHERES);
+  return envelope;
+}
+
+void set_region(v1::Envelope& envelope, const runtime::Region& region) {
+  v1::Box& box = *envelope.mutable_subscribe()->mutable_volume()->mutable_region();
+  const auto set = [](v1::Vector3& out, const runtime::Vec3& v) {
+    out.set_x(v[0]);
+    out.set_y(v[1]);
+    out.set_z(v[2]);
+  };
+  set(*box.mutable_min(), region.low);
+  set(*box.mutable_max(), region.high);
+}
+
+TEST(SpheresStream, VolumesAndRegionsEqualOfflineRefilling) {
+  const TestServer server;
+  const Model& model = server.model();
+  const runtime::Region region{{-31, -18, 120}, {14, 60, 260}};
+  std::uint64_t sequence = 0;
+  TestClient client(server);
+  for (const ModelVolume& volume : model.volumes) {
+    for (const bool whole : {true, false}) {
+      v1::Envelope request = request_for(volume.name);
+      if (!whole) set_region(request, region);
+      const std::uint32_t subscription = client.client().call(request).envelope.subscribed().subscription();
+      const Pose pose = client.bent(0.5);
+      client.send(++sequence, pose);
+      const wire::Frame frame = client.next([&](const v1::Envelope& e) {
+        return e.volume_frame().subscription() == subscription &&
+               e.volume_frame().pose_sequence() == sequence;
+      });
+      const v1::VolumeFrame& sent = frame.envelope.volume_frame();
+      ASSERT_EQ(sent.status().code(), 0U) << sent.status().message();
+      const runtime::BodyPoser poser(std::make_shared<const Model>(model));
+      runtime::PosedBody body = poser.make_frame();
+      ASSERT_TRUE(poser.run(pose, runtime::Skinning::cor, {}, body).ok());
+      const auto part = whole ? std::nullopt : std::optional(region);
+      const Image expected =
+          runtime::pose_volume(model, body.segments, volume, part, runtime::Sampling::trilinear);
+      ImageGrid grid;
+      ASSERT_TRUE(wire::from_proto(sent.grid(), grid).ok());
+      EXPECT_EQ(grid, expected.grid);
+      std::span<const std::byte> voxels;
+      ASSERT_TRUE(wire::find(sent.voxels(), frame.payload, voxels));
+      ASSERT_EQ(voxels.size(), expected.bytes.size());
+      EXPECT_EQ(std::memcmp(voxels.data(), expected.bytes.data(), voxels.size()), 0);
+      // Something lies there, and it moved.
+      const Image rest = runtime::pose_volume(model, std::vector<RigidTransform>(body.segments.size()),
+                                              volume, part, runtime::Sampling::trilinear);
+      EXPECT_NE(rest.bytes, expected.bytes);
+    }
+  }
+}
+
+TEST(SpheresStream, TetsStayWhatIsMeantWithoutAWord) {
+  const Model model = test::toy_model();
+  v1::Subscribe request;
+  request.mutable_volume()->set_volume("ct");
+  Want want;
+  ASSERT_TRUE(read_want(request, model, want).ok());
+  EXPECT_FALSE(std::get<VolumeWant>(want).by_spheres);
+  request.mutable_volume()->set_deformer(v1::DEFORMER_TETS);
+  ASSERT_TRUE(read_want(request, model, want).ok());
+  EXPECT_FALSE(std::get<VolumeWant>(want).by_spheres);
+}
+
+TEST(SpheresStream, WhatCannotBeRefilledIsRefused) {
+  const TestServer server;
+  Want want;
+  const auto code = [&](const v1::Envelope& request, const Model& model) {
+    return read_want(request.subscribe(), model, want).code;
+  };
+  v1::Envelope request = request_for("ct");
+  EXPECT_EQ(code(request, server.model()), StatusCode::ok);
+  Model without = server.model();
+  without.spheres.clear();
+  EXPECT_EQ(code(request, without), StatusCode::failed_precondition);
+  request.mutable_subscribe()->mutable_volume()->set_deformer(static_cast<v1::Deformer>(7));
+  EXPECT_EQ(code(request, server.model()), StatusCode::unimplemented);
+  for (const runtime::Region& region : {runtime::Region{{0, 0, 10}, {0, 0, 5}},
+                                        {{0, 0, 0}, {1, 1, std::nan("")}},
+                                        {{-24, -24, -4}, {-21, -21, -1}}}) {
+    request = request_for("ct");
+    set_region(request, region);
+    EXPECT_EQ(code(request, server.model()), StatusCode::invalid_argument);
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::server
