@@ -19,6 +19,7 @@
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/resample.hpp"
 
 namespace ecorche::app {
@@ -37,6 +38,7 @@ struct Settings {
   std::string volume_format = "nrrd";
   std::string sampling = "trilinear";
   std::string grid = "posed";
+  std::string deformer = "tets";
   bool tets = false, field = false, as_case = false;
   std::vector<std::string> tet_formats{"vtu"};
 
@@ -88,6 +90,8 @@ Plan plan_of(const Settings& settings, const Model& model) {
       usage("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
     if (settings.formats != Settings{}.formats || settings.volume_format != Settings{}.volume_format)
       usage("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
+    if (settings.deformer != "tets")
+      usage("--as-case", "a case's surfaces and volumes follow the same tets", "leave out --deformer");
     return {{}, {}, true, false};  // the case itself, and the tets beside it
   }
   const std::vector<std::string> all{"all"};
@@ -224,9 +228,19 @@ class FrameWriter {
   }
 
   void write_volume(const ModelVolume& volume) {
-    const Image posed =
-        runtime::resample(model_, body_.nodes, map_on(volume.image.grid), volume, sampling_of(settings_));
+    const Image posed = settings_.deformer == "spheres"
+                            ? refilled(volume)
+                            : runtime::resample(model_, body_.nodes, map_on(volume.image.grid), volume,
+                                                sampling_of(settings_));
     io::write_image(next(volume.name + "." + settings_.volume_format), posed);
+  }
+
+  Image refilled(const ModelVolume& volume) const {
+    const runtime::BallSet set = runtime::balls_for(model_, body_.segments, volume);
+    const runtime::LatticeBox box =
+        settings_.grid == "rest" ? runtime::LatticeBox{{0, 0, 0}, set.lattice.size} : runtime::grown_box(set);
+    const runtime::Sampling sampling = volume.labels ? runtime::Sampling::nearest : sampling_of(settings_);
+    return runtime::refill(set, box, volume.image, volume.background, sampling, context_);
   }
 
   void write_field() {
@@ -279,6 +293,9 @@ std::string line_of(const json& frame) {
 int run(const Program& program, const Settings& settings) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   const Plan plan = plan_of(settings, *model);
+  if (settings.deformer == "spheres" && model->spheres.empty())
+    throw Error(ErrorKind::config, settings.model.string(), "it holds no spheres",
+                "preprocess it with spheres, or deform by tets");
   const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
   const runtime::BodyPoser poser(model);
   const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
@@ -318,14 +335,7 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
   command->add_option("MODEL", s->model, "a model that preprocess made")->required();
   command->add_option("-o,--output", s->output, "folder to write into, made where absent")->required();
-  command->add_option(
-      "--pose", s->frames.pose,
-      "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
-  add_motion_options(*command, s->frames.motion);
-  command->add_option(
-      "--frames", s->frames.frames,
-      "frames of the motion from 0: A, A:B or A:B:STEP, B is one past the last; several go into "
-      "folders of their own");
+  add_frame_options(*command, s->frames);
   command->add_option("--skinning", s->skinning, "how segments blend: cor, dqs or lbs")
       ->check(CLI::IsMember({"cor", "dqs", "lbs"}))
       ->capture_default_str();
@@ -333,6 +343,11 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       "What is not named is not written; without --tissues, --volumes, --tets and --field "
       "everything is.";
   command->footer(choice);
+  command
+      ->add_option("--deformer", s->deformer,
+                   "how volumes follow: tets, or spheres (the model's volumetric skeleton, refilled)")
+      ->check(CLI::IsMember({"tets", "spheres"}))
+      ->capture_default_str();
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');
   command->add_option("--format", s->formats, "of the tissues: stl, obj, ply, off, vtp, glb, or several")

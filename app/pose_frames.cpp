@@ -52,6 +52,17 @@ Pose named_pose(const Program& program, const std::string& name, const Rig& rig)
 
 }  // namespace
 
+void add_frame_options(CLI::App& command, FrameChoice& choice) {
+  command.add_option(
+      "--pose", choice.pose,
+      "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
+  add_motion_options(command, choice.motion);
+  command.add_option(
+      "--frames", choice.frames,
+      "frames of the motion from 0: A, A:B or A:B:STEP, B is one past the last; each of several has a "
+      "name of its own, frame_0000 ...");
+}
+
 std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig) {
   if (choice.pose.empty() == choice.motion.file.empty()) {
     usage("pose", choice.pose.empty() ? "nothing to pose" : "both --pose and --motion are given",

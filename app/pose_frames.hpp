@@ -20,6 +20,9 @@ struct FrameChoice {
   std::string frames;  ///< A, A:B or A:B:STEP
 };
 
+/// Declares the options that fill `choice`, which must live as long as the command.
+void add_frame_options(CLI::App& command, FrameChoice& choice);
+
 struct Frame {
   std::string name;  ///< empty for a single pose, which needs no folder of its own
   Pose pose;

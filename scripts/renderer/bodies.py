@@ -101,7 +101,12 @@ def tets_of(points, connectivity, cell_data):
 
 
 def read_image(path):
-    """A 3-D scalar NRRD as ecorche writes it: attached data, raw or gzip, little-endian."""
+    """Voxels and spacing of `read_placed_image`."""
+    return read_placed_image(path)[:2]
+
+
+def read_placed_image(path):
+    """A 3-D scalar NRRD as ecorche writes it (attached data, raw or gzip, little-endian): voxels, spacing, origin."""
     data = path.read_bytes()
     head, _, body = data.partition(b"\n\n")
     fields = {}
@@ -111,13 +116,14 @@ def read_image(path):
             fields[key.strip()] = value.lstrip("=").strip()
     sizes = [int(word) for word in fields["sizes"].split()]
     if len(sizes) != 3:
-        return None, None  # a vector field: nothing to show as a slice
+        return None, None, None  # a vector field: nothing to show as a slice
     if fields["encoding"] in ("gzip", "gz"):
         body = gzip.decompress(body)
     kind = np.dtype("<" + NRRD_TYPES[fields["type"]])
     voxels = np.frombuffer(body, kind, count=int(np.prod(sizes))).reshape(sizes[::-1])
     vectors = [np.array([float(x) for x in word.strip("()").split(",")]) for word in fields["space directions"].split()]
-    return voxels, np.array([np.linalg.norm(vector) for vector in vectors])
+    origin = np.array([float(x) for x in fields.get("space origin", "(0,0,0)").strip("()").split(",")])
+    return voxels, np.array([np.linalg.norm(vector) for vector in vectors]), origin
 
 
 def read_case(folder):

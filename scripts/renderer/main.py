@@ -7,6 +7,8 @@
                                         (Sujar18 figures 3, 4, 5, 11)
   scripts/render POSED_FOLDER -o DIR    what `ecorche pose` wrote: tissues, volume slices, the posed tets by det F
   scripts/render A.vtp B.vtp ... -o DIR surfaces side by side, one picture (Sujar18 figure 7)
+  scripts/render A.nrrd B.nrrd ... -o DIR   volumes rendered, a picture each, and all of them as one animated PNG; with --beside
+                                        side by side in one picture instead
 
 Every picture written is named on stdout, one a line.
 """
@@ -14,21 +16,25 @@ import argparse
 import pathlib
 import sys
 
+import numpy as np
+
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
 import bodies  # noqa: E402
 import scene  # noqa: E402
 import slices  # noqa: E402
+import volumes  # noqa: E402
 
 
 def parse():
     parser = argparse.ArgumentParser(prog="render", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("paths", nargs="+", type=pathlib.Path, help="a case folder, a model, a posed folder, or surface files")
+    parser.add_argument("paths", nargs="+", type=pathlib.Path, help="a case folder, a model, a posed folder, surface files, or volumes")
     parser.add_argument("-o", "--out", required=True, type=pathlib.Path, help="folder for the pictures, made where absent")
     parser.add_argument("--name", help="how the pictures' names begin (default: the input's name)")
     parser.add_argument("--height", type=int, default=1200, help="pixels (default %(default)s)")
     parser.add_argument("--segment", help="whose weight is drawn on a model (default: the third of the skeleton)")
     parser.add_argument("--cut", type=float, help="y of the cutting plane through a model, mm (default: the middle)")
+    parser.add_argument("--beside", action="store_true", help="volumes side by side")
     parser.add_argument("--view", choices=sorted(scene.VIEWS), default="front",
                         help="from where surfaces side by side are seen (default %(default)s)")
     return parser.parse_args()
@@ -48,8 +54,16 @@ def main():
 
     if all(path.suffix in bodies.SURFACES for path in args.paths):
         save(scene.row_of_surfaces([bodies.read_surface(path) for path in args.paths], args.view, args.height), "row")
+    elif all(path.suffix == ".nrrd" for path in args.paths):
+        frames = volumes.rendered(args.paths, args.view, args.height)
+        if args.beside:
+            save(slices.picture(np.concatenate(frames, axis=1)), "beside")
+        else:
+            for number, frame in enumerate(frames):
+                save(slices.picture(frame), f"{number:04d}")
+            written.append(volumes.animated(frames, args.out / f"{name}_clip.png"))
     elif len(args.paths) != 1:
-        raise SystemExit("error: render: several inputs must all be surfaces (name one case, model or posed folder)")
+        raise SystemExit("error: render: several inputs must all be surfaces or all volumes (name one case, model or posed folder)")
     else:
         body = bodies.read(first)
         if body.tissues:

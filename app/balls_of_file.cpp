@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/balls_of_file.hpp"
+
+#include <string>
+#include <vector>
+
+#include "core/kinematics/angles.hpp"
+#include "core/kinematics/forward.hpp"
+#include "core/model_file/model_file.hpp"
+#include "core/values/error.hpp"
+#include "io/case/case_file.hpp"
+#include "io/surface/volumetric_skeleton_file.hpp"
+
+namespace ecorche::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_model(const fs::path& path) {
+  return path.extension() == ".hdf";
+}
+
+Rig read_rig(const fs::path& path) {
+  if (is_model(path)) return model_file::read(path, {}).rig;
+  Rig rig{io::read_skeleton(path), {}};
+  for (const Segment& segment : rig.skeleton.segments) {
+    if (segment.joint.rule != CenterRule::given)
+      throw Error(ErrorKind::config, path.string(),
+                  "joint '" + segment.joint.name + "' is to be fitted to bones",
+                  "name a model, whose rig is fitted");
+  }
+  return rig;
+}
+
+// Its voxels on the rows of `rig`.
+void hang_on(const fs::path& path, const std::vector<std::string>& names, const Rig& rig,
+             VolumetricSkeleton& skeleton) {
+  if (skeleton.segment.empty())
+    throw Error(ErrorKind::data, path.string(), "its voxels hang on no segments",
+                "attach it to the rig: ecorche thin");
+  std::vector<std::int32_t> row;
+  for (const std::string& name : names) {
+    row.push_back(rig.skeleton.find_segment(name));
+    if (row.back() < 0)
+      throw Error(ErrorKind::config, path.string(), "the rig has no segment '" + name + "'",
+                  "name the rig that it was attached to");
+  }
+  for (std::int32_t& segment : skeleton.segment) {
+    if (segment >= 0) segment = row[static_cast<std::size_t>(segment)];
+  }
+}
+
+}  // namespace
+
+std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const fs::path& skeleton, const fs::path& rig) {
+  if (!is_model(skeleton)) {
+    io::VolumetricSkeletonFile file = io::read_volumetric_skeleton(skeleton);
+    if (rig.empty()) return {std::move(file.skeleton), {}};
+    Rig moved_by = read_rig(rig);
+    hang_on(skeleton, file.segments, moved_by, file.skeleton);
+    return {std::move(file.skeleton), std::move(moved_by)};
+  }
+  Model model = model_file::read(skeleton, {});
+  if (model.spheres.empty())
+    throw Error(ErrorKind::config, skeleton.string(), "it holds no spheres",
+                "preprocess it with spheres, or name a skeleton (.vtp)");
+  VolumetricSkeleton own = std::move(model.spheres.front());
+  if (rig.empty()) return {std::move(own), std::move(model.rig)};
+  std::vector<std::string> names;
+  for (const Segment& segment : model.rig.skeleton.segments) names.push_back(segment.name);
+  Rig moved_by = read_rig(rig);
+  hang_on(skeleton, names, moved_by, own);
+  return {std::move(own), std::move(moved_by)};
+}
+
+runtime::BallSet posed_balls(const VolumetricSkeleton& skeleton, const ImageGrid& lattice, const Rig& rig,
+                             Pose pose, std::size_t& clamped) {
+  std::vector<ClampedJoint> held;
+  kinematics::constrain(rig.skeleton, pose, held);
+  clamped = held.size();
+  runtime::BallSet set = runtime::balls_at_rest(skeleton, lattice);
+  runtime::move_balls(skeleton, kinematics::forward(rig, pose), set);
+  return set;
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A skeleton file's balls, posed by a rig that is named apart.
+#pragma once
+
+#include <filesystem>
+#include <utility>
+
+#include "core/values/pose.hpp"
+#include "core/values/skeleton.hpp"
+#include "core/values/volumetric_skeleton.hpp"
+#include "runtime/spheres/balls.hpp"
+
+namespace ecorche::app {
+
+/// A skeleton by itself (.vtp), or the first of a model (.hdf); and the rig that moves it: of `rig`, a
+/// skeleton file whose every centre is given (.yaml) or a model, else of the model that the skeleton came
+/// from, else empty. With a rig the voxels hang on its rows, matched by the names of segments. Throws as the
+/// readers do; Error{config} for a joint without its centre, a segment that the rig lacks, a model without
+/// spheres; Error{data} for a skeleton that hangs on no segments although a rig is given.
+std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const std::filesystem::path& skeleton,
+                                                         const std::filesystem::path& rig);
+
+/// Its balls at `pose` (within limits, coupled); `clamped` counts the joints that limits held back.
+runtime::BallSet posed_balls(const VolumetricSkeleton& skeleton, const ImageGrid& lattice, const Rig& rig,
+                             Pose pose, std::size_t& clamped);
+
+}  // namespace ecorche::app

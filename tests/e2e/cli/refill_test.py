@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`ecorche refill`, `tears`, `deformers` and `pose --deformer spheres`: the way through, and each mistake with its code and words."""
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "scripts/renderer"))
+import bodies  # noqa: E402
+import volumes  # noqa: E402
+
+ECORCHE = os.environ["ECORCHE_BIN"]
+CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
+ERROR_LINE = re.compile(r"^error: .+: .+ \(.+\)$", re.M)
+
+ARM = """ecorche_skeleton: 1
+name: arm
+segments:
+  upper: {joint: {name: shoulder, kind: free, center: [6, 8, 7.5]}}
+  lower: {parent: upper, joint: {name: elbow, kind: ball, center: [30, 8, 7.5], sequence: [{flexion: z}, {abduction: y}, {rotation: x}]}}
+"""
+BENT = "ecorche_pose: 1\nskeleton: arm\njoints:\n  elbow: {flexion_deg: 50}\n"
+
+
+def run(*words):
+    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=200)
+
+
+def write_nrrd(path, voxels, spacing=1.0):
+    kind = {"uint8": "uint8", "int16": "int16"}[voxels.dtype.name]
+    head = (f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: {' '.join(map(str, voxels.shape[::-1]))}\n"
+            f"space directions: ({spacing},0,0) (0,{spacing},0) (0,0,{spacing})\nkinds: domain domain domain\nendian: little\nencoding: raw\n"
+            f"space origin: (0,0,0)\n\n")
+    path.write_bytes(head.encode() + voxels.tobytes())
+    return path
+
+
+class Refill(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        labels = np.zeros((16, 17, 64), np.uint8)
+        labels[2:14, 2:15, 2:62] = 3
+        labels[6:9, 6:9, 4:60] = 7
+        cls.bar = write_nrrd(cls.folder / "bar.nrrd", labels)
+        cls.voxels = labels
+        cls.rig = cls.folder / "arm.yaml"
+        cls.rig.write_text(ARM)
+        cls.pose = cls.folder / "bent.yaml"
+        cls.pose.write_text(BENT)
+        cls.all = cls.folder / "all.vtp"
+        cls.few = cls.folder / "few.vtp"
+        cls.loose = cls.folder / "loose.vtp"
+        for out, words in ((cls.all, ("--tp", -2, "--tree", "--skeleton", cls.rig)), (cls.few, ("--tp", 0.3, "--tree", "--skeleton", cls.rig)), (cls.loose, ("--tp", 0.3))):
+            done = run("thin", cls.bar, "-o", out, *words)
+            assert done.returncode == 0, done.stderr
+
+    def ok(self, *words):
+        done = run("--json", *words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def read(self, path):
+        return bodies.read_placed_image(path)
+
+    def assert_error(self, code, words, *parts):
+        done = run(*words)
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.assertRegex(done.stderr, ERROR_LINE)
+        for part in parts:
+            self.assertIn(part, done.stderr)
+
+    def test_every_voxel_kept_fills_the_object_again(self):
+        out = self.folder / "rest.nrrd"
+        result = self.ok("refill", self.all, self.bar, "-o", out, "--sampling", "nearest", "--object", self.bar)
+        self.assertTrue((self.read(out)[0] == self.voxels).all())
+        self.assertEqual(result["loss"]["loss_percent"], 0)
+        self.assertEqual(result["frames"][0]["held_voxels"], int((self.voxels > 0).sum()))
+        thin = self.folder / "thin.vtp"
+        self.ok("thin", self.all, "-o", thin, "--tp", 0.7)
+        self.assertGreater(self.ok("refill", thin, "-o", out, "--object", self.bar)["loss"]["loss_percent"], 0)
+        self.assertLessEqual(set(np.unique(self.read(out)[0])), {0, 1})  # without a volume, a mask
+
+    def test_a_pose_a_region_and_the_way_back(self):
+        whole, part, back = (self.folder / name for name in ("whole.nrrd", "part.nrrd", "back.nrrd"))
+        words = ("--rig", self.rig, "--pose", self.pose, "--sampling", "nearest")
+        self.ok("refill", self.all, self.bar, "-o", whole, *words)
+        self.ok("refill", self.all, self.bar, "-o", part, *words, "--region", "20,3,2,45,30,12")
+        big, _, big_at = self.read(whole)
+        small, _, small_at = self.read(part)
+        x, y, z = np.rint(small_at - big_at).astype(int)
+        self.assertTrue((big[z:z + small.shape[0], y:y + small.shape[1], x:x + small.shape[2]] == small).all())
+        self.assertGreater((small > 0).mean(), 0.2)
+        # 60 voxels long before; bent, it reaches as far aside.
+        self.assertGreater(big.shape[1], self.voxels.shape[1] + 10)
+        self.ok("refill", self.all, whole, "-o", back, *words, "--back")
+        again, _, at = self.read(back)
+        x, y, z = np.rint(-at).astype(int)
+        again = again[z:z + 16, y:y + 17, x:x + 64]
+        differ = (again != self.voxels)[self.voxels > 0].mean()
+        self.assertLess(differ, 0.12)
+        self.assertGreater(differ, 0)
+
+    def test_effects_and_previews(self):
+        out = self.folder / "effect.nrrd"
+        held = [self.ok("refill", self.few, "-o", out, "--melt", "--time", t)["frames"][0]["held_voxels"] for t in (0, 0.7, 1)]
+        self.assertTrue(held[0] > held[1] > held[2] == 0, held)
+        words = ("--rig", self.rig, "--pose", self.pose)
+        plain = self.ok("refill", self.few, "-o", out, *words)["frames"][0]["held_voxels"]
+        self.assertGreater(self.ok("refill", self.few, "-o", out, *words, "--bulge", 0.4)["frames"][0]["held_voxels"], plain)
+        self.assertLess(self.ok("refill", self.few, "-o", out, *words, "--bulge", -0.4)["frames"][0]["held_voxels"], plain)
+        apart = self.ok("refill", self.few, "-o", out, "--explode", 3)["frames"][0]
+        self.assertGreater(apart["size"][0], 100)
+        for ending in ("glb", "vtp"):
+            preview = self.folder / f"preview.{ending}"
+            self.assertGreater(self.ok("refill", self.few, "-o", preview)["frames"][0]["triangles"], 500)
+            self.assertGreater(preview.stat().st_size, 1000)
+
+    def test_a_morph_begins_and_ends_with_its_objects(self):
+        other = np.zeros((30, 20, 20), np.uint8)
+        other[3:27, 3:17, 3:17] = 9
+        image, skeleton, out = write_nrrd(self.folder / "other.nrrd", other), self.folder / "other.vtp", self.folder / "morph.nrrd"
+        self.assertEqual(run("thin", image, "-o", skeleton, "--tp", -2).returncode, 0)
+        words = ("refill", self.all, self.bar, "-o", out, "--morph", skeleton, image, "--sampling", "nearest", "--time")
+        self.ok(*words, 0)
+        self.assertTrue((self.read(out)[0] == self.voxels).all())
+        self.ok(*words, 1)
+        last = self.read(out)[0]
+        self.assertEqual(int((last == 9).sum()), int((other == 9).sum()))
+        self.ok(*words, 0.5)
+        half = self.read(out)[0]
+        self.assertGreater((half > 0).sum(), min((self.voxels > 0).sum(), (other > 0).sum()) / 2)
+
+    def test_tears_are_told(self):
+        result = self.ok("tears", self.few, "--rig", self.rig, "--pose", self.pose, "--prove", 20, "--sweep", "--step", 60)
+        self.assertGreaterEqual(result["proof"]["found_percent"], 95)
+        self.assertFalse(result["proof"]["rest_errs"])
+        self.assertEqual(len(result["frames"]), 1)
+        self.assertEqual({row["joint"] for row in result["sweep"]}, {"elbow"})
+        self.assertEqual(len(result["sweep"]), 6)
+        for row in result["sweep"]:
+            self.assertTrue(row["bulged_breaks_at_deg"] == 0 or row["bulged_breaks_at_deg"] >= row["breaks_at_deg"] > 0, row)
+
+    def test_both_deformers_pose_a_model(self):
+        model = self.folder / "m.hdf"
+        done = run("preprocess", CASE, "-o", model, "--mesher", "lattice", "--max-tets", 60000, "--spheres", 0.3)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        pose = self.folder / "knee.yaml"
+        info = self.ok("info", model)
+        pose.write_text(f"ecorche_pose: 1\nskeleton: {info['skeleton']}\njoints:\n  knee_right: {{flexion_deg: 40}}\n")
+        result = self.ok("deformers", model, "--volume", "labels", "--pose", pose, "-o", self.folder / "both")["frames"][0]
+        self.assertGreater(result["object_voxels"], 10000)
+        self.assertEqual(result["differ"], result["differ_inner"] + result["differ_boundary"])
+        self.assertLess(result["differ"], 0.5 * result["object_voxels"])
+        colours = self.read(self.folder / "both/difference.nrrd")[0]
+        self.assertEqual(int((colours >= 2).sum()), result["differ"])
+        self.assertEqual(int((colours == 3).sum()), result["differ_inner"])
+        # What `deformers` compares is what `pose` writes.
+        self.ok("pose", model, "-o", self.folder / "posed", "--pose", pose, "--volumes", "labels", "--deformer", "spheres")
+        own, _, own_at = self.read(self.folder / "posed/labels.nrrd")
+        joined, spacing, at = self.read(self.folder / "both/spheres.nrrd")
+        x, y, z = np.rint((own_at - at) / spacing).astype(int)
+        self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
+        self.assert_error(64, ("deformers", model, "--volume", "mri", "--pose", pose), "mri")
+        self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--deformer", "spheres", "--as-case"), "--deformer")
+        plain = pathlib.Path(os.environ["ECORCHE_MODEL"])
+        self.assert_error(78, ("pose", plain, "-o", self.folder / "p", "--pose", pose, "--deformer", "spheres"), "holds no spheres")
+        self.assert_error(78, ("refill", plain, "-o", self.folder / "x.nrrd"), "holds no spheres")
+
+    def test_mistakes(self):
+        out = self.folder / "x.nrrd"
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--pose", self.pose), "--rig")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--rig", self.rig), "nothing is posed")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--bulge", 1), "--bulge")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--back"), "--back")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", self.folder / "x.glb"), "preview")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--region", "9,9,9,1,1,1"), "--region")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--region", "9.2,9.2,9.2,9.4,9.4,9.4"), "voxel centre")
+        self.assert_error(64, ("refill", self.few, "-o", out, "--morph", self.few, self.bar), "--morph")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--time", 2), "time")
+        self.assert_error(65, ("refill", self.loose, self.bar, "-o", out, "--rig", self.rig, "--pose", self.pose), "no segments")
+        self.assert_error(66, ("refill", self.folder / "none.vtp", self.bar, "-o", out), "none.vtp")
+        other = self.folder / "other.yaml"
+        other.write_text(ARM.replace("lower:", "forearm:"))
+        self.assert_error(78, ("refill", self.few, self.bar, "-o", out, "--rig", other, "--pose", self.pose), "no segment 'lower'")
+        fewer = write_nrrd(self.folder / "fewer.nrrd", np.zeros((4, 4, 4), np.uint8))
+        self.assert_error(65, ("refill", self.few, "-o", out, "--object", fewer), "balls hold")
+        self.assert_error(64, ("tears", self.few, "--rig", self.rig), "nothing is to be looked at")
+        self.assert_error(64, ("tears", self.few, "--sweep"), "--rig")
+        self.assertFalse(out.exists())
+
+    def test_an_animated_picture_holds_every_frame(self):
+        frames = [np.full((5, 7, 3), 40 * i, np.uint8) for i in range(3)]
+        data = volumes.animated(frames, self.folder / "clip.png").read_bytes()
+        self.assertEqual((data.count(b"acTL"), data.count(b"fcTL"), data.count(b"fdAT")), (1, 3, 2))
+
+
+if __name__ == "__main__":
+    unittest.main()
