@@ -2,7 +2,8 @@
 // Figures of thinning, one JSON object on stdout; bench/volumetric/run calls it for every body.
 //   bench_volumetric times BODY           distance transform beside ITK's and VTK's, thinning, extraction
 //   bench_volumetric curve BODY           voxels against TP, its exponential fit, the paper's counts
-// BODY: ellipsoid, surface FILE, labels FILE, or above LOW FILE (an image; resampled to its finest edge).
+// BODY: ellipsoid, surface FILE, labels FILE, above LOW FILE (an image; resampled to its finest edge), or
+// paper LOW FILE: the same stretched to the 290 x 169 x 940 voxels of Gagvani01's volume.
 #include <tbb/info.h>
 
 #include <algorithm>
@@ -42,6 +43,22 @@ Mask ellipsoid() {  // half axes of 120, 80 and 60 voxels
   return mask;
 }
 
+Mask stretched(const Mask& from, const std::array<std::int32_t, 3>& size) {
+  Mask out;
+  out.grid.size = size;
+  out.inside.reserve(out.grid.voxels());
+  const auto at = [&](int i, std::size_t a) {
+    return static_cast<int>((static_cast<std::int64_t>(2 * i + 1) * from.grid.size[a]) / (2 * size[a]));
+  };
+  for (int k = 0; k < size[2]; ++k) {
+    for (int j = 0; j < size[1]; ++j) {
+      for (int i = 0; i < size[0]; ++i)
+        out.inside.push_back(from.inside[from.grid.offset(at(i, 0), at(j, 1), at(k, 2))]);
+    }
+  }
+  return out;
+}
+
 Mask body(const std::vector<std::string>& words) {
   if (words.at(0) == "ellipsoid") return ellipsoid();
   if (words[0] == "surface") {
@@ -51,6 +68,7 @@ Mask body(const std::vector<std::string>& words) {
   }
   thin::Segmentation how;
   how.largest = true;
+  if (words[0] == "paper") return stretched(body({"above", words.at(1), words.at(2)}), {290, 169, 940});
   if (words[0] == "above") how.low = std::stod(words.at(1));
   Image image = io::read_image(words.back());
   if (!thin::is_isotropic(image.grid)) {

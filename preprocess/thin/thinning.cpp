@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <sstream>
 #include <vector>
@@ -49,87 +50,98 @@ struct Kept {
   std::vector<float> deficit;
 };
 
-// Sums of lengths (roots of squares; <3,4,5> as it is, whose sums are exact) over 3 by 3 voxels of slices.
-template <class T>
-class Planes {
- public:
-  Planes(const T* values, const std::array<std::int32_t, 3>& size, bool squares)
-      : values_(values),
-        nx_(static_cast<std::size_t>(size[0])),
-        ny_(static_cast<std::size_t>(size[1])),
-        nz_(static_cast<std::size_t>(size[2])),
-        squares_(squares),
-        row_(nx_ + 2, 0.0F),
-        rows_(3 * nx_) {}
+// Where a row is not 0: from the first such voxel to behind the last; empty where begin is not below end.
+struct Extent {
+  std::size_t begin = 0, end = 0;
+};
 
-  const T* row(std::size_t j, std::size_t k) const { return values_ + (k * ny_ + j) * nx_; }
-  void lengths(const T* from, float* to) const {
-    if (squares_) {
-      for (std::size_t i = 0; i < nx_; ++i) to[i] = std::sqrt(static_cast<float>(from[i]));
-    } else {
-      for (std::size_t i = 0; i < nx_; ++i) to[i] = static_cast<float>(from[i]);
-    }
-  }
-  // The sums over slice k (all 0 beyond the image), nx by ny.
-  void sums(std::ptrdiff_t k, std::vector<float>& out) {
-    out.resize(nx_ * ny_);
-    if (k < 0 || k >= static_cast<std::ptrdiff_t>(nz_)) {
-      std::fill(out.begin(), out.end(), 0.0F);
-      return;
-    }
-    row_sums(0, k, ny_);
-    for (std::size_t j = 0; j < ny_; ++j) {
-      const float* const before = j == 0 ? nullptr : &rows_[(j - 1) % 3 * nx_];
-      row_sums(j + 1, k, ny_);
-      const float *const here = &rows_[j % 3 * nx_], *const after = &rows_[(j + 1) % 3 * nx_];
-      float* const to = &out[j * nx_];
-      if (before == nullptr) {
-        for (std::size_t i = 0; i < nx_; ++i) to[i] = 0.0F + here[i] + after[i];
+template <class T>
+Extent extent_of(const T* row, std::size_t n) {
+  constexpr std::size_t lanes = sizeof(std::uint64_t) / sizeof(T);
+  const auto is_empty = [&](std::size_t at) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, row + at, sizeof word);
+    return word == 0;
+  };
+  Extent e{0, n};
+  while (e.begin + lanes <= n && is_empty(e.begin)) e.begin += lanes;
+  while (e.begin < n && row[e.begin] == 0) ++e.begin;
+  while (e.end >= e.begin + lanes && is_empty(e.end - lanes)) e.end -= lanes;
+  while (e.end > e.begin && row[e.end - 1] == 0) --e.end;
+  return e;
+}
+
+// The lengths over one slice (roots of squares; <3,4,5> as it is, whose sums are exact), with a border of
+// zeros. Most of a scan is background: only what a row holds is looked at.
+class Slice {
+ public:
+  Slice(std::size_t nx, std::size_t ny)
+      : stride_(nx + 2), lengths_((nx + 2) * (ny + 2), 0.0F), extents_(ny) {}
+
+  template <class T>
+  void read(const T* values, bool squares) {
+    const std::size_t nx = stride_ - 2;
+    for (std::size_t j = 0; j < extents_.size(); ++j) {
+      float* const to = row(j);
+      std::fill(to + extents_[j].begin, to + std::max(extents_[j].begin, extents_[j].end), 0.0F);
+      const T* const from = values + j * nx;
+      const Extent e = extents_[j] = extent_of(from, nx);
+      if (squares) {
+        for (std::size_t i = e.begin; i < e.end; ++i) to[i] = std::sqrt(static_cast<float>(from[i]));
       } else {
-        for (std::size_t i = 0; i < nx_; ++i) to[i] = before[i] + here[i] + after[i];
+        for (std::size_t i = e.begin; i < e.end; ++i) to[i] = static_cast<float>(from[i]);
       }
     }
   }
+  void clear() {
+    std::fill(lengths_.begin(), lengths_.end(), 0.0F);
+    std::fill(extents_.begin(), extents_.end(), Extent());
+  }
+  // Voxel 0 of row j, which may be -1 or one past the last: index -1 is valid too.
+  float* row(std::size_t j) { return &lengths_[(j + 1) * stride_ + 1]; }
+  const float* row(std::size_t j) const { return &lengths_[(j + 1) * stride_ + 1]; }
+  const float* row_before(std::size_t j) const { return &lengths_[j * stride_ + 1]; }
+  Extent extent(std::size_t j) const { return extents_[j]; }
 
  private:
-  void row_sums(std::size_t j, std::ptrdiff_t k, std::size_t rows) {
-    float* const to = &rows_[j % 3 * nx_];
-    if (j >= rows) {
-      std::fill_n(to, nx_, 0.0F);
-      return;
-    }
-    lengths(row(j, static_cast<std::size_t>(k)), &row_[1]);
-    for (std::size_t i = 0; i < nx_; ++i) to[i] = row_[i] + row_[i + 1] + row_[i + 2];
-  }
-
-  const T* values_;
-  std::size_t nx_, ny_, nz_;
-  bool squares_;
-  std::vector<float> row_;   // one row, 0 beyond both ends
-  std::vector<float> rows_;  // sums along i of three rows, by j modulo 3
+  std::size_t stride_;
+  std::vector<float> lengths_;
+  std::vector<Extent> extents_;
 };
 
 template <class T>
 void thin_slab(const T* values, const std::array<std::int32_t, 3>& size, bool squares, double thinness,
                std::size_t begin, std::size_t end, const Context& context, Kept& kept) {
-  const auto nx = static_cast<std::size_t>(size[0]), ny = static_cast<std::size_t>(size[1]);
-  Planes<T> planes(values, size, squares);
-  std::vector<float> before, here, after, own(nx), deficit(nx);
-  planes.sums(static_cast<std::ptrdiff_t>(begin) - 1, before);
-  planes.sums(static_cast<std::ptrdiff_t>(begin), here);
+  const auto nx = static_cast<std::size_t>(size[0]), ny = static_cast<std::size_t>(size[1]),
+             nz = static_cast<std::size_t>(size[2]);
+  Slice before(nx, ny), here(nx, ny), after(nx, ny);
+  if (begin > 0) before.read(values + (begin - 1) * nx * ny, squares);
+  here.read(values + begin * nx * ny, squares);
+  std::vector<float> columns(nx + 2), deficit(nx);  // of nine rows at voxel i - 1; of voxel i
   const float above = floor_float(thinness), unit = squares ? 1.0F : 3.0F;
   for (std::size_t k = begin; k < end && !context.stop.stop_requested(); ++k) {
-    planes.sums(static_cast<std::ptrdiff_t>(k) + 1, after);
+    if (k + 1 < nz) {
+      after.read(values + (k + 1) * nx * ny, squares);
+    } else {
+      after.clear();
+    }
     for (std::size_t j = 0; j < ny; ++j) {
-      const T* const row = planes.row(j, k);
-      planes.lengths(row, own.data());
-      const float *const a = &before[j * nx], *const b = &here[j * nx], *const c = &after[j * nx];
-      // No product here, which a compiler could fuse into a sum on some processors.
-      for (std::size_t i = 0; i < nx; ++i) {
-        const float all = a[i] + b[i] + c[i];
-        deficit[i] = (own[i] - (all - own[i]) / 26.0F) / unit;
+      const Extent e = here.extent(j);
+      if (e.begin >= e.end) continue;
+      const float *const a0 = before.row_before(j) - 1, *const a1 = before.row(j) - 1,
+                         *const a2 = before.row(j + 1) - 1, *const b0 = here.row_before(j) - 1,
+                         *const b1 = here.row(j) - 1, *const b2 = here.row(j + 1) - 1,
+                         *const c0 = after.row_before(j) - 1, *const c1 = after.row(j) - 1,
+                         *const c2 = after.row(j + 1) - 1;
+      // No product here or below, which a compiler could fuse into a sum on some processors.
+      for (std::size_t i = e.begin; i < e.end + 2; ++i)
+        columns[i] = (a0[i] + a1[i] + a2[i]) + (b0[i] + b1[i] + b2[i]) + (c0[i] + c1[i] + c2[i]);
+      for (std::size_t i = e.begin; i < e.end; ++i) {
+        const float all = columns[i] + columns[i + 1] + columns[i + 2], own = b1[i + 1];
+        deficit[i] = (own - (all - own) / 26.0F) / unit;
       }
-      for (std::size_t i = 0; i < nx; ++i) {
+      const T* const row = values + (k * ny + j) * nx;
+      for (std::size_t i = e.begin; i < e.end; ++i) {
         if (!(deficit[i] > above) || row[i] == 0) continue;
         kept.voxel.push_back(
             {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j), static_cast<std::uint16_t>(k)});
@@ -137,8 +149,8 @@ void thin_slab(const T* values, const std::array<std::int32_t, 3>& size, bool sq
         kept.deficit.push_back(deficit[i]);
       }
     }
-    before.swap(here);
-    here.swap(after);
+    std::swap(before, here);
+    std::swap(here, after);
   }
 }
 

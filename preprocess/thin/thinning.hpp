@@ -13,8 +13,8 @@ namespace ecorche::thin {
 inline constexpr double least_thinness = -2, most_thinness = 2;
 
 /// The voxels whose deficit, their distance minus the mean of their 26 neighbours' (not squared, in voxels,
-/// 0 in the background), is above `thinness`. Time does not depend on `thinness`: sums over rows, then
-/// planes, then cubes, always added in the same order, so that a voxel's deficit has the same bits whatever
+/// 0 in the background), is above `thinness`. Time does not depend on `thinness`: sums over nine rows,
+/// then along them, always added in the same order, so that a voxel's deficit has the same bits whatever
 /// the threads, the thinness and the rest of the image. `grid` is the mask's; without tree or attachment.
 /// Throws Error{usage} for a thinness out of range or NaN, Error{data} for a grid whose spacing differs by
 /// more than 1e-6 of itself between axes or which has more than 65535 voxels along one.

@@ -9,6 +9,8 @@
   scripts/render A.vtp B.vtp ... -o DIR surfaces side by side, one picture (Sujar18 figure 7)
   scripts/render A.nrrd B.nrrd ... -o DIR   volumes rendered, a picture each, and all of them as one animated PNG; with --beside
                                         side by side in one picture instead
+  scripts/render SKELETON.vtp -o DIR    what `ecorche thin` wrote: its voxels by the segment that they hang on, and its tree
+                                        (Gagvani01 figure 2); a model's spheres are drawn so too, within the skin
 
 Every picture written is named on stdout, one a line.
 """
@@ -22,6 +24,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
 import bodies  # noqa: E402
 import scene  # noqa: E402
+import skeletons  # noqa: E402
 import slices  # noqa: E402
 import volumes  # noqa: E402
 
@@ -53,7 +56,12 @@ def main():
         written.append(path)
 
     if all(path.suffix in bodies.SURFACES for path in args.paths):
-        save(scene.row_of_surfaces([bodies.read_surface(path) for path in args.paths], args.view, args.height), "row")
+        surfaces = [bodies.read_surface(path) for path in args.paths]
+        if len(surfaces) == 1 and skeletons.is_skeleton(surfaces[0]):
+            for view in ("front", "side"):
+                save(skeletons.draw(surfaces[0], view, args.height), f"skeleton_{view}")
+        else:
+            save(scene.row_of_surfaces(surfaces, args.view, args.height), "row")
     elif all(path.suffix == ".nrrd" for path in args.paths):
         frames = volumes.rendered(args.paths, args.view, args.height)
         if args.beside:
@@ -74,6 +82,11 @@ def main():
         if body.tets is not None:
             for key, picture in scene.tet_cuts(body, args.cut, args.segment, args.height):
                 save(picture, key)
+        if first.suffix == ".hdf":
+            skins = [tissue.surface for tissue in body.tissues if tissue.group == "skin"]
+            for spheres, data in skeletons.of_model(first):
+                for view in ("front", "side"):
+                    save(skeletons.draw(data, view, args.height, skins), f"spheres_{spheres}_{view}")
     for path in written:
         print(path)
 

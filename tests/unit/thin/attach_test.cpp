@@ -50,7 +50,9 @@ Skeleton rig() {
 }
 
 TEST(Attach, TwoPasses) {
-  const auto [mask, s] = body();
+  const Body made = body();
+  const Mask& mask = made.mask;
+  const VolumetricSkeleton& s = made.skeleton;
   Skeleton r = rig();
   // A hand whose joint lies at the elbow: bones of the arm end before its hook, whose tip they do not see.
   r.segments[3].joint.center = {49, 44, 15};
@@ -134,7 +136,9 @@ TEST(Attach, TwoPasses) {
 }
 
 TEST(Attach, AFarComponentHangsOnTheNearestBone) {
-  const auto [mask, s] = body(true);
+  const Body made = body(true);
+  const Mask& mask = made.mask;
+  const VolumetricSkeleton& s = made.skeleton;
   const Attachment a = attach(s, mask, rig(), {});
   EXPECT_EQ(a.far_components, 1U);
   for (std::size_t v = 0; v < s.size(); ++v) {
@@ -146,7 +150,9 @@ TEST(Attach, AFarComponentHangsOnTheNearestBone) {
 }
 
 TEST(Attach, JointsSnapToTheNearestVoxelAndOutsideOnesAreNamed) {
-  const auto [mask, s] = body();
+  const Body made = body();
+  const Mask& mask = made.mask;
+  const VolumetricSkeleton& s = made.skeleton;
   Skeleton r = rig();
   EXPECT_TRUE(joints_outside(mask, r).empty());
   r.segments[3].joint.center = {20, 60, 15};
