@@ -45,8 +45,8 @@ inline Mask ellipsoid(const Index& size, const std::array<double, 3>& half) {
 }
 
 /// The least of `cost(|di|, |dj|, |dk|)` over all background voxels, one layer beyond the image among them.
-template <class T>
-std::vector<T> brute_distance(const Mask& mask, const std::function<T(int, int, int)>& cost) {
+template <class T, class Cost>
+std::vector<T> brute_distance(const Mask& mask, Cost&& cost) {
   const Index& n = mask.grid.size;
   std::vector<Index> background;
   for (int k = -1; k <= n[2]; ++k) {
