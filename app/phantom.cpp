@@ -19,10 +19,16 @@ namespace {
 
 struct Settings {
   std::filesystem::path folder;
-  phantom::Size size = phantom::Size::standard;
+  std::string size = "standard";
   std::uint64_t seed = 1;
   bool bar = false;
 };
+
+phantom::Size size_of(const Settings& settings) {
+  return settings.size == "small"   ? phantom::Size::small
+         : settings.size == "paper" ? phantom::Size::paper
+                                    : phantom::Size::standard;
+}
 
 /// Refuses what is not ours to overwrite: a file, or a folder of something else.
 void check_target(const std::filesystem::path& folder) {
@@ -39,9 +45,9 @@ void check_target(const std::filesystem::path& folder) {
 
 int run(const Program& program, const Settings& settings) {
   check_target(settings.folder);
-  const phantom::Phantom made = settings.bar
-                                    ? phantom::make_bar(settings.size, program.context("bar"))
-                                    : phantom::make(settings.size, settings.seed, program.context("phantom"));
+  const phantom::Phantom made =
+      settings.bar ? phantom::make_bar(size_of(settings), program.context("bar"))
+                   : phantom::make(size_of(settings), settings.seed, program.context("phantom"));
   const Case& patient = made.patient;
   io::write_case(settings.folder, patient, program.context("write"));
   if (!made.clips.empty()) files::make_folder(settings.folder / "motion");
@@ -85,14 +91,11 @@ void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
   const auto settings = std::make_shared<Settings>();
   CLI::App* command = app.add_subcommand("phantom", "write the built-in synthetic patient as a case");
   command->add_option("-o,--output", settings->folder, "folder of the case")->required();
-  const std::map<std::string, phantom::Size> sizes{{"small", phantom::Size::small},
-                                                   {"standard", phantom::Size::standard},
-                                                   {"paper", phantom::Size::paper}};
   command
       ->add_option("--size", settings->size,
                    "small (tests), standard (demo) or paper (Sujar18's largest model)")
-      ->transform(CLI::CheckedTransformer(sizes, CLI::ignore_case))
-      ->default_str("standard");
+      ->check(CLI::IsMember({"small", "standard", "paper"}))
+      ->capture_default_str();
   command->add_option("--seed", settings->seed, "draws the body's proportions and the noise of the CT")
       ->capture_default_str();
   command->add_flag("--bar", settings->bar, "the bar of Sujar18 figure 7 instead of a patient");

@@ -60,7 +60,7 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
   bool ended = false;
   for (int line = 1; at < head.size(); ++line) {
     const std::size_t end = head.find('\n', at);
-    if (end == head.npos) break;
+    if (end == head.npos && line > 1) break;  // what is no NRRD may have no line at all
     std::string_view text = head.substr(at, end - at);
     at = end + 1;
     if (!text.empty() && text.back() == '\r') text.remove_suffix(1);

@@ -82,7 +82,7 @@ SURFACE_ROWS = [
 
 IMAGE_ROWS = [
     ("image_empty", put("ct.nrrd", b""), CHECK, 65, "ct.nrrd"),
-    ("image_wrong_magic", put("ct.nrrd", b"PK\x03\x04" * 50), CHECK, 65, "ct.nrrd"),
+    ("image_is_a_zip", put("ct.nrrd", b"PK\x03\x04" * 50), CHECK, 65, "is no NRRD: its first line is not NRRD0001 to NRRD0005"),
     ("image_truncated_raw", put("ct.nrrd", body.nrrd(VOXELS[:50])), CHECK, 65, "declares 120 bytes of voxels, but has 50"),
     ("image_too_long", put("ct.nrrd", body.nrrd(VOXELS + b"more")), CHECK, 65, "but has 124"),
     ("image_truncated_gzip", put("ct.nrrd", body.nrrd(bytes(range(120)), encoding="gzip")[:-20]), CHECK, 65, "compressed data hold"),
@@ -138,6 +138,7 @@ CASE_ROWS = [
     ("case_no_bones", swap("case.yaml", "bones:", "bones: []\nbanes:"), CHECK, 78, "banes"),
     ("case_name_is_a_map", swap("case.yaml", "name: small", "name: {a: b}"), CHECK, 78, "must be a plain value"),
     ("case_absent", gone("case.yaml"), CHECK, 66, "case.yaml"),
+    ("case_name_empty", swap("case.yaml", "name: small", "name: ''"), CHECK, 78, "is empty (write a word)"),
     ("case_skeleton_absent", gone("skeleton.yaml"), CHECK, 66, "skeleton.yaml"),
     ("case_skin_far_away", put("femur_right.stl", body.stl(body.box((900, 900, 900), (950, 950, 950)))),
      ("check", "CASE", "--frame", "L"), 64, "'L' is no frame"),
@@ -159,7 +160,7 @@ SKELETON_ROWS = [
      "skeleton.yaml:"),
     ("skeleton_axis_of_no_length", skeleton("      sequence", "      axes: {x: [0, 0, 0], z: [0, 0, 1]}\n      sequence"), CHECK, 78,
      "has no length"),
-    ("skeleton_empty", put("skeleton.yaml", "ecorche_skeleton: 1\nname: small\nsegments: {}\n"), CHECK, 78, "is empty"),
+    ("skeleton_no_segments", put("skeleton.yaml", "ecorche_skeleton: 1\nname: small\nsegments: {}\n"), CHECK, 78, "is empty (a skeleton has at least a root)"),
     ("skeleton_unknown_axis", skeleton("flexion: x", "flexion: w"), CHECK, 78, "'w' is no axis"),
     ("skeleton_axis_twice", skeleton("adduction: y", "adduction: x"), CHECK, 78, "turns about the same axis again"),
     ("skeleton_limits_reversed", skeleton("[-20, 120]", "[120, -20]"), CHECK, 78, "the least angle is above the most"),
@@ -225,6 +226,7 @@ MOTION_ROWS = [
     ("pose_unknown_volume", none, POSE + ("--volumes", "mr"), 64, "the model has no 'mr'"),
     ("pose_unknown_skinning", none, POSE + ("--skinning", "fem2"), 64, "--skinning"),
     ("pose_unknown_format", none, POSE + ("--format", "docx"), 64, "--format"),
+    ("pose_below_a_file", none, ("pose", "MODEL", "-o", "CASE/case.yaml/posed", "--pose", "CASE/pose.yaml"), 73, "cannot make this folder"),
     ("pose_into_a_file", none, ("pose", "MODEL", "-o", "CASE/case.yaml", "--pose", "CASE/pose.yaml"), 73, "case.yaml"),
     ("bvh_empty", put("clip.bvh", ""), MOVE, 65, "the file ends"),
     ("bvh_binary", put("clip.bvh", bytes(range(256))), MOVE, 65, "clip.bvh"),

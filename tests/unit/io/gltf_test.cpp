@@ -164,8 +164,8 @@ TEST(Gltf, BuffersLieBesideItOrInIt) {
   }
 }
 
-TEST(Gltf, SkinnedNodesStandInTheirRestPose) {
-  const Scratch scratch;
+// Its first mesh on a skin of two joints.
+Parts skinned() {
   Parts parts;
   parts.add<std::uint8_t>({0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0}, 5121, "VEC4",
                           5);                                                                           // 5
@@ -178,7 +178,12 @@ TEST(Gltf, SkinnedNodesStandInTheirRestPose) {
       {{"translation", {10, 0, 0}}},
       {{"translation", {0, 20, 0}}}};
   parts.gltf["scenes"] = {{{"nodes", {0, 1, 2}}}};
-  const SurfaceMesh mesh = read_glb(scratch, parts);
+  return parts;
+}
+
+TEST(Gltf, SkinnedNodesStandInTheirRestPose) {
+  const Scratch scratch;
+  const SurfaceMesh mesh = read_glb(scratch, skinned());
   Points expected(4, 3);
   expected << 10, 0, 0, 1, 20, 0, 10, 1, 0, 1, 21, 0;  // weights that do not sum to one are made to
   EXPECT_EQ(mesh.V, expected);
@@ -186,8 +191,7 @@ TEST(Gltf, SkinnedNodesStandInTheirRestPose) {
 
 TEST(Gltf, EveryMistakeIsNamed) {
   const Scratch scratch;
-  const auto refused = [&](const std::string& part, const auto& change) {
-    Parts parts;
+  const auto refused = [&](const std::string& part, const auto& change, Parts parts = {}) {
     change(parts.gltf);
     expect_error(ErrorKind::data, part, [&] { read_glb(scratch, parts); });
   };
@@ -200,6 +204,26 @@ TEST(Gltf, EveryMistakeIsNamed) {
   refused("an index is 3, of 3 points", [](json& g) { g["accessors"][0]["count"] = 3; });
   refused("its nodes are no tree", [](json& g) { g["nodes"] = {{{"children", {1}}}, {{"children", {0}}}}; });
   refused("names node 7 of 1", [](json& g) { g["scenes"][0]["nodes"] = {7}; });
+  refused("a node names mesh 7 of 2", [](json& g) { g["nodes"][0]["mesh"] = 7; });
+  refused("names scene 3 of 1", [](json& g) { g["scene"] = 3; });
+  refused("a buffer view names buffer 4 of 1", [](json& g) { g["bufferViews"][0]["buffer"] = 4; });
+  refused("a primitive is of mode 9", [](json& g) { g["meshes"][0]["primitives"][0]["mode"] = 9; });
+  refused(
+      "a node names a skin that is not there", [](json& g) { g["nodes"][0]["skin"] = 5; }, skinned());
+  refused(
+      "a joint of its skin is not in the scene",
+      [](json& g) {
+        g["scenes"][0]["nodes"] = {0, 1};
+      },
+      skinned());
+  refused(
+      "its weights are not as many as its points", [](json& g) { g["accessors"][6]["count"] = 4; },
+      skinned());
+  Parts bound = skinned();
+  bound.add<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 5126, "MAT4", 1);
+  refused(
+      "a skin has fewer matrices than joints", [](json& g) { g["skins"][0]["inverseBindMatrices"] = 7; },
+      bound);
   refused("a node's transform is damaged", [](json& g) { g["nodes"][0]["scale"] = {1, 2}; });
   refused("has no triangle", [](json& g) {
     g["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}}}, {"mode", 1}}}}}};
@@ -214,6 +238,10 @@ TEST(Gltf, EveryMistakeIsNamed) {
   expect_error(ErrorKind::data, "is no GLB", [&] { read_surface(scratch.put("b.glb", "solid x")); });
   expect_error(ErrorKind::data, "is no GLB",
                [&] { read_surface(scratch.put("b.glb", std::string(40, 'x'))); });
+  std::string odd;
+  append<std::uint32_t>(odd, {0x46546C67, 2, 25, 5, 0x4E4F534A});
+  expect_error(ErrorKind::data, "its JSON chunk is not padded to 4 bytes",
+               [&] { read_surface(scratch.put("b.glb", odd + "{   }")); });
   expect_error(ErrorKind::data, "bytes, but has", [&] { read_surface(scratch.put("b.glb", whole + "x")); });
   expect_error(ErrorKind::data, "is no glTF: it is no JSON object",
                [&] { read_surface(scratch.put("b.gltf", whole)); });

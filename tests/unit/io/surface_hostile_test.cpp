@@ -223,7 +223,38 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
           "cell 0 has more corners than its list");
   refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n3 0 1 7\n",
           "triangle 0 uses point 7 of 3");
+  refused(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement face 1\nproperty list float int vertex_indices\nend_header\n3 0 1 2\n",
+      "'float' counts no list");
+  refused("a.ply",
+          "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n0 0\n",
+          "its vertices have no 'z'");
+  refused("a.vtk", "# vtk DataFile Version 4.2\nx\nEBCDIC\n", "is neither ASCII nor BINARY: 'ebcdic'");
+  refused("a.vtk", "# vtk DataFile Version 4.2\nx\nASCII\nFIELD x\n", "its fourth line is no DATASET");
+  refused("a.vtk", vtk + "POINTS 1 float or so\n0 0 0\n", "has words where a line should end");
+  refused("a.vtk", vtk + "POINTS 1 float\n0 0 0\nPOINTS 1 float\n0 0 0\n", "has POINTS twice");
   refused("a.vtp", "<VTKFile type=\"UnstructuredGrid\"></VTKFile>", "is no VTK PolyData");
+  const auto vtp = [](const std::string& points, const std::string& offsets) {
+    return "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"3\" "
+           "NumberOfPolys=\"1\"><Points><DataArray "
+           "type=\"Float32\" " +
+           points +
+           "</DataArray></Points><Polys><DataArray type=\"Int32\" Name=\"connectivity\" "
+           "format=\"ascii\">0 1 2</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">" +
+           offsets + "</DataArray></Polys></Piece></PolyData></VTKFile>";
+  };
+  const std::string nine = "0 0 0 1 0 0 0 1 0";
+  refused("a.vtp", vtp("NumberOfComponents=\"2\" format=\"ascii\">" + nine, "3"),
+          "its points have not 3 coordinates");
+  refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"hex\">" + nine, "3"),
+          "an array is stored as 'hex'");
+  refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine + " 7", "3"),
+          "an array is larger than its counts say");
+  refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"binary\">AAAA", "3"),
+          "an array of 4 bytes ends early");
+  refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine, "9"),
+          "a cell ends at corner 9 of 3");
   refused("a.vtp", "<!DOCTYPE x [<!ENTITY a \"b\">]><x/>", "has a DOCTYPE");
   refused("a.vtp", "<VTKFile", "is no XML: unclosed token");
   const Scratch scratch;
