@@ -21,6 +21,7 @@
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/resample.hpp"
+#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -157,11 +158,12 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
 // Writes one posed body. Every file is checked for a stop request before it is begun.
 class FrameWriter {
  public:
-  FrameWriter(const Settings& settings, const Plan& plan, const Model& model, const runtime::PosedBody& body,
-              fs::path folder, const Context& context)
+  FrameWriter(const Settings& settings, const Plan& plan, const runtime::VolumePoser& poser,
+              const runtime::PosedBody& body, fs::path folder, const Context& context)
       : settings_(settings),
         plan_(plan),
-        model_(model),
+        poser_(poser),
+        model_(poser.model()),
         body_(body),
         folder_(std::move(folder)),
         context_(context) {
@@ -221,18 +223,21 @@ class FrameWriter {
     if (!field_written) write("vtu");
   }
 
-  const runtime::InverseMap& map_on(const ImageGrid& rest) {
-    const ImageGrid grid = settings_.grid == "rest" ? rest : runtime::grow_to(rest, body_.nodes);
-    if (!(map_.grid == grid)) runtime::locate(model_, body_.nodes, grid, map_, context_);
-    return map_;
+  ImageGrid grid_for(const ImageGrid& rest) const {
+    return settings_.grid == "rest" ? rest : runtime::grow_to(rest, body_.nodes);
   }
 
   void write_volume(const ModelVolume& volume) {
-    const Image posed = settings_.deformer == "spheres"
-                            ? refilled(volume)
-                            : runtime::resample(model_, body_.nodes, map_on(volume.image.grid), volume,
-                                                sampling_of(settings_));
+    const Image posed = settings_.deformer == "spheres" ? refilled(volume) : drawn(volume);
     io::write_image(next(volume.name + "." + settings_.volume_format), posed);
+  }
+
+  Image drawn(const ModelVolume& volume) const {
+    Image posed;
+    runtime::VolumePoser::Scratch scratch;
+    poser_.pose(body_.nodes, volume, sampling_of(settings_), grid_for(volume.image.grid), posed, scratch,
+                context_);
+    return posed;
   }
 
   Image refilled(const ModelVolume& volume) const {
@@ -244,7 +249,9 @@ class FrameWriter {
   }
 
   void write_field() {
-    const auto field = runtime::inverse_displacement(model_, body_.nodes, map_on(field_grid()));
+    runtime::InverseMap map;
+    runtime::locate(model_, body_.nodes, grid_for(field_grid()), map, context_);
+    const auto field = runtime::inverse_displacement(model_, body_.nodes, map);
     io::write_image(next("displacement." + settings_.volume_format), field.vectors);
     io::write_image(next("mask." + settings_.volume_format), field.mask);
   }
@@ -268,11 +275,11 @@ class FrameWriter {
 
   const Settings& settings_;
   const Plan& plan_;
+  const runtime::VolumePoser& poser_;
   const Model& model_;
   const runtime::PosedBody& body_;
   fs::path folder_;
   const Context& context_;
-  runtime::InverseMap map_;
   json written_ = json::array();
 };
 
@@ -298,6 +305,7 @@ int run(const Program& program, const Settings& settings) {
                 "preprocess it with spheres, or deform by tets");
   const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
   const runtime::BodyPoser poser(model);
+  const runtime::VolumePoser volumes(model);
   const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
   runtime::PosedBody body = poser.make_frame();
 
@@ -312,9 +320,9 @@ int run(const Program& program, const Settings& settings) {
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
     if (settings.as_case)
       io::write_case(folder,
-                     posed_case(*model, body, {sampling_of(settings), settings.grid == "posed"}, context),
+                     posed_case(volumes, body, {sampling_of(settings), settings.grid == "posed"}, context),
                      context);
-    FrameWriter writer(settings, plan, *model, body, folder, context);
+    FrameWriter writer(settings, plan, volumes, body, folder, context);
     json written = writer.write(quality);
     if (settings.as_case) written.push_back((folder / "case.yaml").string());
     result["frames"].push_back({{"name", frame.name},

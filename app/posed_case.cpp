@@ -26,8 +26,9 @@ void add_volume(Case& patient, const ModelVolume& volume, Image image) {
 
 }  // namespace
 
-Case posed_case(const Model& model, const runtime::PosedBody& body, const PosedVolumes& volumes,
-                const Context& context) {
+Case posed_case(const runtime::VolumePoser& poser, const runtime::PosedBody& body,
+                const PosedVolumes& volumes, const Context& context) {
+  const Model& model = poser.model();
   Case patient;
   patient.name = model.name;
   patient.skeleton = kinematics::posed_rest(model.rig, body.pose);
@@ -44,12 +45,13 @@ Case posed_case(const Model& model, const runtime::PosedBody& body, const PosedV
       patient.bones.push_back({tissue.name, patient.skeleton.segments[segment].name, std::move(surface)});
     }
   }
-  runtime::InverseMap map;
+  runtime::VolumePoser::Scratch scratch;
   for (const ModelVolume& volume : model.volumes) {
     context.check_stop();
     const ImageGrid grid = volumes.grow ? runtime::grow_to(volume.image.grid, body.nodes) : volume.image.grid;
-    if (!(map.grid == grid)) runtime::locate(model, body.nodes, grid, map, context);
-    add_volume(patient, volume, runtime::resample(model, body.nodes, map, volume, volumes.sampling));
+    Image posed;
+    poser.pose(body.nodes, volume, volumes.sampling, grid, posed, scratch, context);
+    add_volume(patient, volume, std::move(posed));
   }
   return patient;
 }

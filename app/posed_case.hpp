@@ -6,7 +6,7 @@
 #include "core/values/context.hpp"
 #include "core/values/model.hpp"
 #include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/resample.hpp"
+#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::app {
 
@@ -15,9 +15,9 @@ struct PosedVolumes {
   bool grow = true;  ///< their lattices grow to the posed body; or stay
 };
 
-/// The case of `body`, posed from `model`: its surfaces, label map and volumes, and the skeleton in its new
-/// rest pose (posed_rest). Every tissue of `body` must have been posed.
-Case posed_case(const Model& model, const runtime::PosedBody& body, const PosedVolumes& volumes,
-                const Context& context);
+/// The case of `body`, posed from the model of `poser`: its surfaces, label map and volumes, and the skeleton
+/// in its new rest pose (posed_rest). Every tissue of `body` must have been posed.
+Case posed_case(const runtime::VolumePoser& poser, const runtime::PosedBody& body,
+                const PosedVolumes& volumes, const Context& context);
 
 }  // namespace ecorche::app

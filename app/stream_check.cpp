@@ -134,10 +134,7 @@ std::string StreamCheck::compare_volume(const v1::VolumeFrame& frame, const wire
   ImageGrid sent;
   if (const Status status = wire::from_proto(frame.grid(), sent); !status.ok()) return status.message;
   if (sent != grid) return "volume '" + volume.name + "' lies on another grid";
-  runtime::InverseMap map;
-  runtime::locate(poser_.model(), body_.nodes, grid, map);
-  const auto sampling = volume.labels ? runtime::Sampling::nearest : sampling_;
-  const Image expected = runtime::resample(poser_.model(), body_.nodes, map, volume, sampling);
+  const Image expected = runtime::pose_volume(poser_.shared_model(), body_.nodes, volume, sampling_, grid);
   std::span<const std::byte> got;
   if (!wire::find(frame.voxels(), payload, got) || frame.voxels().type() != wire::to_proto(expected.type)) {
     return "volume '" + volume.name + "' has no readable voxels";

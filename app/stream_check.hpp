@@ -13,7 +13,7 @@
 
 #include "proto/framing.hpp"
 #include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/resample.hpp"
+#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::app {
 

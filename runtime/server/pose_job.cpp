@@ -126,9 +126,8 @@ Status fill_volume(const PoseJob& job, const VolumeWant& want, const runtime::Po
   } else {
     const ImageGrid grid = runtime::grow_to(volume.image.grid, body.nodes);
     if (const Status status = check_size(grid, job); !status.ok()) return status;
-    runtime::InverseMap map;
-    runtime::locate(model, body.nodes, grid, map);
-    image = runtime::resample(model, body.nodes, map, volume, want.sampling);
+    runtime::VolumePoser::Scratch scratch;
+    job.model->volumes.pose(body.nodes, volume, want.sampling, grid, image, scratch);
   }
   const ImageGrid grid = image.grid;
   wire::to_proto(grid, *frame.mutable_grid());

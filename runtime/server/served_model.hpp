@@ -8,6 +8,7 @@
 #include "core/values/model.hpp"
 #include "proto/framing.hpp"
 #include "runtime/skin/body_poser.hpp"
+#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::server {
 
@@ -19,6 +20,7 @@ struct ServedModel {
   const Model& model() const { return poser.model(); }
 
   runtime::BodyPoser poser;
+  runtime::VolumePoser volumes;
   v1::ModelSummary summary;
   v1::ModelOpened opened;                         ///< without session, role and triangles
   std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`

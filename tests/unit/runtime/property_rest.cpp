@@ -2,7 +2,7 @@
 // Rest pose in, rest pose out, through the whole machinery: meshes within 1e-3 mm, voxels identical.
 #include <cstdio>
 
-#include "runtime/volume/resample.hpp"
+#include "runtime/volume/volume_poser.hpp"
 #include "tests/unit/runtime/prepared_body.hpp"
 
 namespace ecorche::runtime {
@@ -62,7 +62,7 @@ TEST(Rest, EveryVoxelInTheMeshIsIdenticalWithNearestSampling) {
     for (const ModelVolume& volume : model->volumes) {
       const Image& rest = volume.image;
       locate(*model, body.nodes, rest.grid, map);
-      const Image posed = resample(*model, body.nodes, map, volume, Sampling::nearest);
+      const Image posed = pose_volume(model, body.nodes, volume, Sampling::nearest, rest.grid);
       const std::size_t bytes = rest.bytes.size() / rest.grid.voxels();
       std::size_t held = 0, different = 0;
       for (std::size_t v = 0; v < map.tet.size(); ++v) {

@@ -9,6 +9,7 @@
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/resample.hpp"
+#include "runtime/volume/volume_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
@@ -163,10 +164,8 @@ TEST(Stream, VolumesEqualOfflineResampling) {
     const Offline offline(pose);
     const ModelVolume& rest = server.model().volumes[static_cast<std::size_t>(row)];
     const ImageGrid grid = runtime::grow_to(rest.image.grid, offline.body.nodes);
-    runtime::InverseMap map;
-    runtime::locate(server.model(), offline.body.nodes, grid, map);
-    const auto sampling = rest.labels ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
-    const Image expected = runtime::resample(server.model(), offline.body.nodes, map, rest, sampling);
+    const Image expected = runtime::pose_volume(std::make_shared<const Model>(server.model()),
+                                                offline.body.nodes, rest, runtime::Sampling::trilinear, grid);
     ImageGrid sent;
     ASSERT_TRUE(wire::from_proto(volume.grid(), sent).ok());
     EXPECT_EQ(sent, grid);
