@@ -49,12 +49,13 @@ struct Body {
   }
 };
 
-json frame_json(const std::string& name, const runtime::Tears& tears) {
-  return {{"name", name},
-          {"uncovered", tears.uncovered},
-          {"links", tears.links},
-          {"parts", tears.parts},
-          {"errs", tears.errs()}};
+json frame_json(const Skeleton& rig, const std::string& name, const runtime::Tears& tears) {
+  json out{{"name", name},         {"uncovered", tears.uncovered}, {"links", tears.links},
+           {"parts", tears.parts}, {"errs", tears.errs()},         {"between", json::array()}};
+  for (const std::int32_t segment : tears.between) {
+    if (segment >= 0) out["between"].push_back(rig.segments[static_cast<std::size_t>(segment)].name);
+  }
+  return out;
 }
 
 json look_at_frames(const Program& program, const Settings& s, const Body& body) {
@@ -69,7 +70,7 @@ json look_at_frames(const Program& program, const Settings& s, const Body& body)
       runtime::bulge(set, body.rig.skeleton, runtime::bulges_of(body.rest, body.rig.skeleton, s.bulge), 1);
     const runtime::Tears tears = body.detector->look(set, {nullptr, nullptr, context.stop});
     torn += tears.errs();
-    frames.push_back(frame_json(frame.name, tears));
+    frames.push_back(frame_json(body.rig.skeleton, frame.name, tears));
     context.report(static_cast<double>(frames.size()) / static_cast<double>(poses.size()));
   }
   return {{"frames", frames},
@@ -184,6 +185,13 @@ json prove(const Settings& s, const Body& body) {
             {"rest_errs", rest_errs}}}};
 }
 
+// Where most links are torn.
+std::string place_of(const json& frame) {
+  const json& between = frame["between"];
+  if (between.size() != 2) return {};
+  return " (most between " + between[0].get<std::string>() + " and " + between[1].get<std::string>() + ")";
+}
+
 std::string text_of(const json& result) {
   std::string text;
   char line[240];
@@ -207,9 +215,9 @@ std::string text_of(const json& result) {
   if (result.contains("torn")) {
     for (const json& f : result["frames"]) {
       if (!f["errs"].get<bool>()) continue;
-      std::snprintf(line, sizeof line, "%s: %zu voxels uncovered, %zu links torn, %zu parts\n",
+      std::snprintf(line, sizeof line, "%s: %zu voxels uncovered, %zu links torn%s, %zu parts\n",
                     f["name"].get<std::string>().c_str(), f["uncovered"].get<std::size_t>(),
-                    f["links"].get<std::size_t>(), f["parts"].get<std::size_t>());
+                    f["links"].get<std::size_t>(), place_of(f).c_str(), f["parts"].get<std::size_t>());
       text += line;
     }
     std::snprintf(line, sizeof line, "%zu of %zu frames err (%.2f %%)\n", result["torn"].get<std::size_t>(),

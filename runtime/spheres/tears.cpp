@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "runtime/spheres/coverage.hpp"
 
@@ -123,9 +124,24 @@ Tears TearDetector::look(const BallSet& posed, const Context& context) const {
   Tears out;
   out.rest_parts = rest_parts_;
   out.uncovered = count_if(deep_.size(), [&](std::size_t i) { return !cover.near(place(deep_[i])); });
+  std::vector<std::uint8_t> is_torn(links_.size());
   out.links = count_if(links_.size(), [&](std::size_t i) {
-    return torn(cover, place(deep_[links_[i].a]), place(deep_[links_[i].b]));
+    is_torn[i] = torn(cover, place(deep_[links_[i].a]), place(deep_[links_[i].b]));
+    return is_torn[i] != 0;
   });
+  std::map<std::array<std::int32_t, 2>, std::size_t> by_pair;
+  std::size_t most = 0;
+  for (std::size_t i = 0; out.links > 0 && i < links_.size(); ++i) {
+    if (is_torn[i] == 0) continue;
+    const auto segment = [&](std::uint32_t row) {
+      return posed.balls[static_cast<std::size_t>(deep_[row].ball)].motion;
+    };
+    const auto [low, high] = std::minmax({segment(links_[i].a), segment(links_[i].b)});
+    const std::size_t now = ++by_pair[{low, high}];
+    if (now <= most) continue;
+    most = now;
+    out.between = {low, high};
+  }
   out.parts = parts_of(cover.mask, Tears::least_part);
   return out;
 }

@@ -17,6 +17,8 @@ struct Tears {
   std::size_t links = 0;  ///< neighbours two deep at rest between whose posed places lies a voxel in no ball
   std::size_t parts = 0;  ///< pieces that hang together with nothing, of at least `least_part` voxels
   std::size_t rest_parts = 0;
+  /// Segments between which most links are torn, the lower row first; -1 without any.
+  std::array<std::int32_t, 2> between{-1, -1};
 
   bool errs() const { return uncovered > 0 || links > least_links || parts > rest_parts; }
   /// A tear is an opening that can be seen: fewer torn links than the faces of a 3 x 3 patch are none.
