@@ -182,6 +182,15 @@ std::string text_of(const json& result) {
   return text;
 }
 
+// The volume's own lattice, so that what is posed and brought back lies where it lay; see posed_lattice.
+ImageGrid lattice_for(const Settings& s, const VolumetricSkeleton& skeleton, const Image& volume) {
+  if (s.voxel_mm > 0) return runtime::lattice_of(skeleton, s.voxel_mm);
+  if (volume.bytes.empty()) return skeleton.grid;
+  ModelVolume shown;
+  shown.image.grid = volume.grid;
+  return runtime::posed_lattice(skeleton, shown);
+}
+
 int run(const Program& program, const Settings& s) {
   check(s);
   { const files::AtomicFile probe(s.output); }
@@ -194,7 +203,7 @@ int run(const Program& program, const Settings& s) {
   if (!s.morph.empty()) {
     result["frames"].push_back(run_morph(s, skeleton, volume, program.context("morph")));
   } else {
-    const ImageGrid lattice = s.voxel_mm > 0 ? runtime::lattice_of(skeleton, s.voxel_mm) : skeleton.grid;
+    const ImageGrid lattice = lattice_for(s, skeleton, volume);
     const std::vector<Frame> frames =
         s.poses() ? read_frames(program, s.frames, rig) : std::vector<Frame>{{"", {}}};
     for (const Frame& frame : frames) {
@@ -234,7 +243,10 @@ void declare_refill(CLI::App& app, Program& program, Run& chosen) {
       ->add_option("--region", s->region, "X0,Y0,Z0,X1,Y1,Z1, LPS mm: fill this box of the posed space only")
       ->delimiter(',')
       ->expected(6);
-  command->add_option("--voxel", s->voxel_mm, "edge of the posed voxels, mm (default: the skeleton's)")
+  command
+      ->add_option(
+          "--voxel", s->voxel_mm,
+          "edge of the posed voxels, mm (default: the volume's where they are cubic, else the skeleton's)")
       ->check(CLI::Range(0.01, 100.0));
   command->add_option("--background", s->background, "value where nothing is")->capture_default_str();
   command->add_option("--sampling", s->sampling, "nearest (labels) or trilinear")
