@@ -167,7 +167,8 @@ TEST(LabelTable, EveryMistakeIsNamed) {
   refused("a.ctbl", "1 a 0 0 0 red\n", "a.ctbl:1: 'red' is no colour");
   refused("a.txt", "1 0 0 0 1 1 \"a\"\n", "a.txt:1: has 6 numbers before its name");
   refused("a.tsv", "id\tcolour\n1\tred\n", "a.tsv:1: has no column 'name'");
-  refused("a.tsv", "index\tname\n1\n", "a.tsv:2: has 1 columns");
+  refused("a.tsv", "", "is empty (give a table of labels)");
+  refused("a.tsv", "index\tname\n1\n", "a.tsv:2: has 1 columns (one for every head)");
   refused("a.tsv", std::string("index\tname\n1\0\n", 13), "is no text");
 }
 

@@ -290,6 +290,15 @@ TEST_F(Hostile, AContentsPageThatLies) {
   }
 }
 
+TEST_F(Hostile, ContentsWithoutADigestEach) {
+  expect_refused(
+      [](Forge& forge) {
+        forge.dataset("/ecorche/digests/xxh64", H5T_STD_U64LE, {1},
+                      [](hid_t creation) { H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY); });
+      },
+      {"/ecorche/digests/xxh64", "is not one u64 per dataset"});
+}
+
 TEST_F(Hostile, ADatasetThatIsNotListed) {
   expect_refused(
       [](Forge& forge) {
@@ -322,12 +331,12 @@ TEST_F(Hostile, WrongShapes) {
       [&](Forge& forge) {
         forge.dataset(kWeight, H5T_IEEE_F32LE, {8, 1}, early);
       },
-      {kWeight, "shape 8 x 1"});
+      {kWeight, "has the shape 8 x 1, not"});
   expect_refused(
       [&](Forge& forge) {
         forge.dataset("/VTKHDF/Points", H5T_IEEE_F32LE, {8, 2}, early);
       },
-      {"/VTKHDF/Points", "shape 8 x 2, not n x 3"});
+      {"/VTKHDF/Points", "has the shape 8 x 2, not n x 3"});
 }
 
 TEST_F(Hostile, AScalarWithoutShape) {
@@ -347,7 +356,7 @@ TEST_F(Hostile, MissingParts) {
        {"/ecorche/weights/weight", "/ecorche/quality/min_weight", "/ecorche/tissues/skin/index",
         "/ecorche/digests/xxh64", "/VTKHDF/Types", "/ecorche/skeleton", "/ecorche/volumes"}) {
     model_file::write(toy_model(), file("a.hdf"), {});
-    expect_refused([&](Forge& forge) { forge.remove(path); }, {path, "missing"});
+    expect_refused([&](Forge& forge) { forge.remove(path); }, {path, "is missing"});
   }
 }
 
@@ -399,9 +408,24 @@ TEST_F(Hostile, SignedContentsThatAreNoModel) {
   model_file::write(toy_model(), file("a.hdf"), {});
   expect_refused(
       [](Forge& forge) {
+        forge.edit<std::int32_t>("/ecorche/skeleton/angle_joint", H5T_NATIVE_INT32, [](auto& v) {
+          v.front() = 2;
+          v.back() = 1;
+        });
+      },
+      {"/ecorche/skeleton/angle_joint", "is not sorted"});
+  model_file::write(toy_model(), file("a.hdf"), {});
+  expect_refused(
+      [](Forge& forge) {
+        forge.edit<std::uint8_t>("/ecorche/volumes/ct/labels", H5T_NATIVE_UINT8, [](auto& v) { v[0] = 7; });
+      },
+      {"/ecorche/volumes/ct/labels", "is neither 0 nor 1"});
+  model_file::write(toy_model(), file("a.hdf"), {});
+  expect_refused(
+      [](Forge& forge) {
         forge.edit<std::uint8_t>("/ecorche/skeleton/kind", H5T_NATIVE_UINT8, [](auto& v) { v[1] = 99; });
       },
-      {"/ecorche/skeleton/kind", "99"});
+      {"/ecorche/skeleton/kind", "99 has no meaning"});
   model_file::write(toy_model(), file("a.hdf"), {});
   expect_refused(
       [](Forge& forge) {

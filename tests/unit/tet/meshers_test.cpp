@@ -179,7 +179,7 @@ TEST(Meshers, ByName) {
     FAIL();
   } catch (const Error& e) {
     EXPECT_EQ(e.kind(), ErrorKind::usage);
-    EXPECT_NE(std::string(e.what()).find("gmsh"), std::string::npos);
+    EXPECT_NE(std::string(e.what()).find("there is no mesher \"gmsh\""), std::string::npos);
     EXPECT_NE(std::string(e.what()).find("lattice"), std::string::npos);
   }
 }

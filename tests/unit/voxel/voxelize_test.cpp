@@ -255,6 +255,7 @@ TEST(Voxelize, Refusals) {
   EXPECT_EQ(refusal(patient, {.voxel_mm = 0.001}, {}, line), ErrorKind::config);
   EXPECT_NE(line.find("coarser voxels"), std::string::npos) << line;
   EXPECT_EQ(refusal(patient, {.voxel_mm = -1}, {}, line), ErrorKind::config);
+  EXPECT_NE(line.find("give a positive length, or 0 for the finest that fits"), std::string::npos) << line;
   EXPECT_EQ(refusal(shapes::body({}), {}, {}, line), ErrorKind::data);
   EXPECT_NE(line.find("skin has no triangle"), std::string::npos) << line;
   Case broken = patient;
