@@ -5,7 +5,7 @@ namespace ecorche::tet {
 
 std::vector<std::string_view> mesher_names() {
 #ifdef ECORCHE_GPL
-  return {"cgal", "tetgen", "lattice"};
+  return {"lattice", "cgal", "tetgen"};
 #else
   return {"lattice"};
 #endif
