@@ -6,11 +6,11 @@
 #include <set>
 
 #include "app/command.hpp"
-#include "preprocess/mapping/round_trip.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/mapping/bind.hpp"
+#include "preprocess/mapping/round_trip.hpp"
 #include "runtime/volume/resample.hpp"
 
 namespace ecorche::app {
