@@ -291,12 +291,9 @@ TEST_F(Hostile, AContentsPageThatLies) {
 }
 
 TEST_F(Hostile, ContentsWithoutADigestEach) {
-  expect_refused(
-      [](Forge& forge) {
-        forge.dataset("/ecorche/digests/xxh64", H5T_STD_U64LE, {1},
-                      [](hid_t creation) { H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY); });
-      },
-      {"/ecorche/digests/xxh64", "is not one u64 per dataset"});
+  const auto early = [](hid_t creation) { H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY); };
+  expect_refused([&](Forge& f) { f.dataset("/ecorche/digests/xxh64", H5T_STD_U64LE, {1}, early); },
+                 {"/ecorche/digests/xxh64", "is not one u64 per dataset"});
 }
 
 TEST_F(Hostile, ADatasetThatIsNotListed) {
