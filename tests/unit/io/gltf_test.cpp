@@ -219,6 +219,15 @@ TEST(Gltf, EveryMistakeIsNamed) {
   refused(
       "its weights are not as many as its points", [](json& g) { g["accessors"][6]["count"] = 4; },
       skinned());
+  refused("a node's matrix is not affine",
+          [](json& g) { g["nodes"][0]["matrix"] = {1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; });
+  refused("a node's rotation is no quaternion", [](json& g) { g["nodes"][0]["rotation"] = {0, 0, 0, 0}; });
+  refused(
+      "a weight names a joint that is not there", [](json& g) { g["skins"][0]["joints"] = {1}; }, skinned());
+  refused("an accessor names buffer view 40 of 5", [](json& g) { g["accessors"][0]["bufferView"] = 40; });
+  refused("a mesh names accessor 30 of 5",
+          [](json& g) { g["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 30; });
+  refused("an accessor has not 3 values a row", [](json& g) { g["accessors"][0]["type"] = "VEC2"; });
   Parts bound = skinned();
   bound.add<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 5126, "MAT4", 1);
   refused(
@@ -242,6 +251,14 @@ TEST(Gltf, EveryMistakeIsNamed) {
   append<std::uint32_t>(odd, {0x46546C67, 2, 25, 5, 0x4E4F534A});
   expect_error(ErrorKind::data, "its JSON chunk is not padded to 4 bytes",
                [&] { read_surface(scratch.put("b.glb", odd + "{   }")); });
+  std::string old;
+  append<std::uint32_t>(old, {0x46546C67, 1, 25, 5, 0x4E4F534A});
+  expect_error(ErrorKind::data, "is of glTF version 1 (save it as glTF 2.0)",
+               [&] { read_surface(scratch.put("b.glb", old + "{   }")); });
+  std::string damaged;
+  append<std::uint32_t>(damaged, {0x46546C67, 2, 25, 500, 0x4E4F534A});
+  expect_error(ErrorKind::data, "its JSON chunk is damaged",
+               [&] { read_surface(scratch.put("b.glb", damaged + "{   }")); });
   expect_error(ErrorKind::data, "bytes, but has", [&] { read_surface(scratch.put("b.glb", whole + "x")); });
   expect_error(ErrorKind::data, "is no glTF: it is no JSON object",
                [&] { read_surface(scratch.put("b.gltf", whole)); });

@@ -230,6 +230,18 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
   refused("a.ply",
           "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n0 0\n",
           "its vertices have no 'z'");
+  refused("a.ply", "ply\nformat utf8 1.0\nend_header\n", "no format is named 'utf8'");
+  refused("a.ply",
+          "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float x\nend_header\n0 0\n",
+          "property 'x' is declared twice");
+  refused("a.ply", head + "element face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n1\n",
+          "its element 'face' has no list 'vertex_indices'");
+  refused("a.vtk", vtk + "BANANAS 3\n", "'bananas' is no part of a surface");
+  refused("a.vtk", vtk + "POINTS many float\n", "'many' is no count");
+  refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 8\n3 0 1 2 0 0 0 0\n",
+          "its cells are fewer than their list");
+  refused("a.vtp", "<VTKFile type=\"PolyData\"><AppendedData encoding=\"raw\">",
+          "its appended data do not begin");
   refused("a.vtk", "# vtk DataFile Version 4.2\nx\nEBCDIC\n", "is neither ASCII nor BINARY: 'ebcdic'");
   refused("a.vtk", "# vtk DataFile Version 4.2\nx\nASCII\nFIELD x\n", "its fourth line is no DATASET");
   refused("a.vtk", vtk + "POINTS 1 float or so\n0 0 0\n", "has words where a line should end");
@@ -255,6 +267,13 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
           "an array of 4 bytes ends early");
   refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine, "9"),
           "a cell ends at corner 9 of 3");
+  refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"appended\" offset=\"999\">", "3"),
+          "an array begins at '999', outside the file");
+  std::string odd = vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine, "3");
+  odd.replace(odd.find("Float32"), 7, "Float33");
+  refused("a.vtp", odd, "an array is of type 'Float33'");
+  odd.replace(odd.find("Points=\"3\""), 10, "Points=\"999999999\"");
+  refused("a.vtp", odd, "NumberOfPoints is '999999999', more than the file can hold");
   refused("a.vtp", "<!DOCTYPE x [<!ENTITY a \"b\">]><x/>", "has a DOCTYPE");
   refused("a.vtp", "<VTKFile", "is no XML: unclosed token");
   const Scratch scratch;
