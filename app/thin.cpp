@@ -2,6 +2,7 @@
 // `ecorche thin`: a sampled volume in, its volumetric skeleton out (Gagvani01 3-4).
 #include "preprocess/thin/thinning.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -31,6 +32,7 @@ struct Settings {
   std::string metric = "euclidean";
   // What the paper poses with: a third of a percent of a body's voxels.
   double thinness = 0.48;
+  fs::path distance_map;
   HangSettings hang;
   std::vector<std::string> for_images;  // options that were given and have no meaning for a skeleton
 };
@@ -85,6 +87,18 @@ Image isotropic(const Program& program, const Settings& settings, Image image, n
   return out;
 }
 
+// Distances in mm on the image's own voxels, whatever their edges.
+int write_distances(const Program& program, const Image& image, const thin::Segmentation& how,
+                    const fs::path& path) {
+  const thin::Mask mask = thin::segment(image, how, program.context("segmenting"));
+  const thin::Field<double> squares = thin::squared_distance_mm(mask, program.context("distance map"));
+  Image map(image.grid, ScalarType::f32);
+  std::transform(squares.data(), squares.data() + squares.size(), map.scalars<float>().begin(),
+                 [](double square) { return static_cast<float>(std::sqrt(square)); });
+  io::write_image(path, map);
+  return 0;
+}
+
 // A fresh skeleton of an image, and the object that it is of.
 VolumetricSkeleton from_image(const Program& program, const Settings& settings, thin::Mask& mask,
                               StepClock& clock, nlohmann::json& report) {
@@ -92,6 +106,8 @@ VolumetricSkeleton from_image(const Program& program, const Settings& settings, 
   read_threshold(settings.threshold, how);
   how.boundary = settings.boundary == 6 ? thin::Boundary::faces_6 : thin::Boundary::all_26;
   Image image = clock.time("read", [&] { return io::read_image(settings.input); });
+  if (!settings.distance_map.empty())
+    clock.time("distance_map", [&] { return write_distances(program, image, how, settings.distance_map); });
   const int components = image.components;
   image = clock.time("resample", [&] { return isotropic(program, settings, std::move(image), report); });
   if (image.components < components) how.component = 0;  // resampling has taken the one
@@ -202,6 +218,9 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--isotropic", s->isotropic_mm,
                       "resample to cubes of this edge, mm; 0: the finest spacing. Labels to the nearest, "
                       "thresholded values trilinearly");
+  command->add_option("--distance-map", s->distance_map,
+                      "also write each object voxel's distance to the background, mm, on the image's own "
+                      "voxels (.nrrd, .mha, .nii.gz)");
   command->add_option("--metric", s->metric, "euclidean (exact) or chamfer345 (<3,4,5>)")
       ->check(CLI::IsMember({"euclidean", "chamfer345"}))
       ->capture_default_str();
@@ -211,7 +230,7 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen) {
   add_hang_options(*command, s->hang);
   command->callback([&program, &chosen, s, command] {
     for (const char* option : {"--threshold", "--labels", "--component", "--largest", "--boundary",
-                               "--isotropic", "--metric", "--skeleton", "--model"}) {
+                               "--isotropic", "--metric", "--distance-map", "--skeleton", "--model"}) {
       if (command->count(option) > 0) s->for_images.emplace_back(option);
     }
     chosen = [&program, s] { return run(program, *s); };

@@ -113,7 +113,9 @@ std::string packed_bytes(Source& source, const Storage& storage, std::uint64_t l
   const std::uint64_t blocks = header_word(head, 0, storage), size = header_word(head, 1, storage),
                       last = header_word(head, 2, storage);
   if (blocks == 0) return {};
-  if (blocks > limit || size > limit || last > limit || (blocks - 1) * size > limit)
+  // An array shorter than a block still names the size of a whole one.
+  const bool any_whole = blocks > 1 || last == 0;
+  if (blocks > limit || last > limit || (any_whole && (size > limit || (blocks - 1) * size > limit)))
     refuse(where, "an array is larger than its counts say");
   const std::string sizes = source.take(word * (3 + blocks)).substr(word * 3);
   std::uint64_t total = 0;

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """`ecorche thin`: an image becomes a skeleton that VTK reads, thinner ones come out of it, joints hang on it, mistakes are told."""
+import gzip
 import json
 import os
 import pathlib
@@ -12,7 +13,7 @@ import unittest
 
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLPolyDataWriter
 
 ECORCHE = os.environ["ECORCHE_BIN"]
 CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
@@ -105,6 +106,21 @@ class Thin(unittest.TestCase):
         self.refused(64, "--labels", "no meaning", words=["thin", self.folder / "thick.vtp", "-o",
                                                            self.folder / "t.vtp", "--labels", "3"])
 
+    def test_a_skeleton_that_vtk_saved_again_is_the_same(self):
+        (self.folder / "arm.yaml").write_text(ARM % 8)
+        self.thin("--tp", "0.2", "--tree", "--skeleton", self.folder / "arm.yaml")
+        self.thin("--tp", "0.4", "--tree", image=self.folder / "s.vtp", name="thin.vtp")
+        thin = (self.folder / "thin.vtp").read_bytes()
+        for mode in "Ascii", "Binary", "Appended":
+            writer = vtkXMLPolyDataWriter()
+            writer.SetFileName(str(self.folder / "again.vtp"))
+            writer.SetInputData(self.poly_data())
+            getattr(writer, f"SetDataModeTo{mode}")()
+            writer.Write()
+            self.thin("--tp", "0.4", "--tree", image=self.folder / "again.vtp", name="thin.vtp")
+            self.assertEqual((self.folder / "thin.vtp").read_bytes(), thin, mode)
+            self.assertIn(b"Name=\"segment\"", thin)
+
     def test_the_same_bytes_for_any_number_of_threads(self):
         self.thin("--tree", "--tp", "0.2", "--threads", "1", name="a.vtp")
         one = (self.folder / "a.vtp").read_bytes()
@@ -152,7 +168,16 @@ class Thin(unittest.TestCase):
         self.refused(64, "not isotropic", "--isotropic 0", words=words)
         self.refused(64, "--isotropic", words=[*words, "--isotropic", "-1"])
         self.refused(64, "--isotropic", "longer edge", words=[*words, "--isotropic", "1e-5"])
-        report, said = self.ok(*words, "--isotropic", "0")
+        report, said = self.ok(*words, "--isotropic", "0", "--distance-map", self.folder / "mm.nrrd")
+        head, _, packed = (self.folder / "mm.nrrd").read_bytes().partition(b"\n\n")
+        self.assertIn(b"sizes: 32 32 16", head)  # the image's own voxels
+        mm = np.frombuffer(gzip.decompress(packed), "<f4").reshape(16, 32, 32)
+        self.assertTrue(((mm > 0) == (grey >= 90)).all())
+        background = np.argwhere(grey < 90) * (2, 1, 1)
+        for k, j, i in np.argwhere(grey >= 90)[::50]:
+            nearest = ((background - (2 * k, j, i)) ** 2).sum(axis=1).min()
+            self.assertEqual(mm[k, j, i], np.float32(np.sqrt(nearest)))
+        self.refused(64, "mm.txt", words=[*words, "--isotropic", "0", "--distance-map", self.folder / "mm.txt"])
         self.assertIn("resampled trilinearly from 32 x 32 x 16 to 32 x 32 x 32 voxels of 1 mm", said)
         self.assertEqual(report["resampled"]["sampling"], "trilinear")
         self.assertAlmostEqual(report["voxels"]["object"], 4 / 3 * np.pi * 1000, delta=150)
