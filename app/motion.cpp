@@ -151,8 +151,9 @@ void declare_motion(CLI::App& app, Program& program, Run& chosen) {
       "--against", s->against,
       "another file of the same motion: differences joint by joint, both from their beginning");
   command
-      ->add_option("--most-deg", s->most_deg,
-                   "exit with 1 when a joint differs by more than this in the mean, a constant turn taken out")
+      ->add_option(
+          "--most-deg", s->most_deg,
+          "exit with 1 when a joint differs by more than this in the mean, a constant turn taken out")
       ->check(CLI::Range(0.0, 180.0));
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
 }

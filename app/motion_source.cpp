@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "app/marker_source.hpp"
 #include "core/values/error.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/motion_map.hpp"
@@ -37,23 +38,6 @@ std::string some(const std::vector<std::string>& names) {
   return names.size() > 6 ? out + " and " + std::to_string(names.size() - 6) + " more" : out;
 }
 
-io::MotionSpace space_of(const MotionChoice& choice) {
-  io::MotionSpace space;
-  if (!choice.frame.empty()) {
-    const auto axes = io::axes_from_code(choice.frame);
-    if (!axes)
-      usage("--motion-frame", "'" + choice.frame + "' names no axes", "use three letters such as LSA or RAS");
-    space.axes = *axes;
-  }
-  if (!choice.unit.empty() && choice.unit != "body") {
-    space.unit_mm = io::unit_from_name(choice.unit);
-    if (!space.unit_mm)
-      usage("--motion-unit", "'" + choice.unit + "' is no unit",
-            "use um, mm, cm, m, in, millimetres a unit such as 56.44, or body");
-  }
-  return space;
-}
-
 std::optional<std::size_t> whole(std::string_view text) {
   std::size_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -74,7 +58,7 @@ class ClipSource final : public MotionSource {
   ClipSource(const Program& program, const MotionChoice& choice, const Rig& rig)
       : rig_(rig),
         path_(choice.file.string()),
-        clip_(io::open_clip(choice.file, space_of(choice), choice.asf)) {
+        clip_(io::open_clip(choice.file, motion_space(choice), choice.asf)) {
     kinematics::NameMap names;
     if (!choice.map.empty()) names = io::read_motion_map(choice.map, rig).joints;
     match_ = kinematics::match(rig, clip_->head(), names);
@@ -105,7 +89,7 @@ class ClipSource final : public MotionSource {
     if (!frame)
       usage("--motion-rest", "'" + choice.rest + "' is no reference", "use auto, zero, FRAME or CLIP:FRAME");
     if (colon == std::string::npos) return align_at(*clip_, *frame, "frame " + std::to_string(*frame));
-    const auto other = io::open_clip(choice.rest.substr(0, colon), space_of(choice), choice.asf);
+    const auto other = io::open_clip(choice.rest.substr(0, colon), motion_space(choice), choice.asf);
     // The same joints in another order, or with others beside them, are found by their names.
     const Clip& head = clip_->head();
     kinematics::ClipFrame named;
@@ -282,10 +266,27 @@ class SequenceSource final : public MotionSource {
 
 }  // namespace
 
+io::MotionSpace motion_space(const MotionChoice& choice) {
+  io::MotionSpace space;
+  if (!choice.frame.empty()) {
+    const auto axes = io::axes_from_code(choice.frame);
+    if (!axes)
+      usage("--motion-frame", "'" + choice.frame + "' names no axes", "use three letters such as LSA or RAS");
+    space.axes = *axes;
+  }
+  if (!choice.unit.empty() && choice.unit != "body") {
+    space.unit_mm = io::unit_from_name(choice.unit);
+    if (!space.unit_mm)
+      usage("--motion-unit", "'" + choice.unit + "' is no unit",
+            "use um, mm, cm, m, in, millimetres a unit such as 56.44, or body");
+  }
+  return space;
+}
+
 void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file) {
   if (with_file)
     command.add_option("--motion", choice.file,
-                       "a motion: .bvh, .amc, .gltf, .glb, .mot, or a pose sequence .yaml");
+                       "a motion: .bvh, .amc, .gltf, .glb, .mot, .trc, or a pose sequence .yaml");
   command.add_option(
       "--motion-unit", choice.unit,
       "length of one unit of the clip: um, mm, cm, m, in, millimetres, or body (its figure as long as "
@@ -307,6 +308,7 @@ std::unique_ptr<MotionSource> open_motion(const Program& program, const MotionCh
                                           const Rig& rig) {
   const std::string ending = choice.file.extension().string();
   if (ending == ".mot" || ending == ".sto") return std::make_unique<AngleSource>(program, choice, rig);
+  if (ending == ".trc") return open_markers(program, choice, rig);
   if (ending == ".yaml" || ending == ".yml") return std::make_unique<SequenceSource>(program, choice, rig);
   return std::make_unique<ClipSource>(program, choice, rig);
 }

@@ -11,6 +11,7 @@
 #include "core/kinematics/retarget.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/skeleton.hpp"
+#include "io/motion/clip_file.hpp"
 
 namespace ecorche::app {
 
@@ -23,6 +24,9 @@ struct MotionChoice {
 
 /// --motion (unless `with_file` is false) and what belongs to it.
 void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file = true);
+
+/// Frame and unit as the command line says them. Throws Error{usage} for words that are none.
+io::MotionSpace motion_space(const MotionChoice& choice);
 
 /// Poses that are read as they are asked for; one thread at a time.
 class MotionSource {
@@ -38,9 +42,9 @@ class MotionSource {
   std::string reference;
 };
 
-/// Opens `.bvh .amc .gltf .glb .mot .sto` motions and `.yaml` pose sequences; notes what moves nothing and
-/// where the zero pose was aligned. Throws Error{usage} for options that do not fit, Error{data} for a figure
-/// more than 20 times longer or shorter than the patient, and what the readers throw.
+/// Opens `.bvh .amc .gltf .glb .mot .sto .trc` motions and `.yaml` pose sequences; notes what moves nothing
+/// and where the zero pose was aligned. Throws Error{usage} for options that do not fit, Error{data} for a
+/// figure more than 20 times longer or shorter than the patient, and what the readers throw.
 std::unique_ptr<MotionSource> open_motion(const Program& program, const MotionChoice& choice, const Rig& rig);
 
 }  // namespace ecorche::app

@@ -3,9 +3,11 @@
 
 #include <charconv>
 #include <cstdio>
+#include <numbers>
 
 #include "core/values/error.hpp"
 #include "io/case/case_file.hpp"
+#include "io/case/ik_file.hpp"
 #include "io/case/pose_library.hpp"
 
 namespace ecorche::app {
@@ -50,12 +52,31 @@ Pose named_pose(const Program& program, const std::string& name, const Rig& rig)
   return std::move(pose.pose);
 }
 
+// Says of each goal how far it was missed.
+Pose solved_pose(const Program& program, const std::filesystem::path& path, const Rig& rig) {
+  const io::IkRequest request = io::read_ik(path, rig);
+  const kinematics::IkResult result = kinematics::solve_ik(rig, request.start, request.problem);
+  char text[128];
+  for (std::size_t i = 0; i < result.away_mm.size(); ++i) {
+    const bool missed = result.away_mm[i] > request.problem.tolerance_mm;
+    std::snprintf(text, sizeof text, "%.1f mm from its goal%s", result.away_mm[i],
+                  missed ? ": beyond reach, limits or the other goals" : "");
+    program.note((missed ? "warning: " : "note: ") + request.names[i] + " is " + text);
+  }
+  for (std::size_t i = 0; i < result.off.size(); ++i) {
+    std::snprintf(text, sizeof text, " is %.1f degrees off", result.off[i] * 180 / std::numbers::pi);
+    program.note("note: " + request.names[result.away_mm.size() + i] + text);
+  }
+  return result.pose;
+}
+
 }  // namespace
 
 void add_frame_options(CLI::App& command, FrameChoice& choice) {
   command.add_option(
       "--pose", choice.pose,
       "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
+  command.add_option("--ik", choice.ik, "goals of points of the body, a file (docs/motion.md)");
   add_motion_options(command, choice.motion);
   command.add_option(
       "--frames", choice.frames,
@@ -64,10 +85,16 @@ void add_frame_options(CLI::App& command, FrameChoice& choice) {
 }
 
 std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig) {
-  if (choice.pose.empty() == choice.motion.file.empty()) {
-    usage("pose", choice.pose.empty() ? "nothing to pose" : "both --pose and --motion are given",
-          "give either --pose FILE, or --motion CLIP --frames A:B");
+  const int given =
+      (choice.pose.empty() ? 0 : 1) + (choice.ik.empty() ? 0 : 1) + (choice.motion.file.empty() ? 0 : 1);
+  if (given != 1) {
+    usage("pose",
+          given == 0          ? "nothing to pose"
+          : choice.ik.empty() ? "both --pose and --motion are given"
+                              : "--ik stands beside --pose or --motion",
+          "give one of --pose FILE, --ik FILE, or --motion CLIP --frames A:B");
   }
+  if (!choice.ik.empty()) return {{"", solved_pose(program, choice.ik, rig)}};
   if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig)}};
   if (choice.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
   const auto motion = open_motion(program, choice.motion, rig);

@@ -13,9 +13,10 @@
 
 namespace ecorche::app {
 
-/// As the command line says it: a pose, or frames of a motion.
+/// As the command line says it: a pose, goals of points, or frames of a motion.
 struct FrameChoice {
-  std::string pose;  ///< a pose file, or lib:NAME
+  std::string pose;          ///< a pose file, or lib:NAME
+  std::filesystem::path ik;  ///< goals of points
   MotionChoice motion;
   std::string frames;  ///< A, A:B or A:B:STEP
 };

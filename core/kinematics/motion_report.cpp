@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
@@ -17,6 +16,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kContact = 25;  // mm
+constexpr double kFloorShare = 0.05;
 
 std::vector<std::size_t> feet(const Skeleton& skeleton) {
   std::vector<std::size_t> out;
@@ -50,7 +50,7 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
   std::vector<ClampedJoint> clamped;
   MotionReport out;
   std::vector<LimitViolation> limits(joints);
-  std::vector<double> lowest(foot.size(), std::numeric_limits<double>::infinity());
+  std::vector<std::vector<float>> heights(foot.size());
   const auto place = [&](std::size_t f) -> Vector3d {
     return motion[foot[f]] * rig.skeleton.segments[foot[f]].joint.center;
   };
@@ -66,7 +66,14 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
       limit.worst = std::max(limit.worst, c.removed);
     }
     forward(rig, now, motion);
-    for (std::size_t f = 0; f < foot.size(); ++f) lowest[f] = std::min(lowest[f], place(f).z());
+    for (std::size_t f = 0; f < foot.size(); ++f) heights[f].push_back(static_cast<float>(place(f).z()));
+  }
+  std::vector<double> floor(foot.size(), 0);
+  for (std::size_t f = 0; f < foot.size() && frames > 0; ++f) {
+    const auto low =
+        heights[f].begin() + static_cast<std::ptrdiff_t>(kFloorShare * static_cast<double>(frames));
+    std::nth_element(heights[f].begin(), low, heights[f].end());
+    floor[f] = static_cast<double>(*low);
   }
   for (std::size_t j = 0; j < joints; ++j) {
     if (limits[j].share == 0) continue;
@@ -87,7 +94,7 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
     forward(rig, now, motion);
     for (std::size_t f = 0; f < foot.size(); ++f) {
       const Vector3d at = place(f);
-      const double height = at.z() - lowest[f];
+      const double height = std::max(at.z() - floor[f], 0.0);
       if (height < kContact) {
         ++out.feet[f].contact_share;
         if (frame > 0) {

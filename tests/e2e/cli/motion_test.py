@@ -133,6 +133,51 @@ class Motion(unittest.TestCase):
         self.ok("pose", MODEL, "-o", self.folder / "up", "--motion", file, "--frames", "4", "--tissues", "skin")
         self.refused(78, "keys[0].pose", *self.motion(self.put("bad.yaml", keys.replace("time_s: 0", "time_s: 0, pose: a.yaml, root: {}"))))
 
+    def test_goals(self):
+        info = self.ok("info", MODEL)
+        center = {row["segment"]: row["center_mm"] for row in info["rig"]}
+        goal = [center["hand_left"][0], center["hand_left"][1] - 250, center["hand_left"][2] + 150]
+        text = f"ecorche_ik: 1\nskeleton: {info['skeleton']}\ntargets: [{{segment: hand_left, goal: {goal}}}]\n"
+        file = self.put("ik.yaml", text)
+        result = run("pose", MODEL, "-o", self.folder / "out", "--ik", file, "--tissues", "skin", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"note: hand_left is 0\.[01] mm from its goal")
+        far = self.put("far.yaml", text.replace(str(goal), "[0, -5000, 0]"))
+        result = run("pose", MODEL, "-o", self.folder / "far", "--ik", far, "--tissues", "skin")
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("mm from its goal: beyond reach", result.stderr)
+        self.refused(64, "--ik stands beside", "pose", MODEL, "-o", self.folder / "x", "--ik", file, "--pose", "lib:sitting")
+        self.refused(78, "unknown segment", "pose", MODEL, "-o", self.folder / "x", "--ik", self.put("bad.yaml", text.replace("hand_left", "wing")))
+
+    # The joints of a walk as markers: what inverse kinematics makes of them is that walk.
+    def test_markers(self):
+        info = self.ok("info", MODEL)
+        names = [row["joint"] for row in info["rig"]]
+        center = [row["center_mm"] for row in info["rig"]]
+        rows = []
+        for frame in range(3):
+            at = [f"{x / 10}\t{z / 10}\t{-(y - 50 * frame) / 10}" for x, y, z in center]
+            rows.append(f"{frame + 1}\t{frame / 100}\t" + "\t".join(at))
+
+        def trc(markers, unit):
+            head = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n" \
+                   f"100\t100\t3\t{len(markers)}\t{unit}\nFrame#\tTime\t" + "\t\t\t".join(markers) + "\t\t\n\t\tX1\n"
+            return self.put(f"{unit}_{markers[0]}.trc", head + "\n".join(rows) + "\n")
+
+        file, metres = trc(names, "cm"), trc(names, "m")
+        self.assertEqual(self.ok(*self.motion(file))["frames"], 3)
+        for markers, unit in ((file, ()), (metres, ("--motion-unit", "body"))):
+            out = self.folder / markers.stem
+            self.ok("pose", MODEL, "-o", out, "--motion", markers, "--frames", "2", "--format", "obj", "--tissues", "skin", *unit)
+            rest = self.folder / "rest"
+            self.ok("pose", MODEL, "-o", rest, "--pose", self.put("rest.yaml", f"ecorche_pose: 1\nskeleton: {info['skeleton']}\n"),
+                    "--format", "obj", "--tissues", "skin")
+            moved, still = [[tuple(map(float, line.split()[1:])) for line in (folder / "skin.obj").read_text().splitlines() if line[:2] == "v "]
+                            for folder in (out, rest)]
+            self.assertLess(max(abs(a[1] + 100 - b[1]) for b, a in zip(still, moved)), 5)
+        self.refused(65, "times as far apart as on the patient", *self.motion(metres))
+        self.refused(65, "0 of its", *self.motion(trc([f"m{i}" for i in range(len(names))], "cm")))
+
     def test_refusals(self):
         text = WALK.read_text()
         self.refused(66, "none.bvh", *self.motion(self.folder / "none.bvh"))

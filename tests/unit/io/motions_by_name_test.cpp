@@ -7,6 +7,7 @@
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
 #include "io/case/case_file.hpp"
+#include "io/case/ik_file.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/case/pose_library.hpp"
 #include "io/case/pose_sequence.hpp"
@@ -176,6 +177,40 @@ TEST(Docs, TheExamplesOfMotionAreRead) {
   const auto sequence =
       read_pose_sequence(scratch.put("way.yaml", block("ecorche_pose_sequence")), rig_of("right_leg"));
   EXPECT_EQ(sequence.frames(), 91U);
+  const IkRequest ik = read_ik(scratch.put("ik.yaml", block("ecorche_ik")), rig_of("bodyparts3d"));
+  EXPECT_EQ(ik.problem.targets.size(), 3U);
+  EXPECT_EQ(ik.problem.looks.size(), 1U);
+}
+
+TEST(IkFile, PinsAreWhereTheStartHasThem) {
+  const Scratch scratch;
+  const Rig rig = rig_of("right_leg");
+  scratch.put("bent.yaml", "ecorche_pose: 1\nskeleton: right_leg\njoints: {knee_right: {flexion_deg: 60}}\n");
+  const std::string text =
+      "ecorche_ik: 1\nskeleton: right_leg\nstart: bent.yaml\npinned: [{segment: shank_right, point: [-80, "
+      "-60, 100]}]\n"
+      "targets: [{segment: thigh_right, point: [0, 0, 500], goal: [1, 2, 3], weight: 5}]\n";
+  const IkRequest read = read_ik(scratch.put("ik.yaml", text), rig);
+  const auto motion = kinematics::forward(rig, read.start);
+  ASSERT_EQ(read.problem.targets.size(), 2U);
+  EXPECT_EQ(read.problem.targets[0].weight, 5);
+  EXPECT_EQ(read.problem.targets[0].goal, Vector3d(1, 2, 3));
+  EXPECT_LT((read.problem.targets[1].goal - motion[1] * Vector3d(-80, -60, 100)).norm(), 1e-9);
+  EXPECT_GT((read.problem.targets[1].goal - Vector3d(-80, -60, 100)).norm(), 100);
+  const auto refused = [&](const std::string& from, const std::string& to, const std::string& part) {
+    std::string wrong = text;
+    wrong.replace(wrong.find(from), from.size(), to);
+    expect_error(ErrorKind::config, part, [&] { read_ik(scratch.put("ik.yaml", wrong), rig); });
+  };
+  refused("thigh_right", "tigh_right",
+          "ik.yaml:5:targets[0].segment: unknown segment 'tigh_right' (did you mean");
+  refused("weight: 5", "weight: 0", "ik.yaml:5:targets[0].weight: is 0");
+  refused("goal: [1, 2, 3]", "goal: [1, 2]", "has 2 values");
+  refused("goal: [1, 2, 3]", "goal: [1, 2, .inf]", "goal");
+  refused("goal:", "gaol:", "did you mean 'goal'?");
+  refused("skeleton: right_leg", "skeleton: left_leg", "this pose is for the skeleton 'left_leg'");
+  expect_error(ErrorKind::config, "asks for nothing",
+               [&] { read_ik(scratch.put("none.yaml", "ecorche_ik: 1\nskeleton: right_leg\n"), rig); });
 }
 
 }  // namespace
