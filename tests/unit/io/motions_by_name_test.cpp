@@ -204,9 +204,13 @@ TEST(IkFile, PinsAreWhereTheStartHasThem) {
   };
   refused("thigh_right", "tigh_right",
           "ik.yaml:5:targets[0].segment: unknown segment 'tigh_right' (did you mean");
-  refused("weight: 5", "weight: 0", "ik.yaml:5:targets[0].weight: is 0");
+  refused("weight: 5", "weight: 0", "targets[0].weight: is 0 (write a number above 0, 1000 at most)");
   refused("goal: [1, 2, 3]", "goal: [1, 2]", "has 2 values");
   refused("goal: [1, 2, 3]", "goal: [1, 2, .inf]", "goal");
+  std::string many = "pinned: [{segment: shank_right}";
+  for (int i = 0; i < 1000; ++i) many += ", {segment: shank_right}";
+  refused("pinned: [{segment: shank_right, point: [-80, -60, 100]}", many,
+          "has 1001 entries (1000 are the most)");
   refused("goal:", "gaol:", "did you mean 'goal'?");
   refused("skeleton: right_leg", "skeleton: left_leg", "this pose is for the skeleton 'left_leg'");
   expect_error(ErrorKind::config, "asks for nothing",
