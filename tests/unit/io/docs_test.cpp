@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The examples of docs/case.md are read by the readers that they describe.
+// The examples of docs/case.md and docs/volumetric.md are read by the readers that they describe.
 #include <gtest/gtest.h>
 
+#include "io/case/attachment_file.hpp"
 #include "io/case/case_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
@@ -12,8 +13,8 @@ namespace ecorche::io {
 namespace {
 
 // The first block of YAML after the heading.
-std::string example(const std::string& heading) {
-  std::ifstream file(ECORCHE_SOURCE "/docs/case.md", std::ios::binary);
+std::string example(const std::string& heading, const char* of = "case.md") {
+  std::ifstream file(std::string(ECORCHE_SOURCE "/docs/") + of, std::ios::binary);
   const std::string page(std::istreambuf_iterator<char>(file), {});
   const std::size_t at = page.find("## " + heading), begin = page.find("```yaml\n", at) + 8;
   EXPECT_NE(at, page.npos) << heading;
@@ -37,6 +38,11 @@ TEST(Docs, TheExamplesAreRead) {
   Rig rig;
   rig.skeleton = patient.skeleton;
   const Pose pose = read_pose(scratch.put("pose.yaml", example("pose.yaml")), rig);
+  const Reassignment by_hand =
+      read_attachment(scratch.put("by_hand.yaml", example("Joints", "volumetric.md")), patient.skeleton);
+  EXPECT_EQ(by_hand.splits.at(0).within_mm, 120);
+  EXPECT_EQ(by_hand.regions.at(0).from, "thigh_right");
+  EXPECT_EQ(by_hand.regions.at(1).radius, 60);
   EXPECT_NEAR(2 * std::acos(pose.rotation[2].w()), std::acos(0.0), 1e-12);  // the knee at 90 degrees
 }
 
