@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// `ecorche export`: the rest tets of a model in the formats of other programs.
+// `ecorche export`: a model in the formats of other programs: its rest tets, or its rig with a motion.
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 
 #include "app/command.hpp"
+#include "app/export_rig.hpp"
 #include "app/tet_regions.hpp"
 #include "core/model_file/model_file.hpp"
 
@@ -13,16 +15,33 @@ namespace {
 struct Settings {
   std::filesystem::path model;
   std::vector<std::filesystem::path> outputs;
+  RigChoice rig;
 };
+
+std::string to_text(const nlohmann::json& rig) {
+  char text[256] = "";
+  if (rig.contains("truncation_mm"))
+    std::snprintf(text, sizeof text,
+                  "; four influences a vertex instead of all: %.3f mm rms, %.3f mm at worst (LBS)",
+                  rig["truncation_mm"]["rms"].get<double>(), rig["truncation_mm"]["worst"].get<double>());
+  return rig["file"].get<std::string>() + ": " + rig["joints"].dump() + " joints, " + rig["frames"].dump() +
+         " frames, " + rig["frames_clamped"].dump() + " of them within limits only" + text;
+}
 
 int run(const Program& program, const Settings& settings) {
   const Model model = model_file::read(settings.model, program.context("reading"));
   const io::TetRegions regions = tet_regions(model);
   const Context context = program.context("writing");
-  nlohmann::json written = nlohmann::json::array();
+  nlohmann::json written = nlohmann::json::array(), rigs = nlohmann::json::array();
   std::string text;
   for (const std::filesystem::path& output : settings.outputs) {
     context.check_stop();
+    if (is_rig_file(output)) {
+      rigs.push_back(export_rig(program, model, settings.rig, output));
+      written.push_back(output.string());
+      text += (text.empty() ? "" : "\n") + to_text(rigs.back());
+      continue;
+    }
     io::write_tets(output, model.nodes, model.tets, {},
                    {{"label", 1, {model.tet_label.begin(), model.tet_label.end()}}}, regions);
     written.push_back(output.string());
@@ -32,6 +51,7 @@ int run(const Program& program, const Settings& settings) {
   program.result(text, {{"nodes", model.node_count()},
                         {"tets", model.tet_count()},
                         {"regions", regions.names},
+                        {"rigs", rigs},
                         {"written", written}});
   return 0;
 }
@@ -39,16 +59,20 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_export(CLI::App& app, Program& program, Run& chosen) {
-  auto* command =
-      app.add_subcommand("export", "the rest tets of a model for other programs, with its regions");
+  auto* command = app.add_subcommand(
+      "export", "a model for other programs: its rest tets with their regions, or its rig with a motion");
   auto s = std::make_shared<Settings>();
   command->add_option("model", s->model, "the model, a .hdf file")->required();
   command
-      ->add_option("-o,--output", s->outputs,
-                   "files to write: .vtu, .msh (Gmsh), .ele with .node (TetGen), .inp (Abaqus), .mcnp.inp "
-                   "(MCNP6, in cm, "
-                   "refuses degenerate tets)")
+      ->add_option(
+          "-o,--output", s->outputs,
+          "files to write: .vtu, .msh (Gmsh), .ele with .node (TetGen), .inp (Abaqus), .mcnp.inp "
+          "(MCNP6, in cm, "
+          "refuses degenerate tets), .glb (tissues skinned by four influences, with the motion), .bvh")
       ->required();
+  add_motion_options(*command, s->rig.motion);
+  command->add_option("--tissues", s->rig.tissues, "of a .glb: names with commas between, all by default")
+      ->delimiter(',');
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
 }
 

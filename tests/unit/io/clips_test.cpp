@@ -12,6 +12,8 @@
 #include "io/motion/bvh.hpp"
 #include "io/motion/gltf_clip.hpp"
 #include "io/motion/table_file.hpp"
+#include "io/surface/rigged_glb.hpp"
+#include "tests/unit/io/assimp_reading.hpp"
 #include "tests/unit/io/scratch.hpp"
 
 namespace ecorche::io {
@@ -259,6 +261,47 @@ TEST(Gltf, EveryMistakeIsNamed) {
   refused("\"children\":[2]", "\"children\":[0]", "its nodes are no tree");
   refused("\"input\":0,\"output\":1", "\"input\":9,\"output\":1", "names accessor 9");
   refused("\"input\":0,\"output\":2", "\"input\":1,\"output\":2", "has not 1 values a row");
+}
+
+// A body of two joints and one triangle, written and read by assimp and by ourselves.
+TEST(RiggedGlb, OthersReadTheSame) {
+  const Scratch scratch;
+  Clip clip;
+  clip.name = "walk";
+  clip.frame_seconds = 0.25;
+  clip.joints = {{"hips", -1, {10, 20, 900}}, {"knee", 0, {0, -30, -400}}};
+  for (int f = 0; f < 3; ++f) {
+    clip.root_position.emplace_back(10, 20 - 100.0 * f, 900);
+    clip.rotation.emplace_back(AngleAxisd(0.4 * f, Vector3d(1, 2, 3).normalized()));
+    clip.rotation.emplace_back(AngleAxisd(-2.5 * f, Vector3d::UnitX()));  // more than half a turn in all
+  }
+  SkinnedSurface skin{"skin", {Points(3, 3), Triangles(1, 3)}, {}};
+  skin.mesh.V << 0, 0, 0, 100, 0, 0, 0, 0, 100;
+  skin.mesh.F << 0, 1, 2;
+  skin.influences.joint.assign(3, {1, 0, 0, 0});
+  skin.influences.weight.assign(3, {0.75F, 0.25F, 0, 0});
+  write_rigged_glb(scratch / "a.glb", clip, {skin});
+
+  const auto other = foreign::assimp_motion(scratch / "a.glb");
+  const Clip back = read_whole(*open_clip(scratch / "a.glb"));
+  ASSERT_EQ(back.frames(), 3U);
+  EXPECT_NEAR(back.frame_seconds, 0.25, 1e-6);
+  for (std::size_t f = 0; f < 3; ++f) {
+    EXPECT_LT((back.root_position[f] - clip.root_position[f]).norm(), 1e-3);
+    const Vector3d p = other.position.at("hips").at(f);
+    EXPECT_LT((1000 * lsa_to_lps() * p - clip.root_position[f]).norm(), 1e-3);
+    for (std::size_t j = 0; j < 2; ++j) {
+      EXPECT_LT(back.rotation[2 * f + j].angularDistance(clip.rotation[2 * f + j]), 1e-5);
+      const Quaterniond q = other.rotation.at(clip.joints[j].name).at(f);
+      const Quaterniond lps(q.w(), q.x(), -q.z(), q.y());
+      EXPECT_LT(lps.angularDistance(clip.rotation[2 * f + j]), 1e-5);
+    }
+  }
+  EXPECT_LT((back.joints[1].offset - clip.joints[1].offset).norm(), 1e-3);
+  skin.influences.joint[0][0] = 7;
+  expect_error(ErrorKind::internal, "no four joints a vertex",
+               [&] { write_rigged_glb(scratch / "b.glb", clip, {skin}); });
+  EXPECT_FALSE(std::filesystem::exists(scratch / "b.glb"));
 }
 
 const std::string kMot =

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// A model's skin and skeleton, and a motion on it, for other programs.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "app/command.hpp"
+#include "app/motion_source.hpp"
+#include "core/values/model.hpp"
+
+namespace ecorche::app {
+
+/// What of a model goes into a `.glb` or `.bvh`.
+struct RigChoice {
+  MotionChoice motion;               ///< no file: the scan alone
+  std::vector<std::string> tissues;  ///< of a `.glb`: names, or `all`
+};
+
+/// Whether `path` is one that export_rig writes.
+bool is_rig_file(const std::filesystem::path& path);
+
+/// Writes the skeleton with the motion, within its limits: `.glb` also with the tissues, skinned by four
+/// influences, `.bvh` in cm. Returns what it did; a `.glb`'s says what cutting to four influences costs, by
+/// linear blending over the motion's frames. Throws Error{usage} for tissues that the model has not, or a
+/// `.bvh` without motion.
+nlohmann::json export_rig(const Program& program, const Model& model, const RigChoice& choice,
+                          const std::filesystem::path& path);
+
+}  // namespace ecorche::app
