@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What others make of a .glb of ours: the Khronos validator, and three.js playing it.
 //
-// usage: node check_glb.mjs FILE.glb SECONDS   (node_modules: see scripts/setup)
+// usage: node check_glb.mjs FILE.glb SECONDS   (node_modules: see scripts/setup --tests)
 // Prints one JSON object: the validator's issues, and of each skinned mesh where three.js puts its vertices at that time,
 // in LPS mm.
 import { readFileSync } from "node:fs";

@@ -38,7 +38,7 @@ class Gltf(unittest.TestCase):
         cls.folder = pathlib.Path(tempfile.mkdtemp())
         cls.addClassCleanup(shutil.rmtree, cls.folder)
         if not (CHECK.parent / "node_modules").exists():
-            raise AssertionError("no node_modules beside check_glb.mjs: run scripts/setup")
+            raise AssertionError("no node_modules beside check_glb.mjs: run scripts/setup --tests")
         cls.glb, cls.bvh = cls.folder / "walk.glb", cls.folder / "walk.bvh"
         cls.said = run("export", MODEL, "-o", cls.glb, cls.bvh, "--motion", WALK)["rigs"]
 
