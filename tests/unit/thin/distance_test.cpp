@@ -26,6 +26,7 @@ std::vector<Trial> trials() {
   out.push_back({"sheet", make_mask({13, 11, 9}, [](int, int, int k) { return k == 4; })});
   out.push_back({"line", make_mask({70, 3, 3}, [](int, int j, int k) { return j == 1 && k == 1; })});
   out.push_back({"long rows", random_mask({120, 4, 3}, 0.97, 3)});
+  out.push_back({"wide planes", random_mask({150, 9, 9}, 0.998, 5)});
   out.push_back({"tall", random_mask({3, 4, 70}, 0.985, 4)});
   out.push_back({"dense", random_mask({15, 13, 12}, 0.99, 1)});
   out.push_back({"half", random_mask({33, 8, 7}, 0.5, 2)});
