@@ -221,7 +221,7 @@ MOTION_ROWS = [
     ("pose_both_sources", none, POSE + ("--motion", "CASE/clip.bvh", "--frames", "0"), 64, "both --pose and --motion"),
     ("pose_no_frames", none, MOVE[:6], 64, "no frames are named"),
     ("pose_frames_word", none, MOVE[:7] + ("a:b",), 64, "is not A, A:B or A:B:STEP"),
-    ("pose_frames_beyond", none, MOVE[:7] + ("7:9",), 64, "names no frames of this clip"),
+    ("pose_frames_beyond", none, MOVE[:7] + ("7:9",), 64, "names no frames of this motion"),
     ("pose_unknown_tissue", none, POSE + ("--tissues", "liver"), 64, "the model has no 'liver'"),
     ("pose_unknown_volume", none, POSE + ("--volumes", "mr"), 64, "the model has no 'mr'"),
     ("pose_unknown_skinning", none, POSE + ("--skinning", "fem2"), 64, "--skinning"),
