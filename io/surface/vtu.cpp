@@ -72,7 +72,9 @@ class PieceReader {
     const auto data = piece_.sections.find("PointData");
     std::vector<GridArray> kept;
     if (data != piece_.sections.end()) {
-      for (const auto& [name, array] : data->second) {
+      for (const auto& entry : data->second) {
+        const std::string& name = entry.first;
+        const vtk_xml::DataArray& array = entry.second;
         const std::string_view word = array.attribute("NumberOfComponents");
         const auto components = word.empty() ? std::optional<std::int64_t>(1) : bytes::whole(word);
         if (!components || *components < 1 || *components > 64)
