@@ -214,22 +214,25 @@ TEST_F(PosedInOnePass, WhereTetsFoldTheLowestPositiveOneWins) {
   for (std::size_t v = 0; v < volume.image.bytes.size(); ++v) {
     volume.image.bytes[v] = static_cast<std::byte>(1 + (v % 260 > 90) + (v % 260 > 190));
   }
-  const Image posed = pose_volume(std::make_shared<const Model>(folded), nodes, volume, Sampling::nearest,
-                                  ImageGrid{{60, 60, 60}, {-10, -10, -10}, {1, 1, 1}});
-  const auto at = [&](int i, int j, int k) {
-    return static_cast<int>(posed.bytes[posed.grid.offset(i, j, k)]);
+  const auto posed = [&](int i, int j, int k) {
+    const Image image = pose_volume(std::make_shared<const Model>(folded), nodes, volume, Sampling::nearest,
+                                    ImageGrid{{60, 60, 60}, {-10, -10, -10}, {1, 1, 1}});
+    return static_cast<int>(image.bytes[image.grid.offset(i, j, k)]);
   };
-  EXPECT_EQ(at(15, 15, 15), 2);
-  EXPECT_EQ(at(45, 12, 12), 2);
-  EXPECT_EQ(at(55, 55, 55), 0);
+  EXPECT_EQ(posed(15, 15, 15), 2);
+  EXPECT_EQ(posed(45, 12, 12), 2);
+  EXPECT_EQ(posed(55, 55, 55), 0);
+  // All three the wrong way round: the lowest.
+  for (std::size_t n : {4U, 8U}) std::swap_ranges(&nodes[3 * n + 3], &nodes[3 * n + 6], &nodes[3 * n + 6]);
+  EXPECT_EQ(posed(15, 15, 15), 1);
 }
 
 TEST_F(PosedInOnePass, FlatTetsAndNodesThatAreNoNumbersDoNoHarm) {
   const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
-  // A sheet a tenth of a millimetre thick, on voxel centres.
+  // A sheet a hundredth of a millimetre thick, on voxel centres.
   const ImageGrid grid{{21, 60, 100}, {-10, -90, -40}, {1, 3, 4}};
   std::vector<float> nodes = rest_nodes(*model);
-  for (std::size_t n = 0; n < nodes.size(); n += 3) nodes[n] *= 1e-3F;
+  for (std::size_t n = 0; n < nodes.size(); n += 3) nodes[n] *= 1e-4F;
   poser.pose(nodes, volume, Sampling::trilinear, grid, out, scratch);
   EXPECT_LE((differing<std::uint8_t>(*model, nodes, volume, Sampling::trilinear, out, 1)), 1e-3);
   nodes[30] = std::numeric_limits<float>::quiet_NaN();
