@@ -20,8 +20,8 @@ struct BentCylinder {
     ImageGrid grid;
     grid.size = {2 * radius + 5, 2 * radius + 5, length};
     grid.origin = {-12.5, 40, 900};
-    const int middle = radius + 2;
-    const auto within = [middle](int i, int j, int r) {
+    constexpr int middle = radius + 2;
+    const auto within = [](int i, int j, int r) {
       return (i - middle) * (i - middle) + (j - middle) * (j - middle) <= r * r;
     };
     const Image mask = mask_where(
