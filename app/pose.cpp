@@ -306,6 +306,7 @@ int run(const Program& program, const Settings& settings) {
   const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
+  const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model);
   const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
   runtime::PosedBody body = poser.make_frame();
 
@@ -316,7 +317,8 @@ int run(const Program& program, const Settings& settings) {
     // Quality looks at every tissue, whichever are written.
     const Status status = poser.run(frame.pose, skinning, poser.all_tissues(), body);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
-    const json quality = quality_json(*model, body, runtime::measure(*model, body, poser.all_tissues()));
+    const json quality =
+        quality_json(*model, body, runtime::measure(*model, body, poser.all_tissues(), {}, closed));
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
     if (settings.as_case)
       io::write_case(folder,

@@ -146,8 +146,15 @@ void judge(const QualityThresholds& thresholds, PoseQuality& quality) {
                  quality.bone_rigidity_mm <= thresholds.max_bone_rigidity_mm;
 }
 
+std::vector<std::uint8_t> closed_surfaces(const Model& model) {
+  std::vector<std::uint8_t> out(model.tissues.size());
+  tbb::parallel_for(std::size_t{0}, out.size(),
+                    [&](std::size_t t) { out[t] = is_closed(model.tissues[t].F) ? 1 : 0; });
+  return out;
+}
+
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
-                    const QualityThresholds& thresholds) {
+                    const QualityThresholds& thresholds, std::span<const std::uint8_t> closed) {
   PoseQuality out;
   const TetSums sums = sum_tets(model, body.nodes);
   out.tets_measured = model.tet_count();
@@ -166,7 +173,7 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
     const std::vector<float>& posed = body.tissues[tissues[i]];
     TissueChange& change = out.tissues[i];
     change.name = tissue.name;
-    change.closed = is_closed(tissue.F);
+    change.closed = closed.empty() ? is_closed(tissue.F) : closed[tissues[i]] != 0;
     if (change.closed) {
       change.rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
       change.posed_mm3 = enclosed_volume(posed, tissue.F);

@@ -42,10 +42,14 @@ struct PoseQuality {
   bool pass = true;  ///< the verdict: `pass` or `warn`
 };
 
-/// `tissues`: rows of Model::tissues that `body` holds. Sums run in a fixed order: same figures for any
-/// thread count.
+/// `tissues`: rows of Model::tissues that `body` holds. `closed`: closed_surfaces of the model, for those who
+/// measure many poses; worked out again where empty. Sums run in a fixed order: same figures for any thread
+/// count.
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
-                    const QualityThresholds& thresholds = {});
+                    const QualityThresholds& thresholds = {}, std::span<const std::uint8_t> closed = {});
+
+/// is_closed of every tissue's triangles. Parallel.
+std::vector<std::uint8_t> closed_surfaces(const Model& model);
 
 /// Sets `pass` and the thresholds that it was judged by.
 void judge(const QualityThresholds& thresholds, PoseQuality& quality);

@@ -96,7 +96,7 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, cons
     *array.mutable_array() = wire::append(*payload, std::span<const float>(body.tissues[tissue]), 3);
   }
   if (want.quality) {
-    describe(runtime::measure(job.model->model(), body, want.tissues), want.tissues,
+    describe(runtime::measure(job.model->model(), body, want.tissues, {}, job.model->closed), want.tissues,
              *frame.mutable_quality());
   }
   *frame.mutable_timings() = timings;

@@ -45,7 +45,10 @@ void describe(const ModelVolume& volume, v1::Volume& out) {
 }  // namespace
 
 ServedModel::ServedModel(std::string name, std::shared_ptr<const Model> model)
-    : poser(model), volumes(model), summary(summarize(std::move(name), *model)) {
+    : poser(model),
+      volumes(model),
+      closed(runtime::closed_surfaces(*model)),
+      summary(summarize(std::move(name), *model)) {
   opened.set_model(summary.name());
   opened.set_identity(summary.identity());
   opened.set_rig_digest(model_file::rig_digest(model->rig));

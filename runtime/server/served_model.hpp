@@ -7,6 +7,7 @@
 
 #include "core/values/model.hpp"
 #include "proto/framing.hpp"
+#include "runtime/quality/pose_quality.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/volume_poser.hpp"
 
@@ -21,6 +22,7 @@ struct ServedModel {
 
   runtime::BodyPoser poser;
   runtime::VolumePoser volumes;
+  std::vector<std::uint8_t> closed;  ///< runtime::closed_surfaces
   v1::ModelSummary summary;
   v1::ModelOpened opened;                         ///< without session, role and triangles
   std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`

@@ -181,7 +181,11 @@ TEST(PoseQuality, OpenSurfacesHaveNoVolume) {
   posed.model = std::make_shared<const Model>(model);
   deform(posed.body, [](const Vector3d& p) { return Vector3d(1.2 * p.x(), p.y(), p.z()); });
   const QualityMeter meter(posed.model);
-  for (const PoseQuality& q : {posed.measured(), meter.measure(posed.body, posed.poser.all_tissues())}) {
+  const auto once = closed_surfaces(*posed.model);
+  EXPECT_EQ(once, (std::vector<std::uint8_t>{1, 1, 1, 1, 0}));
+  for (const PoseQuality& q :
+       {posed.measured(), measure(*posed.model, posed.body, posed.poser.all_tissues(), {}, once),
+        meter.measure(posed.body, posed.poser.all_tissues())}) {
     EXPECT_TRUE(q.tissues[0].closed);
     EXPECT_NEAR(q.tissues[0].share, 0.2, 1e-4);
     EXPECT_FALSE(q.tissues[4].closed);
