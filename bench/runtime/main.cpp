@@ -230,7 +230,7 @@ class Bench {
             (sampling == runtime::Sampling::nearest ? " bit, nearest" : " bit, trilinear");
         const auto row = [&](const std::string& name, const ImageGrid& grid, int runs) {
           Image out;
-          line("  " + name + ", " + how, threads,
+          line(std::string("  ").append(name).append(", ").append(how), threads,
                time(runs, [&](int) { poser.pose(frame.nodes, sampled, sampling, grid, out, scratch); }), 0);
         };
         row("290 x 169 x 940", fine, 5);

@@ -73,8 +73,9 @@ TetSums sum_tets(const Model& model, std::span<const float> posed) {
 
 Vector3d mean_of(std::span<const float> points) {
   Vector3d sum = Vector3d::Zero();
-  for (std::size_t v = 0; v < points.size() / 3; ++v) sum += point(points, v);
-  return sum / static_cast<double>(points.size() / 3);
+  const std::size_t count = points.size() / 3;
+  for (std::size_t v = 0; v < count; ++v) sum += point(points, v);
+  return sum / static_cast<double>(count);
 }
 
 }  // namespace

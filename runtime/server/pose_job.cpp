@@ -121,11 +121,11 @@ Status fill_volume(const PoseJob& job, const VolumeWant& want, const runtime::Po
   if (want.by_spheres) {
     const runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
     const runtime::LatticeBox box = runtime::box_for(set, want.region);
-    if (const Status status = check_size(grid_of(set.lattice, box), job); !status.ok()) return status;
+    if (Status status = check_size(grid_of(set.lattice, box), job); !status.ok()) return status;
     image = runtime::refill(set, box, volume.image, volume.background, want.sampling);
   } else {
     const ImageGrid grid = runtime::grow_to(volume.image.grid, body.nodes);
-    if (const Status status = check_size(grid, job); !status.ok()) return status;
+    if (Status status = check_size(grid, job); !status.ok()) return status;
     runtime::VolumePoser::Scratch scratch;
     job.model->volumes.pose(body.nodes, volume, want.sampling, grid, image, scratch);
   }

@@ -44,7 +44,7 @@ void describe(const ModelVolume& volume, v1::Volume& out) {
 
 }  // namespace
 
-ServedModel::ServedModel(std::string name, std::shared_ptr<const Model> model)
+ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model)
     : poser(model),
       volumes(model),
       closed(runtime::closed_surfaces(*model)),

@@ -16,7 +16,7 @@ namespace ecorche::server {
 /// Immutable after construction; shared by every thread.
 struct ServedModel {
   /// `name` is what OpenModel asks for.
-  ServedModel(std::string name, std::shared_ptr<const Model> model);
+  ServedModel(std::string name, const std::shared_ptr<const Model>& model);
 
   const Model& model() const { return poser.model(); }
 

@@ -43,7 +43,7 @@ struct Tile {
   void for_owned(F&& f) const {
     for (std::int32_t k = 0; k < size[2]; ++k) {
       for (std::int32_t j = 0; j < size[1]; ++j) {
-        const std::int32_t* row = &owners->owner[static_cast<std::size_t>(kTileEdge * (j + kTileEdge * k))];
+        const std::int32_t* row = owners->owner.data() + kTileEdge * (j + kTileEdge * k);
         for (std::int32_t i = 0; i < size[0]; ++i) {
           if (row[i] != TileOwners::none) f(first[0] + i, first[1] + j, first[2] + k, row[i]);
         }
