@@ -3,7 +3,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <array>
 #include <memory>
@@ -31,8 +30,6 @@ class TestServer {
   void join();
 
  private:
-  // ThreadSanitizer sees no edges inside TBB's own threads: here a pose is one thread's work.
-  tbb::global_control one_thread_{tbb::global_control::max_allowed_parallelism, 1};
   std::shared_ptr<const Model> model_;
   Workers workers_;
   std::unique_ptr<Server> server_;
