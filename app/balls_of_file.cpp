@@ -75,12 +75,14 @@ std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const fs::path& skeleto
 }
 
 runtime::BallSet posed_balls(const VolumetricSkeleton& skeleton, const ImageGrid& lattice, const Rig& rig,
-                             Pose pose, std::size_t& clamped) {
+                             Pose pose, const runtime::Seams& seams, std::size_t& clamped) {
   std::vector<ClampedJoint> held;
   kinematics::constrain(rig.skeleton, pose, held);
   clamped = held.size();
   runtime::BallSet set = runtime::balls_at_rest(skeleton, lattice);
-  runtime::move_balls(skeleton, kinematics::forward(rig, pose), set);
+  const std::vector<RigidTransform> motions = kinematics::forward(rig, pose);
+  runtime::move_balls(skeleton, motions, set);
+  runtime::bridge(seams, motions, set);
   return set;
 }
 

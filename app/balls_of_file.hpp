@@ -9,6 +9,7 @@
 #include "core/values/skeleton.hpp"
 #include "core/values/volumetric_skeleton.hpp"
 #include "runtime/spheres/balls.hpp"
+#include "runtime/spheres/seams.hpp"
 
 namespace ecorche::app {
 
@@ -20,8 +21,9 @@ namespace ecorche::app {
 std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const std::filesystem::path& skeleton,
                                                          const std::filesystem::path& rig);
 
-/// Its balls at `pose` (within limits, coupled); `clamped` counts the joints that limits held back.
+/// Its balls at `pose` (within limits, coupled), bridged along `seams`; `clamped` counts the joints that
+/// limits held back.
 runtime::BallSet posed_balls(const VolumetricSkeleton& skeleton, const ImageGrid& lattice, const Rig& rig,
-                             Pose pose, std::size_t& clamped);
+                             Pose pose, const runtime::Seams& seams, std::size_t& clamped);
 
 }  // namespace ecorche::app

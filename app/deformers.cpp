@@ -26,6 +26,7 @@ struct Settings {
   fs::path model, output;
   FrameChoice frames;
   std::string volume, sampling = "nearest", skinning = "cor";
+  bool bridge = false;
 };
 
 double seconds_of(const std::function<void()>& work) {
@@ -127,7 +128,7 @@ std::vector<std::byte> background_bytes(const ModelVolume& volume) {
 }
 
 json compare_frame(const Settings& s, const runtime::BodyPoser& poser, const ModelVolume& volume,
-                   const Frame& frame, const Context& context) {
+                   const runtime::Seams& seams, const Frame& frame, const Context& context) {
   const Model& model = poser.model();
   runtime::PosedBody body = poser.make_frame();
   const runtime::Sampling how =
@@ -149,7 +150,8 @@ json compare_frame(const Settings& s, const runtime::BodyPoser& poser, const Mod
         kMib;
   });
   const double spheres = seconds_of([&] {
-    const runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
+    runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
+    runtime::bridge(seams, body.segments, set);
     by_spheres = runtime::refill(set, runtime::grown_box(set), volume.image, volume.background, how, context);
     spheres_mib = (set.balls.size() * (sizeof set.balls[0] + 48) + by_spheres.bytes.size()) / kMib;
   });
@@ -203,9 +205,11 @@ int run(const Program& program, const Settings& s) {
                 "its voxels are not cubic, so the two do not pose it on one lattice", "resample it");
   const std::vector<Frame> frames = read_frames(program, s.frames, model->rig);
   const runtime::BodyPoser poser(model);
+  runtime::Seams seams;
+  if (s.bridge) seams = runtime::seams_for(*model, *volume, program.context("seams"));
   json rows = json::array();
   for (const Frame& frame : frames)
-    rows.push_back(compare_frame(s, poser, *volume, frame, program.context("pose")));
+    rows.push_back(compare_frame(s, poser, *volume, seams, frame, program.context("pose")));
   program.result(text_of(rows), {{"ok", true},
                                  {"volume", s.volume},
                                  {"balls", spheres.size()},
@@ -226,6 +230,7 @@ void declare_deformers(CLI::App& app, Program& program, Run& chosen) {
       "-o,--output", s->output,
       "folder for tets.nrrd, spheres.nrrd and difference.nrrd (1 same, 2 differs on the boundary, 3 within)");
   add_frame_options(*command, s->frames);
+  command->add_flag("--bridge", s->bridge, "of the spheres: fill what opens between segments");
   command->add_option("--sampling", s->sampling, "nearest or trilinear; labels are always nearest")
       ->check(CLI::IsMember({"nearest", "trilinear"}))
       ->capture_default_str();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -40,7 +41,7 @@ struct Settings {
   std::string sampling = "trilinear";
   std::string grid = "posed";
   std::string deformer = "tets";
-  bool tets = false, field = false, as_case = false;
+  bool tets = false, field = false, as_case = false, bridge = false;
   std::vector<std::string> tet_formats{"vtu"};
 
   bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
@@ -54,6 +55,7 @@ runtime::Sampling sampling_of(const Settings& settings) {
 struct Plan {
   std::vector<std::uint32_t> tissues, volumes;
   bool tets = false, field = false;
+  std::map<std::string, runtime::Seams> seams;  // of volumes that are to be bridged, by name
 };
 
 [[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
@@ -86,6 +88,8 @@ std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::st
 
 // What is not named is not written; naming nothing writes everything.
 Plan plan_of(const Settings& settings, const Model& model) {
+  if (settings.bridge && settings.deformer != "spheres")
+    usage("--bridge", "tets open no gaps", "add --deformer spheres");
   if (settings.as_case) {
     if (settings.chooses())
       usage("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
@@ -93,7 +97,7 @@ Plan plan_of(const Settings& settings, const Model& model) {
       usage("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
     if (settings.deformer != "tets")
       usage("--as-case", "a case's surfaces and volumes follow the same tets", "leave out --deformer");
-    return {{}, {}, true, false};  // the case itself, and the tets beside it
+    return {{}, {}, true, false, {}};  // the case itself, and the tets beside it
   }
   const std::vector<std::string> all{"all"};
   const bool everything = !settings.chooses();
@@ -241,7 +245,9 @@ class FrameWriter {
   }
 
   Image refilled(const ModelVolume& volume) const {
-    const runtime::BallSet set = runtime::balls_for(model_, body_.segments, volume);
+    runtime::BallSet set = runtime::balls_for(model_, body_.segments, volume);
+    if (const auto seams = plan_.seams.find(volume.name); seams != plan_.seams.end())
+      runtime::bridge(seams->second, body_.segments, set);
     const runtime::LatticeBox box =
         settings_.grid == "rest" ? runtime::LatticeBox{{0, 0, 0}, set.lattice.size} : runtime::grown_box(set);
     const runtime::Sampling sampling = volume.labels ? runtime::Sampling::nearest : sampling_of(settings_);
@@ -299,10 +305,15 @@ std::string line_of(const json& frame) {
 
 int run(const Program& program, const Settings& settings) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
-  const Plan plan = plan_of(settings, *model);
+  Plan plan = plan_of(settings, *model);
   if (settings.deformer == "spheres" && model->spheres.empty())
     throw Error(ErrorKind::config, settings.model.string(), "it holds no spheres",
                 "preprocess it with spheres, or deform by tets");
+  for (const std::uint32_t row : plan.volumes) {
+    const ModelVolume& volume = model->volumes[row];
+    if (settings.bridge)
+      plan.seams.emplace(volume.name, runtime::seams_for(*model, volume, program.context("seams")));
+  }
   const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
@@ -358,6 +369,8 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
                    "how volumes follow: tets, or spheres (the model's volumetric skeleton, refilled)")
       ->check(CLI::IsMember({"tets", "spheres"}))
       ->capture_default_str();
+  command->add_flag("--bridge", s->bridge,
+                    "of the spheres: fill what opens between segments that turn against each other");
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');
   command->add_option("--format", s->formats, "of the tissues: stl, obj, ply, off, vtp, glb, or several")

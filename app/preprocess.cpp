@@ -189,6 +189,13 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::Range(Options::sigma_range.low, Options::sigma_range.high))
       ->capture_default_str();
   command
+      ->add_option(
+          "--spheres-by", o.spheres_by,
+          "what the skeleton's voxels hang by: the largest skinning weight, or the nearest line from "
+          "joint to joint that they see")
+      ->check(CLI::IsMember({"weights", "bones"}))
+      ->capture_default_str();
+  command
       ->add_option("--spheres", o.spheres_tp,
                    "also thin the body to a volumetric skeleton of this thinness (0.48 is the paper's), for "
                    "pose --deformer spheres")

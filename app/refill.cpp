@@ -19,6 +19,7 @@
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/spheres/preview.hpp"
 #include "runtime/spheres/refill.hpp"
+#include "runtime/spheres/seams.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -34,7 +35,7 @@ struct Settings {
   double background = 0;
   std::string sampling = "trilinear";
   double bulge = 0, explode = 0, time = 1;
-  bool melt = false, back = false;
+  bool melt = false, back = false, bridge = false;
   std::vector<std::string> morph;
 
   bool poses() const { return !frames.pose.empty() || !frames.motion.file.empty(); }
@@ -59,6 +60,8 @@ void check(const Settings& s) {
   if (!s.rig.empty() && !s.poses())
     usage("--rig", "nothing is posed", "add --pose FILE or --motion CLIP --frames A:B");
   if (s.back && !s.poses()) usage("--back", "no pose to come back from", "add --rig and --pose");
+  if (s.bridge && (!s.poses() || s.back))
+    usage("--bridge", "only what is posed opens gaps", "add --rig and --pose, and leave out --back");
   if (s.bulge != 0 && !rigged) usage("--bulge", "joints are needed", "add --rig and --pose");
   if (is_surface(s.output) && (!s.region.empty() || !s.volume.empty()))
     usage("--output", "a preview shows no values", "leave out VOLUME and --region, or name an image");
@@ -204,11 +207,15 @@ int run(const Program& program, const Settings& s) {
     result["frames"].push_back(run_morph(s, skeleton, volume, program.context("morph")));
   } else {
     const ImageGrid lattice = lattice_for(s, skeleton, volume);
+    runtime::Seams seams;
+    if (s.bridge)
+      seams = runtime::seams_of(runtime::balls_at_rest(skeleton, lattice), skeleton.segment, rig.skeleton,
+                                program.context("seams"));
     const std::vector<Frame> frames =
         s.poses() ? read_frames(program, s.frames, rig) : std::vector<Frame>{{"", {}}};
     for (const Frame& frame : frames) {
       std::size_t clamped = 0;
-      runtime::BallSet set = s.poses() ? posed_balls(skeleton, lattice, rig, frame.pose, clamped)
+      runtime::BallSet set = s.poses() ? posed_balls(skeleton, lattice, rig, frame.pose, seams, clamped)
                                        : runtime::balls_at_rest(skeleton, lattice);
       if (clamped > 0) program.note("note: limits held back " + std::to_string(clamped) + " joint(s)");
       apply_effects(s, rig, set);
@@ -257,6 +264,8 @@ void declare_refill(CLI::App& app, Program& program, Run& chosen) {
           "--bulge", s->bulge,
           "balls at joints grow by this share (negative: shrink); the new shell shows the ball's rim")
       ->check(CLI::Range(-0.99, 10.0));
+  command->add_flag("--bridge", s->bridge,
+                    "fill what opens between segments that turn against each other, halfway between them");
   command->add_flag("--melt", s->melt, "small balls go first; at time 1 none is left");
   command
       ->add_option("--explode", s->explode,

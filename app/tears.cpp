@@ -12,8 +12,10 @@
 #include "app/balls_of_file.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
+#include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
 #include "runtime/spheres/effects.hpp"
+#include "runtime/spheres/seams.hpp"
 #include "runtime/spheres/tears.hpp"
 
 namespace ecorche::app {
@@ -26,7 +28,7 @@ struct Settings {
   fs::path skeleton, rig;
   FrameChoice frames;
   double voxel_mm = 0, bulge = 0, step_deg = 10;
-  bool sweep = false;
+  bool sweep = false, bridge = false;
   int prove = 0;
 };
 
@@ -40,11 +42,14 @@ struct Body {
   Rig rig;
   runtime::BallSet rest;
   std::optional<runtime::TearDetector> detector;
+  runtime::Seams seams;  // none where they are not to be bridged
 
-  runtime::BallSet posed(std::span<const RigidTransform> motions, double gain) const {
+  runtime::BallSet posed(const Pose& pose, double gain) const {
     runtime::BallSet set = rest;
+    const std::vector<RigidTransform> motions = kinematics::forward(rig, pose);
     runtime::move_balls(skeleton, motions, set);
     if (gain != 0) runtime::bulge(set, rig.skeleton, runtime::bulges_of(rest, rig.skeleton, gain), 1);
+    runtime::bridge(seams, motions, set);
     return set;
   }
 };
@@ -64,11 +69,11 @@ json look_at_frames(const Program& program, const Settings& s, const Body& body)
   const std::vector<Frame> poses = read_frames(program, s.frames, body.rig);
   const Context context = program.context("frames");
   for (const Frame& frame : poses) {
-    std::size_t clamped = 0;
-    runtime::BallSet set = posed_balls(body.skeleton, body.rest.lattice, body.rig, frame.pose, clamped);
-    if (s.bulge != 0)
-      runtime::bulge(set, body.rig.skeleton, runtime::bulges_of(body.rest, body.rig.skeleton, s.bulge), 1);
-    const runtime::Tears tears = body.detector->look(set, {nullptr, nullptr, context.stop});
+    Pose pose = frame.pose;
+    std::vector<ClampedJoint> clamped;
+    kinematics::constrain(body.rig.skeleton, pose, clamped);
+    const runtime::Tears tears =
+        body.detector->look(body.posed(pose, s.bulge), {nullptr, nullptr, context.stop});
     torn += tears.errs();
     frames.push_back(frame_json(body.rig.skeleton, frame.name, tears));
     context.report(static_cast<double>(frames.size()) / static_cast<double>(poses.size()));
@@ -94,8 +99,7 @@ double first_tear(const Body& body, std::size_t joint, const AngleAxis& angle, d
     Eigen::Vector3d axis = Eigen::Vector3d::Zero();
     axis[angle.axis] = sign * angle.sign;
     pose.rotation[joint] = Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis);
-    if (body.detector->look(body.posed(kinematics::forward(body.rig, pose), gain), context).errs())
-      return degrees;
+    if (body.detector->look(body.posed(pose, gain), context).errs()) return degrees;
   }
   return 0;
 }
@@ -129,16 +133,6 @@ bool hangs_on(const Skeleton& rig, int segment, int on) {
   return segment == on;
 }
 
-// The largest radius of the balls that hold a joint's centre, voxels; 0 where none does.
-double radius_at(const Body& body, std::size_t joint) {
-  double largest = 0;
-  for (const runtime::JointBulge& at : runtime::bulges_of(body.rest, body.rig.skeleton, 0)) {
-    if (static_cast<std::size_t>(at.segment) == joint)
-      largest = at.reach_mm / 1.5 / body.rest.lattice.spacing[0];
-  }
-  return largest;
-}
-
 // From the rest of the body towards what hangs on the joint, unit; zero where one of them has no balls.
 Eigen::Vector3d way_out(const Body& body, int joint) {
   std::array<Eigen::Vector3d, 2> sum{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
@@ -158,9 +152,10 @@ Eigen::Vector3d way_out(const Body& body, int joint) {
 json prove(const Settings& s, const Body& body) {
   std::mt19937 random(2001);
   std::uniform_real_distribution<double> way(-1, 1), factor(2, 4);
+  const std::vector<double> radius = runtime::radii_at_joints(body.rest, body.rig.skeleton);
   std::vector<std::size_t> joints;
-  for (std::size_t j = 1; j < body.rig.skeleton.segments.size(); ++j) {
-    if (radius_at(body, j) > 0 && way_out(body, static_cast<int>(j)).norm() > 0) joints.push_back(j);
+  for (std::size_t j = 1; j < radius.size(); ++j) {
+    if (radius[j] > 0 && way_out(body, static_cast<int>(j)).norm() > 0) joints.push_back(j);
   }
   if (joints.empty()) usage("--prove", "no joint lies within the body", "check the rig");
   int found = 0;
@@ -168,7 +163,7 @@ json prove(const Settings& s, const Body& body) {
     const std::size_t joint = joints[random() % joints.size()];
     Eigen::Vector3d shift = way_out(body, static_cast<int>(joint));
     shift += 0.4 * Eigen::Vector3d(way(random), way(random), way(random));
-    shift *= factor(random) * radius_at(body, joint) / shift.norm();
+    shift *= factor(random) * radius[joint] / shift.norm();
     runtime::BallSet set = body.rest;
     runtime::move_balls(body.skeleton, std::vector<RigidTransform>(body.rig.skeleton.segments.size()), set);
     for (runtime::Ball& ball : set.balls) {
@@ -239,6 +234,9 @@ int run(const Program& program, const Settings& s) {
   body.rest = runtime::balls_at_rest(
       body.skeleton, s.voxel_mm > 0 ? runtime::lattice_of(body.skeleton, s.voxel_mm) : body.skeleton.grid);
   body.detector.emplace(body.rest, body.skeleton.segment, program.context("rest"));
+  if (s.bridge)
+    body.seams =
+        runtime::seams_of(body.rest, body.skeleton.segment, body.rig.skeleton, program.context("seams"));
   json result{{"ok", true},
               {"deep_voxels", body.detector->deep_voxels()},
               {"deep_links", body.detector->deep_links()}};
@@ -272,6 +270,7 @@ void declare_tears(CLI::App& app, Program& program, Run& chosen) {
       ->add_option("--bulge", s->bulge,
                    "balls at joints grow by this share (the sweep tells both; there 0.3 where not given)")
       ->check(CLI::Range(-0.99, 10.0));
+  command->add_flag("--bridge", s->bridge, "fill what opens between segments, as refill --bridge does");
   command->add_option("--prove", s->prove, "first seed so many tears and say how many are found")
       ->check(CLI::Range(0, 100000));
   command->add_option("--voxel", s->voxel_mm, "edge of the voxels to look at, mm (default: the skeleton's)")

@@ -16,6 +16,7 @@
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/relax_slivers.hpp"
+#include "preprocess/thin/attach_by_weights.hpp"
 #include "preprocess/thin/body_spheres.hpp"
 #include "preprocess/thin/thinning.hpp"
 #include "preprocess/voxel/voxelize.hpp"
@@ -253,6 +254,9 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   model.tets = std::move(mesh->T);
   model.tet_label = std::move(mesh->label);
   mesh.reset();
+  for (VolumetricSkeleton& spheres : model.spheres) {
+    if (options.spheres_by == "weights") spheres.segment = thin::attach_by_weights(spheres, model, context);
+  }
 
   model.cor = stage([&] {
     return cor::centres(model.nodes, model.tets, model.weights, model.segment_count(), {options.cor_sigma},

@@ -36,6 +36,8 @@ struct Options {
   /// Thinness of the body's volumetric skeleton. None is made without it: only the deformer of spheres reads
   /// one, and a model is posed by tets unless told otherwise.
   std::optional<double> spheres_tp;
+  /// What its voxels hang by: `weights` (thin/attach_by_weights.hpp) or `bones` (thin/attach.hpp).
+  std::string spheres_by = "weights";
 };
 
 struct StageTime {

@@ -37,7 +37,10 @@ std::map<std::string, std::string> provenance(const Case& patient, const Options
   out["option/max_tets"] = std::to_string(options.max_tets);
   out["option/max_nodes"] = std::to_string(options.max_nodes);
   out["option/cor_sigma"] = decimal(options.cor_sigma);
-  if (options.spheres_tp) out["option/spheres_tp"] = decimal(*options.spheres_tp);
+  if (options.spheres_tp) {
+    out["option/spheres_tp"] = decimal(*options.spheres_tp);
+    out["option/spheres_by"] = options.spheres_by;
+  }
   out["library/eigen"] = eigen_version();
 #ifdef ECORCHE_GPL
   if (mesher == "cgal") out["library/cgal"] = ECORCHE_CGAL_VERSION;

@@ -44,11 +44,12 @@ std::size_t root_of(std::vector<std::size_t>& parent, std::size_t a) {
   return a;
 }
 
-// Joins the runs of two rows that touch, corners included.
-void join(const Runs& runs, std::size_t row, std::size_t other, std::vector<std::size_t>& parent) {
+// Joins the runs of two rows that touch, corners included, or between which at most `gap` voxels lie. What
+// the smaller end leaves behind lies farther off, or is joined along its own row.
+void join(const Runs& runs, std::size_t row, std::size_t other, int gap, std::vector<std::size_t>& parent) {
   std::size_t a = runs.first[row], b = runs.first[other];
   while (a < runs.first[row + 1] && b < runs.first[other + 1]) {
-    if (runs.run[a].begin <= runs.run[b].end && runs.run[b].begin <= runs.run[a].end) {
+    if (runs.run[a].begin <= runs.run[b].end + gap && runs.run[b].begin <= runs.run[a].end + gap) {
       parent[root_of(parent, a)] = root_of(parent, b);
     }
     runs.run[a].end < runs.run[b].end ? ++a : ++b;
@@ -78,18 +79,24 @@ Image covered(const BallSet& set, const LatticeBox& box, const Context& context)
   return out;
 }
 
-std::size_t parts_of(const Image& mask, std::size_t least) {
+std::size_t parts_of(const Image& mask, std::size_t least, Gap across) {
+  const int gap = across == Gap::one_voxel ? 1 : 0;
   const Runs runs = runs_of(mask);
   std::vector<std::size_t> parent(runs.run.size());
   std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const auto rows = static_cast<std::size_t>(mask.grid.size[1]);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(mask.grid.size[2]); ++k) {
-    for (std::size_t j = 0; j < rows; ++j) {
-      const std::size_t row = j + rows * k;
-      if (j > 0) join(runs, row, row - 1, parent);
-      if (k == 0) continue;
-      for (std::size_t beside = j > 0 ? j - 1 : 0; beside < std::min(j + 2, rows); ++beside) {
-        join(runs, row, beside + rows * (k - 1), parent);
+  const int rows = mask.grid.size[1];
+  const auto row_of = [&](int j, int k) { return static_cast<std::size_t>(j + std::int64_t{rows} * k); };
+  for (int k = 0; k < mask.grid.size[2]; ++k) {
+    for (int j = 0; j < rows; ++j) {
+      const std::size_t row = row_of(j, k);
+      for (std::size_t r = runs.first[row] + 1; r < runs.first[row + 1]; ++r) {
+        if (runs.run[r].begin - runs.run[r - 1].end <= gap)
+          parent[root_of(parent, r)] = root_of(parent, r - 1);
+      }
+      for (int down = 0; down <= std::min(1 + gap, k); ++down) {
+        const int last = down == 0 ? j - 1 : std::min(j + 1 + gap, rows - 1);
+        for (int beside = std::max(j - 1 - gap, 0); beside <= last; ++beside)
+          join(runs, row, row_of(beside, k - down), gap, parent);
       }
     }
   }

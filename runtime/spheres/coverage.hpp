@@ -13,8 +13,10 @@ std::size_t covered_voxels(const BallSet& set, const LatticeBox& box, const Cont
 /// 1 where some ball holds the voxel, else 0: u8.
 Image covered(const BallSet& set, const LatticeBox& box, const Context& context = {});
 
-/// Pieces of the nonzero voxels of a u8 image that hang together by faces, edges or corners, of at least
-/// `least` voxels. O(voxels).
-std::size_t parts_of(const Image& mask, std::size_t least);
+/// How far apart two voxels may lie and hang together: corner to corner, or with one empty voxel between.
+enum class Gap { none, one_voxel };
+
+/// Pieces of the nonzero voxels of a u8 image that hang together, of at least `least` voxels. O(voxels).
+std::size_t parts_of(const Image& mask, std::size_t least, Gap across = Gap::none);
 
 }  // namespace ecorche::runtime

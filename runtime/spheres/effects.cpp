@@ -21,17 +21,25 @@ Vec3 joint_place(const BallSet& set, const Skeleton& rig, std::size_t segment) {
 
 }  // namespace
 
-std::vector<JointBulge> bulges_of(const BallSet& set, const Skeleton& rig, double gain) {
-  std::vector<JointBulge> out;
-  for (std::size_t s = 1; s < rig.segments.size(); ++s) {
+std::vector<double> radii_at_joints(const BallSet& set, const Skeleton& rig) {
+  std::vector<double> out;
+  for (std::size_t s = 0; s < rig.segments.size(); ++s) {
     const Vec3 middle = joint_place(set, rig, s);
     double largest = 0;
     for (const Ball& ball : set.balls) {
       if (distance2(ball.rest, middle) < ball.rest_radius2) largest = std::max(largest, ball.rest_radius2);
     }
-    if (largest > 0) {
-      out.push_back({static_cast<std::int32_t>(s), 1.5 * std::sqrt(largest) * set.lattice.spacing[0], gain});
-    }
+    out.push_back(std::sqrt(largest));
+  }
+  return out;
+}
+
+std::vector<JointBulge> bulges_of(const BallSet& set, const Skeleton& rig, double gain) {
+  std::vector<JointBulge> out;
+  const std::vector<double> radius = radii_at_joints(set, rig);
+  for (std::size_t s = 1; s < radius.size(); ++s) {
+    if (radius[s] > 0)
+      out.push_back({static_cast<std::int32_t>(s), 1.5 * radius[s] * set.lattice.spacing[0], gain});
   }
   return out;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "core/values/skeleton.hpp"
 #include "runtime/spheres/balls.hpp"
@@ -17,6 +18,10 @@ struct JointBulge {
   double reach_mm = 0;       ///< positive
   double gain = 0.3;         ///< above -1
 };
+
+/// Of every segment of `rig` the radius, voxels, of the largest ball that holds its joint's centre at rest; 0
+/// where none does.
+std::vector<double> radii_at_joints(const BallSet& set, const Skeleton& rig);
 
 /// A bulge at every joint but the root's: `reach` is 1.5 times the radius of the largest ball that holds the
 /// joint's centre at rest; joints outside every ball get none.

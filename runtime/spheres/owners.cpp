@@ -241,4 +241,15 @@ void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context
   context.check_stop();
 }
 
+std::vector<std::int32_t> owners_of(const BallSet& set, const LatticeBox& box, const Context& context) {
+  const ImageGrid grid = grid_of(set.lattice, box);
+  std::vector<std::int32_t> out(grid.voxels(), TileOwners::none);
+  for_tiles(set, box, context, [&](const Tile& tile) {
+    tile.for_owned([&](std::int32_t i, std::int32_t j, std::int32_t k, std::int32_t row) {
+      out[grid.offset(i, j, k)] = row;
+    });
+  });
+  return out;
+}
+
 }  // namespace ecorche::runtime

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "core/values/context.hpp"
 #include "runtime/spheres/balls.hpp"
@@ -56,5 +57,9 @@ struct Tile {
 /// Throws as grown_box, and Error{interrupted} on a stop.
 void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context,
                const std::function<void(const Tile&)>& f);
+
+/// Of every voxel of the box the row of the ball that owns it, TileOwners::none where none does. Throws as
+/// for_tiles.
+std::vector<std::int32_t> owners_of(const BallSet& set, const LatticeBox& box, const Context& context = {});
 
 }  // namespace ecorche::runtime

@@ -32,6 +32,12 @@ BallSet balls_for(const Model& model, std::span<const RigidTransform> segments, 
   return set;
 }
 
+Seams seams_for(const Model& model, const ModelVolume& volume, const Context& context) {
+  const VolumetricSkeleton& skeleton = spheres_for(model, volume);
+  return seams_of(balls_at_rest(skeleton, posed_lattice(skeleton, volume)), skeleton.segment,
+                  model.rig.skeleton, context);
+}
+
 LatticeBox box_for(const BallSet& set, const std::optional<Region>& region) {
   if (!region) return grown_box(set);
   const LatticeBox box = box_within(set.lattice, region->low, region->high);

@@ -7,6 +7,7 @@
 
 #include "core/values/model.hpp"
 #include "runtime/spheres/refill.hpp"
+#include "runtime/spheres/seams.hpp"
 
 namespace ecorche::runtime {
 
@@ -26,6 +27,9 @@ ImageGrid posed_lattice(const VolumetricSkeleton& skeleton, const ModelVolume& v
 
 /// The balls of `spheres_for` on that lattice, moved. `segments`: as PosedBody has them.
 BallSet balls_for(const Model& model, std::span<const RigidTransform> segments, const ModelVolume& volume);
+
+/// Where such balls are to be bridged (seams.hpp). Once a volume, not once a pose.
+Seams seams_for(const Model& model, const ModelVolume& volume, const Context& context = {});
 
 /// The voxels to fill: those of the region, or all that the lattice and the posed balls hold. Throws
 /// Error{usage} for a region without a voxel centre.

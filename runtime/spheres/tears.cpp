@@ -80,12 +80,7 @@ TearDetector::TearDetector(const BallSet& rest, const std::vector<std::int32_t>&
                            const Context& context) {
   const LatticeBox box = grown_box(rest);
   const ImageGrid grid = grid_of(rest.lattice, box);
-  std::vector<std::int32_t> owner(grid.voxels(), TileOwners::none);
-  for_tiles(rest, box, context, [&](const Tile& tile) {
-    tile.for_owned([&](std::int32_t i, std::int32_t j, std::int32_t k, std::int32_t row) {
-      owner[grid.offset(i, j, k)] = row;
-    });
-  });
+  const std::vector<std::int32_t> owner = owners_of(rest, box, context);
   const auto held = [&](std::int32_t i, std::int32_t j, std::int32_t k) {
     return i >= 0 && j >= 0 && k >= 0 && i < grid.size[0] && j < grid.size[1] && k < grid.size[2] &&
            owner[grid.offset(i, j, k)] != TileOwners::none;
@@ -115,7 +110,7 @@ TearDetector::TearDetector(const BallSet& rest, const std::vector<std::int32_t>&
       }
     }
   }
-  rest_parts_ = parts_of(covered(rest, box, context), Tears::least_part);
+  rest_parts_ = parts_of(covered(rest, box, context), Tears::least_part, Gap::one_voxel);
 }
 
 Tears TearDetector::look(const BallSet& posed, const Context& context) const {
@@ -142,7 +137,7 @@ Tears TearDetector::look(const BallSet& posed, const Context& context) const {
     most = now;
     out.between = {low, high};
   }
-  out.parts = parts_of(cover.mask, Tears::least_part);
+  out.parts = parts_of(cover.mask, Tears::least_part, Gap::one_voxel);
   return out;
 }
 

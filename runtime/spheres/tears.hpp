@@ -15,7 +15,9 @@ namespace ecorche::runtime {
 struct Tears {
   std::size_t uncovered = 0;  ///< voxels two deep at rest whose own posed place is in no ball
   std::size_t links = 0;  ///< neighbours two deep at rest between whose posed places lies a voxel in no ball
-  std::size_t parts = 0;  ///< pieces that hang together with nothing, of at least `least_part` voxels
+  /// Pieces of at least `least_part` voxels with more than one empty voxel around: a narrower gap opens in a
+  /// thin neck whenever the lattice falls otherwise.
+  std::size_t parts = 0;
   std::size_t rest_parts = 0;
   /// Segments between which most links are torn, the lower row first; -1 without any.
   std::array<std::int32_t, 2> between{-1, -1};

@@ -110,6 +110,20 @@ class Refill(unittest.TestCase):
         self.assertLess(differ, 0.12)
         self.assertGreater(differ, 0)
 
+    def test_bridges_fill_what_opens(self):
+        out = self.folder / "bridge.nrrd"
+        words = ("--rig", self.rig, "--pose", self.pose)
+        plain = self.ok("refill", self.few, "-o", out, *words)["frames"][0]
+        open_ = self.read(out)[0] > 0
+        bridged = self.ok("refill", self.few, "-o", out, *words, "--bridge")["frames"][0]
+        self.assertGreater(bridged["balls"], plain["balls"])
+        self.assertGreater(bridged["held_voxels"], plain["held_voxels"])
+        self.assertLess(bridged["held_voxels"], 1.2 * plain["held_voxels"])
+        self.assertEqual(int(open_.sum()), plain["held_voxels"])
+        self.assertEqual(self.ok("tears", self.few, *words, "--bridge")["frames"][0]["links"], 0)
+        self.assert_error(64, ("refill", self.few, "-o", out, "--bridge"), "--bridge", "only what is posed opens gaps")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, *words, "--bridge", "--back"), "--bridge")
+
     def test_effects_and_previews(self):
         out = self.folder / "effect.nrrd"
         held = [self.ok("refill", self.few, "-o", out, "--melt", "--time", t)["frames"][0]["held_voxels"] for t in (0, 0.7, 1)]
@@ -170,6 +184,14 @@ class Refill(unittest.TestCase):
         joined, spacing, at = self.read(self.folder / "both/spheres.nrrd")
         x, y, z = np.rint((own_at - at) / spacing).astype(int)
         self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
+        both = self.ok("deformers", model, "--volume", "labels", "--pose", pose, "--bridge", "-o", self.folder / "both")["frames"][0]
+        self.assertNotEqual(both["differ"], result["differ"])
+        self.ok("pose", model, "-o", self.folder / "posed", "--pose", pose, "--volumes", "labels", "--deformer", "spheres", "--bridge")
+        own, _, own_at = self.read(self.folder / "posed/labels.nrrd")
+        joined, spacing, at = self.read(self.folder / "both/spheres.nrrd")
+        x, y, z = np.rint((own_at - at) / spacing).astype(int)
+        self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
+        self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--bridge"), "tets open no gaps")
         self.assert_error(64, ("deformers", model, "--volume", "mri", "--pose", pose), "mri")
         self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--deformer", "spheres", "--as-case"), "--deformer")
         plain = pathlib.Path(os.environ["ECORCHE_MODEL"])
