@@ -42,6 +42,7 @@ void declare_export(CLI::App& app, Program& program, Run& chosen);
 void declare_pose(CLI::App& app, Program& program, Run& chosen);
 void declare_motion(CLI::App& app, Program& program, Run& chosen);
 void declare_unpose(CLI::App& app, Program& program, Run& chosen);
+void declare_probe(CLI::App& app, Program& program, Run& chosen);
 void declare_serve(CLI::App& app, Program& program, Run& chosen);
 void declare_stream(CLI::App& app, Program& program, Run& chosen);
 void declare_thin(CLI::App& app, Program& program, Run& chosen);

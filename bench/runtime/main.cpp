@@ -16,7 +16,9 @@
 #include <functional>
 
 #include "bench/runtime/bandwidth.hpp"
+#include "bench/runtime/figure.hpp"
 #include "bench/runtime/plain_eigen.hpp"
+#include "bench/runtime/probing.hpp"
 #include "core/kinematics/forward.hpp"
 #include "core/model_file/model_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
@@ -44,22 +46,6 @@ Pose swing(std::size_t joints, int f) {
   }
   pose.root_translation = {10.0 * f, 0, 5.0 * f};
   return pose;
-}
-
-struct Figure {
-  double median, best, worst;  // ms
-};
-
-Figure time(int frames, const std::function<void(int)>& work) {
-  std::vector<double> ms;
-  for (int f = -3; f < frames; ++f) {
-    const auto start = std::chrono::steady_clock::now();
-    work(f + 3);
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-    if (f >= 0) ms.push_back(took.count());
-  }
-  std::sort(ms.begin(), ms.end());
-  return {ms[ms.size() / 2], ms.front(), ms.back()};
 }
 
 struct Bytes {
@@ -96,15 +82,6 @@ Bytes bytes_of(const Model& model, const runtime::BodyParts& parts) {
   out.quantised = size_of(all, 6);
   out.normals += size_of(all, 6);
   return out;
-}
-
-void line(const std::string& what, int threads, const Figure& figure, double floor_ms, double against = 0) {
-  std::printf("  %-38s %d thread%s %8.3f ms (%.3f .. %.3f)", what.c_str(), threads, threads == 1 ? " " : "s",
-              figure.median, figure.best, figure.worst);
-  if (floor_ms > 0) std::printf(", floor %7.3f, x%.2f", floor_ms, figure.median / floor_ms);
-  if (against > 0) std::printf(", plain Eigen x%.1f slower", against / figure.median);
-  std::printf("\n");
-  std::fflush(stdout);
 }
 
 class Bench {
@@ -192,6 +169,7 @@ class Bench {
     const runtime::QualityMeter meter(model_);
     line("quality, subset of tets", threads,
          time(kFrames, [&](int) { meter.measure(frame, posers_[0]->all_tissues()); }), 0);
+    time_probe(model_, frame.nodes, threads);
     if (model_->volumes.empty()) return;
     const ModelVolume& volume = model_->volumes.front();
     runtime::InverseMap map;

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/point_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include "core/files/atomic_file.hpp"
+#include "core/values/error.hpp"
+
+namespace ecorche::app {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r";
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+std::vector<std::string_view> cells_of(std::string_view line) {
+  std::vector<std::string_view> out;
+  for (;;) {
+    const std::size_t comma = line.find(',');
+    out.push_back(trimmed(line.substr(0, comma)));
+    if (comma == std::string_view::npos) return out;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::optional<float> number(std::string_view text) {
+  float value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
+  return value;
+}
+
+std::string quoted(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char letter : text) out += letter == '"' ? "\"\"" : std::string(1, letter);
+  return out + '"';
+}
+
+void append_line(std::string& out, const nlohmann::json& cells) {
+  bool first = true;
+  for (const nlohmann::json& cell : cells) {
+    if (!first) out += ',';
+    first = false;
+    if (!cell.is_null()) out += cell.is_string() ? quoted(cell.get<std::string>()) : cell.dump();
+  }
+  out += '\n';
+}
+
+}  // namespace
+
+std::vector<float> read_points(const std::filesystem::path& path) {
+  const std::string text = files::read_text(path);
+  std::vector<float> points;
+  std::array<std::size_t, 3> columns{0, 1, 2};
+  bool named = false;
+  std::size_t line_number = 0;
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = trimmed(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    ++line_number;
+    if (line.empty() || line.front() == '#') continue;
+    const std::vector<std::string_view> cells = cells_of(line);
+    const std::string where = path.string() + ":" + std::to_string(line_number);
+    if (points.empty() && !named && !number(cells[0])) {
+      constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
+      for (std::size_t a = 0; a < 3; ++a) {
+        const auto found = std::find(cells.begin(), cells.end(), axes[a]);
+        if (found == cells.end())
+          throw Error(ErrorKind::data, where, "no column is named '" + std::string(axes[a]) + "'",
+                      "begin with a line x,y,z, or with the first point");
+        columns[a] = static_cast<std::size_t>(found - cells.begin());
+      }
+      named = true;
+      continue;
+    }
+    for (const std::size_t column : columns) {
+      const std::optional<float> value = column < cells.size() ? number(cells[column]) : std::nullopt;
+      if (!value || (!named && cells.size() != 3))
+        throw Error(ErrorKind::data, where, "'" + std::string(line) + "' is no point",
+                    "give x, y and z in mm with commas between");
+      points.push_back(*value);
+    }
+  }
+  if (points.empty())
+    throw Error(ErrorKind::data, path.string(), "it holds no points", "give a line x,y,z for each point");
+  return points;
+}
+
+std::string csv_of(const nlohmann::json& columns, const nlohmann::json& rows) {
+  std::string out;
+  append_line(out, columns);
+  for (const nlohmann::json& row : rows) append_line(out, row);
+  return out;
+}
+
+}  // namespace ecorche::app

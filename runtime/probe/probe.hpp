@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points both ways through a posed body: where a posed point was at rest and what is there, and where a rest
+// point went.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/values/model.hpp"
+#include "runtime/probe/tet_runs.hpp"
+#include "runtime/probe/tissue_columns.hpp"
+#include "runtime/volume/resample.hpp"
+
+namespace ecorche::runtime {
+
+/// What to say of every point besides the tet that holds it and where it is on the other side.
+struct ProbeWants {
+  struct Volume {
+    std::uint32_t row = 0;                    ///< of Model::volumes
+    Sampling sampling = Sampling::trilinear;  ///< labels are always sampled nearest
+  };
+  bool gradient = false;
+  bool tissue = false;  ///< by the surfaces: most of the time of a probe
+  std::vector<Volume> volumes = {};
+};
+
+/// One row per point, #P.
+struct Probed {
+  std::vector<std::int32_t> tet;     ///< TetPlace::none where the point lies outside the body
+  std::vector<float> barycentric;    ///< 4 * #P, of the tet's corners; the same at rest and posed
+  std::vector<float> points;         ///< 3 * #P, LPS mm, on the other side; NaN outside
+  std::vector<std::uint16_t> label;  ///< of the tet: TetMesh::soft, or 1 + the row of its bone; 0 outside
+  std::vector<float> gradient;       ///< 9 * #P, row by row: F = d posed / d rest of the tet; NaN outside
+  std::vector<std::int32_t> tissue;  ///< as TissueColumns::at says of the rest point; none outside
+  std::vector<std::vector<double>> values;  ///< per wanted volume, #P * components; its background outside
+};
+
+/// Made once per model; shared and immutable, as BodyPoser is. The body is its tets: what lies in the skin's
+/// surface but in no tet (the skin may stand a little off the mesh) is outside. Where the posed body folds
+/// over itself the tet is the one that posed volumes take (resample.hpp): a positive one before an inverted
+/// one, then the lowest index. Results are the same for any number of threads.
+class Probe {
+ public:
+  explicit Probe(std::shared_ptr<const Model> model);
+
+  /// The tree about one posed body. Kept from pose to pose, so that nothing of the body's size is allocated
+  /// again; one writer at a time.
+  struct PosedTree {
+    std::vector<float> nodes;
+    BoxTree boxes;
+  };
+  /// Must follow every new pose. `nodes`: 3 * #nodes, LPS mm, finite. O(#nodes), parallel.
+  void follow(std::span<const float> nodes, PosedTree& tree) const;
+
+  /// `points`: 3 * #P, LPS mm; those that are not finite lie outside. Any number of threads may ask the same
+  /// tree. Throws Error{usage} for a volume that the model has not.
+  void posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
+                     Probed& out) const;
+  void rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
+                     Probed& out) const;
+
+  const Model& model() const { return *model_; }
+
+ private:
+  struct Way;
+  void run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const;
+
+  std::shared_ptr<const Model> model_;
+  TetRuns runs_;
+  BoxTree rest_;
+  TissueColumns tissues_;
+};
+
+}  // namespace ecorche::runtime

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/probe/tet_runs.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace ecorche::runtime {
+namespace {
+
+constexpr float kFar = std::numeric_limits<float>::infinity();
+
+BoxNode empty_node() {
+  BoxNode node;
+  for (auto& axis : node.low) axis.fill(kFar);
+  for (auto& axis : node.high) axis.fill(-kFar);
+  return node;
+}
+
+}  // namespace
+
+TetRuns::TetRuns(const Tets& tets) {
+  const auto count = static_cast<std::size_t>(tets.rows());
+  const std::size_t runs = (count + width - 1) / width;
+  begin_.reserve(runs + 1);
+  begin_.push_back(0);
+  for (std::size_t r = 0; r < runs; ++r) {
+    std::array<std::uint32_t, 4 * width> nodes;
+    std::size_t used = 0;
+    for (std::size_t t = width * r; t < std::min(count, width * (r + 1)); ++t) {
+      for (int c = 0; c < 4; ++c)
+        nodes[used++] = static_cast<std::uint32_t>(tets(static_cast<Eigen::Index>(t), c));
+    }
+    std::sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(used));
+    node_.insert(node_.end(), nodes.begin(),
+                 std::unique(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(used)));
+    begin_.push_back(static_cast<std::uint32_t>(node_.size()));
+  }
+  std::size_t level = runs;
+  do {
+    level = std::max<std::size_t>(1, (level + width - 1) / width);
+    first_[levels_ + 1] = first_[levels_] + level;
+    ++levels_;
+  } while (level > 1 || levels_ < 2);  // what is fitted in parallel always has a node above it
+}
+
+void fit_boxes(const TetRuns& runs, std::span<const float> nodes, BoxTree& tree) {
+  if (tree.size() != runs.tree_nodes()) tree.assign(runs.tree_nodes(), empty_node());
+  constexpr std::size_t width = TetRuns::width;
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, runs.first(2) - runs.first(1), 4),
+      [&](const auto& range) { kernels::fit_boxes(runs, nodes, tree, range.begin(), range.end()); });
+  for (std::size_t level = 2; level < runs.levels(); ++level) {
+    for (std::size_t child = runs.first(level - 1); child < runs.first(level); ++child) {
+      const std::size_t i = child - runs.first(level - 1);
+      BoxNode& parent = tree[runs.first(level) + i / width];
+      for (std::size_t a = 0; a < 3; ++a) {
+        parent.low[a][i % width] = *std::min_element(tree[child].low[a].begin(), tree[child].low[a].end());
+        parent.high[a][i % width] = *std::max_element(tree[child].high[a].begin(), tree[child].high[a].end());
+      }
+    }
+  }
+}
+
+TetPlace find_tet(const FindTets& where, const std::array<float, 3>& point) {
+  TetPlace place;
+  place.tet = kernels::find_tet(where, point.data(), place.barycentric.data());
+  return place;
+}
+
+}  // namespace ecorche::runtime
