@@ -76,22 +76,9 @@ constexpr double kMargin = 1e-10;
 constexpr double kFlat = 1e-12;
 constexpr std::size_t kWidth = TetRuns::width;
 
-// Nodes as vectors of four; the last one has nothing after it.
-class Nodes {
- public:
-  explicit Nodes(std::span<const float> nodes) : at_(nodes.data()), last_(nodes.size() - 3) {
-    std::memcpy(end_, &nodes[last_], 3 * sizeof(float));
-  }
-  HWY_INLINE V4 operator[](std::size_t node) const {
-    const std::size_t first = 3 * node;
-    return load4(first < last_ ? at_ + first : end_);
-  }
-
- private:
-  const float* at_;
-  std::size_t last_;
-  float end_[4] = {};
-};
+HWY_INLINE const float* node_at(const PaddedNodes& nodes, std::size_t node) {
+  return nodes.data() + 4 * node;
+}
 
 struct Box4 {
   V4 low, high;
@@ -107,9 +94,8 @@ HWY_INLINE void put(const Box4& box, BoxNode& node, std::size_t child) {
   }
 }
 
-void fit_boxes(const TetRuns& runs, std::span<const float> points, BoxTree& tree, std::size_t begin,
+void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end) {
-  const Nodes nodes(points);
   constexpr float far = std::numeric_limits<float>::infinity();
   const Box4 empty{all4(far), all4(-far)};
   const std::size_t lowest = runs.first(1);
@@ -119,7 +105,7 @@ void fit_boxes(const TetRuns& runs, std::span<const float> points, BoxTree& tree
       for (std::size_t r = kWidth * node; r < std::min(runs.runs(), kWidth * (node + 1)); ++r) {
         Box4 box = empty;
         for (const std::uint32_t n : runs.nodes_of(r)) {
-          const V4 x = nodes[n];
+          const V4 x = load4(node_at(nodes, n));
           box = {least(box.low, x), most(box.high, x)};
         }
         put(box, tree[node], r % kWidth);
@@ -188,18 +174,17 @@ HWY_INLINE double held_by(const float* const (&corner)[4], const float* point, d
 }
 
 // The tet of run `r` that holds the point, positive ones first; `inverted` is the lowest of the others.
-HWY_INLINE std::int32_t search_run(const FindTets& where, const Nodes& nodes, std::size_t r,
-                                   const float* point, V4 at, double* barycentric, TetPlace& inverted) {
+HWY_INLINE std::int32_t search_run(const FindTets& where, std::size_t r, const float* point, V4 at,
+                                   double* barycentric, TetPlace& inverted) {
   const auto first = static_cast<std::int32_t>(kWidth * r);
   const auto end =
       std::min(static_cast<std::int32_t>(where.tets.rows()), first + static_cast<std::int32_t>(kWidth));
-  const std::int32_t* corners = where.tets.data() + 4 * std::size_t{kWidth} * r;
+  const std::int32_t* corners = where.tets.data() + 4 * kWidth * r;
   for (std::int32_t t = first; t < end; ++t, corners += 4) {
-    const V4 a = nodes[static_cast<std::size_t>(corners[0])], b = nodes[static_cast<std::size_t>(corners[1])];
-    const V4 c = nodes[static_cast<std::size_t>(corners[2])], d = nodes[static_cast<std::size_t>(corners[3])];
-    if (!between3(least(least(a, b), least(c, d)), at, most(most(a, b), most(c, d)))) continue;
     const float* corner[4];
-    for (int k = 0; k < 4; ++k) corner[k] = &where.nodes[3 * static_cast<std::size_t>(corners[k])];
+    for (int k = 0; k < 4; ++k) corner[k] = node_at(where.nodes, static_cast<std::size_t>(corners[k]));
+    const V4 a = load4(corner[0]), b = load4(corner[1]), c = load4(corner[2]), d = load4(corner[3]);
+    if (!between3(least(least(a, b), least(c, d)), at, most(most(a, b), most(c, d)))) continue;
     double shares[4];
     const double det = held_by(corner, point, shares);
     if (det > 0) {
@@ -215,7 +200,6 @@ HWY_INLINE std::int32_t search_run(const FindTets& where, const Nodes& nodes, st
 }
 
 std::int32_t find_tet(const FindTets& where, const float* point, double* barycentric) {
-  const Nodes nodes(where.nodes);
   const float padded[4] = {point[0], point[1], point[2], 0};
   const V4 at = load4(padded);
   TetPlace inverted;
@@ -240,7 +224,7 @@ std::int32_t find_tet(const FindTets& where, const float* point, double* barycen
       waiting[level] = children_around(where.tree[where.runs.first(level) + child], point);
       continue;
     }
-    const std::int32_t found = search_run(where, nodes, child, point, at, barycentric, inverted);
+    const std::int32_t found = search_run(where, child, point, at, barycentric, inverted);
     if (found != TetPlace::none) return found;
   }
   std::copy_n(inverted.barycentric.begin(), 4, barycentric);
@@ -256,7 +240,7 @@ namespace ecorche::runtime::kernels {
 HWY_EXPORT(fit_boxes);
 HWY_EXPORT(find_tet);
 
-void fit_boxes(const TetRuns& runs, std::span<const float> nodes, BoxTree& tree, std::size_t begin,
+void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end) {
   HWY_DYNAMIC_DISPATCH(fit_boxes)(runs, nodes, tree, begin, end);
 }

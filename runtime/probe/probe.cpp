@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -16,16 +17,16 @@ namespace {
 constexpr std::size_t kPointsPerTask = 128;
 constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
 
-std::span<const float> numbers(const PointsF& points) {
-  return {points.data(), static_cast<std::size_t>(points.size())};
-}
-
 using EdgeVectors = Eigen::Matrix3d;  // columns: from corner 0 to the others
 
-EdgeVectors edges(const Tets& tets, std::span<const float> nodes, std::int32_t t) {
+Eigen::Vector3d corner(const Tets& tets, const PaddedNodes& nodes, std::int32_t t, int c) {
+  return Eigen::Map<const Eigen::Vector3f>(&nodes[4 * static_cast<std::size_t>(tets(t, c))]).cast<double>();
+}
+
+EdgeVectors edges(const Tets& tets, const PaddedNodes& nodes, std::int32_t t) {
   EdgeVectors out;
-  const Eigen::Vector3d from = corner_of(tets, nodes, t, 0);
-  for (int c = 1; c < 4; ++c) out.col(c - 1) = corner_of(tets, nodes, t, c) - from;
+  const Eigen::Vector3d from = corner(tets, nodes, t, 0);
+  for (int c = 1; c < 4; ++c) out.col(c - 1) = corner(tets, nodes, t, c) - from;
   return out;
 }
 
@@ -55,35 +56,67 @@ struct Values {
   }
 };
 
+// Points in Morton order of 1/1024ths of the box of the tree: those that are asked one after the other then
+// find the same nodes and tets in the caches. A radix sort by ten bits three times.
+std::vector<std::uint32_t> near_order(std::span<const float> points, const BoxNode& top) {
+  const std::size_t count = points.size() / 3;
+  std::array<float, 3> low, scale;
+  for (std::size_t a = 0; a < 3; ++a) {
+    low[a] = *std::min_element(top.low[a].begin(), top.low[a].end());
+    scale[a] = 1023 / std::max(1e-6F, *std::max_element(top.high[a].begin(), top.high[a].end()) - low[a]);
+  }
+  const auto spread = [](float x) {  // ten bits, two zeros between
+    auto bits = static_cast<std::uint32_t>(x >= 0 ? std::min(x, 1023.0F) : 0.0F);
+    bits = (bits | bits << 16U) & 0x030000ffU;
+    bits = (bits | bits << 8U) & 0x0300f00fU;
+    bits = (bits | bits << 4U) & 0x030c30c3U;
+    return (bits | bits << 2U) & 0x09249249U;
+  };
+  std::vector<std::uint32_t> key(count), order(count), other(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t a = 0; a < 3; ++a) key[i] |= spread((points[3 * i + a] - low[a]) * scale[a]) << a;
+    order[i] = static_cast<std::uint32_t>(i);
+  }
+  for (const unsigned shift : {0U, 10U, 20U}) {
+    std::array<std::uint32_t, 1025> begin{};
+    for (const std::uint32_t k : key) ++begin[(k >> shift & 1023U) + 1];
+    for (std::size_t b = 0; b < 1024; ++b) begin[b + 1] += begin[b];
+    for (const std::uint32_t i : order) other[begin[key[i] >> shift & 1023U]++] = i;
+    order.swap(other);
+  }
+  return order;
+}
+
 }  // namespace
 
 // From the nodes where points lie to those of the other side.
 struct Probe::Way {
   FindTets here;
-  std::span<const float> there, rest, posed;
+  const PaddedNodes &there, &rest, &posed;
   bool from_rest;
 };
 
 Probe::Probe(std::shared_ptr<const Model> model)
     : model_(std::move(model)), runs_(model_->tets), tissues_(*model_) {
-  fit_boxes(runs_, numbers(model_->nodes), rest_);
+  pad_nodes({model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_);
+  fit_boxes(runs_, rest_nodes_, rest_);
 }
 
 void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
-  tree.nodes.assign(nodes.begin(), nodes.end());
+  pad_nodes(nodes, tree.nodes);
   fit_boxes(runs_, tree.nodes, tree.boxes);
 }
 
 void Probe::posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                           Probed& out) const {
-  const std::span<const float> rest = numbers(model_->nodes);
-  run({{runs_, model_->tets, tree.nodes, tree.boxes}, rest, rest, tree.nodes, false}, points, wants, out);
+  run({{runs_, model_->tets, tree.nodes, tree.boxes}, rest_nodes_, rest_nodes_, tree.nodes, false}, points,
+      wants, out);
 }
 
 void Probe::rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                           Probed& out) const {
-  const std::span<const float> rest = numbers(model_->nodes);
-  run({{runs_, model_->tets, rest, rest_}, tree.nodes, rest, tree.nodes, true}, points, wants, out);
+  run({{runs_, model_->tets, rest_nodes_, rest_}, tree.nodes, rest_nodes_, tree.nodes, true}, points, wants,
+      out);
 }
 
 void Probe::run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const {
@@ -107,8 +140,10 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
                        volume.labels || wanted.sampling == Sampling::nearest, out.values[v]});
   }
   const Tets& tets = model_->tets;
+  const std::vector<std::uint32_t> order = near_order(points, way.here.tree.back());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kPointsPerTask), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+    for (std::size_t turn = range.begin(); turn < range.end(); ++turn) {
+      const std::size_t i = order[turn];
       const std::array<float, 3> point{points[3 * i], points[3 * i + 1], points[3 * i + 2]};
       const TetPlace place = find_tet(way.here, point);
       const bool held = place.tet != TetPlace::none;
@@ -118,7 +153,7 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
       if (held) {
         other.setZero();
         for (int c = 0; c < 4; ++c)
-          other += place.barycentric[static_cast<std::size_t>(c)] * corner_of(tets, way.there, place.tet, c);
+          other += place.barycentric[static_cast<std::size_t>(c)] * corner(tets, way.there, place.tet, c);
       }
       for (std::size_t c = 0; c < 4; ++c)
         out.barycentric[4 * i + c] = static_cast<float>(held ? place.barycentric[c] : 0);

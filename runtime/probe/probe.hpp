@@ -48,7 +48,7 @@ class Probe {
   /// The tree about one posed body. Kept from pose to pose, so that nothing of the body's size is allocated
   /// again; one writer at a time.
   struct PosedTree {
-    std::vector<float> nodes;
+    PaddedNodes nodes;
     BoxTree boxes;
   };
   /// Must follow every new pose. `nodes`: 3 * #nodes, LPS mm, finite. O(#nodes), parallel.
@@ -69,6 +69,7 @@ class Probe {
 
   std::shared_ptr<const Model> model_;
   TetRuns runs_;
+  PaddedNodes rest_nodes_;
   BoxTree rest_;
   TissueColumns tissues_;
 };

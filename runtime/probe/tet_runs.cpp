@@ -45,7 +45,16 @@ TetRuns::TetRuns(const Tets& tets) {
   } while (level > 1 || levels_ < 2);  // what is fitted in parallel always has a node above it
 }
 
-void fit_boxes(const TetRuns& runs, std::span<const float> nodes, BoxTree& tree) {
+void pad_nodes(std::span<const float> nodes, PaddedNodes& out) {
+  out.resize(nodes.size() / 3 * 4);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size() / 3, 16384), [&](const auto& range) {
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      std::copy_n(&nodes[3 * n], 3, &out[4 * n]);
+    }
+  });
+}
+
+void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree) {
   if (tree.size() != runs.tree_nodes()) tree.assign(runs.tree_nodes(), empty_node());
   constexpr std::size_t width = TetRuns::width;
   tbb::parallel_for(

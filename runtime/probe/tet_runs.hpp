@@ -48,17 +48,23 @@ struct BoxNode {
 /// The tree's boxes for one place of the nodes; #tree_nodes.
 using BoxTree = Aligned<BoxNode>;
 
-/// Where to look. `points` is 3 * #nodes coordinates, mm, and `tree` what fit_boxes made of them.
+/// Nodes as x, y, z and a zero, so that each is one load; 4 * #nodes.
+using PaddedNodes = Aligned<float>;
+
+/// Where to look. `tree` is what fit_boxes made of `nodes`.
 struct FindTets {
   const TetRuns& runs;
   const Tets& tets;
-  std::span<const float> nodes;
+  const PaddedNodes& nodes;
   const BoxTree& tree;
 };
 
-/// Boxes of every run and every node of the tree about `nodes` (3 * #nodes, finite). Allocates only where
-/// `tree` was not made for these runs yet. Parallel.
-void fit_boxes(const TetRuns& runs, std::span<const float> nodes, BoxTree& tree);
+/// Boxes of every run and every node of the tree about `nodes`. Allocates only where `tree` was not made for
+/// these runs yet. Parallel.
+void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree);
+
+/// `nodes`: 3 * #nodes, finite. Allocates only where `out` has another size. Parallel.
+void pad_nodes(std::span<const float> nodes, PaddedNodes& out);
 
 /// Where a point lies in a mesh.
 struct TetPlace {
@@ -74,7 +80,7 @@ TetPlace find_tet(const FindTets& where, const std::array<float, 3>& point);
 
 namespace kernels {
 /// The boxes of the runs under nodes [begin, end) of level 1 of the tree, and of those nodes.
-void fit_boxes(const TetRuns& runs, std::span<const float> nodes, BoxTree& tree, std::size_t begin,
+void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end);
 std::int32_t find_tet(const FindTets& where, const float* point, double* barycentric);
 }  // namespace kernels
