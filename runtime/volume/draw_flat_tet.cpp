@@ -82,6 +82,7 @@ void draw_flat_tet(const DrawTets& job, const VoxelRange& range, std::uint32_t i
   for (std::int32_t k = box.first[2]; k <= box.last[2]; ++k) {
     for (std::int32_t j = box.first[1]; j <= box.last[1]; ++j) {
       for (std::int32_t i = box.first[0]; i <= box.last[0]; ++i) {
+        if (job.only && !job.only.has(i, j, k)) continue;
         const Vector3d at(i, j, k);
         std::array<double, 4> share;
         bool inside = true;

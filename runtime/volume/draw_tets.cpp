@@ -8,21 +8,15 @@
 
 #include <algorithm>
 
+#include "runtime/volume/corners-inl.hpp"
 #include "runtime/volume/draw_tets.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using F = hn::CappedTag<float, 16>;
-using I = hn::Rebind<std::int32_t, F>;
-using V = hn::Vec<F>;
-using VI = hn::Vec<I>;
-
 // Rounding moves a plane's value, edge x edge x distance, by about 4e-7 of the longest edge cubed.
 constexpr float kMargin = 2e-6F;
-constexpr std::size_t kMostLanes = 16;
-
 struct V3 {
   V x, y, z;
 };
@@ -41,45 +35,11 @@ HWY_INLINE V3 scaled(const V3& a, V s) {
   return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)};
 }
 
-// The corners of a vector of tets, whole numbers.
-struct Corners {
-  VI x[4][3];
-};
-
-HWY_INLINE void load_nodes(const Tets& tets, VI ids, VI (&node)[4]) {
-  const VI first = hn::ShiftLeft<2>(ids);
-  for (int c = 0; c < 4; ++c) {
-    const VI n = hn::GatherIndex(I(), tets.data(), hn::Add(first, hn::Set(I(), c)));
-    node[c] = hn::Add(n, hn::Add(n, n));
-  }
-}
-
-HWY_INLINE Corners load_corners(const std::int32_t* points, const VI (&node)[4]) {
-  Corners out;
-  for (int c = 0; c < 4; ++c) {
-    for (int a = 0; a < 3; ++a) out.x[c][a] = hn::GatherIndex(I(), points + a, node[c]);
-  }
-  return out;
-}
-
 HWY_INLINE V3 edge(const Corners& c, int to, V one) {
   const auto along = [&](int a) HWY_ATTR {
     return hn::Mul(hn::ConvertTo(F(), hn::Sub(c.x[to][a], c.x[0][a])), one);
   };
   return {along(0), along(1), along(2)};
-}
-
-// First and last voxel of the boxes along an axis, within [low, high].
-struct Span {
-  VI first, last;
-};
-
-HWY_INLINE Span span_of(const Corners& c, int axis, int bits, std::int32_t low, std::int32_t high) {
-  const VI least = hn::Min(hn::Min(c.x[0][axis], c.x[1][axis]), hn::Min(c.x[2][axis], c.x[3][axis]));
-  const VI most = hn::Max(hn::Max(c.x[0][axis], c.x[1][axis]), hn::Max(c.x[2][axis], c.x[3][axis]));
-  const VI up = hn::Add(least, hn::Set(I(), (1 << bits) - 1));
-  return {hn::Max(hn::ShiftRightSame(up, bits), hn::Set(I(), low)),
-          hn::Min(hn::ShiftRightSame(most, bits), hn::Set(I(), high))};
 }
 
 struct Edges {
@@ -131,6 +91,9 @@ std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis
       TetExtent& out = extents[t - begin + i];
       out = {};
       if (first[0][i] > last[0][i] || first[1][i] > last[1][i] || first[2][i] > last[2][i]) continue;
+      if (job.only &&
+          !job.only.meets({first[0][i], first[1][i], first[2][i]}, {last[0][i], last[1][i], last[2][i]}))
+        continue;
       const auto id = static_cast<std::uint32_t>(t + i);
       double sign = static_cast<double>(job.left_handed ? -det[i] : det[i]);
       if (!(std::abs(det[i]) >= kFlatTet * cube[i])) sign = posed_det(job, id);
@@ -230,6 +193,7 @@ struct Rows {
   HWY_ALIGN std::int32_t low[kMostLanes], high[kMostLanes];  // x from the box's first voxel
   HWY_ALIGN std::int32_t offset[kMostLanes];                 // of x = 0 in the posed grid
   HWY_ALIGN float part[3][kMostLanes];                       // of the place of x = 0
+  HWY_ALIGN std::int32_t brick[kMostLanes];                  // brick (0, y, z), where only some are drawn
 };
 
 // Rows [row, row + lanes) of the box, y fastest.
@@ -255,6 +219,11 @@ HWY_INLINE void cut_rows(const DrawTets& job, const Setup& tet, std::size_t t, V
   const VI j = hn::Add(hn::ConvertTo(I(), y), hn::Set(I(), tet.first[1][t]));
   const VI k = hn::Add(hn::ConvertTo(I(), z), hn::Set(I(), tet.first[2][t]));
   const VI line = hn::Add(j, hn::Mul(k, hn::Set(I(), job.size[1])));
+  static_assert(Bricks::edge == 32);
+  const std::array<std::int32_t, 3>& bricks = job.only.bricks.count;
+  const VI row_of_bricks =
+      hn::Add(hn::ShiftRight<5>(j), hn::Mul(hn::ShiftRight<5>(k), hn::Set(I(), bricks[1])));
+  hn::Store(hn::Mul(row_of_bricks, hn::Set(I(), bricks[0])), I(), out.brick);
   hn::Store(hn::Add(hn::Mul(line, hn::Set(I(), job.size[0])), hn::Set(I(), tet.first[0][t])), I(),
             out.offset);
   for (int a = 0; a < 3; ++a) {
@@ -264,12 +233,13 @@ HWY_INLINE void cut_rows(const DrawTets& job, const Setup& tet, std::size_t t, V
   }
 }
 
-HWY_INLINE void put_rows(const Rows& rows, const Setup& tet, std::size_t t, VoxelBatch& batch,
-                         const BatchSink& sink) {
+HWY_INLINE void put_rows(const DrawTets& job, const Rows& rows, const Setup& tet, std::size_t t,
+                         VoxelBatch& batch, const BatchSink& sink) {
   const std::array<std::int32_t, 3> base{tet.base[0][t], tet.base[1][t], tet.base[2][t]};
   const std::array<float, 3> step{tet.to[0][0][t], tet.to[1][0][t], tet.to[2][0][t]};
   for (std::size_t r = 0; r < hn::Lanes(F()); ++r) {
     for (std::int32_t x = rows.low[r]; x <= rows.high[r]; ++x) {
+      if (job.only && job.only.moved[rows.brick[r] + (tet.first[0][t] + x) / Bricks::edge] == 0) continue;
       if (batch.count == VoxelBatch::capacity) {
         sink.sample(sink.to, batch);
         batch.count = 0;
@@ -296,7 +266,7 @@ void draw_box(const DrawTets& job, const Setup& tet, std::size_t t, VoxelBatch& 
       const V z = hn::Floor(hn::Mul(hn::Add(lane, hn::Set(F(), 0.5F)), inverse));
       const V y = hn::Sub(lane, hn::Mul(z, hn::Set(F(), static_cast<float>(ny))));
       cut_rows(job, tet, t, y, z, ny * nz, row, rows);
-      put_rows(rows, tet, t, batch, sink);
+      put_rows(job, rows, tet, t, batch, sink);
     }
     return;
   }
@@ -304,7 +274,7 @@ void draw_box(const DrawTets& job, const Setup& tet, std::size_t t, VoxelBatch& 
     for (std::int32_t row = 0; row < ny; row += lanes) {
       const V y = hn::ConvertTo(F(), hn::Iota(I(), row));
       cut_rows(job, tet, t, y, hn::Set(F(), static_cast<float>(k)), ny, row, rows);
-      put_rows(rows, tet, t, batch, sink);
+      put_rows(job, rows, tet, t, batch, sink);
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "core/values/mesh.hpp"
+#include "runtime/volume/bricks.hpp"
 
 namespace ecorche::runtime {
 
@@ -24,11 +25,6 @@ struct VoxelBatch {
 struct BatchSink {
   void (*sample)(const void* to, const VoxelBatch& batch);
   const void* to;
-};
-
-/// A region of the posed grid: first and last index, both in.
-struct VoxelRange {
-  std::array<std::int32_t, 3> first{}, last{};
 };
 
 /// Where one tet may hold voxels, and how it lies.
@@ -49,6 +45,7 @@ struct DrawTets {
   bool same_lattice = false;
   bool left_handed = false;            ///< the posed grid's axes turn the sign of every volume
   std::array<std::int32_t, 3> size{};  ///< of the posed grid
+  BrickMask only{};                    ///< tets and voxels of other bricks are left out
 };
 
 /// Tets whose determinant is below this share of their longest edge cubed are drawn in double precision.
@@ -63,6 +60,12 @@ namespace kernels {
 std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis, std::int32_t band,
                           std::size_t begin, std::size_t end, std::span<TetExtent> extents,
                           std::span<std::uint32_t> inverted);
+
+/// Sets `moved` of every brick of `bricks` that a tet of [begin, end) may hold voxels of at `before` or at
+/// `job.posed`, where a corner of it differs between the two. `range`: the whole grid. Several may run at
+/// once.
+void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const VoxelRange& range,
+                const Bricks& bricks, std::size_t begin, std::size_t end, std::uint8_t* moved);
 
 /// Puts the voxels of `range` that the tets `ids` hold, in that order, into `batch`, which goes to `sink`
 /// whenever it is full, not at the end. Every voxel whose centre lies in the closed tet is drawn; one that

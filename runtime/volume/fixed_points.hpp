@@ -21,4 +21,8 @@ double index_reach(const ImageGrid& grid, std::span<const float, 6> low_high);
 /// is no number becomes the far end. Parallel, the same for any number of threads.
 void to_fixed(const ImageGrid& grid, int bits, std::span<const float> points, std::span<std::int32_t> out);
 
+/// The same for those groups of 64 points whose byte of `groups` is not 0; the others are left as they are.
+void to_fixed(const ImageGrid& grid, int bits, std::span<const float> points,
+              std::span<const std::uint8_t> groups, std::span<std::int32_t> out);
+
 }  // namespace ecorche::runtime

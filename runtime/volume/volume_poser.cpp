@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "runtime/volume/fixed_points.hpp"
@@ -79,67 +80,182 @@ bool one_lattice(const ImageGrid& a, const ImageGrid& b) {
   return a.spacing == b.spacing && a.direction == b.direction;
 }
 
-// Every task its own part of the output, whole rows.
-void fill_band(const SampleJob& job, const VoxelRange& range) {
+// Every task its own part of the output, whole rows or those of the mask's bricks.
+void fill_band(const SampleJob& job, const BrickMask& only, const VoxelRange& range) {
   with_scalar_type(job.posed.type, [&](auto zero) {
     using T = decltype(zero);
     const std::span<T> posed = job.posed.scalars<T>();
     const auto components = static_cast<std::size_t>(job.posed.components);
     const ImageGrid& grid = job.posed.grid;
     const T background = to_scalar<T>(job.background);
-    for (std::int32_t k = range.first[2]; k <= range.last[2]; ++k) {
-      const std::size_t first = grid.offset(0, range.first[1], k);
-      const std::size_t end = grid.offset(0, range.last[1], k) + static_cast<std::size_t>(grid.size[0]);
+    const auto fill = [&](std::size_t first, std::size_t end) {
       std::fill(posed.begin() + static_cast<std::ptrdiff_t>(components * first),
                 posed.begin() + static_cast<std::ptrdiff_t>(components * end), background);
+    };
+    for (std::int32_t k = range.first[2]; k <= range.last[2]; ++k) {
+      if (!only) {
+        fill(grid.offset(0, range.first[1], k),
+             grid.offset(0, range.last[1], k) + static_cast<std::size_t>(grid.size[0]));
+        continue;
+      }
+      for (std::int32_t j = range.first[1]; j <= range.last[1]; ++j) {
+        for (std::int32_t i = 0; i < grid.size[0]; i += Bricks::edge) {
+          if (only.has(i, j, k))
+            fill(grid.offset(i, j, k),
+                 grid.offset(0, j, k) + static_cast<std::size_t>(std::min(i + Bricks::edge, grid.size[0])));
+        }
+      }
     }
   });
 }
 
+VoxelRange whole(const ImageGrid& grid) {
+  return {{}, {grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1}};
+}
+
+void check_grid(const ImageGrid& grid) {
+  const double voxels = static_cast<double>(grid.size[0]) * grid.size[1] * grid.size[2];
+  if (voxels > 0 && voxels <= kMostVoxels) return;
+  throw Error(ErrorKind::data, "posed volume", "a grid of " + std::to_string(voxels) + " voxels",
+              "ask for at least one voxel and at most 2^31");
+}
+
+// Made anew where it is another one.
+void fit_image(const ImageGrid& grid, const ModelVolume& volume, Image& out) {
+  if (!(out.grid == grid && out.type == volume.image.type && out.components == volume.image.components))
+    out = Image(grid, volume.image.type, volume.image.components);
+}
+
 }  // namespace
 
-VolumePoser::VolumePoser(std::shared_ptr<const Model> model) : model_(std::move(model)), blocks_(*model_) {}
+struct VolumePoser::Job {
+  std::span<const float> nodes;
+  const ModelVolume& volume;
+  Sampling sampling;
+  const ImageGrid& grid;
+  bool all_nodes;  // in fixed points, also of tets that lie beyond the grid
+  const Context& context;
+};
+
+VolumePoser::VolumePoser(std::shared_ptr<const Model> model) : model_(std::move(model)), blocks_(*model_) {
+  if (model_->node_count() == 0) return;
+  for (int c = 0; c < 3; ++c) {
+    rest_box_[static_cast<std::size_t>(c)] = model_->nodes.col(c).minCoeff();
+    rest_box_[static_cast<std::size_t>(c) + 3] = model_->nodes.col(c).maxCoeff();
+  }
+}
+
+// Which blocks reach into the grid, and their nodes in fixed points.
+DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
+  const ImageGrid& rest_grid = job.volume.image.grid;
+  scratch.bounds.resize(6 * blocks_.groups());
+  blocks_.bound_groups(job.nodes, scratch.bounds);
+  const int bits = fraction_bits(
+      std::max(index_reach(job.grid, box_of(scratch.bounds)), index_reach(rest_grid, rest_box_)));
+
+  const GridBox grid_box(job.grid);
+  scratch.block_meets.resize(blocks_.blocks());
+  scratch.groups.assign(blocks_.groups(), job.all_nodes ? 1 : 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.blocks(), 512), [&](const auto& range) {
+    for (std::size_t b = range.begin(); b < range.end(); ++b) {
+      const bool meets = grid_box.meets(blocks_, b, scratch.bounds);
+      scratch.block_meets[b] = meets ? 1 : 0;
+      for (std::size_t i = 0; meets && !job.all_nodes && i < blocks_.groups_of(b).size(); ++i) {
+        // Everybody writes the same 1.
+        std::atomic_ref(scratch.groups[blocks_.groups_of(b)[i]]).store(1, std::memory_order_relaxed);
+      }
+    }
+  });
+  scratch.posed.resize(job.nodes.size());
+  to_fixed(job.grid, bits, job.nodes, scratch.groups, scratch.posed);
+  if (scratch.of_rest.model != model_.get() || scratch.of_rest.bits != bits ||
+      !(scratch.of_rest.grid == rest_grid)) {
+    scratch.rest.resize(job.nodes.size());
+    to_fixed(rest_grid, bits, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())},
+             scratch.rest);
+    scratch.of_rest = {model_.get(), rest_grid, bits};
+  }
+  job.context.check_stop();
+  return {model_->tets,
+          scratch.posed,
+          scratch.rest,
+          bits,
+          one_lattice(job.grid, rest_grid),
+          to_index(job.grid).linear.determinant() < 0,
+          job.grid.size,
+          {}};
+}
 
 void VolumePoser::pose(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
                        const ImageGrid& grid, Image& out, Scratch& scratch, const Context& context) const {
-  const double voxels = static_cast<double>(grid.size[0]) * grid.size[1] * grid.size[2];
-  if (!(voxels > 0 && voxels <= kMostVoxels)) {
-    throw Error(ErrorKind::data, "posed volume", "a grid of " + std::to_string(voxels) + " voxels",
-                "ask for at least one voxel and at most 2^31");
-  }
-  if (!(out.grid == grid && out.type == volume.image.type && out.components == volume.image.components)) {
-    out = Image(grid, volume.image.type, volume.image.components);
-  }
+  check_grid(grid);
+  fit_image(grid, volume, out);
+  const Job job{nodes, volume, sampling, grid, false, context};
+  draw(job, prepare(job, scratch), out, scratch);
+}
 
-  scratch.bounds.resize(6 * blocks_.groups());
-  blocks_.bound_groups(nodes, scratch.bounds);
-  const std::span<const float> rest_nodes(model_->nodes.data(),
-                                          static_cast<std::size_t>(model_->nodes.size()));
-  std::array<float, 6> rest_box;
-  for (int c = 0; c < 3; ++c) {
-    rest_box[static_cast<std::size_t>(c)] = model_->nodes.col(c).minCoeff();
-    rest_box[static_cast<std::size_t>(c) + 3] = model_->nodes.col(c).maxCoeff();
+void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
+                         const ImageGrid& grid, PosedVolume& kept, Scratch& scratch,
+                         const Context& context) const {
+  check_grid(grid);
+  const bool same = kept.drawn.volume == &volume && kept.drawn.sampling == sampling &&
+                    kept.image.grid == grid && kept.drawn.posed.size() == nodes.size();
+  kept.drawn.volume = nullptr;
+  fit_image(grid, volume, kept.image);
+  const Job job{nodes, volume, sampling, grid, true, context};
+  DrawTets tets = prepare(job, scratch);
+  kept.bricks = Bricks(grid);
+  kept.moved.assign(kept.bricks.all(), same && kept.drawn.bits == tets.bits ? 0 : 1);
+  if (same && kept.drawn.bits == tets.bits) {
+    find_moved(job, tets, kept, scratch);
+    tets.only = {kept.bricks, kept.moved.data()};
   }
-  const int bits = fraction_bits(
-      std::max(index_reach(grid, box_of(scratch.bounds)), index_reach(volume.image.grid, rest_box)));
-  scratch.posed.resize(nodes.size());
-  scratch.rest.resize(nodes.size());
-  to_fixed(grid, bits, nodes, scratch.posed);
-  to_fixed(volume.image.grid, bits, rest_nodes, scratch.rest);
-  context.check_stop();
+  kept.rewritten.clear();
+  kept.rewritten.reserve(kept.bricks.all());
+  for (std::size_t b = 0; b < kept.moved.size(); ++b) {
+    if (kept.moved[b] != 0) kept.rewritten.push_back(static_cast<std::uint32_t>(b));
+  }
+  if (!kept.rewritten.empty()) draw(job, tets, kept.image, scratch);
+  kept.drawn.posed.resize(nodes.size());
+  std::swap(kept.drawn.posed, scratch.posed);
+  kept.drawn.bits = tets.bits;
+  kept.drawn.sampling = sampling;
+  kept.drawn.volume = &volume;
+}
 
-  const DrawTets job{model_->tets,
-                     scratch.posed,
-                     scratch.rest,
-                     bits,
-                     one_lattice(grid, volume.image.grid),
-                     to_index(grid).linear.determinant() < 0,
-                     grid.size};
+void VolumePoser::find_moved(const Job& job, const DrawTets& tets, PosedVolume& kept,
+                             Scratch& scratch) const {
+  const std::span<const std::int32_t> before = kept.drawn.posed;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.groups(), 256), [&](const auto& range) {
+    for (std::size_t g = range.begin(); g < range.end(); ++g) {
+      const std::size_t first = 3 * TetBlocks::size * g;
+      const std::size_t end = std::min(before.size(), first + 3 * TetBlocks::size);
+      scratch.groups[g] = std::equal(before.begin() + static_cast<std::ptrdiff_t>(first),
+                                     before.begin() + static_cast<std::ptrdiff_t>(end),
+                                     scratch.posed.begin() + static_cast<std::ptrdiff_t>(first))
+                              ? 0
+                              : 1;
+    }
+  });
+  const VoxelRange range = whole(job.grid);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.blocks(), 64), [&](const auto& blocks) {
+    for (std::size_t b = blocks.begin(); b < blocks.end(); ++b) {
+      const std::span<const std::uint32_t> groups = blocks_.groups_of(b);
+      if (std::none_of(groups.begin(), groups.end(), [&](std::uint32_t g) { return scratch.groups[g] != 0; }))
+        continue;
+      kernels::mark_moved(tets, before, range, kept.bricks, b * TetBlocks::size,
+                          std::min(model_->tet_count(), (b + 1) * TetBlocks::size), kept.moved.data());
+    }
+  });
+  job.context.check_stop();
+}
+
+void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratch& scratch) const {
+  const ImageGrid& grid = job.grid;
+  const Context& context = job.context;
   const Bands bands(grid);
-  const VoxelRange whole{{}, {grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1}};
 
   // The blocks that reach into the grid, and the bands of each of their tets.
-  const GridBox grid_box(grid);
   const std::size_t tets = model_->tet_count(), all = blocks_.blocks();
   scratch.extents.resize(tets);
   scratch.block_first.resize(all);
@@ -153,11 +269,11 @@ void VolumePoser::pose(std::span<const float> nodes, const ModelVolume& volume, 
     for (std::size_t b = task * kBlocksPerTask; b < std::min(all, (task + 1) * kBlocksPerTask); ++b) {
       std::uint16_t& first = scratch.block_first[b] = TetExtent::none;
       std::uint16_t& last = scratch.block_last[b] = 0;
-      if (!grid_box.meets(blocks_, b, scratch.bounds)) continue;
+      if (scratch.block_meets[b] == 0) continue;
       const std::size_t begin = b * TetBlocks::size, end = std::min(tets, begin + TetBlocks::size);
       const std::span<TetExtent> extents = std::span(scratch.extents).subspan(begin, end - begin);
       scratch.blocks[task] += static_cast<std::uint32_t>(
-          kernels::classify_tets(job, whole, bands.axis, bands.height, begin, end, extents,
+          kernels::classify_tets(drawn, whole(grid), bands.axis, bands.height, begin, end, extents,
                                  std::span(scratch.inverted).subspan(task_first + scratch.blocks[task])));
       for (const TetExtent& extent : extents) {
         if (extent.first > extent.last) continue;
@@ -177,14 +293,14 @@ void VolumePoser::pose(std::span<const float> nodes, const ModelVolume& volume, 
   std::reverse(scratch.inverted.begin(), scratch.inverted.begin() + static_cast<std::ptrdiff_t>(inverted));
 
   // From the least to the greatest claim on a voxel, each writing over the last.
-  const SampleJob samples{volume.image, volume.background, out};
-  const BatchSink sink = sink_for(samples, volume.labels ? Sampling::nearest : sampling);
+  const SampleJob samples{job.volume.image, job.volume.background, out};
+  const BatchSink sink = sink_for(samples, job.volume.labels ? Sampling::nearest : job.sampling);
   tbb::parallel_for(std::size_t{0}, bands.count, [&](std::size_t band) {
     if (context.stop.stop_requested()) return;
     const VoxelRange range = bands.of(band, grid);
-    fill_band(samples, range);
+    fill_band(samples, drawn.only, range);
     VoxelBatch batch;
-    kernels::draw_tets(job, range, std::span<const std::uint32_t>(scratch.inverted).first(inverted), batch,
+    kernels::draw_tets(drawn, range, std::span<const std::uint32_t>(scratch.inverted).first(inverted), batch,
                        sink);
     std::array<std::uint32_t, TetBlocks::size> ids;
     for (std::size_t b = all; b-- > 0;) {
@@ -194,7 +310,7 @@ void VolumePoser::pose(std::span<const float> nodes, const ModelVolume& volume, 
         const TetExtent& extent = scratch.extents[t];
         if (band >= extent.first && band <= extent.last) ids[count++] = static_cast<std::uint32_t>(t);
       }
-      kernels::draw_tets(job, range, std::span<const std::uint32_t>(ids).first(count), batch, sink);
+      kernels::draw_tets(drawn, range, std::span<const std::uint32_t>(ids).first(count), batch, sink);
     }
     if (batch.count > 0) sink.sample(sink.to, batch);
   });

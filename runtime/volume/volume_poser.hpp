@@ -2,6 +2,7 @@
 // Posed volumes in one pass: the inverse map of each deformed tet (Sujar18 4), drawn and sampled at once.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,11 +11,29 @@
 #include "core/values/context.hpp"
 #include "core/values/image.hpp"
 #include "core/values/model.hpp"
+#include "runtime/volume/bricks.hpp"
 #include "runtime/volume/draw_tets.hpp"
 #include "runtime/volume/resample.hpp"
 #include "runtime/volume/tet_blocks.hpp"
 
 namespace ecorche::runtime {
+
+/// One volume kept posed from pose to pose, for one subscriber: VolumePoser::follow makes only those bricks
+/// again that moved. Others read `image`, `bricks`, `moved` and `rewritten`, and touch nothing.
+struct PosedVolume {
+  Image image;                           ///< on the grid of the last call
+  Bricks bricks;                         ///< of that grid
+  std::vector<std::uint8_t> moved;       ///< a brick each: 1 where the last call made it again
+  std::vector<std::uint32_t> rewritten;  ///< those bricks, ascending
+
+  /// Of VolumePoser: what `image` shows.
+  struct Drawn {
+    const ModelVolume* volume = nullptr;  // null: nothing yet, or only half of it
+    Sampling sampling = Sampling::trilinear;
+    int bits = 0;
+    std::vector<std::int32_t> posed;
+  } drawn;
+};
 
 /// Made once per model; shared and immutable, as BodyPoser is.
 class VolumePoser {
@@ -26,6 +45,12 @@ class VolumePoser {
     std::vector<TetExtent> extents;
     std::vector<std::uint32_t> blocks, inverted;
     std::vector<std::uint16_t> block_first, block_last;
+    std::vector<std::uint8_t> block_meets, groups;
+    struct Rest {  // what `rest` holds
+      const Model* model = nullptr;
+      ImageGrid grid;
+      int bits = 0;
+    } of_rest;
   };
 
   explicit VolumePoser(std::shared_ptr<const Model> model);
@@ -41,11 +66,24 @@ class VolumePoser {
   void pose(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling, const ImageGrid& grid,
             Image& out, Scratch& scratch, const Context& context = {}) const;
 
+  /// As pose(), into `kept.image`, byte for byte; but where `kept` shows the same `volume` (the same object,
+  /// unchanged) on the same grid, only the bricks that a tet left, came to or moved within are made again.
+  /// Nothing is allocated where the last call with `kept` and `scratch` was of the same sizes. After an error
+  /// the next call makes all bricks again.
+  void follow(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
+              const ImageGrid& grid, PosedVolume& kept, Scratch& scratch, const Context& context = {}) const;
+
   const Model& model() const { return *model_; }
 
  private:
+  struct Job;
+  DrawTets prepare(const Job& job, Scratch& scratch) const;
+  void draw(const Job& job, const DrawTets& tets, Image& out, Scratch& scratch) const;
+  void find_moved(const Job& job, const DrawTets& tets, PosedVolume& kept, Scratch& scratch) const;
+
   std::shared_ptr<const Model> model_;
   TetBlocks blocks_;
+  std::array<float, 6> rest_box_{};
 };
 
 /// `volume` carried along: a VolumePoser for one call.

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "runtime/skin/body_poser.hpp"
+#include "runtime/volume/volume_poser.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace {
@@ -65,6 +66,30 @@ TEST(Allocation, NoneInAFrame) {
     }
   }
   EXPECT_GT(allocated, 0u) << "the counter counts";
+}
+
+TEST(Allocation, NoneInAVolume) {
+  const auto model = std::make_shared<const Model>(test::toy_model());
+  const BodyPoser poser(model);
+  const VolumePoser volumes(model);
+  PosedBody body = poser.make_frame();
+  VolumePoser::Scratch scratch;
+  PosedVolume kept;
+  Image whole;
+  ImageGrid grid = model->volumes[0].image.grid;
+  for (auto& size : grid.size) size += 40;
+  Pose pose = Pose::rest(3);
+  tbb::task_arena(1).execute([&] {
+    std::size_t before = 0;
+    for (int frame = 0; frame <= 20; ++frame) {
+      if (frame == 2) before = allocated;
+      pose.rotation[1] = Eigen::AngleAxisd(0.1 * frame, Eigen::Vector3d::UnitX());
+      ASSERT_TRUE(poser.run(pose, Skinning::cor, {}, body).ok());
+      volumes.pose(body.nodes, model->volumes[0], Sampling::trilinear, grid, whole, scratch);
+      volumes.follow(body.nodes, model->volumes[0], Sampling::nearest, grid, kept, scratch);
+    }
+    EXPECT_EQ(allocated - before, 0u);
+  });
 }
 
 }  // namespace

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Corners of a vector of tets as whole numbers, and the voxels that their boxes hold. Included once per
+// instruction set.
+#if defined(ECORCHE_RUNTIME_VOLUME_CORNERS_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef ECORCHE_RUNTIME_VOLUME_CORNERS_INL
+#undef ECORCHE_RUNTIME_VOLUME_CORNERS_INL
+#else
+#define ECORCHE_RUNTIME_VOLUME_CORNERS_INL
+#endif
+
+#include <hwy/highway.h>
+
+#include "core/values/mesh.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ecorche::runtime::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F = hn::CappedTag<float, 16>;
+using I = hn::Rebind<std::int32_t, F>;
+using V = hn::Vec<F>;
+using VI = hn::Vec<I>;
+
+constexpr std::size_t kMostLanes = 16;
+
+// The corners of a vector of tets, whole numbers.
+struct Corners {
+  VI x[4][3];
+};
+
+HWY_INLINE void load_nodes(const Tets& tets, VI ids, VI (&node)[4]) {
+  const VI first = hn::ShiftLeft<2>(ids);
+  for (int c = 0; c < 4; ++c) {
+    const VI n = hn::GatherIndex(I(), tets.data(), hn::Add(first, hn::Set(I(), c)));
+    node[c] = hn::Add(n, hn::Add(n, n));
+  }
+}
+
+HWY_INLINE Corners load_corners(const std::int32_t* points, const VI (&node)[4]) {
+  Corners out;
+  for (int c = 0; c < 4; ++c) {
+    for (int a = 0; a < 3; ++a) out.x[c][a] = hn::GatherIndex(I(), points + a, node[c]);
+  }
+  return out;
+}
+
+// First and last voxel of the boxes along an axis, within [low, high].
+struct Span {
+  VI first, last;
+};
+
+HWY_INLINE Span span_of(const Corners& c, int axis, int bits, std::int32_t low, std::int32_t high) {
+  const VI least = hn::Min(hn::Min(c.x[0][axis], c.x[1][axis]), hn::Min(c.x[2][axis], c.x[3][axis]));
+  const VI most = hn::Max(hn::Max(c.x[0][axis], c.x[1][axis]), hn::Max(c.x[2][axis], c.x[3][axis]));
+  const VI up = hn::Add(least, hn::Set(I(), (1 << bits) - 1));
+  return {hn::Max(hn::ShiftRightSame(up, bits), hn::Set(I(), low)),
+          hn::Min(hn::ShiftRightSame(most, bits), hn::Set(I(), high))};
+}
+
+}  // namespace ecorche::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
