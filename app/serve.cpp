@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/command.hpp"
+#include "app/token_file.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
 #include "proto/address.hpp"
@@ -21,7 +22,9 @@ namespace {
 struct Settings {
   std::vector<std::string> models;
   std::string listen = "127.0.0.1:7070";
+  std::string http;
   std::string port_file;
+  std::string token_file;
   std::string log = "info";
   server::Options options;
 };
@@ -40,6 +43,11 @@ std::vector<server::NamedModel> read_models(const Settings& settings, const Prog
   return models;
 }
 
+server::Endpoint endpoint(const std::string& text) {
+  const wire::Address address = wire::parse_address(text);
+  return {.host = address.host, .port = address.port};
+}
+
 int run_serve(const Settings& settings, const Program& program) {
   // stdout is for the result.
   spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
@@ -47,9 +55,10 @@ int run_serve(const Settings& settings, const Program& program) {
   spdlog::set_level(spdlog::level::from_str(settings.log));
 
   server::Options options = settings.options;
-  const wire::Address address = wire::parse_address(settings.listen);
-  options.host = address.host;
-  options.port = address.port;
+  options.listen = endpoint(settings.listen);
+  const std::string host = options.listen.host;
+  if (!settings.http.empty()) options.http = endpoint(settings.http);
+  if (!settings.token_file.empty()) options.token = read_token(settings.token_file);
   options.version = ECORCHE_VERSION;
 
   // The main thread serves; as many workers as threads take up poses, all of them inside one arena, which
@@ -59,11 +68,15 @@ int run_serve(const Settings& settings, const Program& program) {
   server::Workers workers(threads, [&arena](const server::Job& job) { arena.execute(job); });
   server::Server server(std::move(options), read_models(settings, program), workers);
 
-  const std::string where = address.host + ":" + std::to_string(server.port());
-  if (!settings.port_file.empty())
-    files::write_text(settings.port_file, std::to_string(server.port()) + "\n");
-  program.result("listening on " + where,
-                 {{"address", where}, {"port", server.port()}, {"models", settings.models.size()}});
+  const std::string where = host + ":" + std::to_string(server.port());
+  if (!settings.port_file.empty()) {
+    std::string ports = std::to_string(server.port()) + "\n";
+    if (server.http_port() != 0) ports += std::to_string(server.http_port()) + "\n";
+    files::write_text(settings.port_file, ports);
+  }
+  nlohmann::json report{{"address", where}, {"port", server.port()}, {"models", settings.models.size()}};
+  if (server.http_port() != 0) report["http_port"] = server.http_port();
+  program.result("listening on " + where, report);
 
   const std::stop_callback on_stop(program.stop, [&server] { server.stop(); });
   server.run();
@@ -80,9 +93,18 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
       ->required();
   command->add_option("--listen", settings->listen, "HOST:PORT; port 0 picks a free one")
       ->capture_default_str();
-  command->add_option("--port-file", settings->port_file, "write the port to this file once listening");
+  command->add_option("--http", settings->http,
+                      "HOST:PORT of /healthz, /readyz, /metrics and, at /v1, WebSockets");
+  command->add_option("--origin", settings->options.origins,
+                      "a page that may connect from a browser, as https://viewer.example; repeatable");
+  command->add_option("--port-file", settings->port_file,
+                      "write the port, and below it that of --http, to this file once listening");
+  command->add_option("--tls-certificate", settings->options.certificate,
+                      "speak TLS, as the owner of this PEM chain");
+  command->add_option("--tls-key", settings->options.key, "its key, PEM, unencrypted");
+  command->add_option("--token-file", settings->token_file, "clients must show the token in this file");
   command->add_flag("--insecure", settings->options.insecure,
-                    "listen beyond loopback although nothing is encrypted");
+                    "listen beyond loopback although TLS or the token is missing");
   command->add_option("--log", settings->log, "what to log on stderr")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();

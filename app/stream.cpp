@@ -10,6 +10,7 @@
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
 #include "app/stream_check.hpp"
+#include "app/token_file.hpp"
 #include "clients/cpp/client.hpp"
 #include "core/model_file/model_file.hpp"
 #include "proto/convert.hpp"
@@ -31,6 +32,8 @@ struct Settings {
   bool quality = false;
   std::string model;
   std::uint64_t check_every = 1;
+  client::Access access;
+  std::string token_file;
 };
 
 // After the last pose: how long a silence ends the wait for its frames.
@@ -100,7 +103,8 @@ class Stream {
       : settings_(settings),
         program_(program),
         skinning_(runtime::skinning_from_name(settings.skinning)),
-        client_(wire::parse_address(settings.address), std::string("ecorche stream ") + ECORCHE_VERSION) {}
+        client_(wire::parse_address(settings.address), std::string("ecorche stream ") + ECORCHE_VERSION,
+                settings.access) {}
 
   int run() {
     open();
@@ -342,6 +346,9 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--open", settings->open, "the server's name of the model; its first by default");
   command->add_option("--session", settings->session,
                       "a name that others can watch; one of one's own by default");
+  command->add_option("--tls-ca", settings->access.authorities,
+                      "speak TLS, with a server whose certificate one in this PEM file vouches for");
+  command->add_option("--token-file", settings->token_file, "show the server the token in this file");
   add_motion_options(*command, settings->motion);
   command->add_option("--rate", settings->rate, "poses per second")
       ->check(CLI::Range(0.1, 1e5))
@@ -365,7 +372,10 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 32))
       ->capture_default_str();
   command->callback([settings, &program, &chosen] {
-    chosen = [settings, &program] { return Stream(*settings, program).run(); };
+    chosen = [settings, &program] {
+      if (!settings->token_file.empty()) settings->access.token = read_token(settings->token_file);
+      return Stream(*settings, program).run();
+    };
   });
 }
 

@@ -33,14 +33,16 @@ Error to_error(const std::string& where, const v1::Status& status) {
                "this is the server's answer");
 }
 
-Client::Client(const wire::Address& address, const std::string& name)
-    : socket_(address, Clock::now() + std::chrono::seconds(5)), reader_(kLimits) {
+Client::Client(const wire::Address& address, const std::string& name, const Access& access)
+    : socket_(address, Clock::now() + std::chrono::seconds(5), access.authorities), reader_(kLimits) {
   v1::Envelope envelope;
   v1::ClientHello& hello = *envelope.mutable_client_hello();
   hello.set_protocol_min(1);
   hello.set_protocol_max(1);
   hello.set_client(name.substr(0, 64));
   hello.add_encodings(v1::ENCODING_F32);
+  hello.set_token(access.token);
+  hello.set_resume_token(access.resume_token);
   wire::Frame answer = call(std::move(envelope));
   if (!answer.envelope.has_server_hello()) {
     throw Error(ErrorKind::protocol, "hello", "the server answered with something else",

@@ -11,6 +11,13 @@
 
 namespace ecorche::client {
 
+/// How a server is entered.
+struct Access {
+  std::string authorities;   ///< PEM file whose certificates are trusted; empty: no TLS
+  std::string token;         ///< of the right to connect
+  std::string resume_token;  ///< ServerHello.resume_token of an earlier connection
+};
+
 /// One connection; for one thread. Frames are acknowledged and pings answered as they are read, so call
 /// receive() often.
 ///
@@ -30,7 +37,7 @@ class Client {
   static constexpr std::chrono::seconds patience{30};
 
   /// Connects and exchanges the hellos.
-  Client(const wire::Address& address, const std::string& name);
+  Client(const wire::Address& address, const std::string& name, const Access& access = {});
 
   const v1::ServerHello& server() const { return hello_; }
 

@@ -24,7 +24,7 @@ std::string reason(int error) {
 
 }  // namespace
 
-Socket::Socket(const wire::Address& address, Clock::time_point until)
+Socket::Socket(const wire::Address& address, Clock::time_point until, const std::string& authorities)
     : where_(address.host + ":" + std::to_string(address.port)) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
@@ -55,6 +55,15 @@ Socket::Socket(const wire::Address& address, Clock::time_point until)
   }
   const int on = 1;
   setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  if (authorities.empty()) return;
+  try {
+    tls_ = std::make_unique<Tls>(authorities, address.host);
+    tls_->handshake([&](std::span<std::byte> out) { return read_plain(out, until); },
+                    [&](std::span<const std::byte> bytes) { write_plain(bytes, until); });
+  } catch (...) {
+    close(fd_);
+    throw;
+  }
 }
 
 Socket::~Socket() {
@@ -62,6 +71,18 @@ Socket::~Socket() {
 }
 
 std::size_t Socket::read(std::span<std::byte> out, Clock::time_point until) {
+  if (!tls_) return read_plain(out, until);
+  return tls_->read(
+      out, [&](std::span<std::byte> plain) { return read_plain(plain, until); },
+      [&](std::span<const std::byte> bytes) { write_plain(bytes, until); });
+}
+
+void Socket::write(std::span<const std::byte> bytes, Clock::time_point until) {
+  if (!tls_) return write_plain(bytes, until);
+  tls_->write(bytes, [&](std::span<const std::byte> part) { write_plain(part, until); });
+}
+
+std::size_t Socket::read_plain(std::span<std::byte> out, Clock::time_point until) {
   while (true) {
     const ssize_t n = recv(fd_, out.data(), out.size(), 0);
     if (n > 0) return static_cast<std::size_t>(n);
@@ -71,7 +92,7 @@ std::size_t Socket::read(std::span<std::byte> out, Clock::time_point until) {
   }
 }
 
-void Socket::write(std::span<const std::byte> bytes, Clock::time_point until) {
+void Socket::write_plain(std::span<const std::byte> bytes, Clock::time_point until) {
   while (!bytes.empty()) {
     const ssize_t n = send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (n > 0) {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A TCP socket that waits no longer than it is told.
+// A TCP socket, or TLS over one, that waits no longer than it is told.
 #pragma once
 
 #include <chrono>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 
+#include "clients/cpp/tls.hpp"
 #include "proto/address.hpp"
 
 namespace ecorche::client {
@@ -16,8 +18,9 @@ using Clock = std::chrono::steady_clock;
 /// Not for two threads at once.
 class Socket {
  public:
-  /// Throws Error{temporary} when nobody answers there until `until`.
-  Socket(const wire::Address& address, Clock::time_point until);
+  /// Throws Error{temporary} when nobody answers there until `until`. `authorities`: a PEM file; empty: no
+  /// TLS. What else a server can do wrong there: Tls.
+  Socket(const wire::Address& address, Clock::time_point until, const std::string& authorities = {});
   ~Socket();
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
@@ -29,11 +32,14 @@ class Socket {
   void write(std::span<const std::byte> bytes, Clock::time_point until);
 
  private:
+  std::size_t read_plain(std::span<std::byte> out, Clock::time_point until);
+  void write_plain(std::span<const std::byte> bytes, Clock::time_point until);
   bool wait(short events, Clock::time_point until) const;
   [[noreturn]] void fail(const std::string& what) const;
 
   int fd_ = -1;
   std::string where_;
+  std::unique_ptr<Tls> tls_;
 };
 
 }  // namespace ecorche::client

@@ -20,6 +20,7 @@ Needs numpy and the messages generated from proto/ecorche/v1 (the build leaves t
 """
 import select
 import socket
+import ssl
 import struct
 import time
 
@@ -111,7 +112,9 @@ class VolumeFrame:
 class Client:
     """One connection. Not for several threads. Frames are acknowledged as they are read, so read often."""
 
-    def __init__(self, host, port, name="python", timeout=30.0):
+    def __init__(self, host, port, name="python", timeout=30.0, tls_ca=None, token=b"", resume_token=b""):
+        """`tls_ca`: a PEM file whose certificates are trusted; None: no TLS. `token`: of the right to connect.
+        `resume_token`: `server.resume_token` of an earlier connection."""
         self.timeout = timeout
         self.body = None
         self.acks = []            # v1.PoseAck since the last look
@@ -122,9 +125,20 @@ class Client:
         self._buffer = bytearray()
         self._socket = socket.create_connection((host, port), timeout)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        try:
+            self._greet(host, name, tls_ca, token, resume_token)
+        except BaseException:
+            self._socket.close()
+            raise
+
+    def _greet(self, host, name, tls_ca, token, resume_token):
+        if tls_ca is not None:
+            self._socket = ssl.create_default_context(cafile=tls_ca).wrap_socket(self._socket, server_hostname=host)
         hello = envelope_pb2.Envelope()
         hello.client_hello.protocol_min = hello.client_hello.protocol_max = 1
         hello.client_hello.client = name
+        hello.client_hello.token = token
+        hello.client_hello.resume_token = resume_token
         hello.client_hello.encodings.append(common_pb2.ENCODING_F32)
         self.server = self._call(hello)[0].server_hello
 
@@ -215,7 +229,8 @@ class Client:
     def _fill(self, size, until):
         """Waits for `size` bytes of the present frame; False when they do not come in time (they are kept)."""
         while len(self._buffer) < size:
-            if not select.select([self._socket], [], [], max(0.0, until - time.monotonic()))[0]:
+            buffered = self._socket.pending() if isinstance(self._socket, ssl.SSLSocket) else 0
+            if not buffered and not select.select([self._socket], [], [], max(0.0, until - time.monotonic()))[0]:
                 return False
             received = self._socket.recv(max(65536, size - len(self._buffer)))
             if not received:

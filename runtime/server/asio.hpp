@@ -40,4 +40,9 @@ inline Clock::duration duration(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
+/// `time` in seconds.
+inline double seconds(Clock::duration time) {
+  return std::chrono::duration<double>(time).count();
+}
+
 }  // namespace ecorche::server

@@ -6,6 +6,7 @@
 
 #include "proto/convert.hpp"
 #include "runtime/server/connection.hpp"
+#include "runtime/server/tls.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -100,6 +101,12 @@ void Connection::handle(const wire::Frame& frame) {
 
 void Connection::handle_hello(const v1::Envelope& request) {
   if (const Status status = check_hello(request.client_hello()); !status.ok()) return end(status);
+  const std::string& token = house_.options().token;
+  if (!token.empty() && !proven_ && !same_token(request.client_hello().token(), token)) {
+    house_.metrics().denied();
+    return end(
+        {StatusCode::unauthenticated, "hello: the token is missing or wrong (ask who runs the server)"});
+  }
   greeted_ = true;
   reader_.set_limits(
       {.envelope_bytes = house_.limits().envelope_bytes, .payload_bytes = house_.limits().payload_bytes});
@@ -153,6 +160,7 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
     return answer_status(id, status);
   }
   if (subscriptions_.size() >= house_.limits().subscriptions) {
+    house_.metrics().hit("subscriptions");
     return answer_status(
         id, {StatusCode::resource_exhausted, "subscribe: " + std::to_string(subscriptions_.size()) +
                                                  " subscriptions already (Unsubscribe one first)"});
@@ -211,6 +219,10 @@ void Connection::pose_done(const PoseOutcome& outcome, const Skipped& skipped) {
   if (closed_ || ending_) return;
   v1::Envelope envelope;
   v1::PoseAck& ack = *envelope.mutable_pose_ack();
+  Metrics& metrics = house_.metrics();
+  metrics.took(Metrics::Stage::waited, 1e-6 * static_cast<double>(outcome.timings.waited()));
+  metrics.took(Metrics::Stage::posed, 1e-6 * static_cast<double>(outcome.timings.posed()));
+  metrics.skipped(skipped.count);
   ack.set_sequence(outcome.sequence);
   wire::to_proto(outcome.status, *ack.mutable_status());
   const auto& segments = session_->model()->model().rig.skeleton.segments;

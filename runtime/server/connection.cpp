@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sockets, deadlines and the end of a connection; what its messages do stands in commands.cpp.
+// Bytes in and out, deadlines and the end of a connection; what its messages do stands in commands.cpp.
 #include "runtime/server/connection.hpp"
 
 #include <spdlog/spdlog.h>
@@ -19,30 +19,31 @@ constexpr double kLastWordsSeconds = 1;
 
 }  // namespace
 
-Connection::Connection(tcp::socket socket, House& house)
-    : socket_(std::move(socket)),
+Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, House& house)
+    : transport_(std::move(transport)),
       house_(house),
       reader_({.envelope_bytes = house.limits().hello_bytes, .payload_bytes = 0}),
       outbox_(house.limits().frames_in_flight),
-      wake_(socket_.get_executor()),
-      pause_(socket_.get_executor()),
+      wake_(transport_->executor()),
+      pause_(transport_->executor()),
+      peer_(std::move(peer)),
+      proven_(proven),
       allowance_(house.limits().messages_per_second),
-      allowance_at_(Clock::now()) {
-  boost::system::error_code ec;
-  socket_.set_option(tcp::no_delay(true), ec);
-  const tcp::endpoint peer = socket_.remote_endpoint(ec);
-  peer_ = ec ? "?" : peer.address().to_string() + ":" + std::to_string(peer.port());
-}
+      allowance_at_(Clock::now()) {}
 
 Connection::~Connection() = default;
 
 void Connection::start() {
   spdlog::debug("{}: connected", peer_);
-  const auto spawn = [&](net::awaitable<void> work) {
-    net::co_spawn(socket_.get_executor(), std::move(work), net::detached);
-  };
   spawn(read_frames());
-  spawn(write_frames());
+}
+
+// A coroutine that ends by an exception (out of memory, most likely) ends its connection, and nothing else.
+void Connection::spawn(net::awaitable<void> work) {
+  net::co_spawn(transport_->executor(), std::move(work),
+                [self = shared_from_this()](const std::exception_ptr& failed) {
+                  if (failed) self->close("failed");
+                });
 }
 
 void Connection::start_refused(const Status& status) {
@@ -73,8 +74,7 @@ void Connection::close(const char* why) {
   if (std::exchange(closed_, true)) return;
   spdlog::debug("{}: closed: {}", peer_, why);
   if (const auto session = std::exchange(session_, nullptr)) session->leave(*this);
-  boost::system::error_code ec;
-  socket_.close(ec);
+  transport_->close();
   wake_.cancel();
   pause_.cancel();
 }
@@ -87,26 +87,49 @@ void Connection::check(Clock::time_point now) {
   if (closed_) return;
   if (ending_) {
     if (longer(ending_since_, kLastWordsSeconds)) close("last words not read");
+  } else if (!open_ && longer(born_, limits.hello_seconds)) {
+    house_.metrics().hit("hello");
+    close("no handshake");  // nothing can be said yet
   } else if (!greeted_ && longer(born_, limits.hello_seconds)) {
-    end({StatusCode::deadline_exceeded,
-         "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
+    hit("hello", {StatusCode::deadline_exceeded,
+                  "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
   } else if (longer(writing_since_, limits.stall_seconds) ||
              longer(outbox_.oldest_in_flight(), limits.stall_seconds)) {
     spdlog::info("{}: dropped: stopped reading", peer_);
+    house_.metrics().hit("stall");
     close("stalled");
   } else if (longer(reading_since_, limits.stall_seconds)) {
-    end({StatusCode::deadline_exceeded, "frame: half a message, then nothing (send whole messages)"});
+    hit("stall",
+        {StatusCode::deadline_exceeded, "frame: half a message, then nothing (send whole messages)"});
   } else if (longer(heard_, limits.idle_seconds)) {
-    end({StatusCode::deadline_exceeded, "connection: nothing heard (send a Ping now and then)"});
+    hit("idle", {StatusCode::deadline_exceeded, "connection: nothing heard (send a Ping now and then)"});
   }
+}
+
+void Connection::hit(const char* limit, const Status& status) {
+  house_.metrics().hit(limit);
+  end(status);
+}
+
+net::awaitable<bool> Connection::open_transport() {
+  boost::system::error_code ec;
+  co_await transport_->open(ec);
+  if (ec && !closed_) spdlog::debug("{}: {}", peer_, ec.message());
+  open_ = !ec;
+  co_return open_ && !closed_;
 }
 
 net::awaitable<void> Connection::read_frames() {
   const auto self = shared_from_this();
+  const bool opened = co_await open_transport();
+  if (!opened) {
+    close("no handshake");
+    co_return;
+  }
+  spawn(write_frames());
   boost::system::error_code ec;
   while (!closed_ && !ending_) {
-    const std::size_t n = co_await socket_.async_read_some(
-        net::buffer(reader_.want().data(), reader_.want().size()), quietly(ec));
+    const std::size_t n = co_await transport_->read_some(reader_.want(), ec);
     if (ec) {
       close("client left");
       co_return;
@@ -120,9 +143,14 @@ net::awaitable<void> Connection::read_frames() {
 void Connection::take_in(std::size_t n) {
   if (ending_) return;  // said goodbye meanwhile
   heard_ = Clock::now();
+  house_.metrics().read(n);
   if (reader_.between_frames()) reading_since_ = heard_;
   try {
-    if (const Status status = reader_.advance(n); !status.ok()) return end(status);
+    if (const Status status = reader_.advance(n); !status.ok()) return hit("frame", status);
+    if (const auto ended = transport_->message_ended(); ended && *ended != reader_.complete()) {
+      return end({StatusCode::invalid_argument,
+                  "message: it holds more or less than one frame (send one frame a message)"});
+    }
     if (!reader_.complete()) return;
     reading_since_.reset();
     handle(reader_.take());
@@ -135,6 +163,7 @@ void Connection::take_in(std::size_t n) {
 net::awaitable<void> Connection::hold_back() {
   const double rate = house_.limits().messages_per_second;
   boost::system::error_code ec;
+  bool held = false;
   allowance_ -= 1;
   while (!closed_ && !ending_) {
     const auto now = Clock::now();
@@ -143,8 +172,9 @@ net::awaitable<void> Connection::hold_back() {
         std::min(rate, allowance_ + rate * std::chrono::duration<double>(now - allowance_at_).count());
     allowance_at_ = now;
     if (allowance_ >= 0 && outbox_.answers() <= kMostAnswers) co_return;
+    if (!std::exchange(held, true)) house_.metrics().hit("rate");
     pause_.expires_after(std::chrono::milliseconds(5));
-    co_await pause_.async_wait(quietly(ec));
+    co_await house_.wait(pause_, ec);
   }
 }
 
@@ -153,7 +183,7 @@ net::awaitable<void> Connection::hold_back() {
 net::awaitable<void> Connection::discard() {
   std::array<std::byte, 4096> bytes{};
   boost::system::error_code ec;
-  while (!closed_ && !ec) co_await socket_.async_read_some(net::buffer(bytes), quietly(ec));
+  while (!closed_ && !ec) co_await transport_->read_some(bytes, ec);
   close("client left");
 }
 
@@ -163,20 +193,27 @@ net::awaitable<void> Connection::write_frames() {
   while (!closed_) {
     const SharedFrame frame = outbox_.next(Clock::now());
     if (!frame && ending_) {
-      socket_.shutdown(tcp::socket::shutdown_send, ec);
+      co_await transport_->finish(ec);
       co_return;
     }
     if (!frame) {
       wake_.expires_at(Clock::time_point::max());
-      co_await wake_.async_wait(quietly(ec));
+      co_await house_.wait(wake_, ec);
       continue;
     }
+    const bool posed = outbox_.last_was_posed();
     std::array<net::const_buffer, 2> buffers{net::buffer(frame->head), net::const_buffer()};
     if (frame->payload) buffers[1] = net::buffer(*frame->payload);
-    writing_since_ = Clock::now();
-    co_await net::async_write(socket_, buffers, quietly(ec));
+    const auto start = Clock::now();
+    writing_since_ = start;
+    co_await transport_->write(std::span(buffers).first(frame->payload ? 2 : 1), ec);
     writing_since_.reset();
-    if (ec) close("client left");
+    if (ec) {
+      close("client left");
+      co_return;
+    }
+    house_.metrics().wrote(frame->bytes(), posed);
+    if (posed) house_.metrics().took(Metrics::Stage::written, seconds(Clock::now() - start));
   }
 }
 

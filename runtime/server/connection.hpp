@@ -10,21 +10,23 @@
 
 #include "runtime/server/house.hpp"
 #include "runtime/server/outbox.hpp"
+#include "runtime/server/transport.hpp"
 
 namespace ecorche::server {
 
 /// Two coroutines on the I/O thread:
 ///
-///   socket --> read_frames --> handle --> answers --> Outbox --> write_frames --> socket
-///                                |                      ^
-///                                +--> Session -- frames-+
+///   Transport --> read_frames --> handle --> answers --> Outbox --> write_frames --> Transport
+///                                   |                      ^
+///                                   +--> Session -- frames-+
 ///
 /// Nothing that a client sends reaches beyond its own connection: a broken rule ends it with a Status and a
 /// second to read it. Its deadlines are points in time that the server looks at ten times a second (check),
 /// so that no read or write needs a timer of its own.
 class Connection final : public std::enable_shared_from_this<Connection>, private Member {
  public:
-  Connection(tcp::socket socket, House& house);
+  /// `proven`: the client has shown its right to connect already.
+  Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, House& house);
   ~Connection() override;
 
   void start();
@@ -68,7 +70,11 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void end(v1::Envelope last);
   void end(const Status& status);
 
-  tcp::socket socket_;
+  void spawn(net::awaitable<void> work);
+  net::awaitable<bool> open_transport();
+  void hit(const char* limit, const Status& status);
+
+  std::unique_ptr<Transport> transport_;
   House& house_;
   wire::FrameReader reader_;
   Outbox outbox_;
@@ -76,6 +82,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   net::steady_timer pause_;  ///< the reader sleeps on it
   std::string peer_;
 
+  bool proven_;           ///< of the token, where one is asked for
+  bool open_ = false;     ///< the transport's handshake is over
   bool greeted_ = false;  ///< the hellos are exchanged
   bool ending_ = false;   ///< the last message is queued
   bool closed_ = false;

@@ -17,8 +17,20 @@ bool identifier(const std::string& name) {
 }  // namespace
 
 House::House(net::io_context& io, Workers& workers, Options options,
-             std::vector<std::shared_ptr<const ServedModel>> models)
-    : io_(io), workers_(workers), options_(std::move(options)), models_(std::move(models)) {}
+             std::vector<std::shared_ptr<const ServedModel>> models, Seams seams)
+    : io_(io),
+      workers_(workers),
+      options_(std::move(options)),
+      models_(std::move(models)),
+      seams_(std::move(seams)) {}
+
+net::awaitable<void> House::wait(net::steady_timer& timer, boost::system::error_code& ec) {
+  if (seams_.timer_fails && seams_.timer_fails()) {
+    ec = net::error::operation_aborted;
+    co_return;
+  }
+  co_await timer.async_wait(quietly(ec));
+}
 
 Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) {
   const auto model = std::find_if(models_.begin(), models_.end(), [&](const auto& m) {
@@ -44,6 +56,7 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
   }
   sweep(Clock::now());
   if (sessions_.size() >= options_.limits.sessions) {
+    metrics_.hit("sessions");
     return {StatusCode::resource_exhausted, "open: " + std::to_string(sessions_.size()) +
                                                 " sessions are open (try again when one has ended)"};
   }

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/server/metrics.hpp"
+#include "runtime/server/seams.hpp"
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
@@ -14,7 +16,7 @@ namespace ecorche::server {
 class House {
  public:
   House(net::io_context& io, Workers& workers, Options options,
-        std::vector<std::shared_ptr<const ServedModel>> models);
+        std::vector<std::shared_ptr<const ServedModel>> models, Seams seams);
 
   const Options& options() const { return options_; }
   const Limits& limits() const { return options_.limits; }
@@ -25,6 +27,11 @@ class House {
   /// for one session too many.
   Status open(const v1::OpenModel& request, std::shared_ptr<Session>& out);
 
+  Metrics& metrics() { return metrics_; }
+  /// Waits for the timer.
+  net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
+
+  std::size_t sessions() const { return sessions_.size(); }
   /// Ends the sessions that are over.
   void sweep(Clock::time_point now);
 
@@ -33,6 +40,8 @@ class House {
   Workers& workers_;
   Options options_;
   std::vector<std::shared_ptr<const ServedModel>> models_;
+  Seams seams_;
+  Metrics metrics_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
   std::uint64_t unnamed_ = 0;
 };

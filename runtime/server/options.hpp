@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace ecorche::server {
 
@@ -26,11 +28,19 @@ struct Limits {
   std::uint64_t volume_voxels = std::uint64_t{256} << 20;
 };
 
-struct Options {
+struct Endpoint {
   std::string host = "127.0.0.1";  ///< a numeric address, or localhost
-  std::uint16_t port = 7070;       ///< 0: any free one
-  bool insecure = false;           ///< listen beyond loopback although nothing is encrypted
-  std::string version;             ///< of the program, for ServerHello
+  std::uint16_t port = 0;          ///< 0: any free one
+};
+
+struct Options {
+  Endpoint listen{.host = "127.0.0.1", .port = 7070};
+  std::optional<Endpoint> http;      ///< health, metrics and WebSockets; none by default
+  std::vector<std::string> origins;  ///< pages whose scripts may connect, e.g. `https://viewer.example`
+  std::string certificate, key;      ///< PEM files; both or neither. With them both ports speak TLS only
+  std::string token;                 ///< clients must show it; empty: none is asked for
+  bool insecure = false;             ///< listen beyond loopback although TLS or the token is missing
+  std::string version;               ///< of the program, for ServerHello
   Limits limits;
 };
 

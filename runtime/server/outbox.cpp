@@ -25,6 +25,7 @@ void Outbox::acknowledge(std::uint32_t subscription, std::uint64_t number) {
 }
 
 SharedFrame Outbox::next(Clock::time_point now) {
+  last_was_posed_ = false;
   if (!answers_.empty()) {
     SharedFrame frame = std::move(answers_.front());
     answers_.pop_front();
@@ -37,6 +38,7 @@ SharedFrame Outbox::next(Clock::time_point now) {
     Lane& candidate = lane->second;
     if (!candidate.waiting || candidate.in_flight.size() >= limit_) continue;
     last_lane_ = lane->first;
+    last_was_posed_ = true;
     candidate.in_flight.push_back({candidate.waiting_number, now});
     return std::exchange(candidate.waiting, nullptr);
   }

@@ -31,6 +31,9 @@ class Outbox {
   /// What to write next; answers first, then the subscriptions in turn. Null when nothing may go now.
   SharedFrame next(Clock::time_point now);
 
+  /// Whether the last of next() was a subscription's.
+  bool last_was_posed() const { return last_was_posed_; }
+
   std::size_t answers() const { return answers_.size(); }
   /// When the frame left that has been on its way for longest.
   std::optional<Clock::time_point> oldest_in_flight() const;
@@ -53,6 +56,7 @@ class Outbox {
   std::map<std::uint32_t, Lane> lanes_;
   std::uint32_t last_lane_ = 0;  ///< subscription that was served last
   std::uint64_t replaced_ = 0;
+  bool last_was_posed_ = false;
 };
 
 }  // namespace ecorche::server

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "runtime/server/connection.hpp"
+#include "runtime/server/tls.hpp"
+#include "runtime/server/web.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -17,18 +19,30 @@ constexpr auto kTick = std::chrono::milliseconds(100);
 // Connections beyond the limit that may be told so at one time; the next ones are closed without a word.
 constexpr std::size_t kMostRefusals = 32;
 
-tcp::endpoint endpoint_of(const Options& options) {
+tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   boost::system::error_code ec;
   const net::ip::address address =
-      net::ip::make_address(options.host == "localhost" ? "127.0.0.1" : options.host, ec);
+      net::ip::make_address(where.host == "localhost" ? "127.0.0.1" : where.host, ec);
   if (ec)
-    throw Error(ErrorKind::usage, "listen", "'" + options.host + "' is no address",
+    throw Error(ErrorKind::usage, "listen", "'" + where.host + "' is no address",
                 "use a numeric one such as 127.0.0.1:7070");
-  if (!address.is_loopback() && !options.insecure) {
-    throw Error(ErrorKind::refused, options.host, "is reachable by others, and nothing is encrypted yet",
-                "listen on 127.0.0.1 and tunnel, or add --insecure on a network that you trust");
+  const bool guarded = !options.certificate.empty() && !options.token.empty();
+  if (!address.is_loopback() && !guarded && !options.insecure) {
+    throw Error(ErrorKind::refused, where.host, "is reachable by others, who could read and take part",
+                "give --tls-certificate, --tls-key and --token-file, listen on 127.0.0.1 and tunnel, or add "
+                "--insecure on a network that you trust");
   }
-  return {address, options.port};
+  return {address, where.port};
+}
+
+void check_options(const Options& options) {
+  if (options.certificate.empty() != options.key.empty())
+    throw Error(ErrorKind::usage, "TLS", "a certificate and its key go together",
+                "give both --tls-certificate and --tls-key");
+  constexpr std::size_t shortest = 16, longest = 1024;
+  if (!options.token.empty() && (options.token.size() < shortest || options.token.size() > longest))
+    throw Error(ErrorKind::config, "token", "it has " + std::to_string(options.token.size()) + " characters",
+                "use 16 to 1024 that nobody can guess, e.g. of openssl rand -hex 32");
 }
 
 void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
@@ -73,32 +87,53 @@ std::vector<std::shared_ptr<const ServedModel>> serve_all(std::vector<NamedModel
 }  // namespace
 
 struct Server::Impl {
-  Impl(Options options, std::vector<NamedModel> models, Workers& workers_) : workers(workers_) {
-    bind(acceptor, endpoint_of(options));
+  Impl(Options options, std::vector<NamedModel> models, Workers& workers_, Seams seams)
+      : workers(workers_), wrap(seams.transport) {
+    check_options(options);
+    bind(acceptor, endpoint_of(options.listen, options));
     port = acceptor.local_endpoint().port();
+    if (options.http) {
+      bind(http_acceptor, endpoint_of(*options.http, options));
+      http_port = http_acceptor.local_endpoint().port();
+    }
+    carrier = std::make_unique<Carrier>(options.certificate, options.key);
     auto served = serve_all(std::move(models), options.limits);
-    house = std::make_unique<House>(io, workers, std::move(options), std::move(served));
+    room = {.token = options.token,
+            .origins = options.origins,
+            .header_bytes = options.limits.hello_bytes,
+            .ready = [this] { return !stopping; },
+            .metrics = [this] { return metrics(); },
+            .denied = [this] { house->metrics().denied(); },
+            .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
+                              bool proven) { welcome(std::move(transport), std::move(peer), proven); }};
+    house = std::make_unique<House>(io, workers, std::move(options), std::move(served), std::move(seams));
   }
 
-  net::awaitable<void> accept();
+  net::awaitable<void> accept(tcp::acceptor& at, bool web);
   net::awaitable<void> watch();
-  void welcome(tcp::socket socket);
+  void look_after(Clock::time_point now);
+  void receive(tcp::socket socket, bool web);
+  void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven);
   void begin_shutdown();
+  std::string metrics();
 
   // Destroyed last: everything below it posts to it.
   net::io_context io{1};
-  tcp::acceptor acceptor{io};
+  tcp::acceptor acceptor{io}, http_acceptor{io};
   net::steady_timer tick{io};
-  net::steady_timer retry{io};
   Workers& workers;
-  std::uint16_t port = 0;
+  std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> wrap;
+  std::uint16_t port = 0, http_port = 0;
+  std::unique_ptr<Carrier> carrier;
+  WebRoom room;
   std::unique_ptr<House> house;
   std::vector<std::shared_ptr<Connection>> connections;
+  std::vector<std::shared_ptr<WebRequest>> requests;
   bool stopping = false;
 };
 
-Server::Server(Options options, std::vector<NamedModel> models, Workers& workers)
-    : impl_(std::make_unique<Impl>(std::move(options), std::move(models), workers)) {}
+Server::Server(Options options, std::vector<NamedModel> models, Workers& workers, Seams seams)
+    : impl_(std::make_unique<Impl>(std::move(options), std::move(models), workers, std::move(seams))) {}
 
 Server::~Server() = default;
 
@@ -106,10 +141,24 @@ std::uint16_t Server::port() const {
   return impl_->port;
 }
 
+std::uint16_t Server::http_port() const {
+  return impl_->http_port;
+}
+
 void Server::run() {
-  net::co_spawn(impl_->io, impl_->accept(), net::detached);
+  net::co_spawn(impl_->io, impl_->accept(impl_->acceptor, false), net::detached);
+  if (impl_->http_port != 0)
+    net::co_spawn(impl_->io, impl_->accept(impl_->http_acceptor, true), net::detached);
   net::co_spawn(impl_->io, impl_->watch(), net::detached);
-  impl_->io.run();
+  while (true) {
+    try {
+      impl_->io.run();
+      break;
+    } catch (const std::exception& error) {
+      // What was being done is lost; its connection will meet its deadlines.
+      spdlog::error("server: {}", error.what());
+    }
+  }
   // A worker may still be on its way out of posting.
   impl_->workers.drain();
 }
@@ -118,29 +167,46 @@ void Server::stop() {
   net::post(impl_->io, [this] { impl_->begin_shutdown(); });
 }
 
-net::awaitable<void> Server::Impl::accept() {
+net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
   boost::system::error_code ec;
-  while (!stopping) {
-    tcp::socket socket = co_await acceptor.async_accept(quietly(ec));
-    if (stopping) co_return;
-    if (!ec) {
-      welcome(std::move(socket));
-      continue;
+  net::steady_timer retry(io);
+  while (at.is_open()) {
+    bool failed = false;
+    try {
+      tcp::socket socket = co_await at.async_accept(quietly(ec));
+      if (!at.is_open()) co_return;
+      if (!ec) receive(std::move(socket), web);
+      failed = static_cast<bool>(ec);
+      // Out of file descriptors, or the client is gone already: neither ends the server.
+      if (ec) spdlog::warn("accept: {}", ec.message());
+    } catch (const std::exception& error) {
+      spdlog::warn("accept: {}", error.what());
+      failed = true;
     }
-    // Out of file descriptors, or the client is gone already: neither ends the server.
-    spdlog::warn("accept: {}", ec.message());
+    if (!failed) continue;
     retry.expires_after(kTick);
-    co_await retry.async_wait(quietly(ec));
+    co_await house->wait(retry, ec);
   }
 }
 
-void Server::Impl::welcome(tcp::socket socket) {
+void Server::Impl::receive(tcp::socket socket, bool web) {
+  std::string peer = peer_of(socket);
+  std::unique_ptr<Transport> transport = carrier->carry(std::move(socket));
+  if (wrap) transport = wrap(std::move(transport));
+  if (!web) return welcome(std::move(transport), std::move(peer), false);
+  if (requests.size() >= house->limits().connections) return house->metrics().hit("connections");
+  requests.push_back(web_request(std::move(transport), std::move(peer), room));
+  requests.back()->start();
+}
+
+void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven) {
   const auto limit = house->limits().connections;
   const auto alive = static_cast<std::size_t>(std::count_if(
       connections.begin(), connections.end(), [](const auto& c) { return !c->closed() && !c->ending(); }));
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
-  if (connections.size() >= limit + kMostRefusals) return;
-  connections.push_back(std::make_shared<Connection>(std::move(socket), *house));
+  if (alive >= limit) house->metrics().hit("connections");
+  if (stopping || connections.size() >= limit + kMostRefusals) return;
+  connections.push_back(std::make_shared<Connection>(std::move(transport), std::move(peer), proven, *house));
   if (alive < limit) return connections.back()->start();
   connections.back()->start_refused(
       {StatusCode::resource_exhausted,
@@ -151,13 +217,37 @@ void Server::Impl::welcome(tcp::socket socket) {
 net::awaitable<void> Server::Impl::watch() {
   boost::system::error_code ec;
   while (!stopping || !connections.empty()) {
-    const auto now = Clock::now();
-    for (const auto& connection : connections) connection->check(now);
-    std::erase_if(connections, [](const auto& c) { return c->closed(); });
-    house->sweep(now);
+    try {
+      look_after(Clock::now());
+    } catch (const std::exception& error) {
+      spdlog::error("server: {}", error.what());
+    }
     tick.expires_after(kTick);
-    co_await tick.async_wait(quietly(ec));
+    co_await house->wait(tick, ec);
   }
+  // Until the last client had its goodbye, the HTTP port tells that the server stops.
+  http_acceptor.close(ec);
+  for (const auto& request : requests) request->close();
+}
+
+void Server::Impl::look_after(Clock::time_point now) {
+  for (const auto& connection : connections) connection->check(now);
+  std::erase_if(connections, [](const auto& c) { return c->closed(); });
+  for (const auto& request : requests) {
+    if (now - request->born() <= duration(house->limits().hello_seconds)) continue;
+    if (!request->over()) house->metrics().hit("hello");
+    request->close();
+  }
+  std::erase_if(requests, [](const auto& request) { return request->over(); });
+  house->sweep(now);
+}
+
+std::string Server::Impl::metrics() {
+  Metrics& figures = house->metrics();
+  figures.set_clients(static_cast<std::size_t>(
+      std::count_if(connections.begin(), connections.end(), [](const auto& c) { return !c->closed(); })));
+  figures.set_sessions(house->sessions());
+  return figures.text();
 }
 
 void Server::Impl::begin_shutdown() {
@@ -165,7 +255,6 @@ void Server::Impl::begin_shutdown() {
   spdlog::info("stopping: {} connections", connections.size());
   boost::system::error_code ec;
   acceptor.close(ec);
-  retry.cancel();
   for (const auto& connection : connections) {
     if (!connection->closed())
       connection->say_goodbye({StatusCode::unavailable, "the server stops (connect again later)"});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server: framed Protobuf over TCP (docs/protocol.md).
+// The server: framed Protobuf over TCP, TLS and WebSockets (docs/protocol.md).
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 
 #include "core/values/model.hpp"
 #include "runtime/server/options.hpp"
+#include "runtime/server/seams.hpp"
 #include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
@@ -30,15 +31,17 @@ struct NamedModel {
 class Server {
  public:
   /// Binds and listens. Throws Error{temporary} when the address is in use, Error{usage} for one that cannot
-  /// be, Error{refused} beyond loopback without Options::insecure, Error{config} for too many models or two
-  /// of one name.
-  Server(Options options, std::vector<NamedModel> models, Workers& workers);
+  /// be or half of TLS, Error{refused} beyond loopback without TLS and a token (unless Options::insecure),
+  /// Error{config} for too many models or two of one name, and for files that are no certificate.
+  Server(Options options, std::vector<NamedModel> models, Workers& workers, Seams seams = {});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   /// The port it listens on.
   std::uint16_t port() const;
+  /// That of Options::http; 0 without.
+  std::uint16_t http_port() const;
 
   /// Serves on the calling thread until stop(), then says Goodbye to all, lets them read for up to a second,
   /// and returns once the last job has ended.

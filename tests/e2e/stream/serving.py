@@ -23,7 +23,8 @@ class Server:
                 self.process.kill()
                 raise RuntimeError("ecorche serve did not start: " + self.process.communicate()[1])
             time.sleep(0.01)
-        self.port = int(port_file.read_text())
+        ports = [int(line) for line in port_file.read_text().split()]
+        self.port, self.http_port = ports[0], (ports[1:] or [None])[0]
         self.address = f"127.0.0.1:{self.port}"
 
     def __enter__(self):

@@ -39,7 +39,7 @@ TEST(Shutdown, ClientsThatDoNotReadDoNotHoldItUp) {
 TEST(Shutdown, BeforeItRanAndTwice) {
   Workers workers(1, [](const Job& job) { job(); });
   Options options;
-  options.port = 0;
+  options.listen.port = 0;
   Server server(options, {{"toy", std::make_shared<const Model>(test::toy_model())}}, workers);
   EXPECT_NE(server.port(), 0);
   server.stop();
@@ -59,18 +59,18 @@ TEST(Start, WhatCannotBeServedIsRefused) {
     return ErrorKind::internal;
   };
   Options options;
-  options.port = 0;
+  options.listen.port = 0;
   EXPECT_EQ(kind_of(options, {}), ErrorKind::config);
   EXPECT_EQ(kind_of(options, {{"a", model}, {"a", model}}), ErrorKind::config);
   EXPECT_EQ(kind_of(options, {9, NamedModel{"a", model}}), ErrorKind::config);
-  options.host = "0.0.0.0";
+  options.listen.host = "0.0.0.0";
   EXPECT_EQ(kind_of(options, {{"a", model}}), ErrorKind::refused);
-  options.host = "nowhere";
+  options.listen.host = "nowhere";
   EXPECT_EQ(kind_of(options, {{"a", model}}), ErrorKind::usage);
 
   const TestServer running;
   Options same;
-  same.port = running.address().port;
+  same.listen.port = running.address().port;
   EXPECT_EQ(kind_of(same, {{"a", model}}), ErrorKind::temporary);
 }
 

@@ -19,17 +19,24 @@ client::Clock::time_point within(double seconds) {
          std::chrono::duration_cast<client::Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
+Options with(const Limits& limits) {
+  Options options;
+  options.limits = limits;
+  return options;
+}
+
 }  // namespace
 
-TestServer::TestServer(const Limits& limits)
+TestServer::TestServer(const Limits& limits) : TestServer(with(limits)) {}
+
+TestServer::TestServer(Options options, Seams seams)
     : model_(std::make_shared<const Model>(test::toy_model())), workers_(2, [](const Job& job) { job(); }) {
   spdlog::set_level(spdlog::level::off);
-  Options options;
-  options.port = 0;
+  options.listen.port = 0;
   options.version = "test";
-  options.limits = limits;
   server_ =
-      std::make_unique<Server>(options, std::vector<NamedModel>{{"toy", model_}, {"twin", model_}}, workers_);
+      std::make_unique<Server>(std::move(options), std::vector<NamedModel>{{"toy", model_}, {"twin", model_}},
+                               workers_, std::move(seams));
   thread_ = std::thread([this] { server_->run(); });
 }
 
@@ -42,8 +49,8 @@ void TestServer::join() {
   if (thread_.joinable()) thread_.join();
 }
 
-TestClient::TestClient(const TestServer& server, const std::string& session)
-    : client_(server.address(), "test") {
+TestClient::TestClient(const TestServer& server, const std::string& session, const client::Access& access)
+    : client_(server.address(), "test", access) {
   v1::Envelope open;
   open.mutable_open_model()->set_model("toy");
   open.mutable_open_model()->set_session(session);

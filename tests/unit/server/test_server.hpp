@@ -21,9 +21,12 @@ namespace ecorche::server {
 class TestServer {
  public:
   explicit TestServer(const Limits& limits = {});
+  /// Listens on free ports, whatever the options say of them.
+  explicit TestServer(Options options, Seams seams = {});
   ~TestServer();
 
   wire::Address address() const { return {"127.0.0.1", server_->port()}; }
+  wire::Address http() const { return {"127.0.0.1", server_->http_port()}; }
   const Model& model() const { return *model_; }
   void stop() { server_->stop(); }
   /// Waits for run() to return.
@@ -39,7 +42,8 @@ class TestServer {
 /// A client with the toy body open.
 class TestClient {
  public:
-  explicit TestClient(const TestServer& server, const std::string& session = {});
+  explicit TestClient(const TestServer& server, const std::string& session = {},
+                      const client::Access& access = {});
 
   const v1::ModelOpened& opened() const { return opened_; }
   client::Client& client() { return client_; }

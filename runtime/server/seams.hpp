@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where tests reach in, to make what never fails fail.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "runtime/server/transport.hpp"
+
+namespace ecorche::server {
+
+/// Empty in use.
+struct Seams {
+  /// Stands between the server and a client's bytes.
+  std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> transport;
+  /// Asked before every wait; true: the wait ends at once, with an error.
+  std::function<bool()> timer_fails;
+};
+
+}  // namespace ecorche::server

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What carries frames to and from one client: TCP, TLS over it, WebSocket messages over either.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "runtime/server/asio.hpp"
+
+namespace ecorche::server {
+
+/// One reading and one writing coroutine at a time, both on the I/O thread. Nothing here has a deadline of
+/// its own: whoever owns it calls close(), and what is under way ends with an error.
+class Transport {
+ public:
+  virtual ~Transport() = default;
+
+  virtual net::any_io_executor executor() = 0;
+  /// What must pass before the first byte (TLS' handshake).
+  virtual net::awaitable<void> open(boost::system::error_code& ec) = 0;
+  /// At least a byte, unless a message of the carrier was empty.
+  virtual net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) = 0;
+  /// All of one frame.
+  virtual net::awaitable<void> write(std::span<const net::const_buffer> frame,
+                                     boost::system::error_code& ec) = 0;
+  /// Nothing more is written; the client may read to the end.
+  virtual net::awaitable<void> finish(boost::system::error_code& ec) = 0;
+  virtual void close() = 0;
+
+  /// Where the carrier has messages, and one must be one frame: whether the last byte read ended one.
+  virtual std::optional<bool> message_ended() const { return std::nullopt; }
+};
+
+std::unique_ptr<Transport> tcp_transport(tcp::socket socket);
+
+/// `127.0.0.1:4711`, or `?` once it has gone.
+std::string peer_of(const tcp::socket& socket);
+
+}  // namespace ecorche::server
