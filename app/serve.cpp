@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/command.hpp"
+#include "app/served_clips.hpp"
 #include "app/token_file.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
@@ -25,6 +26,7 @@ struct Settings {
   std::string http;
   std::string port_file;
   std::string token_file;
+  std::string clips;
   std::string log = "info";
   server::Options options;
 };
@@ -34,11 +36,22 @@ std::string model_name(const std::string& path) {
   return std::filesystem::path(path).stem().string();
 }
 
+server::ModelParts read_model(const std::string& path, const std::string& clips, const Program& program,
+                              const Context& context) {
+  server::ModelParts parts{.model = std::make_shared<const Model>(model_file::read(path, context))};
+  if (!clips.empty()) parts.clips = read_clips(program, clips, parts.model->rig);
+  return parts;
+}
+
 std::vector<server::NamedModel> read_models(const Settings& settings, const Program& program) {
   std::vector<server::NamedModel> models;
   for (const std::string& path : settings.models) {
-    Model model = model_file::read(path, program.context("read model"));
-    models.push_back({model_name(path), std::make_shared<const Model>(std::move(model))});
+    server::ModelParts parts = read_model(path, settings.clips, program, program.context("read model"));
+    // Later, aside, by a worker: without a bar.
+    const auto read_again = [path, clips = settings.clips, &program] {
+      return read_model(path, clips, program, Context{});
+    };
+    models.push_back({model_name(path), std::move(parts.model), std::move(parts.clips), read_again});
   }
   return models;
 }
@@ -60,6 +73,7 @@ int run_serve(const Settings& settings, const Program& program) {
   if (!settings.http.empty()) options.http = endpoint(settings.http);
   if (!settings.token_file.empty()) options.token = read_token(settings.token_file);
   options.version = ECORCHE_VERSION;
+  if (!options.record_folder.empty()) files::make_folder(options.record_folder);
 
   // The main thread serves; as many workers as threads take up poses, all of them inside one arena, which
   // TBB's own threads join where a single pose leaves cores idle.
@@ -103,6 +117,11 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
                       "speak TLS, as the owner of this PEM chain");
   command->add_option("--tls-key", settings->options.key, "its key, PEM, unencrypted");
   command->add_option("--token-file", settings->token_file, "clients must show the token in this file");
+  command->add_option(
+      "--clips", settings->clips,
+      "a folder of motion files that clients may have played, by file name without its ending");
+  command->add_option("--record-dir", settings->options.record_folder,
+                      "a folder for what clients have recorded; without it nothing is");
   command->add_flag("--insecure", settings->options.insecure,
                     "listen beyond loopback although TLS or the token is missing");
   command->add_option("--log", settings->log, "what to log on stderr")
@@ -135,6 +154,8 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
   limit("--linger-seconds", limits.linger_seconds, "that a named session outlives its connections", 0.0, 1e6);
   limit("--max-volume-voxels", limits.volume_voxels, "of a posed volume", std::uint64_t{1},
         std::uint64_t{1} << 31);
+  limit("--max-record-bytes", limits.record_bytes, "of a recording", std::uint64_t{4096},
+        std::uint64_t{1} << 30);
 
   command->callback([settings, &program, &chosen] {
     chosen = [settings, &program] { return run_serve(*settings, program); };

@@ -9,6 +9,7 @@
 
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
+#include "app/replay.hpp"
 #include "app/stream_check.hpp"
 #include "app/token_file.hpp"
 #include "clients/cpp/client.hpp"
@@ -34,6 +35,7 @@ struct Settings {
   std::uint64_t check_every = 1;
   client::Access access;
   std::string token_file;
+  std::string replay;
 };
 
 // After the last pose: how long a silence ends the wait for its frames.
@@ -349,6 +351,8 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--tls-ca", settings->access.authorities,
                       "speak TLS, with a server whose certificate one in this PEM file vouches for");
   command->add_option("--token-file", settings->token_file, "show the server the token in this file");
+  command->add_option("--replay", settings->replay,
+                      "play back this recording of a server, and compare every frame with what was recorded");
   add_motion_options(*command, settings->motion);
   command->add_option("--rate", settings->rate, "poses per second")
       ->check(CLI::Range(0.1, 1e5))
@@ -374,6 +378,8 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
   command->callback([settings, &program, &chosen] {
     chosen = [settings, &program] {
       if (!settings->token_file.empty()) settings->access.token = read_token(settings->token_file);
+      if (!settings->replay.empty())
+        return replay(program, settings->replay, wire::parse_address(settings->address), settings->access);
       return Stream(*settings, program).run();
     };
   });

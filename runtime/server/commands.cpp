@@ -13,7 +13,9 @@ namespace {
 
 // The protocol of proto/ecorche/v1.
 constexpr std::uint32_t kProtocol = 1;
-constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY, v1::FEATURE_SPHERES};
+constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY,    v1::FEATURE_CONTROL,
+                               v1::FEATURE_RESUME,  v1::FEATURE_CLIPS,      v1::FEATURE_INVERSE_KINEMATICS,
+                               v1::FEATURE_RELOAD,  v1::FEATURE_THRESHOLDS, v1::FEATURE_SPHERES};
 
 void describe(const Limits& limits, v1::Limits& out) {
   out.set_hello_bytes(limits.hello_bytes);
@@ -38,9 +40,6 @@ Status check_hello(const v1::ClientHello& hello) {
     return {StatusCode::failed_precondition,
             "hello: the client speaks protocol " + std::to_string(hello.protocol_min()) + " to " +
                 std::to_string(hello.protocol_max()) + ", this server 1 to 1 (use another client)"};
-  }
-  if (!hello.resume_token().empty()) {
-    return {StatusCode::unimplemented, "hello: this server resumes nothing (connect without resume_token)"};
   }
   const auto& encodings = hello.encodings();
   if (!encodings.empty() &&
@@ -87,7 +86,24 @@ void Connection::handle(const wire::Frame& frame) {
       pong.mutable_pong()->set_data(request.ping().data().substr(0, 64));
       return answer(id, std::move(pong));
     }
+    case v1::Envelope::kClaimControl:
+      return handle_claim(request);
+    case v1::Envelope::kReleaseControl:
+      return handle_release(request);
+    case v1::Envelope::kSetThresholds:
+      return handle_thresholds(request);
+    case v1::Envelope::kSolveIk:
+      return handle_solve(request);
+    case v1::Envelope::kListClips:
+      return handle_clips(request);
+    case v1::Envelope::kPlayClip:
+      return handle_play(request);
+    case v1::Envelope::kRecord:
+      return handle_record(request);
+    case v1::Envelope::kReloadModel:
+      return handle_reload(request);
     case v1::Envelope::kGoodbye:
+      departed_ = true;
       return close("client said goodbye");
     case v1::Envelope::kPong:
     case v1::Envelope::kStatus:
@@ -115,8 +131,13 @@ void Connection::handle_hello(const v1::Envelope& request) {
   hello.set_protocol(kProtocol);
   hello.set_server("ecorche " + house_.options().version);
   for (const v1::Feature feature : kFeatures) hello.add_features(feature);
+  if (!house_.options().record_folder.empty()) hello.add_features(v1::FEATURE_RECORD);
   hello.add_encodings(v1::ENCODING_F32);
   describe(house_.limits(), *hello.mutable_limits());
+  resume_token_ = random_token();
+  hello.set_resume_token(resume_token_);
+  house_.arrived(resume_token_, [this] { close("its place was taken up again"); });
+  if (!request.client_hello().resume_token().empty()) resume(request.client_hello().resume_token(), hello);
   answer(request.request_id(), std::move(envelope));
 }
 
@@ -129,13 +150,21 @@ void Connection::handle_list(const v1::Envelope& request) {
 
 void Connection::handle_open(const v1::Envelope& request) {
   const v1::OpenModel& open = request.open_model();
-  if (session_) {
+  if (session_ && !session_->retired()) {
     return answer_status(
         request.request_id(),
         {StatusCode::failed_precondition, "open: this connection has a model (open another connection)"});
   }
-  if (const Status status = house_.open(open, session_); !status.ok())
+  std::shared_ptr<Session> session;
+  if (const Status status = house_.open(open, session); !status.ok())
     return answer_status(request.request_id(), status);
+  if (session_) {  // of the model that was
+    session_->leave(*this, false);
+    for (const std::uint32_t subscription : subscriptions_) outbox_.forget(subscription);
+    subscriptions_.clear();
+    last_sequence_ = 0;
+  }
+  session_ = std::move(session);
   role_ = session_->join(*this);
   const ServedModel& model = *session_->model();
   v1::Envelope envelope;
@@ -166,7 +195,8 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
                                                  " subscriptions already (Unsubscribe one first)"});
   }
   v1::Envelope envelope;
-  const std::uint32_t subscription = session_->subscribe(*this, want);
+  const std::uint32_t subscription =
+      session_->subscribe(*this, {.id = 0, .want = want, .request = request.subscribe()});
   subscriptions_.insert(subscription);
   envelope.mutable_subscribed()->set_subscription(subscription);
   answer(id, std::move(envelope));
@@ -206,17 +236,35 @@ Status Connection::check_pose(const v1::PoseUpdate& update, PoseRequest& out) co
   if (update.rig_digest() != model.opened.rig_digest()) {
     return {StatusCode::invalid_argument, "pose: meant for another rig (send ModelOpened.rig_digest)"};
   }
-  if (update.sequence() <= last_sequence_) {
-    return {StatusCode::out_of_range, "pose: sequence " + std::to_string(update.sequence()) + " after " +
-                                          std::to_string(last_sequence_) + " (let it grow)"};
-  }
+  if (const Status status = check_sequence(update.sequence()); !status.ok()) return status;
   out.sequence = update.sequence();
   out.skinning = skinning_of(update.skinning());
   return wire::from_proto(update, model.model().segment_count(), out.pose);
 }
 
+Status Connection::check_sequence(std::uint64_t sequence) const {
+  if (sequence > last_sequence_) return {};
+  return {StatusCode::out_of_range, "pose: sequence " + std::to_string(sequence) + " after " +
+                                        std::to_string(last_sequence_) + " (let it grow)"};
+}
+
+void Connection::handle_reload(const v1::Envelope& request) {
+  house_.reload(request.reload_model().model(),
+                [weak = weak_from_this(), id = request.request_id()](const Status& status) {
+                  if (const auto self = weak.lock()) self->answer_status(id, status);
+                });
+}
+
+void Connection::model_changed(std::uint64_t identity) {
+  if (closed_ || ending_) return;
+  v1::Envelope envelope;
+  envelope.mutable_model_changed()->set_identity(identity);
+  answer(0, std::move(envelope));
+}
+
 void Connection::pose_done(const PoseOutcome& outcome, const Skipped& skipped) {
   if (closed_ || ending_) return;
+  last_sequence_ = std::max(last_sequence_, outcome.sequence);  // of a clip that the server plays
   v1::Envelope envelope;
   v1::PoseAck& ack = *envelope.mutable_pose_ack();
   Metrics& metrics = house_.metrics();

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <array>
+#include <new>
 #include <utility>
 
 #include "proto/convert.hpp"
@@ -73,10 +74,22 @@ void Connection::end(v1::Envelope last) {
 void Connection::close(const char* why) {
   if (std::exchange(closed_, true)) return;
   spdlog::debug("{}: closed: {}", peer_, why);
-  if (const auto session = std::exchange(session_, nullptr)) session->leave(*this);
   transport_->close();
   wake_.cancel();
   pause_.cancel();
+  // A place that can be taken up again; not by one who said goodbye.
+  const auto session = std::exchange(session_, nullptr);
+  const bool may_return = session && !departed_ && !session->retired();
+  std::optional<Lost> place;
+  if (may_return) {
+    try {
+      place =
+          Lost{.session = session, .asked = session->asked_by(*this), .controlled = session->controls(*this)};
+    } catch (const std::bad_alloc&) {  // then nobody comes back to it
+    }
+  }
+  if (session) session->leave(*this, place.has_value());
+  house_.left(resume_token_, std::move(place));
 }
 
 void Connection::check(Clock::time_point now) {
@@ -225,6 +238,7 @@ void Connection::deliver(const PosedFrame& frame) {
 
 void Connection::answer(std::uint64_t request_id, v1::Envelope envelope,
                         std::shared_ptr<const wire::Payload> payload) {
+  if (closed_) return;
   envelope.set_request_id(request_id);
   outbox_.answer(wire::encode(envelope, std::move(payload)));
   wake_.cancel();

@@ -14,6 +14,8 @@
 
 namespace ecorche::server {
 
+struct IkOutcome;
+
 /// Two coroutines on the I/O thread:
 ///
 ///   Transport --> read_frames --> handle --> answers --> Outbox --> write_frames --> Transport
@@ -54,6 +56,9 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void deliver(const PosedFrame& frame) override;
   void pose_done(const PoseOutcome& outcome, const Skipped& skipped) override;
 
+  void control_changed(v1::Role role, bool vacant) override;
+  void model_changed(std::uint64_t identity) override;
+
   void handle(const wire::Frame& frame);
   void handle_hello(const v1::Envelope& request);
   void handle_list(const v1::Envelope& request);
@@ -61,6 +66,23 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void handle_subscribe(const v1::Envelope& request);
   void handle_unsubscribe(const v1::Envelope& request);
   void handle_pose(const v1::PoseUpdate& update);
+  void handle_reload(const v1::Envelope& request);
+  // control.cpp
+  void resume(const std::string& token, v1::ServerHello& hello);
+  void handle_claim(const v1::Envelope& request);
+  void handle_release(const v1::Envelope& request);
+  void handle_thresholds(const v1::Envelope& request);
+  // motion_commands.cpp
+  void handle_solve(const v1::Envelope& request);
+  void solved(std::uint64_t id, const v1::SolveIk& request, const IkOutcome& outcome);
+  void handle_clips(const v1::Envelope& request);
+  void handle_play(const v1::Envelope& request);
+  void handle_record(const v1::Envelope& request);
+  void finish_recording(std::uint64_t id);
+
+  /// Why this connection may not do `what`: no model is open, or (where `control`) another poses.
+  Status may(const char* what, bool control) const;
+  Status check_sequence(std::uint64_t sequence) const;
   Status check_pose(const v1::PoseUpdate& update, PoseRequest& out) const;
 
   void answer(std::uint64_t request_id, v1::Envelope envelope,
@@ -87,12 +109,15 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   bool greeted_ = false;  ///< the hellos are exchanged
   bool ending_ = false;   ///< the last message is queued
   bool closed_ = false;
-  double allowance_;  ///< messages that may be read at once
+  bool departed_ = false;  ///< the client said goodbye
+  double allowance_;       ///< messages that may be read at once
   Clock::time_point allowance_at_;
 
   std::shared_ptr<Session> session_;
   v1::Role role_ = v1::ROLE_UNSPECIFIED;
+  std::string resume_token_;
   std::set<std::uint32_t> subscriptions_;
+  int solving_ = 0;  ///< inverse kinematics under way
   std::uint64_t last_sequence_ = 0;
 
   const Clock::time_point born_ = Clock::now();

@@ -7,6 +7,9 @@
 namespace ecorche::server {
 namespace {
 
+// Recordings of a rig that can be played; the oldest goes.
+constexpr std::size_t kMostRecorded = 16;
+
 // [a-z0-9_]{1,64}
 bool identifier(const std::string& name) {
   return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
@@ -16,13 +19,20 @@ bool identifier(const std::string& name) {
 
 }  // namespace
 
-House::House(net::io_context& io, Workers& workers, Options options,
-             std::vector<std::shared_ptr<const ServedModel>> models, Seams seams)
-    : io_(io),
-      workers_(workers),
-      options_(std::move(options)),
-      models_(std::move(models)),
-      seams_(std::move(seams)) {}
+House::House(net::io_context& io, Workers& workers, Options options, std::vector<NamedModel> models,
+             Seams seams)
+    : io_(io), workers_(workers), options_(std::move(options)), seams_(std::move(seams)) {
+  if (models.empty() || models.size() > options_.limits.models) {
+    throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
+                "serve 1 to " + std::to_string(options_.limits.models) + ", or raise --max-models");
+  }
+  for (NamedModel& model : models) {
+    if (!sources_.emplace(model.name, std::move(model.read_again)).second)
+      throw Error(ErrorKind::config, model.name, "two models have this name", "rename one of the files");
+    models_.push_back(
+        std::make_shared<const ServedModel>(model.name, std::move(model.model), std::move(model.clips)));
+  }
+}
 
 net::awaitable<void> House::wait(net::steady_timer& timer, boost::system::error_code& ec) {
   if (seams_.timer_fails && seams_.timer_fails()) {
@@ -55,18 +65,146 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {};
   }
   sweep(Clock::now());
-  if (sessions_.size() >= options_.limits.sessions) {
+  if (sessions() >= options_.limits.sessions && !make_room()) {
     metrics_.hit("sessions");
-    return {StatusCode::resource_exhausted, "open: " + std::to_string(sessions_.size()) +
-                                                " sessions are open (try again when one has ended)"};
+    return {StatusCode::resource_exhausted,
+            "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
   out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits);
   sessions_.emplace(name, out);
   return {};
 }
 
+// The one that waits for longest, of those that only wait for a client to come back, goes.
+bool House::make_room() {
+  auto oldest = sessions_.end();
+  for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
+    const auto since = it->second->waiting();
+    if (since && (oldest == sessions_.end() || *since < *oldest->second->waiting())) oldest = it;
+  }
+  if (oldest == sessions_.end()) return false;
+  sessions_.erase(oldest);
+  return true;
+}
+
 void House::sweep(Clock::time_point now) {
   std::erase_if(sessions_, [&](const auto& entry) { return entry.second->over(now); });
+  std::erase_if(retired_, [&](const auto& session) { return session->over(now); });
+  const auto linger = duration(options_.limits.linger_seconds);
+  std::erase_if(lost_, [&](const auto& entry) {
+    return now - entry.second.since >= linger || entry.second.session.expired();
+  });
+}
+
+void House::arrived(const std::string& token, std::function<void()> give_up) {
+  live_.emplace(token, std::move(give_up));
+}
+
+void House::left(const std::string& token, std::optional<Lost> place) {
+  live_.erase(token);
+  if (place && !token.empty()) lost_.insert_or_assign(token, std::move(*place));
+}
+
+std::optional<Lost> House::take_up(const std::string& token) {
+  if (const auto live = live_.find(token); live != live_.end()) {
+    const std::function<void()> give_up = live->second;
+    give_up();  // leaves its place
+  }
+  sweep(Clock::now());
+  const auto found = lost_.find(token);
+  if (found == lost_.end()) return std::nullopt;
+  Lost place = std::move(found->second);
+  lost_.erase(found);
+  return place;
+}
+
+std::vector<std::shared_ptr<const Clip>> House::clips_for(const ServedModel& model) const {
+  std::vector<std::shared_ptr<const Clip>> clips = model.clips;
+  const auto own = recorded_.find(model.opened.rig_digest());
+  if (own != recorded_.end()) clips.insert(clips.end(), own->second.begin(), own->second.end());
+  return clips;
+}
+
+void House::add_clip(std::uint64_t rig_digest, Clip clip) {
+  auto& clips = recorded_[rig_digest];
+  if (clip.poses.empty()) return;
+  if (clips.size() >= kMostRecorded) clips.erase(clips.begin());
+  clips.push_back(std::make_shared<const Clip>(std::move(clip)));
+}
+
+Status House::recording_path(const std::string& name, std::filesystem::path& out) const {
+  if (options_.record_folder.empty()) {
+    return {StatusCode::failed_precondition,
+            "record: this server keeps no recordings (serve with --record-dir)"};
+  }
+  if (!identifier(name))
+    return {StatusCode::invalid_argument, "record: a name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
+  out = options_.record_folder / (name + ".ecrec");
+  std::error_code ec;
+  if (std::filesystem::exists(out, ec))
+    return {StatusCode::already_exists, "record: there is a recording '" + name + "' (choose another name)"};
+  return {};
+}
+
+void House::reload(const std::string& name, std::function<void(const Status&)> done) {
+  const auto source = sources_.find(name);
+  if (source == sources_.end())
+    return done({StatusCode::not_found, "reload: no model of that name (ListModels has the names)"});
+  if (!source->second)
+    return done({StatusCode::failed_precondition,
+                 "reload: this model was not read from a file (restart the server)"});
+  if (reloading_) return done({StatusCode::unavailable, "reload: another model is being read (try again)"});
+  reloading_ = true;
+  struct Reading {
+    Status status;
+    std::shared_ptr<const ServedModel> model;
+  };
+  const auto reading = std::make_shared<Reading>();
+  const auto work = [reading, read = source->second, name] {
+    try {
+      ModelParts parts = read();
+      reading->model = std::make_shared<const ServedModel>(name, parts.model, std::move(parts.clips));
+    } catch (const Error& error) {
+      reading->status = to_status(error);
+    } catch (const std::bad_alloc&) {
+      reading->status = {StatusCode::resource_exhausted, "reload: the server is out of memory (restart it)"};
+    } catch (const std::exception& error) {
+      reading->status = {StatusCode::internal, error.what()};
+    }
+  };
+  offload(work, [this, reading, done = std::move(done)] {
+    reloading_ = false;
+    if (reading->status.ok()) replace(reading->model);
+    done(reading->status);
+  });
+}
+
+void House::replace(std::shared_ptr<const ServedModel> model) {
+  const auto old = std::find_if(models_.begin(), models_.end(),
+                                [&](const auto& m) { return m->summary.name() == model->summary.name(); });
+  const std::uint64_t identity = model->opened.identity();
+  if ((*old)->opened.identity() == identity &&
+      (*old)->opened.topology_digest() == model->opened.topology_digest())
+    return;
+  for (auto it = sessions_.begin(); it != sessions_.end();) {
+    if (it->second->model() != *old) {
+      ++it;
+      continue;
+    }
+    it->second->retire(identity);
+    retired_.push_back(it->second);
+    it = sessions_.erase(it);
+  }
+  *old = std::move(model);
+}
+
+void House::offload(std::function<void()> work, std::function<void()> then) {
+  workers_.submit([&io = io_, work = std::move(work), then = std::move(then),
+                   guard = net::make_work_guard(io_)]() mutable {
+    work();
+    // What both hold ends on the I/O thread.
+    net::post(io, [work = std::move(work), then = std::move(then), guard = std::move(guard)] { then(); });
+  });
 }
 
 }  // namespace ecorche::server

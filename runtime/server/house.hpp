@@ -2,21 +2,32 @@
 // What all connections of a server share; lives on the I/O thread.
 #pragma once
 
+#include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "runtime/server/metrics.hpp"
+#include "runtime/server/named_model.hpp"
 #include "runtime/server/seams.hpp"
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
 
+/// The place that a connection left.
+struct Lost {
+  std::weak_ptr<Session> session;
+  std::vector<Asked> asked;
+  bool controlled = false;
+  Clock::time_point since = Clock::now();
+};
+
 class House {
  public:
-  House(net::io_context& io, Workers& workers, Options options,
-        std::vector<std::shared_ptr<const ServedModel>> models, Seams seams);
+  House(net::io_context& io, Workers& workers, Options options, std::vector<NamedModel> models, Seams seams);
 
   const Options& options() const { return options_; }
   const Limits& limits() const { return options_.limits; }
@@ -27,11 +38,31 @@ class House {
   /// for one session too many.
   Status open(const v1::OpenModel& request, std::shared_ptr<Session>& out);
 
+  /// A connection with this resume token is there; `give_up` ends it for another that shows the token.
+  void arrived(const std::string& token, std::function<void()> give_up);
+  /// It ended; a place that can be taken up again is kept for `linger_seconds`.
+  void left(const std::string& token, std::optional<Lost> place);
+  /// The place of the token, once; nothing where there is none (any more).
+  std::optional<Lost> take_up(const std::string& token);
+
+  /// What can be played on the model.
+  std::vector<std::shared_ptr<const Clip>> clips_for(const ServedModel& model) const;
+  /// What was recorded with models of this rig is a clip, too.
+  void add_clip(std::uint64_t rig_digest, Clip clip);
+  /// Where a recording of this name goes: invalid_argument, failed_precondition, already_exists.
+  Status recording_path(const std::string& name, std::filesystem::path& out) const;
+
+  /// Reads a model again, aside, and calls `done` on the I/O thread.
+  void reload(const std::string& name, std::function<void(const Status&)> done);
+
+  /// `work` on a worker, then `then` on the I/O thread. Neither may throw.
+  void offload(std::function<void()> work, std::function<void()> then);
+
   Metrics& metrics() { return metrics_; }
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
 
-  std::size_t sessions() const { return sessions_.size(); }
+  std::size_t sessions() const { return sessions_.size() + retired_.size(); }
   /// Ends the sessions that are over.
   void sweep(Clock::time_point now);
 
@@ -39,7 +70,16 @@ class House {
   net::io_context& io_;
   Workers& workers_;
   Options options_;
+  void replace(std::shared_ptr<const ServedModel> model);
+  bool make_room();
+
   std::vector<std::shared_ptr<const ServedModel>> models_;
+  std::map<std::string, std::function<ModelParts()>> sources_;
+  bool reloading_ = false;
+  std::map<std::string, std::function<void()>> live_;
+  std::map<std::string, Lost> lost_;
+  std::vector<std::shared_ptr<Session>> retired_;
+  std::map<std::uint64_t, std::vector<std::shared_ptr<const Clip>>> recorded_;  // by rig digest
   Seams seams_;
   Metrics metrics_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;

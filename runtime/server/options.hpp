@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ struct Limits {
   double idle_seconds = 300;
   double linger_seconds = 60;
   std::uint64_t volume_voxels = std::uint64_t{256} << 20;
+  std::uint64_t record_bytes = std::uint64_t{64} << 20;  ///< of one recording
 };
 
 struct Endpoint {
@@ -35,12 +37,13 @@ struct Endpoint {
 
 struct Options {
   Endpoint listen{.host = "127.0.0.1", .port = 7070};
-  std::optional<Endpoint> http;      ///< health, metrics and WebSockets; none by default
-  std::vector<std::string> origins;  ///< pages whose scripts may connect, e.g. `https://viewer.example`
-  std::string certificate, key;      ///< PEM files; both or neither. With them both ports speak TLS only
-  std::string token;                 ///< clients must show it; empty: none is asked for
-  bool insecure = false;             ///< listen beyond loopback although TLS or the token is missing
-  std::string version;               ///< of the program, for ServerHello
+  std::optional<Endpoint> http;         ///< health, metrics and WebSockets; none by default
+  std::vector<std::string> origins;     ///< pages whose scripts may connect, e.g. `https://viewer.example`
+  std::string certificate, key;         ///< PEM files; both or neither. With them both ports speak TLS only
+  std::string token;                    ///< clients must show it; empty: none is asked for
+  bool insecure = false;                ///< listen beyond loopback although TLS or the token is missing
+  std::filesystem::path record_folder;  ///< empty: nothing is recorded
+  std::string version;                  ///< of the program, for ServerHello
   Limits limits;
 };
 

@@ -7,6 +7,7 @@
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/server/recording.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -96,8 +97,8 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, cons
     *array.mutable_array() = wire::append(*payload, std::span<const float>(body.tissues[tissue]), 3);
   }
   if (want.quality) {
-    describe(runtime::measure(job.model->model(), body, want.tissues, {}, job.model->closed), want.tissues,
-             *frame.mutable_quality());
+    describe(runtime::measure(job.model->model(), body, want.tissues, job.thresholds, job.model->closed),
+             want.tissues, *frame.mutable_quality());
   }
   *frame.mutable_timings() = timings;
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
@@ -159,6 +160,11 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
           std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
 }
 
+void hand_over(const PoseJob& job, PosedFrame frame) {
+  if (job.digests) frame.digest = digest_of(*frame.bytes);
+  job.on_frame(std::move(frame));
+}
+
 }  // namespace
 
 Status run(const PoseJob& job, runtime::PosedBody& body) {
@@ -182,11 +188,11 @@ Status run(const PoseJob& job, runtime::PosedBody& body) {
   return guarded([&] {
     for (const Subscription& subscription : job.subscriptions) {
       const auto* want = std::get_if<MeshWant>(&subscription.want);
-      if (want) job.on_frame(mesh_frame(job, subscription, *want, body, timings));
+      if (want) hand_over(job, mesh_frame(job, subscription, *want, body, timings));
     }
     for (const Subscription& subscription : job.subscriptions) {
       const auto* want = std::get_if<VolumeWant>(&subscription.want);
-      if (want) job.on_frame(volume_frame(job, subscription, *want, body, timings));
+      if (want) hand_over(job, volume_frame(job, subscription, *want, body, timings));
     }
     return Status{};
   });

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "proto/framing.hpp"
+#include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/asio.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/server/subscription.hpp"
@@ -34,6 +36,7 @@ struct PosedFrame {
   std::uint32_t subscription = 0;
   std::uint64_t number = 0;
   std::shared_ptr<const wire::EncodedFrame> bytes;
+  std::optional<std::uint64_t> digest = {};  ///< XXH64 of the payload, where PoseJob::digests asks for it
 };
 
 struct PoseJob {
@@ -42,6 +45,8 @@ struct PoseJob {
   std::uint64_t number = 0;  ///< of the frames
   std::vector<Subscription> subscriptions;
   std::uint64_t volume_voxels = 0;  ///< Limits
+  runtime::QualityThresholds thresholds;
+  bool digests = false;
   /// Called on the worker, in this order: the outcome once, then every frame, meshes before volumes (which
   /// take longer).
   std::function<void(PoseOutcome)> on_outcome;

@@ -44,11 +44,12 @@ void describe(const ModelVolume& volume, v1::Volume& out) {
 
 }  // namespace
 
-ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model)
+ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves)
     : poser(model),
       volumes(model),
       closed(runtime::closed_surfaces(*model)),
       summary(summarize(std::move(name), *model)) {
+  for (Clip& clip : moves) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
   opened.set_model(summary.name());
   opened.set_identity(summary.identity());
   opened.set_rig_digest(model_file::rig_digest(model->rig));

@@ -8,6 +8,7 @@
 #include "core/values/model.hpp"
 #include "proto/framing.hpp"
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/server/clip.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/volume_poser.hpp"
 
@@ -15,14 +16,15 @@ namespace ecorche::server {
 
 /// Immutable after construction; shared by every thread.
 struct ServedModel {
-  /// `name` is what OpenModel asks for.
-  ServedModel(std::string name, const std::shared_ptr<const Model>& model);
+  /// `name` is what OpenModel asks for; `clips` are of the model's rig.
+  ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> clips = {});
 
   const Model& model() const { return poser.model(); }
 
   runtime::BodyPoser poser;
   runtime::VolumePoser volumes;
   std::vector<std::uint8_t> closed;  ///< runtime::closed_surfaces
+  std::vector<std::shared_ptr<const Clip>> clips;
   v1::ModelSummary summary;
   v1::ModelOpened opened;                         ///< without session, role and triangles
   std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "runtime/server/connection.hpp"
@@ -67,23 +66,6 @@ void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
   check();
 }
 
-std::vector<std::shared_ptr<const ServedModel>> serve_all(std::vector<NamedModel> models,
-                                                          const Limits& limits) {
-  if (models.empty() || models.size() > limits.models) {
-    throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
-                "serve 1 to " + std::to_string(limits.models) + ", or raise --max-models");
-  }
-  std::set<std::string> names;
-  std::vector<std::shared_ptr<const ServedModel>> served;
-  for (NamedModel& model : models) {
-    if (!names.insert(model.name).second) {
-      throw Error(ErrorKind::config, model.name, "two models have this name", "rename one of the files");
-    }
-    served.push_back(std::make_shared<const ServedModel>(model.name, std::move(model.model)));
-  }
-  return served;
-}
-
 }  // namespace
 
 struct Server::Impl {
@@ -97,7 +79,6 @@ struct Server::Impl {
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
-    auto served = serve_all(std::move(models), options.limits);
     room = {.token = options.token,
             .origins = options.origins,
             .header_bytes = options.limits.hello_bytes,
@@ -106,11 +87,12 @@ struct Server::Impl {
             .denied = [this] { house->metrics().denied(); },
             .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
                               bool proven) { welcome(std::move(transport), std::move(peer), proven); }};
-    house = std::make_unique<House>(io, workers, std::move(options), std::move(served), std::move(seams));
+    house = std::make_unique<House>(io, workers, std::move(options), std::move(models), std::move(seams));
   }
 
   net::awaitable<void> accept(tcp::acceptor& at, bool web);
   net::awaitable<void> watch();
+  net::awaitable<void> pause(net::steady_timer& timer);
   void look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool web);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven);
@@ -183,9 +165,7 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
       spdlog::warn("accept: {}", error.what());
       failed = true;
     }
-    if (!failed) continue;
-    retry.expires_after(kTick);
-    co_await house->wait(retry, ec);
+    if (failed) co_await pause(retry);
   }
 }
 
@@ -222,8 +202,7 @@ net::awaitable<void> Server::Impl::watch() {
     } catch (const std::exception& error) {
       spdlog::error("server: {}", error.what());
     }
-    tick.expires_after(kTick);
-    co_await house->wait(tick, ec);
+    co_await pause(tick);
   }
   // Until the last client had its goodbye, the HTTP port tells that the server stops.
   http_acceptor.close(ec);
@@ -256,8 +235,23 @@ void Server::Impl::begin_shutdown() {
   boost::system::error_code ec;
   acceptor.close(ec);
   for (const auto& connection : connections) {
-    if (!connection->closed())
+    if (connection->closed()) continue;
+    try {
       connection->say_goodbye({StatusCode::unavailable, "the server stops (connect again later)"});
+    } catch (const std::exception&) {  // no memory for a word
+      connection->close("stopping");
+    }
+  }
+}
+
+// A tick's time, or nothing where even the wait finds no memory.
+net::awaitable<void> Server::Impl::pause(net::steady_timer& timer) {
+  boost::system::error_code ec;
+  try {
+    timer.expires_after(kTick);
+    co_await house->wait(timer, ec);
+  } catch (const std::exception& error) {
+    spdlog::error("server: {}", error.what());
   }
 }
 

@@ -7,17 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include "runtime/server/named_model.hpp"
 #include "runtime/server/options.hpp"
 #include "runtime/server/seams.hpp"
 #include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
-
-struct NamedModel {
-  std::string name;
-  std::shared_ptr<const Model> model;
-};
 
 /// One I/O thread holds every connection and session; workers pose.
 ///

@@ -24,6 +24,17 @@ Session::Session(net::io_context& io, Workers& workers, std::shared_ptr<const Se
       limits_(limits),
       pace_(io) {
   present_.pose = Pose::rest(model_->model().segment_count());
+  player_ = std::make_shared<ClipPlayer>(io, [this](const Pose& pose) {
+    PoseRequest request;
+    request.sequence = last_sequence_ + 1;
+    request.pose = pose;
+    request.skinning = present_.skinning;
+    take(std::move(request));
+  });
+}
+
+Session::~Session() {
+  player_->release();
 }
 
 v1::Role Session::join(Member& member) {
@@ -34,29 +45,86 @@ v1::Role Session::join(Member& member) {
   return controller_ == &member ? v1::ROLE_CONTROLLER : v1::ROLE_OBSERVER;
 }
 
-void Session::leave(Member& member) {
+v1::Role Session::rejoin(Member& member, bool control) {
+  if (!control || controller_) return join(member);
+  members_.insert(&member);
+  controller_ = &member;
+  control_left_.reset();
+  return v1::ROLE_CONTROLLER;
+}
+
+void Session::leave(Member& member, bool may_return) {
   members_.erase(&member);
   for (Row& row : rows_) row.members.erase(&member);
   std::erase_if(rows_, [](const Row& row) { return row.members.empty(); });
   const auto now = Clock::now();
-  if (controller_ == &member) {
+  const bool controlled = controller_ == &member;
+  if (controlled) {
     controller_ = nullptr;
     control_left_ = now;
   }
-  if (members_.empty()) last_seen_ = now;
+  if (members_.empty()) {
+    last_seen_ = now;
+    awaited_ = may_return;
+    player_->stop();
+  } else if (controlled) {
+    tell_control();
+  }
 }
 
-std::uint32_t Session::subscribe(Member& member, const Want& want) {
+bool Session::claim(Member& member) {
+  if (controller_ == &member) return true;
+  const auto now = Clock::now();
+  if (controller_ || (control_left_ && now - *control_left_ < duration(limits_.linger_seconds))) return false;
+  controller_ = &member;
+  tell_control();
+  return true;
+}
+
+bool Session::release(Member& member) {
+  if (controller_ != &member) return false;
+  controller_ = nullptr;
+  control_left_.reset();
+  tell_control();
+  return true;
+}
+
+void Session::tell_control() {
+  for (Member* member : members_) {
+    member->control_changed(controller_ == member ? v1::ROLE_CONTROLLER : v1::ROLE_OBSERVER,
+                            controller_ == nullptr);
+  }
+}
+
+void Session::retire(std::uint64_t identity) {
+  retired_ = true;
+  for (Member* member : members_) member->model_changed(identity);
+}
+
+std::uint32_t Session::subscribe(Member& member, const Asked& asked) {
+  const Want& want = asked.want;
   auto row =
       std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.subscription.want == want; });
-  if (row == rows_.end())
-    row = rows_.insert(row, {.subscription = {.id = ++last_subscription_, .want = want}, .members = {}});
+  if (row == rows_.end()) {
+    const std::uint32_t number = asked.id != 0 ? asked.id : ++last_subscription_;
+    row = rows_.insert(
+        row, {.subscription = {.id = number, .want = want}, .request = asked.request, .members = {}});
+  }
   row->members.insert(&member);
   const std::uint32_t id = row->subscription.id;
   fresh_.insert(id);
   // Once the answer with the number is on its way.
   net::post(io_, [self = shared_from_this()] { self->start_job(); });
   return id;
+}
+
+std::vector<Asked> Session::asked_by(Member& member) const {
+  std::vector<Asked> out;
+  for (const Row& row : rows_) {
+    if (row.members.contains(&member))
+      out.push_back({row.subscription.id, row.subscription.want, row.request});
+  }
+  return out;
 }
 
 bool Session::unsubscribe(Member& member, std::uint32_t id) {
@@ -67,7 +135,26 @@ bool Session::unsubscribe(Member& member, std::uint32_t id) {
   return true;
 }
 
+void Session::play(std::shared_ptr<const Clip> clip, double speed, bool loop) {
+  player_->play(std::move(clip), speed, loop);
+}
+
+void Session::set_thresholds(const runtime::QualityThresholds& thresholds) {
+  thresholds_ = thresholds;
+  for (const Row& row : rows_) {
+    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
+    if (mesh && mesh->quality) fresh_.insert(row.subscription.id);
+  }
+  start_job();
+}
+
 void Session::pose(PoseRequest request) {
+  player_->stop();
+  take(std::move(request));
+}
+
+void Session::take(PoseRequest request) {
+  last_sequence_ = request.sequence;
   if (slot_) skipped_.add(slot_->sequence);
   slot_ = std::move(request);
   start_job();
@@ -75,7 +162,13 @@ void Session::pose(PoseRequest request) {
 
 bool Session::over(Clock::time_point now) const {
   if (!members_.empty() || busy_) return false;
-  return !named_ || now - last_seen_ >= duration(limits_.linger_seconds);
+  if (retired_ || (!named_ && !awaited_)) return true;
+  return now - last_seen_ >= duration(limits_.linger_seconds);
+}
+
+std::optional<Clock::time_point> Session::waiting() const {
+  if (named_ || !members_.empty() || busy_) return std::nullopt;
+  return last_seen_;
 }
 
 void Session::start_job() {
@@ -84,25 +177,37 @@ void Session::start_job() {
   if (now < next_start_) {
     if (std::exchange(pacing_, true)) return;
     pace_.expires_at(next_start_);
-    pace_.async_wait([weak = weak_from_this()](const boost::system::error_code& ec) {
+    pace_.async_wait([weak = weak_from_this()](const boost::system::error_code&) {
       const auto self = weak.lock();
-      if (!self || ec) return;
+      if (!self) return;
       self->pacing_ = false;
       self->start_job();
     });
     return;
   }
   next_start_ = now + duration(1 / limits_.poses_per_second);
-  busy_ = true;
-
   const bool refresh = !slot_;
   auto job = std::make_shared<PoseJob>();
   take_up(*job);
+  busy_ = true;
+  try {
+    submit(std::move(job), refresh);
+  } catch (...) {  // out of memory: this pose is lost, the next one is not
+    busy_ = false;
+    throw;
+  }
+}
+
+void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
   auto skipped = std::make_shared<const Skipped>(refresh ? Skipped{} : std::exchange(skipped_, {}));
   std::shared_ptr<Session> self = shared_from_this();
-  job->on_outcome = [self, skipped, request = job->request, refresh](PoseOutcome outcome) {
-    net::post(self->io_, [self, skipped, request, refresh, outcome = std::move(outcome)]() mutable {
-      self->finish_pose(std::move(outcome), *skipped, request, refresh);
+  // Posted by the job itself, which holds these.
+  job->on_outcome = [self, skipped, shown = job.get(), refresh](PoseOutcome outcome) {
+    auto said = std::make_shared<PoseJob>();
+    said->number = shown->number;
+    said->request = shown->request;
+    net::post(self->io_, [self, skipped, said, refresh, outcome = std::move(outcome)] {
+      self->finish_pose(outcome, *skipped, *said, refresh);
     });
   };
   job->on_frame = [self](PosedFrame frame) {
@@ -128,6 +233,8 @@ void Session::take_up(PoseJob& job) {
   job.model = model_;
   job.number = ++frames_;
   job.volume_voxels = limits_.volume_voxels;
+  job.thresholds = thresholds_;
+  job.digests = recording_ != nullptr;
   for (const Row& row : rows_) {
     if (!refresh || fresh_.contains(row.subscription.id)) job.subscriptions.push_back(row.subscription);
   }
@@ -140,10 +247,14 @@ void Session::take_up(PoseJob& job) {
   }
 }
 
-void Session::finish_pose(PoseOutcome outcome, const Skipped& skipped, const PoseRequest& request,
+void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,
                           bool refresh) {
   if (refresh) return;
-  if (outcome.status.ok()) present_ = request;
+  if (outcome.status.ok()) present_ = job.request;
+  if (outcome.status.ok() && recording_) {
+    recording_->add(job.request);
+    recorded_job_ = job.number;
+  }
   if (controller_) controller_->pose_done(outcome, skipped);
 }
 
@@ -151,6 +262,7 @@ void Session::publish(const PosedFrame& frame) {
   const auto row = std::find_if(rows_.begin(), rows_.end(),
                                 [&](const Row& r) { return r.subscription.id == frame.subscription; });
   if (row == rows_.end()) return;
+  if (recording_ && frame.number == recorded_job_) recording_->add(frame, row->request);
   for (Member* member : row->members) member->deliver(frame);
 }
 

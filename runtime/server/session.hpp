@@ -10,8 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "runtime/quality/pose_quality.hpp"
+#include "runtime/server/clip.hpp"
 #include "runtime/server/options.hpp"
 #include "runtime/server/pose_job.hpp"
+#include "runtime/server/recording.hpp"
 #include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
@@ -32,6 +35,17 @@ class Member {
   virtual void deliver(const PosedFrame& frame) = 0;
   /// Only to the member that holds control.
   virtual void pose_done(const PoseOutcome& outcome, const Skipped& skipped) = 0;
+  /// `vacant`: nobody holds control.
+  virtual void control_changed(v1::Role role, bool vacant) = 0;
+  /// The model of this name is another one now; the session goes on with the old one.
+  virtual void model_changed(std::uint64_t identity) = 0;
+};
+
+/// A subscription as a member asked for it.
+struct Asked {
+  std::uint32_t id = 0;
+  Want want;
+  v1::Subscribe request;
 };
 
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the
@@ -40,34 +54,71 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model, std::string name,
           bool named, const Limits& limits);
+  ~Session();
 
   const std::string& name() const { return name_; }
   const std::shared_ptr<const ServedModel>& model() const { return model_; }
 
   /// Gives control to the member when nobody holds it (and nobody did during the last `linger_seconds`).
   v1::Role join(Member& member);
-  void leave(Member& member);
+  /// As join; with `control`, the control that it left with is its again, unless somebody has it.
+  v1::Role rejoin(Member& member, bool control);
+  /// `may_return`: keeps an unnamed session for `linger_seconds`, too.
+  void leave(Member& member, bool may_return);
 
-  /// The subscription's number, the same for equal wants. Frames follow, the present pose first.
-  std::uint32_t subscribe(Member& member, const Want& want);
+  /// False while another holds control or may come back to it.
+  bool claim(Member& member);
+  /// False where the member does not hold it.
+  bool release(Member& member);
+  bool controls(const Member& member) const { return controller_ == &member; }
+
+  /// The subscription's number, the same for equal wants; `asked.id` where that is not 0 and the want is new.
+  /// Frames follow, the present pose first.
+  std::uint32_t subscribe(Member& member, const Asked& asked);
+  std::vector<Asked> asked_by(Member& member) const;
   /// False where the member has no such subscription.
   bool unsubscribe(Member& member, std::uint32_t id);
 
   /// From the member that holds control; already checked against the rig.
   void pose(PoseRequest request);
+  /// The pose that is shown.
+  const PoseRequest& present() const { return present_; }
+  /// Of the newest pose, shown or not.
+  std::uint64_t last_sequence() const { return last_sequence_; }
+
+  /// Poses by itself, until the clip ends, a pose comes or everybody has left.
+  void play(std::shared_ptr<const Clip> clip, double speed, bool loop);
+  void stop_clip() { player_->stop(); }
+
+  const runtime::QualityThresholds& thresholds() const { return thresholds_; }
+  void set_thresholds(const runtime::QualityThresholds& thresholds);
+
+  /// What is shown from now on goes into it, until it is taken away.
+  void record(std::shared_ptr<Recording> recording) { recording_ = std::move(recording); }
+  const std::shared_ptr<Recording>& recording() const { return recording_; }
+
+  /// Its model's name means another one now: nobody joins any more, and it ends with its last member.
+  void retire(std::uint64_t identity);
+  bool retired() const { return retired_; }
 
   /// Nobody is here, nor may come back.
   bool over(Clock::time_point now) const;
+  /// Nobody is here, and only who was may come back: since when.
+  std::optional<Clock::time_point> waiting() const;
 
  private:
   struct Row {
     Subscription subscription;
+    v1::Subscribe request;
     std::set<Member*> members;
   };
 
+  void tell_control();
+  void take(PoseRequest request);
   void start_job();
+  void submit(std::shared_ptr<PoseJob> job, bool refresh);
   void take_up(PoseJob& job);
-  void finish_pose(PoseOutcome outcome, const Skipped& skipped, const PoseRequest& request, bool refresh);
+  void finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job, bool refresh);
   void publish(const PosedFrame& frame);
 
   net::io_context& io_;
@@ -82,6 +133,9 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<Clock::time_point> control_left_;  ///< when the last controller went
   Clock::time_point last_seen_ = Clock::now();     ///< when the last member went
 
+  bool awaited_ = false;  ///< the last one may come back
+  bool retired_ = false;
+
   std::vector<Row> rows_;
   std::uint32_t last_subscription_ = 0;
   std::set<std::uint32_t> fresh_;  ///< subscriptions that have not seen the present pose
@@ -95,6 +149,12 @@ class Session : public std::enable_shared_from_this<Session> {
   net::steady_timer pace_;
   Clock::time_point next_start_ = Clock::now();
   bool pacing_ = false;
+
+  std::uint64_t last_sequence_ = 0;
+  std::shared_ptr<ClipPlayer> player_;
+  runtime::QualityThresholds thresholds_;
+  std::shared_ptr<Recording> recording_;
+  std::uint64_t recorded_job_ = 0;  ///< PoseJob::number of the last recorded pose
 };
 
 }  // namespace ecorche::server

@@ -19,6 +19,12 @@ client::Clock::time_point within(double seconds) {
          std::chrono::duration_cast<client::Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
+Pose bent_pose(std::size_t joints, double angle) {
+  Pose pose = Pose::rest(joints);
+  pose.rotation[2] = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX());
+  return pose;
+}
+
 Options with(const Limits& limits) {
   Options options;
   options.limits = limits;
@@ -27,6 +33,15 @@ Options with(const Limits& limits) {
 
 }  // namespace
 
+Clip turning_clip(const Model& model) {
+  Clip clip{.name = "turning", .at = {}, .poses = {}, .last_seconds = 0.01};
+  for (int frame = 0; frame < 20; ++frame) {
+    clip.at.push_back(0.01 * frame);
+    clip.poses.push_back(bent_pose(model.segment_count(), 0.01 * frame));
+  }
+  return clip;
+}
+
 TestServer::TestServer(const Limits& limits) : TestServer(with(limits)) {}
 
 TestServer::TestServer(Options options, Seams seams)
@@ -34,10 +49,21 @@ TestServer::TestServer(Options options, Seams seams)
   spdlog::set_level(spdlog::level::off);
   options.listen.port = 0;
   options.version = "test";
-  server_ =
-      std::make_unique<Server>(std::move(options), std::vector<NamedModel>{{"toy", model_}, {"twin", model_}},
-                               workers_, std::move(seams));
+  read_ = [this] { return ModelParts{model_, {turning_clip(*model_)}}; };
+  const auto read = [this] {
+    const std::lock_guard lock(mutex_);
+    return read_();
+  };
+  server_ = std::make_unique<Server>(
+      std::move(options),
+      std::vector<NamedModel>{{"toy", model_, {turning_clip(*model_)}, read}, {"twin", model_}}, workers_,
+      std::move(seams));
   thread_ = std::thread([this] { server_->run(); });
+}
+
+void TestServer::reads(std::function<ModelParts()> read) {
+  const std::lock_guard lock(mutex_);
+  read_ = std::move(read);
 }
 
 TestServer::~TestServer() {
@@ -73,9 +99,7 @@ std::uint32_t TestClient::subscribe_volume(const std::string& name, bool nearest
 }
 
 Pose TestClient::bent(double angle) const {
-  Pose pose = Pose::rest(static_cast<std::size_t>(opened_.skeleton().segments_size()));
-  pose.rotation[2] = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX());
-  return pose;
+  return bent_pose(static_cast<std::size_t>(opened_.skeleton().segments_size()), angle);
 }
 
 v1::Envelope TestClient::update(std::uint64_t sequence, const Pose& pose) const {

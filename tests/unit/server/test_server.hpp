@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -17,7 +19,10 @@
 
 namespace ecorche::server {
 
-/// Serves the toy body as `toy`, and the same under `twin`, until destroyed.
+/// A clip of 20 poses, 100 a second, that turns the second joint of the toy body by 0.01 more each time.
+Clip turning_clip(const Model& model);
+
+/// Serves the toy body as `toy`, with the clip `turning`, and the same under `twin`, until destroyed.
 class TestServer {
  public:
   explicit TestServer(const Limits& limits = {});
@@ -29,11 +34,15 @@ class TestServer {
   wire::Address http() const { return {"127.0.0.1", server_->http_port()}; }
   const Model& model() const { return *model_; }
   void stop() { server_->stop(); }
+  /// What ReloadModel of `toy` reads from now on; the same model before.
+  void reads(std::function<ModelParts()> read);
   /// Waits for run() to return.
   void join();
 
  private:
   std::shared_ptr<const Model> model_;
+  std::mutex mutex_;
+  std::function<ModelParts()> read_;
   Workers workers_;
   std::unique_ptr<Server> server_;
   std::thread thread_;

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/replay.hpp"
+
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "core/files/atomic_file.hpp"
+#include "proto/recording.hpp"
+
+namespace ecorche::app {
+namespace {
+
+using client::Client;
+using client::Clock;
+
+constexpr std::size_t kLargest = std::size_t{1} << 30;
+constexpr std::chrono::seconds kPatience{30};
+
+wire::RecordedSession read(const std::filesystem::path& file) {
+  const std::string bytes = files::read_text(file, kLargest);
+  wire::RecordedSession session;
+  if (const Status status = wire::read_recording(std::as_bytes(std::span(bytes)), session); !status.ok())
+    throw Error(ErrorKind::data, file.string(), status.message, "give a file of ecorche serve --record-dir");
+  return session;
+}
+
+class Replay {
+ public:
+  Replay(const Program& program, Client& client, const wire::RecordedSession& session)
+      : program_(program), client_(client), session_(session) {}
+
+  // False where the server's model cannot be compared.
+  bool open() {
+    v1::Envelope request;
+    request.mutable_open_model()->set_model(session_.head.model());
+    request.mutable_open_model()->set_without_triangles(true);
+    const v1::ModelOpened opened = client_.call(std::move(request)).envelope.model_opened();
+    if (opened.identity() == session_.head.identity()) return true;
+    program_.note("mismatch: the server's model '" + opened.model() + "' is not the one that was recorded");
+    return opened.rig_digest() == session_.head.rig_digest() &&
+           opened.topology_digest() == session_.head.topology_digest();
+  }
+
+  void subscribe() {
+    for (const auto& [was, subscribe] : session_.subscriptions) {
+      v1::Envelope request;
+      *request.mutable_subscribe() = subscribe;
+      request.mutable_subscribe()->set_max_rate(0);  // every pose
+      now_[client_.call(std::move(request)).envelope.subscribed().subscription()] = was;
+    }
+  }
+
+  void play(const wire::RecordedStep& step) {
+    v1::Envelope update;
+    *update.mutable_pose_update() = step.pose;
+    client_.send(update);
+    std::map<std::uint32_t, std::uint64_t> expected;
+    for (const v1::RecordedFrame& frame : step.frames) expected[frame.subscription()] = frame.digest();
+    const auto until = Clock::now() + kPatience;
+    bool acknowledged = false;
+    while (!acknowledged || !expected.empty()) {
+      if (program_.stop.stop_requested())
+        throw Error(ErrorKind::interrupted, "replay", "interrupted", "run it again");
+      const auto frame = client_.receive(until);
+      if (!frame) {
+        throw Error(ErrorKind::temporary, "replay",
+                    "the frames of pose " + std::to_string(step.pose.sequence()) + " did not come",
+                    "see the server's log");
+      }
+      const v1::Envelope& envelope = frame->envelope;
+      if (envelope.has_pose_ack()) {
+        if (envelope.pose_ack().status().code() != 0)
+          throw client::to_error("pose", envelope.pose_ack().status());
+        acknowledged = true;
+      } else if (envelope.has_mesh_frame()) {
+        compare(envelope.mesh_frame(), frame->payload, step, expected);
+      } else if (envelope.has_volume_frame()) {
+        compare(envelope.volume_frame(), frame->payload, step, expected);
+      }
+    }
+  }
+
+  std::uint64_t frames() const { return frames_; }
+  std::uint64_t mismatches() const { return mismatches_; }
+
+ private:
+  template <class Frame>
+  void compare(const Frame& frame, const wire::Payload& payload, const wire::RecordedStep& step,
+               std::map<std::uint32_t, std::uint64_t>& expected) {
+    const auto subscription = now_.find(frame.subscription());
+    if (frame.pose_sequence() != step.pose.sequence() || subscription == now_.end()) return;
+    const auto recorded = expected.find(subscription->second);
+    if (recorded == expected.end()) return;
+    ++frames_;
+    if (wire::payload_digest(payload) != recorded->second && ++mismatches_ <= 5) {
+      program_.note("mismatch: pose " + std::to_string(step.pose.sequence()) + ", subscription " +
+                    std::to_string(subscription->second));
+    }
+    expected.erase(recorded);
+  }
+
+  const Program& program_;
+  Client& client_;
+  const wire::RecordedSession& session_;
+  std::map<std::uint32_t, std::uint32_t> now_;  // recorded numbers by present ones
+  std::uint64_t frames_ = 0, mismatches_ = 0;
+};
+
+}  // namespace
+
+int replay(const Program& program, const std::filesystem::path& file, const wire::Address& address,
+           const client::Access& access) {
+  const wire::RecordedSession session = read(file);
+  Client client(address, std::string("ecorche stream ") + ECORCHE_VERSION, access);
+  Replay replay(program, client, session);
+  const bool comparable = replay.open();
+  if (comparable) {
+    replay.subscribe();
+    for (const wire::RecordedStep& step : session.steps) replay.play(step);
+  }
+  const bool same = comparable && replay.mismatches() == 0;
+  program.result(std::to_string(session.steps.size()) + " poses, " + std::to_string(replay.frames()) +
+                     " frames compared: " + std::to_string(replay.mismatches()) + " mismatches" +
+                     (session.full ? "; the recording was cut at the server's limit" : ""),
+                 {{"poses", session.steps.size()},
+                  {"frames", replay.frames()},
+                  {"mismatches", comparable ? replay.mismatches() : 1},
+                  {"cut", session.full}});
+  return same ? 0 : 1;
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// The motion files of a folder as clips of a server.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "app/command.hpp"
+#include "core/values/skeleton.hpp"
+#include "runtime/server/clip.hpp"
+
+namespace ecorche::app {
+
+/// Every motion file of the folder, in the order of their names, as poses of the rig; notes those that do not
+/// fit it. Throws Error{missing_input} for a folder that is none, Error{config} for a file whose name is no
+/// identifier or that stands there twice, Error{data} for a clip of more than 36000 frames.
+std::vector<server::Clip> read_clips(const Program& program, const std::filesystem::path& folder,
+                                     const Rig& rig);
+
+}  // namespace ecorche::app

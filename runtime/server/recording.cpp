@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/server/recording.hpp"
+
+#include <utility>
+
+#include "core/files/atomic_file.hpp"
+#include "proto/convert.hpp"
+#include "proto/recording.hpp"
+
+namespace ecorche::server {
+namespace {
+
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kEndBytes = 64;  // the last frame's, kept free
+
+v1::Skinning skinning_to_proto(runtime::Skinning skinning) {
+  if (skinning == runtime::Skinning::dqs) return v1::SKINNING_DQS;
+  return skinning == runtime::Skinning::lbs ? v1::SKINNING_LBS : v1::SKINNING_COR;
+}
+
+// Whether a frame's bytes follow from the pose alone, whatever was sent before.
+bool stands_alone(const v1::Subscribe& request) {
+  return !request.has_mesh() || request.mesh().encoding() != v1::ENCODING_U16_DELTA;
+}
+
+}  // namespace
+
+Recording::Recording(std::string name, const ServedModel& model, const std::string& server, std::size_t limit)
+    : limit_(limit), rig_digest_(model.opened.rig_digest()) {
+  clip_.name = std::move(name);
+  v1::Envelope envelope;
+  v1::RecordingHead& head = *envelope.mutable_recording_head();
+  head.set_version(kVersion);
+  head.set_model(model.opened.model());
+  head.set_identity(model.opened.identity());
+  head.set_rig_digest(model.opened.rig_digest());
+  head.set_topology_digest(model.opened.topology_digest());
+  head.set_server(server);
+  append(envelope);
+}
+
+bool Recording::append(const v1::Envelope& envelope) {
+  if (full_) return false;
+  const std::string frame = wire::encode(envelope).head;
+  full_ = bytes_.size() + frame.size() + kEndBytes > limit_;
+  if (!full_) bytes_ += frame;
+  return !full_;
+}
+
+void Recording::add(const PoseRequest& pose) {
+  v1::Envelope envelope;
+  v1::RecordedPose& recorded = *envelope.mutable_recorded_pose();
+  recorded.set_seconds(seconds(Clock::now() - start_));
+  recorded.mutable_pose()->set_sequence(pose.sequence);
+  recorded.mutable_pose()->set_rig_digest(rig_digest_);
+  recorded.mutable_pose()->set_skinning(skinning_to_proto(pose.skinning));
+  wire::to_proto(pose.pose, *recorded.mutable_pose());
+  if (!append(envelope)) return;
+  ++poses_;
+  last_sequence_ = pose.sequence;
+  if (clip_.at.empty()) first_seconds_ = recorded.seconds();
+  clip_.at.push_back(recorded.seconds() - first_seconds_);
+  clip_.poses.push_back(pose.pose);
+}
+
+void Recording::add(const PosedFrame& frame, const v1::Subscribe& request) {
+  if (!frame.digest || poses_ == 0 || !stands_alone(request)) return;
+  if (!subscriptions_.contains(frame.subscription)) {
+    v1::Envelope envelope;
+    envelope.mutable_recorded_subscription()->set_subscription(frame.subscription);
+    *envelope.mutable_recorded_subscription()->mutable_subscribe() = request;
+    if (!append(envelope)) return;
+    subscriptions_.insert(frame.subscription);
+  }
+  v1::Envelope envelope;
+  v1::RecordedFrame& recorded = *envelope.mutable_recorded_frame();
+  recorded.set_subscription(frame.subscription);
+  recorded.set_pose_sequence(last_sequence_);
+  recorded.set_digest(*frame.digest);
+  recorded.set_payload_bytes(frame.bytes->payload ? frame.bytes->payload->size() : 0);
+  if (append(envelope)) ++frames_;
+}
+
+Clip Recording::finish() {
+  v1::Envelope envelope;
+  v1::RecordingEnd& end = *envelope.mutable_recording_end();
+  end.set_poses(poses_);
+  end.set_frames(frames_);
+  end.set_full(full_);
+  bytes_ += wire::encode(envelope).head;
+  const double steps = static_cast<double>(clip_.at.size()) - 1;
+  clip_.last_seconds = steps > 0 && clip_.at.back() > 0 ? clip_.at.back() / steps : 1.0 / 30;
+  return std::move(clip_);
+}
+
+Status Recording::write(const std::filesystem::path& path) const {
+  try {
+    if (std::filesystem::exists(path)) {
+      return {StatusCode::already_exists, "record: there is a recording of this name (choose another)"};
+    }
+    files::write_text(path, bytes_);
+    return {};
+  } catch (const Error& error) {
+    return to_status(error);
+  } catch (const std::exception& error) {
+    return {StatusCode::internal, error.what()};
+  }
+}
+
+std::uint64_t digest_of(const wire::EncodedFrame& frame) {
+  return wire::payload_digest(frame.payload ? std::span<const std::byte>(*frame.payload)
+                                            : std::span<const std::byte>());
+}
+
+}  // namespace ecorche::server

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// A client's whole life in short, which may break off anywhere.
+#pragma once
+
+#include "tests/unit/server/test_server.hpp"
+
+namespace ecorche::server {
+
+/// Hello, a model, a subscription, two poses, inverse kinematics, a clip, goodbye. True when every answer
+/// came, each within `seconds`.
+inline bool converse(const TestServer& server, double seconds) {
+  try {
+    RawClient client(server);
+    const auto receive = [&](auto&& wanted) -> std::optional<v1::Envelope> {
+      while (auto frame = client.receive(seconds)) {
+        if (wanted(frame->envelope)) return std::move(frame->envelope);
+        if (frame->envelope.has_status() && frame->envelope.request_id() == 0) break;
+      }
+      return std::nullopt;
+    };
+    const auto call = [&](v1::Envelope request) {
+      request.set_request_id(5);
+      client.send(request);
+      return receive([](const v1::Envelope& e) { return e.request_id() == 5; });
+    };
+    v1::Envelope hello, open, subscribe, solve, play, ping;
+    hello.mutable_client_hello()->set_protocol_min(1);
+    hello.mutable_client_hello()->set_protocol_max(1);
+    if (!call(hello)) return false;
+    open.mutable_open_model();
+    const auto opened = call(open);
+    if (!opened || !opened->has_model_opened()) return false;
+    subscribe.mutable_subscribe()->mutable_mesh()->add_tissues("skin");
+    if (!call(subscribe)) return false;
+    const int joints = opened->model_opened().skeleton().segments_size();
+    for (std::uint64_t sequence = 1; sequence <= 2; ++sequence) {
+      v1::Envelope pose;
+      v1::PoseUpdate& update = *pose.mutable_pose_update();
+      update.set_sequence(sequence);
+      update.set_rig_digest(opened->model_opened().rig_digest());
+      for (int i = 0; i < 4 * joints; ++i) update.add_rotation(i % 4 == 0 ? 1 : 0);
+      client.send(pose);
+      const auto frame =
+          receive([&](const v1::Envelope& e) { return e.mesh_frame().pose_sequence() == sequence; });
+      if (!frame) return false;
+      v1::Envelope ack;
+      ack.mutable_frame_ack()->set_subscription(frame->mesh_frame().subscription());
+      ack.mutable_frame_ack()->set_frame(frame->mesh_frame().frame());
+      client.send(ack);
+    }
+    v1::IkTarget& target = *solve.mutable_solve_ik()->add_targets();
+    target.set_segment(2);
+    target.mutable_target()->set_z(10);
+    if (!call(solve)) return false;
+    play.mutable_play_clip()->set_name("turning");
+    if (!call(play)) return false;
+    ping.mutable_ping();
+    if (!call(ping)) return false;
+    v1::Envelope goodbye;
+    goodbye.mutable_goodbye();
+    client.send(goodbye);
+    return client.hung_up(seconds);
+  } catch (const Error&) {  // hung up
+    return false;
+  }
+}
+
+}  // namespace ecorche::server

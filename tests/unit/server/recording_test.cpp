@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a session showed, recorded, read back and played.
+#include "proto/recording.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include "proto/convert.hpp"
+#include "runtime/server/tls.hpp"
+#include "tests/unit/server/test_server.hpp"
+
+namespace ecorche::server {
+namespace {
+
+class RecordingTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("ecorche_record_" + random_token());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Options options() const {
+    Options options;
+    options.record_folder = folder_;
+    return options;
+  }
+  std::string bytes(const std::string& name) const {
+    std::ifstream file(folder_ / (name + ".ecrec"), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  std::filesystem::path folder_;
+};
+
+v1::Envelope record(bool on, const std::string& name = {}) {
+  v1::Envelope envelope;
+  envelope.mutable_record()->set_on(on);
+  envelope.mutable_record()->set_name(name);
+  return envelope;
+}
+
+Status read(const std::string& bytes, wire::RecordedSession& out) {
+  return wire::read_recording(std::as_bytes(std::span(bytes)), out);
+}
+
+TEST_F(RecordingTest, HoldsThePosesAndWhatTheirFramesWere) {
+  const TestServer server(options());
+  TestClient client(server);
+  client.subscribe_mesh({"skin"});
+  client.send(1, client.bent(0.1));
+  client.next_mesh(1);
+  client.client().call(record(true, "bow"));
+  std::vector<std::uint64_t> digests;
+  for (std::uint64_t sequence = 2; sequence <= 5; ++sequence) {
+    client.send(sequence, client.bent(0.1 * static_cast<double>(sequence)));
+    digests.push_back(wire::payload_digest(client.next_mesh(sequence).payload));
+  }
+  client.client().call(record(false));
+
+  wire::RecordedSession session;
+  const Status status = read(bytes("bow"), session);
+  ASSERT_TRUE(status.ok()) << status.message;
+  EXPECT_EQ(session.head.model(), "toy");
+  EXPECT_EQ(session.head.identity(), client.opened().identity());
+  ASSERT_EQ(session.subscriptions.size(), 1U);
+  EXPECT_EQ(session.subscriptions.begin()->second.mesh().tissues(0), "skin");
+  ASSERT_EQ(session.steps.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const wire::RecordedStep& step = session.steps[i];
+    EXPECT_EQ(step.pose.sequence(), i + 2);
+    Pose pose;
+    ASSERT_TRUE(wire::from_proto(step.pose, server.model().segment_count(), pose).ok());
+    EXPECT_EQ(pose.rotation[2].coeffs(), client.bent(0.1 * static_cast<double>(i + 2)).rotation[2].coeffs());
+    ASSERT_EQ(step.frames.size(), 1U);
+    EXPECT_EQ(step.frames[0].digest(), digests[i]);
+  }
+  // It is a clip from now on.
+  v1::Envelope list;
+  list.mutable_list_clips();
+  const v1::ClipList clips = client.client().call(list).envelope.clip_list();
+  ASSERT_EQ(clips.clips_size(), 2);
+  EXPECT_EQ(clips.clips(1).name(), "bow");
+  v1::Envelope play;
+  play.mutable_play_clip()->set_name("bow");
+  client.client().call(play);
+  while (
+      wire::payload_digest(client.next([](const v1::Envelope& e) { return e.has_mesh_frame(); }).payload) !=
+      digests.back()) {
+  }
+}
+
+TEST_F(RecordingTest, NamesFoldersAndOrderAreChecked) {
+  const TestServer server(options()), keeps_none;
+  TestClient client(server), other(keeps_none);
+  EXPECT_EQ(error_of_call(other.client(), record(true, "bow")), ErrorKind::protocol);
+  EXPECT_EQ(error_of_call(client.client(), record(false)), ErrorKind::protocol);
+  for (const char* name : {"", "../bow", "Bow", "a b"})
+    EXPECT_EQ(error_of_call(client.client(), record(true, name)), ErrorKind::protocol) << name;
+  client.client().call(record(true, "bow"));
+  EXPECT_EQ(error_of_call(client.client(), record(true, "nod")), ErrorKind::protocol);
+  client.client().call(record(false));
+  EXPECT_EQ(error_of_call(client.client(), record(true, "bow")), ErrorKind::protocol);  // there is one
+  wire::RecordedSession session;
+  EXPECT_TRUE(read(bytes("bow"), session).ok());
+  EXPECT_TRUE(session.steps.empty());
+}
+
+TEST_F(RecordingTest, EndsAtItsLimitAndIsWholeUpToThere) {
+  Options small = options();
+  small.limits.record_bytes = 2048;
+  const TestServer server(small);
+  TestClient client(server);
+  client.client().call(record(true, "bow"));
+  for (std::uint64_t sequence = 1; sequence <= 30; ++sequence) {
+    client.send(sequence, client.bent(0.01));
+    client.next_ack();
+  }
+  EXPECT_EQ(error_of_call(client.client(), record(false)), ErrorKind::temporary);
+  wire::RecordedSession session;
+  ASSERT_TRUE(read(bytes("bow"), session).ok());
+  EXPECT_TRUE(session.full);
+  EXPECT_GT(session.steps.size(), 2U);
+  EXPECT_LT(session.steps.size(), 30U);
+  EXPECT_LE(bytes("bow").size(), 2048U);
+}
+
+std::string file_of(const std::vector<v1::Envelope>& envelopes) {
+  std::string out;
+  for (const v1::Envelope& envelope : envelopes) out += wire::encode(envelope).head;
+  return out;
+}
+
+std::vector<v1::Envelope> good_recording() {
+  std::vector<v1::Envelope> all(5);
+  all[0].mutable_recording_head()->set_version(1);
+  all[1].mutable_recorded_subscription()->set_subscription(3);
+  all[2].mutable_recorded_pose()->mutable_pose()->set_sequence(7);
+  all[3].mutable_recorded_frame()->set_subscription(3);
+  all[3].mutable_recorded_frame()->set_pose_sequence(7);
+  all[4].mutable_recording_end()->set_poses(1);
+  all[4].mutable_recording_end()->set_frames(1);
+  return all;
+}
+
+TEST(RecordingFile, EveryPrefixAndEveryBrokenRuleIsRefused) {
+  wire::RecordedSession session;
+  const std::string good = file_of(good_recording());
+  ASSERT_TRUE(read(good, session).ok());
+  for (std::size_t length = 0; length < good.size(); ++length) {
+    EXPECT_EQ(read(good.substr(0, length), session).code, StatusCode::data_loss) << length;
+  }
+  const auto broken = [&](const auto& spoil) {
+    std::vector<v1::Envelope> all = good_recording();
+    spoil(all);
+    return read(file_of(all), session).code;
+  };
+  using All = std::vector<v1::Envelope>;
+  const auto invalid = StatusCode::invalid_argument;
+  EXPECT_EQ(broken([](All& a) { a[0].mutable_recording_head()->set_version(2); }), StatusCode::unimplemented);
+  EXPECT_EQ(broken([](All& a) { std::swap(a[0], a[1]); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a.insert(a.begin(), a[0]); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a.insert(a.begin() + 1, a[1]); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a.insert(a.begin() + 2, a[2]); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a[2].mutable_recorded_pose()->set_seconds(-1); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a[3].mutable_recorded_frame()->set_subscription(4); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a[3].mutable_recorded_frame()->set_pose_sequence(8); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a[4].mutable_recording_end()->set_frames(2); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a.push_back(a[4]); }), invalid);
+  EXPECT_EQ(broken([](All& a) { a[3].mutable_ping(); }), invalid);
+}
+
+TEST(RecordingFile, AnyByteMayBeAnyOther) {
+  wire::RecordedSession session;
+  const std::string good = file_of(good_recording());
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    for (const int flip : {1, 0x80, 0xff}) {
+      std::string bytes = good;
+      bytes[i] = static_cast<char>(bytes[i] ^ flip);
+      read(bytes, session);  // whatever it says, it says it
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::server
