@@ -37,3 +37,6 @@ if(ECORCHE_SANITIZE)
   # Linking needs the run-time library whoever links, also foreign units.
   add_link_options(-fsanitize=${_sanitizers})
 endif()
+if(ECORCHE_FUZZ)
+  target_compile_options(ecorche_sanitizers INTERFACE -fsanitize=fuzzer-no-link)
+endif()

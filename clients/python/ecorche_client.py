@@ -118,10 +118,12 @@ class Client:
         self.timeout = timeout
         self.body = None
         self.acks = []            # v1.PoseAck since the last look
+        self.model_changed = False  # ModelChanged came: open() again for the new one
         self.bytes_received = 0
         self._requests = 0
         self._sequence = 0
         self._waiting = []
+        self._address, self._access = (host, port), {"tls_ca": tls_ca, "token": token}
         self._buffer = bytearray()
         self._socket = socket.create_connection((host, port), timeout)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -164,6 +166,7 @@ class Client:
         request.open_model.session = session
         answer, payload = self._call(request)
         self.body = Body(answer.model_opened, payload)
+        self.model_changed = False
         return self.body
 
     def subscribe_mesh(self, tissues=(), quality=False):
@@ -180,6 +183,40 @@ class Client:
         request.subscribe.volume.volume = name
         request.subscribe.volume.nearest = nearest
         return self._call(request)[0].subscribed.subscription
+
+    def resume(self):
+        """Goes on where `resume_token` says, once `server` has `resumed`: subscriptions are there, poses go on. The skeleton is
+        read from a connection of its own, since a connection opens one model."""
+        resumed = self.server.resumed
+        with Client(*self._address, **self._access) as other:
+            self.body = other.open(resumed.model)
+        self._sequence = resumed.last_sequence
+        return resumed
+
+    def clips(self):
+        """Motion that the server can play on this body: a list of v1.ClipSummary."""
+        request = envelope_pb2.Envelope()
+        request.list_clips.SetInParent()
+        return list(self._call(request)[0].clip_list.clips)
+
+    def play(self, name, speed=1.0, loop=False):
+        """Lets the server play a clip; "" stops it."""
+        request = envelope_pb2.Envelope()
+        request.play_clip.name, request.play_clip.speed, request.play_clip.loop = name, speed, loop
+        self._call(request)
+
+    def record(self, name):
+        """Lets the server record what is shown, under this name; None ends it."""
+        request = envelope_pb2.Envelope()
+        request.record.on = name is not None
+        request.record.name = name or ""
+        self._call(request)
+
+    def reload(self, model):
+        """Lets the server read a model's file again."""
+        request = envelope_pb2.Envelope()
+        request.reload_model.model = model
+        self._call(request)
 
     def send_pose(self, rotations, root_translation=(0, 0, 0), skinning=common_pb2.SKINNING_COR):
         """Sends a whole pose (#joints x 4, w x y z) and returns its sequence number. Does not wait: see frames() and acks."""
@@ -266,6 +303,10 @@ class Client:
             answer.request_id = envelope.request_id
             answer.pong.data = envelope.ping.data
             self._socket.sendall(encode(answer))
+        elif kind == "pose_ack":  # of poses that the server played, too: ours go on from there
+            self._sequence = max(self._sequence, envelope.pose_ack.sequence)
+        elif kind == "model_changed":
+            self.model_changed = True
         elif kind == "goodbye":
             raise ServerError(envelope.goodbye.status)
         elif kind == "status" and envelope.request_id == 0:

@@ -18,6 +18,20 @@ constexpr std::size_t kMostAnswers = 64;
 // How long an ending connection may take to read its last words.
 constexpr double kLastWordsSeconds = 1;
 
+class Handling {
+ public:
+  explicit Handling(const Seams& seams) : seams_(seams) { tell(true); }
+  ~Handling() { tell(false); }
+  Handling(const Handling&) = delete;
+  Handling& operator=(const Handling&) = delete;
+
+ private:
+  void tell(bool begins) const {
+    if (seams_.handling) seams_.handling(begins);
+  }
+  const Seams& seams_;
+};
+
 }  // namespace
 
 Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, House& house)
@@ -158,6 +172,7 @@ void Connection::take_in(std::size_t n) {
   heard_ = Clock::now();
   house_.metrics().read(n);
   if (reader_.between_frames()) reading_since_ = heard_;
+  const Handling handling(house_.seams());
   try {
     if (const Status status = reader_.advance(n); !status.ok()) return hit("frame", status);
     if (const auto ended = transport_->message_ended(); ended && *ended != reader_.complete()) {

@@ -59,6 +59,7 @@ class House {
   void offload(std::function<void()> work, std::function<void()> then);
 
   Metrics& metrics() { return metrics_; }
+  const Seams& seams() const { return seams_; }
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
 

@@ -15,6 +15,9 @@ struct Seams {
   std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> transport;
   /// Asked before every wait; true: the wait ends at once, with an error.
   std::function<bool()> timer_fails;
+  /// A message is being handled, from true to false. What finds no memory meanwhile ends its connection; Asio
+  /// itself, between messages, ends the process.
+  std::function<void(bool)> handling;
 };
 
 }  // namespace ecorche::server

@@ -15,6 +15,7 @@ namespace {
 
 // How often deadlines are looked at.
 constexpr auto kTick = std::chrono::milliseconds(100);
+constexpr auto kLastTick = std::chrono::milliseconds(5);  // once stopping
 // Connections beyond the limit that may be told so at one time; the next ones are closed without a word.
 constexpr std::size_t kMostRefusals = 32;
 
@@ -234,6 +235,7 @@ void Server::Impl::begin_shutdown() {
   spdlog::info("stopping: {} connections", connections.size());
   boost::system::error_code ec;
   acceptor.close(ec);
+  tick.cancel();
   for (const auto& connection : connections) {
     if (connection->closed()) continue;
     try {
@@ -248,7 +250,7 @@ void Server::Impl::begin_shutdown() {
 net::awaitable<void> Server::Impl::pause(net::steady_timer& timer) {
   boost::system::error_code ec;
   try {
-    timer.expires_after(kTick);
+    timer.expires_after(stopping ? kLastTick : kTick);
     co_await house->wait(timer, ec);
   } catch (const std::exception& error) {
     spdlog::error("server: {}", error.what());

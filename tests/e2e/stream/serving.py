@@ -11,11 +11,11 @@ ECORCHE = os.environ["ECORCHE_BIN"]
 
 
 class Server:
-    def __init__(self, *models, options=()):
+    def __init__(self, *models, options=(), port=0):
         self._folder = tempfile.TemporaryDirectory()
         port_file = pathlib.Path(self._folder.name) / "port"
         self.process = subprocess.Popen(
-            [ECORCHE, "serve", *map(str, models), "--listen", "127.0.0.1:0", "--port-file", str(port_file), *options],
+            [ECORCHE, "serve", *map(str, models), "--listen", f"127.0.0.1:{port}", "--port-file", str(port_file), *options],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 60
         while not port_file.exists():

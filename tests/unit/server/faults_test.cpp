@@ -16,7 +16,8 @@ struct Faults {
                 [this](std::unique_ptr<Transport> inner) {
                   return std::make_unique<FaultyTransport>(std::move(inner), reads, writes);
                 },
-            .timer_fails = [this] { return timers.strikes(); }};
+            .timer_fails = [this] { return timers.strikes(); },
+            .handling = {}};
   }
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Nth allocation of the I/O thread fails, for every N of a whole conversation. In an executable of its
-// own: it replaces operator new.
+// The Nth allocation while messages are handled fails, for every N of a whole conversation. In an executable
+// of its own: it replaces operator new.
 #include <cstdlib>
 #include <new>
 
@@ -10,10 +10,10 @@
 namespace {
 
 ecorche::server::Countdown allocations;
-thread_local bool on_io_thread = false;
+thread_local bool handling = false;
 
 void* allocate(std::size_t size) {
-  if (on_io_thread && allocations.strikes()) throw std::bad_alloc();
+  if (handling && allocations.strikes()) throw std::bad_alloc();
   if (void* const memory = std::malloc(size == 0 ? 1 : size)) return memory;
   throw std::bad_alloc();
 }
@@ -45,11 +45,8 @@ namespace {
 TEST(MemoryTest, TheNthAllocation) {
   Options options;
   options.limits.linger_seconds = 0;
-  // The server asks this seam on its own thread alone, several times a second.
-  const TestServer server(options, {.transport = {}, .timer_fails = [] {
-                                      on_io_thread = true;
-                                      return false;
-                                    }});
+  const TestServer server(
+      options, {.transport = {}, .timer_fails = {}, .handling = [](bool begins) { handling = begins; }});
   ASSERT_TRUE(converse(server, 10));
   int n = 0;
   bool struck = true;

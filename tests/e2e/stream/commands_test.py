@@ -1,0 +1,157 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Clips, recordings, models read again, and a server that is killed, as their users meet them."""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+
+from ecorche_client import Client, ServerError
+from serving import ECORCHE, Server
+
+CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
+MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
+OTHER_MODEL = os.environ["ECORCHE_MODELS"].split(":")[-1]
+
+
+def run(*words):
+    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+class Commands(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.path = pathlib.Path(self.folder.name)
+        (self.path / "clips").mkdir()
+        shutil.copy(sorted(CASE.glob("**/walk.bvh"))[0], self.path / "clips" / "walk.bvh")
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def test_a_clip_is_played_recorded_and_replayed(self):
+        options = ["--clips", str(self.path / "clips"), "--record-dir", str(self.path / "recordings")]
+        with Server(MODEL, options=options) as server:
+            with Client("127.0.0.1", server.port) as client:
+                client.open()
+                client.subscribe_mesh(["skin"])
+                list(client.frames(0.3))
+                self.assertEqual([clip.name for clip in client.clips()], ["walk"])
+                client.record("walk_once")
+                client.play("walk", speed=4)
+                self.assertGreater(len(list(client.frames(1))), 3)
+                client.play("")
+                list(client.frames(0.3))
+                client.record(None)
+                self.assertEqual([clip.name for clip in client.clips()], ["walk", "walk_once"])
+                with self.assertRaises(ServerError):
+                    client.record("walk_once")
+            recording = self.path / "recordings" / "walk_once.ecrec"
+            result = run("stream", server.address, "--replay", recording, "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads(result.stdout)
+            self.assertGreater(report["frames"], 3)
+            self.assertEqual(report["mismatches"], 0)
+
+            data = bytearray(recording.read_bytes())
+            (self.path / "cut.ecrec").write_bytes(data[:-20])
+            cut = run("stream", server.address, "--replay", self.path / "cut.ecrec")
+            self.assertEqual(cut.returncode, 65, cut.stderr)
+            self.assertIn("give a file of ecorche serve --record-dir", cut.stderr)
+        # Another body, another answer.
+        other = self.path / MODEL.name
+        shutil.copy(OTHER_MODEL, other)
+        with Server(other) as server:
+            result = run("stream", server.address, "--replay", recording, "--json")
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn("is not the one that was recorded", result.stderr)
+
+    def test_what_is_no_clip(self):
+        for name, content, code, message in (("Run.bvh", "", 78, "clients could not ask for a clip of this name"),
+                                             (None, None, 66, "is no folder of clips")):
+            folder = self.path / str(name)
+            if name:
+                folder.mkdir()
+                (folder / name).write_text(content)
+            result = run("serve", MODEL, "--listen", "127.0.0.1:0", "--clips", folder)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(message, result.stderr)
+        (self.path / "clips" / "broken.bvh").write_text("HIERARCHY\n")
+        with Server(MODEL, options=["--clips", str(self.path / "clips")]) as server, Client("127.0.0.1", server.port) as client:
+            client.open()
+            self.assertEqual([clip.name for clip in client.clips()], ["walk"])  # the other is left out, with a warning
+
+    def test_a_changed_file_is_read_again(self):
+        model = self.path / "body.hdf"
+        shutil.copy(MODEL, model)
+        with Server(model) as server, Client("127.0.0.1", server.port) as client, Client("127.0.0.1", server.port) as other:
+            before = client.open().message
+            client.subscribe_mesh(["skin"])
+            list(client.frames(0.3))
+            model.write_bytes(b"not a model")
+            with self.assertRaises(ServerError):
+                other.reload("body")
+            changed = self.path / "changed.hdf"
+            shutil.copy(OTHER_MODEL, changed)
+            changed.rename(model)
+            other.reload("body")
+            sequence = client.send_pose(client.body.rest_pose())
+            self.assertIn(sequence, [frame.pose_sequence for frame in client.frames(1)])  # the old one goes on
+            self.assertTrue(client.model_changed)
+            self.assertNotEqual(client.open().message.identity, before.identity)
+
+    def test_clients_of_a_killed_server_come_back(self):
+        done = threading.Event()
+        frames, resumed, problems = [0] * 4, [0] * 4, []
+
+        def live(row, port):
+            """A client that connects again and again, and takes its place up where it can."""
+            token = b""
+            while not done.is_set():
+                try:
+                    with Client("127.0.0.1", port, resume_token=token, timeout=5) as client:
+                        token = client.server.resume_token
+                        if client.server.HasField("resumed"):
+                            resumed[row] += 1
+                            client.resume()
+                        else:
+                            client.open(session=f"session_{row}")
+                            client.subscribe_mesh(["skin"])
+                        until = time.monotonic() + 0.4
+                        while not done.is_set() and time.monotonic() < until:
+                            client.send_pose(client.body.rest_pose())
+                            frames[row] += len(list(client.frames(1 / 60)))
+                except (OSError, ServerError, TimeoutError):
+                    time.sleep(0.05)
+                except Exception as problem:  # pylint: disable=broad-except
+                    problems.append(problem)
+                    return
+
+        # The same port throughout, as a supervisor would start it again.
+        with Server(MODEL) as first:
+            port = first.port
+            clients = [threading.Thread(target=live, args=(row, port)) for row in range(4)]
+            for client in clients:
+                client.start()
+            time.sleep(1.5)
+            first.process.send_signal(signal.SIGKILL)
+            first.process.wait(10)
+            self.assertTrue(all(frames), frames)
+            self.assertTrue(all(resumed), resumed)
+        before = list(frames)
+        with Server(MODEL, port=port):
+            time.sleep(2)
+            done.set()
+            for client in clients:
+                client.join(30)
+        self.assertEqual(problems, [])
+        self.assertTrue(all(now > then for now, then in zip(frames, before)), (before, frames))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
