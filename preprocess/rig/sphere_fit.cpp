@@ -3,19 +3,15 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
-#include <random>
+
+#include "preprocess/rig/robust.hpp"
 
 namespace ecorche::rig {
 namespace {
 
-constexpr std::uint64_t kSeed = 20180901;
 constexpr int kDraws = 500;        // half outliers leave 1 - (15/16)^500 of a miss: never
-constexpr double kBand = 0.025;    // of the extent: about 5 % of the radius of a ball's facing half
-constexpr double kFarBand = 2.5;   // robust standard deviations, in the refinement
 constexpr double kSurface = 0.25;  // of the radius: farther points are of another part of the bone
-constexpr int kRounds = 10;        // of choosing inliers and fitting them again
 
 struct Sphere {
   Eigen::Vector3d center;
@@ -36,11 +32,11 @@ std::optional<Sphere> through(const Eigen::Vector3d& a, const Eigen::Vector3d& b
   return Sphere{a + from_a, from_a.norm()};
 }
 
-// Gauss-Newton on the sum of (|p - c| - r)^2 over the chosen points.
-Sphere refine(const Points& points, const std::vector<Eigen::Index>& chosen, Sphere sphere) {
-  for (int step = 0; step < 20; ++step) {
-    Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d b = Eigen::Vector4d::Zero();
+// The normal equations of |p - c| - r over the chosen points, in (c, r).
+struct Normal {
+  Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d b = Eigen::Vector4d::Zero();
+  Normal(const Points& points, const std::vector<Eigen::Index>& chosen, const Sphere& sphere) {
     for (const Eigen::Index i : chosen) {
       const Eigen::Vector3d from = points.row(i).transpose() - sphere.center;
       const double length = from.norm();
@@ -50,8 +46,15 @@ Sphere refine(const Points& points, const std::vector<Eigen::Index>& chosen, Sph
       A += slope * slope.transpose();
       b -= slope * (length - sphere.radius);
     }
-    const Eigen::LDLT<Eigen::Matrix4d> ldlt(A);
-    const Eigen::Vector4d change = ldlt.solve(b);
+  }
+};
+
+// Gauss-Newton on the sum of (|p - c| - r)^2 over the chosen points.
+Sphere refine(const Points& points, const std::vector<Eigen::Index>& chosen, Sphere sphere) {
+  for (int step = 0; step < 20; ++step) {
+    const Normal normal(points, chosen, sphere);
+    const Eigen::LDLT<Eigen::Matrix4d> ldlt(normal.A);
+    const Eigen::Vector4d change = ldlt.solve(normal.b);
     if (ldlt.info() != Eigen::Success || !change.allFinite()) break;
     sphere.center += change.head<3>();
     sphere.radius += change[3];
@@ -60,16 +63,25 @@ Sphere refine(const Points& points, const std::vector<Eigen::Index>& chosen, Sph
   return sphere;
 }
 
+// Standard error of the centre, mm, from the points' scatter about the sphere.
+double center_error(const Points& points, const robust::Settled<Sphere>& found) {
+  double squares = 0;
+  for (const Eigen::Index i : found.inliers)
+    squares += found.distance[static_cast<std::size_t>(i)] * found.distance[static_cast<std::size_t>(i)];
+  const double free = std::max(1.0, static_cast<double>(found.inliers.size()) - 4);
+  const Eigen::Matrix4d inverse = Normal(points, found.inliers, found.shape).A.inverse();
+  return std::sqrt(squares / free * inverse.topLeftCorner<3, 3>().trace());
+}
+
 }  // namespace
 
 std::optional<SphereFit> fit_sphere(const Points& points) {
   const Eigen::Index count = points.rows();
   if (count < 4) return std::nullopt;
-  const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
-  const double band = kBand * extent;
+  const double extent = robust::extent_of(points);
+  const double band = robust::kBand * extent;
 
-  std::mt19937_64 random(kSeed);
-  const auto draw = [&] { return static_cast<Eigen::Index>(random() % static_cast<std::uint64_t>(count)); };
+  robust::Draw draw(count);
   std::optional<Sphere> best;
   double best_cost = 0;
   for (int k = 0; k < kDraws; ++k) {
@@ -77,11 +89,7 @@ std::optional<SphereFit> fit_sphere(const Points& points) {
     const auto sphere = through(points.row(i[0]).transpose(), points.row(i[1]).transpose(),
                                 points.row(i[2]).transpose(), points.row(i[3]).transpose());
     if (!sphere || !(sphere->radius <= extent)) continue;
-    double cost = 0;
-    for (Eigen::Index p = 0; p < count; ++p) {
-      const double d = sphere->distance(points.row(p).transpose());
-      cost += std::min(d * d, band * band);
-    }
+    const double cost = robust::truncated_squares(points, *sphere, band);
     if (!best || cost < best_cost) {
       best = sphere;
       best_cost = cost;
@@ -89,44 +97,17 @@ std::optional<SphereFit> fit_sphere(const Points& points) {
   }
   if (!best) return std::nullopt;
 
-  std::vector<double> distance(static_cast<std::size_t>(count));
-  std::vector<Eigen::Index> inliers;
-  const auto measure = [&](double within) {
-    inliers.clear();
-    for (Eigen::Index p = 0; p < count; ++p) {
-      const double d = std::abs(best->distance(points.row(p).transpose()));
-      distance[static_cast<std::size_t>(p)] = d;
-      if (d <= within) inliers.push_back(p);
-    }
-  };
-  measure(band);
-  for (int round = 0; round < kRounds && inliers.size() >= 4; ++round) {
-    const Sphere refined = refine(points, inliers, *best);
-    if (!(refined.radius > 0 && refined.radius <= 2 * extent)) break;
-    best = refined;
-    // The median over the inliers tells the noise; a narrower band then keeps outliers from pulling.
-    measure(band);
-    if (inliers.size() < 4) break;
-    std::vector<double> sorted;
-    for (const Eigen::Index p : inliers) sorted.push_back(distance[static_cast<std::size_t>(p)]);
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                     sorted.end());
-    const double noise = 1.4826 * sorted[sorted.size() / 2];
-    measure(std::min(band, std::max(kFarBand * noise, 1e-3 * extent)));
-  }
-
-  measure(band);
+  const auto found = robust::settle(points, *best, band, 4, [&](const auto& chosen, const Sphere& now) {
+    const Sphere refined = refine(points, chosen, now);
+    return refined.radius > 0 && refined.radius <= 2 * extent ? std::optional(refined) : std::nullopt;
+  });
   SphereFit fit;
-  fit.center = best->center;
-  fit.radius = best->radius;
-  fit.inlier_share = static_cast<double>(inliers.size()) / static_cast<double>(count);
-  double sum = 0, near = 0;
-  for (const double d : distance) {
-    if (d > kSurface * fit.radius) continue;
-    sum += d * d;
-    ++near;
-  }
-  fit.residual = near > 0 ? std::sqrt(sum / near) : fit.radius;
+  fit.center = found.shape.center;
+  fit.radius = found.shape.radius;
+  fit.inlier_share = found.inlier_share();
+  fit.residual = found.residual(kSurface * fit.radius);
+  fit.confidence =
+      robust::confidence(fit.inlier_share, fit.residual / fit.radius, center_error(points, found));
   return fit;
 }
 

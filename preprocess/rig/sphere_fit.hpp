@@ -13,6 +13,7 @@ struct SphereFit {
   double radius = 0;        ///< mm
   double residual = 0;      ///< mm, rms distance from the sphere of the points within 25 % of its radius
   double inlier_share = 0;  ///< of the points, within the band in which the sphere was found
+  double confidence = 0;    ///< 0 to 1 (robust.hpp)
 };
 
 /// RANSAC (Fischler and Bolles 1981; truncated squares as in MSAC; draws from a fixed seed), then a
