@@ -49,5 +49,7 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen);
 void declare_refill(CLI::App& app, Program& program, Run& chosen);
 void declare_tears(CLI::App& app, Program& program, Run& chosen);
 void declare_deformers(CLI::App& app, Program& program, Run& chosen);
+void declare_path(CLI::App& app, Program& program, Run& chosen);
+void declare_contact(CLI::App& app, Program& program, Run& chosen);
 
 }  // namespace ecorche::app

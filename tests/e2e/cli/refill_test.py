@@ -124,6 +124,31 @@ class Refill(unittest.TestCase):
         self.assert_error(64, ("refill", self.few, "-o", out, "--bridge"), "--bridge", "only what is posed opens gaps")
         self.assert_error(64, ("refill", self.few, self.bar, "-o", out, *words, "--bridge", "--back"), "--bridge")
 
+    def test_ways_and_meetings(self):
+        table = self.folder / "way.csv"
+        way = self.ok("path", self.few, "--from", "3,8,8", "--to", "60,8,8", "-o", table)
+        self.assertGreater(way["length_mm"], 40)
+        self.assertLess(way["length_mm"], 80)
+        rows = np.loadtxt(table, delimiter=",", skiprows=1)
+        self.assertEqual(rows.shape, (len(way["points"]), 4))
+        self.assertLess(abs(rows[len(rows) // 2, 1] - 8), 4)  # within, of a bar from 2 to 15
+        self.assertEqual(rows[:, 3].min(), way["narrowest_mm"])
+        bent = self.ok("path", self.few, "--from", "3,8,8", "--to", "60,8,8", "--rig", self.rig, "--pose", self.pose)
+        self.assertGreater(np.ptp([p[1] for p in bent["points"]]), 10)
+        here = self.ok("contact", self.few, self.few)
+        self.assertTrue(here["meet"])
+        self.assertGreater(here["depth_mm"], 5)
+        far = self.folder / "far.yaml"
+        far.write_text(self.pose.read_text() + "root: {translation_mm: [0, 200, 0]}\n")
+        away = self.ok("contact", self.few, self.few, "--other-rig", self.rig, "--other-pose", far)
+        self.assertFalse(away["meet"])
+        self.assertIn("do not meet", run("contact", self.few, self.few, "--other-rig", self.rig, "--other-pose", far).stdout)
+        self.assertIn("meet, deepest by", run("contact", self.few, self.few, "--rig", self.rig, "--pose", self.pose).stdout)
+        self.assert_error(65, ("path", self.loose, "--from", "3,8,8", "--to", "60,8,8"), "it has no tree")
+        self.assert_error(64, ("path", self.few, "--from", "3,8,8", "--to", "60,8,8", "--pose", self.pose), "--rig", "a pose needs a rig")
+        self.assert_error(64, ("contact", self.few, self.few, "--pose", self.pose), "--rig")
+        self.assert_error(64, ("path", self.few, "--from", "3,8"), "--from")
+
     def test_effects_and_previews(self):
         out = self.folder / "effect.nrrd"
         held = [self.ok("refill", self.few, "-o", out, "--melt", "--time", t)["frames"][0]["held_voxels"] for t in (0, 0.7, 1)]
