@@ -130,6 +130,7 @@ Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row) 
   Angles angles = angles_from_rotation(joint, pose.rotation[row]);
   std::array<bool, 3> driven{false, false, false};
   for (const Coupling& coupling : joint.coupled) {
+    if (coupling.slides() >= 0) continue;
     const int lead = skeleton.find_joint(coupling.joint);
     const int drives = find_angle(joint, coupling.drives);
     const int leads =
@@ -149,6 +150,28 @@ Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row) 
     angles[b] += coupling.ratio * moved;
   }
   return rotation_from_angles(joint, angles);
+}
+
+bool drives_angles(const Joint& joint) {
+  return std::any_of(joint.coupled.begin(), joint.coupled.end(),
+                     [](const Coupling& c) { return c.slides() < 0; });
+}
+
+// How far the joint's slides bring it, mm along its axes at rest: after every angle is set.
+Eigen::Vector3d slid(const Skeleton& skeleton, const Pose& pose, const Joint& joint) {
+  Eigen::Vector3d out = Eigen::Vector3d::Zero();
+  for (const Coupling& coupling : joint.coupled) {
+    const int axis = coupling.slides(), lead = axis < 0 ? -1 : skeleton.find_joint(coupling.joint);
+    if (lead < 0) continue;
+    const Joint& leader = skeleton.segments[static_cast<std::size_t>(lead)].joint;
+    const int leads = find_angle(leader, coupling.angle);
+    if (leads < 0) continue;
+    const auto a = static_cast<std::size_t>(leads);
+    out[axis] +=
+        coupling.ratio * (angles_from_rotation(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
+                          leader.sequence[a].rest);
+  }
+  return out;
 }
 
 void report(std::vector<ClampedJoint>& clamped, std::size_t joint, double removed) {
@@ -222,12 +245,22 @@ void constrain(const Skeleton& skeleton, Pose& pose, std::vector<ClampedJoint>& 
     if (skeleton.segments[s].parent < 0) continue;
     const Joint& joint = skeleton.segments[s].joint;
     clamp_joint(skeleton, pose, s, clamped);
-    if (joint.kind != JointKind::free && joint.coupled.empty()) pose.translation[s].setZero();
+    if (joint.kind != JointKind::free) pose.translation[s].setZero();
   }
   for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
     if (skeleton.segments[s].parent < 0 || skeleton.segments[s].joint.coupled.empty()) continue;
+    if (!drives_angles(skeleton.segments[s].joint)) continue;
     pose.rotation[s] = follow(skeleton, pose, s);
     clamp_joint(skeleton, pose, s, clamped);
+  }
+  slide(skeleton, pose);
+}
+
+void slide(const Skeleton& skeleton, Pose& pose) {
+  for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
+    const Joint& joint = skeleton.segments[s].joint;
+    if (skeleton.segments[s].parent >= 0 && joint.kind != JointKind::free && !joint.coupled.empty())
+      pose.translation[s] = slid(skeleton, pose, joint);
   }
 }
 

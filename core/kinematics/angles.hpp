@@ -31,8 +31,13 @@ Eigen::Quaterniond clamp(const Joint& joint, const Eigen::Quaterniond& rotation)
 ///   rest + sum of ratio * (angle of the leading joint - its rest),
 /// in row order (a leading joint that is itself driven must come earlier), and clamps it too; appends what
 /// was taken away (more than 1e-6 rad) to `clamped`, a joint once. A non-root translation of a joint that is
-/// neither `free` nor coupled is removed. The root is the body's place in the room: it is not clamped.
-/// Allocates nothing while `clamped` has room for every joint.
+/// not `free` is removed; then its slides (Coupling::slides) are set from their leaders' angles. The root is
+/// the body's place in the room: it is not clamped. Allocates nothing while `clamped` has room for every
+/// joint.
 void constrain(const Skeleton& skeleton, Pose& pose, std::vector<ClampedJoint>& clamped);
+
+/// The slides alone, from the angles as they are. Leaves `free` joints and those without couplings as they
+/// are.
+void slide(const Skeleton& skeleton, Pose& pose);
 
 }  // namespace ecorche::kinematics

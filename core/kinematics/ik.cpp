@@ -219,6 +219,7 @@ class Solver {
     for (std::size_t j = 0; j < segments_.size(); ++j) {
       if (changed[j] != 0) state.pose.rotation[j] = rotation_from_angles(segments_[j].joint, state.angle[j]);
     }
+    slide(rig_.skeleton, state.pose);  // millimetres: the slopes leave them out
   }
 
   // Levenberg and Marquardt's way down; returns the steps it took.

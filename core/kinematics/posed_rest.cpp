@@ -33,6 +33,7 @@ Skeleton posed_rest(const Rig& rig, const Pose& pose) {
     joint.rule = CenterRule::given;
     joint.center_bone.clear();
     joint.facing_bone.clear();
+    joint.how.reset();
     joint.center = motion[s] * joint.center;
     joint.axes = motion[s].q.toRotationMatrix() * joint.axes;
   }

@@ -104,7 +104,8 @@ class Checker {
       const JointFit& fit = model_.rig.fits[s];
       require_row(fit.joint == segments[s].joint.name, at + "fit_joint", "is not the joint of this row", s);
       require_row(std::isfinite(fit.radius_mm) && std::isfinite(fit.residual_mm) &&
-                      std::isfinite(fit.inlier_share) && fit.points >= 0,
+                      std::isfinite(fit.inlier_share) && fit.confidence >= 0 && fit.confidence <= 1 &&
+                      fit.points >= 0,
                   at + "fit_residual_mm", "is not finite", s);
     }
   }
@@ -136,10 +137,11 @@ class Checker {
     const Skeleton& skeleton = model_.rig.skeleton;
     for (const Coupling& coupling : joint.coupled) {
       const int leader = skeleton.find_joint(coupling.joint);
-      require_row(leader >= 0 && leader != static_cast<int>(row), "/ecorche/skeleton/coupling_leader",
-                  "does not name another joint", row);
+      const bool slides = coupling.slides() >= 0;
+      require_row(leader >= 0 && (slides || leader != static_cast<int>(row)),
+                  "/ecorche/skeleton/coupling_leader", "does not name another joint", row);
       require_row(has_angle(skeleton.segments[static_cast<std::size_t>(leader)].joint, coupling.angle) &&
-                      has_angle(joint, coupling.drives),
+                      (slides || has_angle(joint, coupling.drives)),
                   "/ecorche/skeleton/coupling_angle", "couples angles that do not exist", row);
       require_row(std::isfinite(coupling.ratio), "/ecorche/skeleton/coupling_ratio", "is not finite", row);
     }

@@ -116,6 +116,7 @@ void add_rig(Layout& out, const Rig& rig) {
   out.copy(at + "radius_mm", column(rig.fits, [](const JointFit& f) { return f.radius_mm; }));
   out.copy(at + "residual_mm", column(rig.fits, [](const JointFit& f) { return f.residual_mm; }));
   out.copy(at + "inlier_share", column(rig.fits, [](const JointFit& f) { return f.inlier_share; }));
+  out.copy(at + "confidence", column(rig.fits, [](const JointFit& f) { return f.confidence; }));
   out.copy(at + "points", column(rig.fits, [](const JointFit& f) { return f.points; }));
 }
 

@@ -41,7 +41,7 @@ std::vector<Segment> read_segments(const Source& source) {
   const auto parents = source.vector<std::int32_t>(at + "parent", {n});
   const auto joints = source.texts(at + "joint", {n});
   const auto kinds = read_codes(source, at + "kind", n, JointKind::free);
-  const auto rules = read_codes(source, at + "rule", n, CenterRule::sphere_fit);
+  const auto rules = read_codes(source, at + "rule", n, CenterRule::facing);
   const auto center_bones = source.texts(at + "center_bone", {n});
   const auto facing_bones = source.texts(at + "facing_bone", {n});
   const auto sources = source.texts(at + "limits_source", {n});
@@ -96,14 +96,17 @@ std::vector<JointFit> read_fits(const Source& source) {
   const std::string at = "/ecorche/skeleton/fit_";
   const auto joints = source.texts(at + "joint");
   const std::uint64_t n = joints.size();
-  const auto rules = read_codes(source, at + "rule", n, CenterRule::sphere_fit);
+  const auto rules = read_codes(source, at + "rule", n, CenterRule::facing);
   const auto radii = source.vector<double>(at + "radius_mm", {n});
   const auto residuals = source.vector<double>(at + "residual_mm", {n});
   const auto shares = source.vector<double>(at + "inlier_share", {n});
   const auto points = source.vector<std::int32_t>(at + "points", {n});
+  // Older models say nothing of it: the inlier share stands for it.
+  const bool says = source.catalogue().datasets.contains(at + "confidence");
+  const auto confidences = says ? source.vector<double>(at + "confidence", {n}) : shares;
   std::vector<JointFit> fits;
   for (std::size_t i = 0; i < n; ++i) {
-    fits.push_back({joints[i], rules[i], radii[i], residuals[i], shares[i], points[i]});
+    fits.push_back({joints[i], rules[i], radii[i], residuals[i], shares[i], points[i], confidences[i]});
   }
   return fits;
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/values/image.hpp"
+#include "core/values/joint_rule.hpp"
 #include "core/values/mesh.hpp"
 #include "core/values/skeleton.hpp"
 
@@ -67,6 +68,8 @@ struct CaseLabels {
 struct Case {
   std::string name;
   Skeleton skeleton;
+  std::vector<Region> regions = {};  ///< that the joints' rules name
+  bool generic = false;  ///< no skeleton was given: `skeleton` lists the segments, and proximity joins them
   std::string skin_name = "skin";
   SurfaceMesh skin;
   std::optional<LabelSource> skin_source;

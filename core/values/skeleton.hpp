@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,9 +23,20 @@ enum class JointKind : std::uint8_t {
 
 /// How a joint centre is found.
 enum class CenterRule : std::uint8_t {
-  given,       ///< `center: [x, y, z]`, LPS mm
-  sphere_fit,  ///< sphere through the surface of `center_bone` that faces `facing_bone`
+  given,         ///< `center: [x, y, z]`, LPS mm
+  sphere_fit,    ///< sphere through the surface of `center_bone` that faces `facing_bone`, or as `Joint::how`
+                 ///< says
+  cylinder_fit,  ///< on its axis, halfway between its outermost points
+  plane_fit,     ///< mean of its points
+  ellipse_fit,   ///< its centre
+  centroid,      ///< mean of a region's vertices
+  between,       ///< two other points
+  joint,         ///< another joint's centre
+  first_good,    ///< the first of several that is found well
+  facing,  ///< midway between the surfaces of segment and parent that face each other: where all else fails
 };
+
+struct JointRule;  // core/values/joint_rule.hpp
 
 /// One anatomical angle: a turn about one axis of the joint frame. In `Joint::sequence` order the turns are
 /// intrinsic: R = R(first) R(second) R(third).
@@ -39,10 +51,18 @@ struct AngleAxis {
 
 /// `angle = ratio * (angle of the leading joint)`, about rest: what a rhythm adds (knee roll-back, spine).
 struct Coupling {
-  std::string joint;   ///< the leading joint
-  std::string angle;   ///< its angle
-  std::string drives;  ///< the angle of this joint that follows
-  double ratio = 0;
+  std::string joint;  ///< the leading joint; this joint itself may lead its own slide
+  std::string angle;  ///< its angle
+  std::string
+      drives;  ///< the angle of this joint that follows, or its slide along an axis: `x_mm`, `y_mm`, `z_mm`
+  double ratio = 0;  ///< radians a radian; of a slide mm a radian
+
+  /// 0, 1 or 2: the axis along which it slides, at rest; -1 where it drives an angle.
+  int slides() const {
+    return drives.size() == 4 && drives.ends_with("_mm") && drives[0] >= 'x' && drives[0] <= 'z'
+               ? drives[0] - 'x'
+               : -1;
+  }
 };
 
 struct Joint {
@@ -50,7 +70,8 @@ struct Joint {
   JointKind kind = JointKind::ball;
   CenterRule rule = CenterRule::given;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< LPS mm, where rule is `given`
-  std::string center_bone, facing_bone;              ///< where rule is `sphere_fit`
+  std::string center_bone, facing_bone;              ///< where rule is `sphere_fit`, without `how`
+  std::shared_ptr<const JointRule> how;              ///< null: what stands here says all
   /// Columns are the x, y, z axes of the joint frame in the scanned rest pose, LPS; orthonormal,
   /// right-handed.
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
@@ -91,10 +112,11 @@ struct Skeleton {
 struct JointFit {
   std::string joint;
   CenterRule rule = CenterRule::given;
-  double radius_mm = 0;     ///< of a fitted sphere, else 0
+  double radius_mm = 0;     ///< of a fitted sphere or cylinder, or an ellipse's mean half axis; else 0
   double residual_mm = 0;   ///< rms distance of the points from the fitted surface, 0 where given
   double inlier_share = 1;  ///< points within the inlier band over all candidates
   std::int32_t points = 0;  ///< candidates
+  double confidence = 1;    ///< 0 to 1, the least of centre and axes; 1 where given
 };
 
 /// A skeleton whose every joint has its centre (`Joint::center` is filled, whatever the rule was).

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/values/error.hpp"
+#include "io/case/case_rules.hpp"
 #include "io/case/digest.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/label_map.hpp"
@@ -22,8 +23,8 @@ namespace fs = std::filesystem;
 using yaml::Kind;
 using yaml::Value;
 
-constexpr std::array<std::string_view, 9> kCaseKeys{"name",  "frame",   "unit",   "skeleton", "skin",
-                                                    "bones", "tissues", "labels", "volumes"};
+constexpr std::array<std::string_view, 10> kCaseKeys{"name",  "frame",   "unit",    "skeleton", "skin",
+                                                     "bones", "regions", "tissues", "labels",   "volumes"};
 constexpr std::array<std::string_view, 9> kSkinKeys{"file", "name",   "frame",  "unit",    "root",
                                                     "side", "labels", "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment", "frame",  "unit",
@@ -61,7 +62,7 @@ class CaseReader {
     out_.name = root_.at("name").text();
     read_frame();
     steps_ = 2 + count("bones") + count("tissues") + count("volumes") + (root_.find("labels") ? 1 : 0);
-    const std::map<std::string, Value> rules = read_skeleton_entry(root_.at("skeleton"));
+    const PlacedSkeleton placed = read_skeleton_entry(root_.at("skeleton"));
     step();
     const auto labels = root_.find("labels");
     if (labels) read_labels(*labels);
@@ -79,7 +80,9 @@ class CaseReader {
     const Value bones = root_.at("bones");
     for (const Value& entry : bones.items()) read_bone(entry);
     if (out_.bones.empty()) bones.fail("is empty", "list at least one bone");
-    check_rules(rules);
+    if (out_.generic) list_segments();
+    read_regions(placed.regions);
+    check_named(placed.named, out_);
     if (const auto tissues = root_.find("tissues")) {
       for (const Value& entry : tissues->items()) {
         if (!LabelSources::is_rest(entry)) read_tissue(entry);
@@ -147,17 +150,47 @@ class CaseReader {
     return name;
   }
 
-  std::map<std::string, Value> read_skeleton_entry(const Value& entry) {
+  PlacedSkeleton read_skeleton_entry(const Value& entry) {
     if (entry.kind() == Kind::map) entry.allow(kFileKeys);
     const Value file = entry.kind() == Kind::map ? entry.at("file") : entry;
-    const std::string ending = fs::path(file.text()).extension().string();
-    if (ending != ".yaml" && ending != ".yml") {
-      file.fail("no skeleton template is named '" + file.text() + "'", "name a .yaml file beside the case");
+    out_.generic = file.text() == "generic";
+    if (out_.generic) {
+      out_.skeleton.name = "generic";
+      return {};
     }
-    PlacedSkeleton placed = parse_skeleton(Value::read(locate(entry, file)), frame_);
+    const std::string ending = fs::path(file.text()).extension().string();
+    const bool in_file = ending == ".yaml" || ending == ".yml";
+    const auto text = in_file ? std::nullopt : skeleton_template(file.text());
+    if (!in_file && !text) {
+      file.fail("no skeleton template is named '" + file.text() + "'",
+                "use human, hand, knee, quadruped or generic, or name a .yaml file beside the case");
+    }
+    PlacedSkeleton placed = in_file ? parse_skeleton(Value::read(locate(entry, file)), frame_)
+                                    : parse_skeleton(Value::parse(*text, file.text() + ".yaml"), Frame{});
     out_.skeleton = std::move(placed.skeleton);
     for (const Segment& segment : out_.skeleton.segments) segments_.push_back(segment.name);
-    return std::move(placed.rules);
+    return placed;
+  }
+
+  // Without a skeleton every segment that a bone names is one; which hangs on which is found from the bones.
+  void list_segments() {
+    for (const CaseBone& bone : out_.bones) {
+      if (out_.skeleton.find_segment(bone.segment) >= 0) continue;
+      Segment segment;
+      segment.name = bone.segment;
+      segment.parent = out_.skeleton.segments.empty() ? -1 : 0;
+      segment.joint.name = bone.segment;
+      segment.joint.rule = CenterRule::facing;
+      segment.joint.sequence = {{.name = "x", .axis = 0}, {.name = "y", .axis = 1}, {.name = "z", .axis = 2}};
+      out_.skeleton.segments.push_back(std::move(segment));
+    }
+  }
+
+  // Those of the case's own file and of its skeleton.
+  void read_regions(const std::vector<PlacedRegion>& of_skeleton) {
+    std::vector<PlacedRegion> own;
+    if (const auto entry = root_.find("regions")) own = read_regions_file(locate(root_, *entry), frame_);
+    place_regions(std::move(own), of_skeleton, out_);
   }
 
   SurfaceMesh read_mesh(const Value& entry) {
@@ -227,10 +260,15 @@ class CaseReader {
     entry.allow(kBoneKeys);
     CaseBone bone;
     bone.name = unique_name(entry.at("name"));
-    const Value segment = entry.at("segment");
-    bone.segment = segment.text();
-    if (out_.skeleton.find_segment(bone.segment) < 0)
-      segment.fail_unknown("segment", bone.segment, segments_);
+    if (out_.generic) {
+      const auto segment = entry.find("segment");
+      bone.segment = segment ? segment->identifier() : bone.name;
+    } else {
+      const Value segment = entry.at("segment");
+      bone.segment = segment.text();
+      if (out_.skeleton.find_segment(bone.segment) < 0)
+        segment.fail_unknown("segment", bone.segment, segments_);
+    }
     read_source(entry, bone.surface, bone.source);
     out_.bones.push_back(std::move(bone));
   }
@@ -278,24 +316,6 @@ class CaseReader {
     out_.labels =
         read_label_map(entry, [this](const Value& e, const Value& file) { return locate(e, file); });
     step();
-  }
-
-  // A sphere fit must find its bones, unless its segment is absent from this case.
-  void check_rules(const std::map<std::string, Value>& rules) const {
-    std::vector<std::string> bones;
-    for (const CaseBone& bone : out_.bones) bones.push_back(bone.name);
-    for (const auto& entry : rules) {
-      const std::string& segment = entry.first;
-      const Value& rule = entry.second;
-      const bool present = std::any_of(out_.bones.begin(), out_.bones.end(),
-                                       [&](const CaseBone& bone) { return bone.segment == segment; });
-      if (!present) continue;
-      for (const char* key : {"bone", "facing"}) {
-        const Value name = rule.at(key);
-        if (std::find(bones.begin(), bones.end(), name.text()) == bones.end())
-          name.fail_unknown("bone", name.text(), bones);
-      }
-    }
   }
 
   fs::path folder_;

@@ -2,6 +2,7 @@
 // Writing a case as an ordinary folder of files: case.yaml last, so that a folder with one is whole.
 #include "core/files/atomic_file.hpp"
 #include "io/case/case_file.hpp"
+#include "io/case/joint_rule_file.hpp"
 #include "io/case/yaml_text.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/segmentation.hpp"
@@ -23,13 +24,15 @@ class CaseWriter {
 
   void write() {
     files::make_folder(folder_);
-    files::write_text(folder_ / "skeleton.yaml", skeleton_to_yaml(patient_.skeleton));
-    yaml_ = "name: " + write_text(patient_.name) + "\nframe: LPS\nunit: mm\nskeleton: skeleton.yaml\n";
+    if (!patient_.generic) files::write_text(folder_ / "skeleton.yaml", skeleton_to_yaml(patient_.skeleton));
+    yaml_ = "name: " + write_text(patient_.name) +
+            "\nframe: LPS\nunit: mm\nskeleton: " + (patient_.generic ? "generic" : "skeleton.yaml") + "\n";
     surface("skin.stl", patient_.skin);
     yaml_ += patient_.skin_name == "skin"
                  ? "skin: skin.stl\n"
                  : "skin: {name: " + write_text(patient_.skin_name) + ", file: skin.stl}\n";
     write_bones();
+    write_regions();
     write_tissues();
     write_volumes();
     if (patient_.labels) write_labels(*patient_.labels);
@@ -60,6 +63,11 @@ class CaseWriter {
       yaml_ += "  - {name: " + write_text(bone.name) + ", file: " + write_text(file) +
                ", segment: " + write_text(bone.segment) + "}\n";
     }
+  }
+  void write_regions() {
+    if (patient_.regions.empty()) return;
+    files::write_text(folder_ / "regions.yaml", regions_to_yaml(patient_.regions));
+    yaml_ += "regions: regions.yaml\n";
   }
   void write_tissues() {
     if (patient_.tissues.empty()) return;

@@ -7,4 +7,10 @@ namespace ecorche::io::embedded {
 extern const char* const poses;    ///< the pose library
 extern const char* const opensim;  ///< the motion map of OpenSim's coordinates
 
+// Skeleton templates.
+extern const char* const human;
+extern const char* const hand;
+extern const char* const knee;
+extern const char* const quadruped;
+
 }  // namespace ecorche::io::embedded

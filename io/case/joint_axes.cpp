@@ -18,12 +18,11 @@ Eigen::Matrix3d read_joint_axes(const yaml::Value& value, const Frame& frame) {
   value.allow(skeleton_keys::axes);
   Eigen::Matrix3d given = Eigen::Matrix3d::Zero();
   std::vector<int> named;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto direction = value.find(skeleton_keys::axes[static_cast<std::size_t>(axis)]);
-    if (!direction) continue;
-    const auto numbers = direction->numbers<3>();
+  for (const auto& [letter, direction] : value.pairs()) {  // the first in the file keeps its direction
+    const int axis = letter[0] - 'x';
+    const auto numbers = direction.numbers<3>();
     const Eigen::Vector3d file(numbers[0], numbers[1], numbers[2]);
-    if (file.stableNorm() < 1e-12) direction->fail("has no length", "write a direction");
+    if (file.stableNorm() < 1e-12) direction.fail("has no length", "write a direction");
     given.col(axis) = frame.axes * file;
     named.push_back(axis);
   }

@@ -38,19 +38,19 @@ JointKind read_kind(const Value& value) {
   return static_cast<JointKind>(found - kinds.begin());
 }
 
-void read_center(const Value& value, const Frame& frame, Joint& joint) {
-  if (value.kind() == Kind::map) {
-    value.allow(skeleton_keys::center);
-    const Value rule = value.at("sphere_fit");
-    rule.allow(skeleton_keys::sphere_fit);
-    joint.rule = CenterRule::sphere_fit;
-    joint.center_bone = rule.at("bone").identifier();
-    joint.facing_bone = rule.at("facing").identifier();
-    if (joint.center_bone == joint.facing_bone) rule.fail("a bone cannot face itself", "name two bones");
-    return;
+// A sphere between two bones needs no more than their names; whatever else is found goes by a rule.
+void keep_rule(JointRule rule, Joint& joint) {
+  const PointSource& center = rule.center;
+  joint.rule = center.rule;
+  joint.center = center.point;
+  const bool two_bones = center.rule == CenterRule::sphere_fit && !center.on.facing.empty();
+  if (two_bones) {
+    joint.center_bone = center.on.bone;
+    joint.facing_bone = center.on.facing;
   }
-  const auto center = value.numbers<3>();
-  joint.center = frame.point({center[0], center[1], center[2]});
+  const bool said = center.rule == CenterRule::given || two_bones;
+  if (!said || !rule.axes.empty() || rule.measured_rest)
+    joint.how = std::make_shared<const JointRule>(std::move(rule));
 }
 
 AngleAxis read_angle(const Value& value) {
@@ -143,21 +143,30 @@ void check_rest(const Value& value, const Joint& joint) {
   }
 }
 
-Joint read_joint(const Value& value, const Frame& frame, std::map<std::string, Value>& rules,
-                 const std::string& segment) {
+Joint read_joint(const Value& value, const Frame& frame, NamedInRules& named, const std::string& segment) {
   value.allow(skeleton_keys::joint);
   Joint joint;
   joint.name = value.at("name").identifier();
   if (const auto kind = value.find("kind")) joint.kind = read_kind(*kind);
-  const Value center = value.at("center");
-  read_center(center, frame, joint);
-  if (joint.rule == CenterRule::sphere_fit) rules.emplace(segment, center.at("sphere_fit"));
-  if (const auto axes = value.find("axes")) joint.axes = read_joint_axes(*axes, frame);
+  const RuleReader reader(frame, segment, named);
+  JointRule rule;
+  rule.center = reader.point(value.at("center"));
+  if (const auto axes = value.find("axes")) {
+    if (RuleReader::has_rules(*axes)) {
+      rule.axes = reader.axes(*axes);
+    } else {
+      joint.axes = read_joint_axes(*axes, frame);
+    }
+  }
   joint.sequence = {{.name = "x", .axis = 0}, {.name = "y", .axis = 1}, {.name = "z", .axis = 2}};
   if (const auto sequence = value.find("sequence")) read_sequence(*sequence, joint);
-  if (const auto rest = value.find("rest_deg")) read_rest(*rest, joint);
+  if (const auto rest = value.find("rest_deg")) {
+    rule.measured_rest = rest->kind() == Kind::scalar && rest->text() == "measured";
+    if (!rule.measured_rest) read_rest(*rest, joint);
+  }
   if (const auto limits = value.find("limits_deg")) read_limits(*limits, joint);
-  check_rest(value, joint);
+  if (!rule.measured_rest) check_rest(value, joint);
+  keep_rule(std::move(rule), joint);
   return joint;
 }
 
@@ -173,13 +182,15 @@ void read_couplings(const Value& value, Skeleton& skeleton, Joint& joint) {
     const int row = skeleton.find_joint(coupling.joint);
     if (row < 0) leader.fail_unknown("joint", coupling.joint, joints);
     Joint& leading = skeleton.segments[static_cast<std::size_t>(row)].joint;
-    if (leading.name == joint.name) leader.fail("a joint cannot lead itself", "name another joint");
     const Value angle = item.at("angle"), drives = item.at("drives");
+    coupling.drives = drives.text();
+    const bool slides = coupling.slides() >= 0 && find_angle(joint, coupling.drives) == nullptr;
+    if (leading.name == joint.name && !slides)
+      leader.fail("a joint cannot lead itself", "name another joint");
     coupling.angle = angle.text();
     if (find_angle(leading, coupling.angle) == nullptr)
       angle.fail_unknown("angle", coupling.angle, angle_names(leading));
-    coupling.drives = drives.text();
-    if (find_angle(joint, coupling.drives) == nullptr)
+    if (find_angle(joint, coupling.drives) == nullptr && !slides)
       drives.fail_unknown("angle", coupling.drives, angle_names(joint));
     coupling.ratio = item.at("ratio").number();
     joint.coupled.push_back(coupling);
@@ -195,6 +206,7 @@ bool leads_itself(const Skeleton& skeleton, const std::string& start) {
     open.pop_back();
     for (const Coupling& coupling :
          skeleton.segments[static_cast<std::size_t>(skeleton.find_joint(name))].joint.coupled) {
+      if (coupling.slides() >= 0) continue;  // a slide leads nothing
       if (coupling.joint == start) return true;
       if (seen.insert(coupling.joint).second) open.push_back(coupling.joint);
     }
@@ -251,6 +263,23 @@ std::vector<int> read_parents(const Value& map, const Named& segments) {
   return parents;
 }
 
+// Rules may name segments and joints that stand further below.
+void check_names(const Skeleton& skeleton, const NamedInRules& named) {
+  std::vector<std::string> segments, joints;
+  for (const Segment& segment : skeleton.segments) {
+    segments.push_back(segment.name);
+    joints.push_back(segment.joint.name);
+  }
+  for (const NamedInRules::Word& word : named.segments) {
+    if (skeleton.find_segment(word.value.text()) < 0)
+      word.value.fail_unknown("segment", word.value.text(), segments);
+  }
+  for (const NamedInRules::Word& word : named.joints) {
+    if (skeleton.find_joint(word.value.text()) < 0)
+      word.value.fail_unknown("joint", word.value.text(), joints);
+  }
+}
+
 }  // namespace
 
 PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
@@ -277,7 +306,7 @@ PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
     segment.name = name;
     segment.parent = parents[i] < 0 ? -1 : row_of[static_cast<std::size_t>(parents[i])];
     const Value joint = value.at("joint");
-    segment.joint = read_joint(joint, frame, placed.rules, name);
+    segment.joint = read_joint(joint, frame, placed.named, name);
     if (skeleton.find_joint(segment.joint.name) >= 0) {
       joint.at("name").fail("another joint is named '" + segment.joint.name + "'",
                             "give each joint its own name");
@@ -296,6 +325,8 @@ PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
     if (leads_itself(skeleton, joint.name))
       coupled->fail("'" + joint.name + "' leads itself in a circle", "break the circle");
   }
+  check_names(skeleton, placed.named);
+  if (const auto regions = root.find("regions")) placed.regions = parse_regions(*regions, frame);
   return placed;
 }
 

@@ -31,13 +31,16 @@ std::string angles(const Joint& joint, const std::string& key, const std::string
 std::string joint_to_yaml(const Joint& joint) {
   std::string out = "    joint:\n      name: " + write_text(joint.name) + "\n";
   out += "      kind: " + std::string(skeleton_keys::kinds.at(static_cast<std::size_t>(joint.kind))) + "\n";
-  if (joint.rule == CenterRule::sphere_fit) {
+  if (joint.how) {
+    out += "      center: " + point_to_yaml(joint.how->center) + "\n";
+    if (!joint.how->axes.empty()) out += "      axes: " + axes_to_yaml(joint.how->axes) + "\n";
+  } else if (joint.rule == CenterRule::sphere_fit && !joint.center_bone.empty()) {
     out += "      center: {sphere_fit: {bone: " + write_text(joint.center_bone) +
            ", facing: " + write_text(joint.facing_bone) + "}}\n";
   } else {
     out += "      center: " + yaml::write_vector(joint.center) + "\n";
   }
-  if (joint.axes != Eigen::Matrix3d::Identity()) {
+  if (joint.axes != Eigen::Matrix3d::Identity() && (!joint.how || joint.how->axes.empty())) {
     out += "      axes: {x: " + yaml::write_vector(joint.axes.col(0)) +
            ", y: " + yaml::write_vector(joint.axes.col(1)) + ", z: " + yaml::write_vector(joint.axes.col(2)) +
            "}\n";
@@ -49,8 +52,12 @@ std::string joint_to_yaml(const Joint& joint) {
               std::string(skeleton_keys::axes.at(static_cast<std::size_t>(angle.axis))) + "}");
   }
   if (!turns.empty() && turns != "{x: x}, {y: y}, {z: z}") out += "      sequence: [" + turns + "]\n";
-  out += angles(joint, "rest_deg", "",
-                [](const AngleAxis& angle) { return angle.rest == 0 ? "" : write_degrees(angle.rest); });
+  if (joint.how && joint.how->measured_rest) {
+    out += "      rest_deg: measured\n";
+  } else {
+    out += angles(joint, "rest_deg", "",
+                  [](const AngleAxis& angle) { return angle.rest == 0 ? "" : write_degrees(angle.rest); });
+  }
   const std::string source = joint.limits_source.empty() ? "" : "source: " + write_text(joint.limits_source);
   out += angles(joint, "limits_deg", source, [](const AngleAxis& angle) {
     const bool limited = std::isfinite(angle.min) || std::isfinite(angle.max);

@@ -46,15 +46,16 @@ std::optional<Cylinder> through(const Eigen::Vector3d& a, const Eigen::Vector3d&
   return Cylinder{a + from_a.x() * across.u + from_a.y() * across.v, axis, from_a.norm()};
 }
 
-// Slid along its axis to the middle of the chosen points, so that its direction and place are apart.
+// Slid along its axis to the middle of the chosen points, so that its direction and place are apart: halfway
+// between their 5th and 95th percentile, since an outlier or two may lie near its prolongation.
 void centre(const Points& points, const std::vector<Eigen::Index>& chosen, Cylinder& cylinder) {
-  double least = std::numeric_limits<double>::infinity(), most = -least;
-  for (const Eigen::Index i : chosen) {
-    const double along = (points.row(i).transpose() - cylinder.point).dot(cylinder.axis);
-    least = std::min(least, along);
-    most = std::max(most, along);
-  }
-  if (least <= most) cylinder.point += 0.5 * (least + most) * cylinder.axis;
+  if (chosen.empty()) return;
+  std::vector<double> along;
+  for (const Eigen::Index i : chosen)
+    along.push_back((points.row(i).transpose() - cylinder.point).dot(cylinder.axis));
+  const std::size_t low = along.size() / 20, high = along.size() - 1 - low;
+  std::sort(along.begin(), along.end());
+  cylinder.point += 0.5 * (along[low] + along[high]) * cylinder.axis;
 }
 
 // The normal equations of the distance in two shifts, two tilts and the radius.

@@ -9,9 +9,10 @@
 namespace ecorche::rig {
 
 struct CylinderFit {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< on the axis, halfway between the outermost inliers
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();   ///< unit; its sign means nothing
-  double radius = 0;                                 ///< mm
+  Eigen::Vector3d center =
+      Eigen::Vector3d::Zero();  ///< on the axis, amid the inliers: between their 5th and 95th percentiles
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< unit; its sign means nothing
+  double radius = 0;                                ///< mm
   double residual = 0;  ///< mm, rms distance from the cylinder of the points within 25 % of its radius
   double inlier_share = 0;
   double confidence = 0;  ///< 0 to 1 (robust.hpp)

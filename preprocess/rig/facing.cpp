@@ -37,21 +37,21 @@ double mean_edge(const SurfaceMesh& mesh) {
 
 }  // namespace
 
-Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other) {
+Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other, const Eigen::Vector3d& looks) {
   const auto count = static_cast<std::size_t>(bone.V.rows());
   if (count == 0 || other.F.rows() == 0) return Points(0, 3);
   const geometry::FaceTree tree(other);
   const Points normal = vertex_normals(bone);
 
   std::vector<double> distance(count);
-  std::vector<bool> looks(count);
+  std::vector<bool> faces(count);
   std::int32_t hint = -1;
   for (std::size_t v = 0; v < count; ++v) {
     const Eigen::Vector3d p = bone.V.row(static_cast<Eigen::Index>(v)).transpose();
     const geometry::FaceTree::Hit hit = tree.nearest(p, hint);
     hint = hit.face;
     distance[v] = std::sqrt(hit.squared);
-    looks[v] = (hit.point - p).dot(normal.row(static_cast<Eigen::Index>(v))) >= kFacingCosine * distance[v];
+    faces[v] = (hit.point - p).dot(normal.row(static_cast<Eigen::Index>(v))) >= kFacingCosine * distance[v];
   }
   std::vector<double> sorted = distance;
   const auto wanted = std::max(kFewest, static_cast<std::size_t>(kNearestShare * static_cast<double>(count)));
@@ -59,10 +59,14 @@ Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other) {
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank), sorted.end());
   const double reach = std::max(kReach * sorted[rank], mean_edge(bone));
 
+  const auto turned = [&](std::size_t v) {
+    return normal.row(static_cast<Eigen::Index>(v)).dot(looks.transpose()) >= kFacingCosine * looks.norm();
+  };
   const auto choose = [&](bool only_facing) {
     std::vector<Eigen::Index> rows;
     for (std::size_t v = 0; v < count; ++v) {
-      if (distance[v] <= reach && (looks[v] || !only_facing)) rows.push_back(static_cast<Eigen::Index>(v));
+      if (distance[v] <= reach && (faces[v] || !only_facing) && turned(v))
+        rows.push_back(static_cast<Eigen::Index>(v));
     }
     return rows;
   };

@@ -10,7 +10,9 @@ namespace ecorche::rig {
 /// twice the distance of the nearest 2 % of the vertices (16 at least), and never less than the mean edge, so
 /// that neither the width of the cartilage nor the resolution must be known. A vertex looks at `other` when
 /// its normal is within 60 degrees of the way to the closest point there; where fewer than 16 do, as in bones
-/// that touch, reach alone counts.
-Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other);
+/// that touch, reach alone counts. `looks`: a direction within 60 degrees of which the normals must be; zero
+/// for any.
+Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other,
+                       const Eigen::Vector3d& looks = Eigen::Vector3d::Zero());
 
 }  // namespace ecorche::rig

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/rig/fit_rig.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <sstream>
 
-#include "preprocess/rig/facing.hpp"
+#include "core/kinematics/angles.hpp"
+#include "preprocess/rig/generic_tree.hpp"
+#include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/present_part.hpp"
-#include "preprocess/rig/sphere_fit.hpp"
 
 namespace ecorche::rig {
 namespace {
 
 constexpr double kBadResidual = 0.10;  // of the radius
 constexpr double kFewInliers = 0.5;
+constexpr double kRounding = 1e-9;  // radians
 
-const SurfaceMesh& bone_surface(const Case& patient, const Joint& joint, const std::string& name) {
-  for (const CaseBone& bone : patient.bones) {
-    if (bone.name == name) return bone.surface;
-  }
-  throw Error(ErrorKind::config, "joint " + joint.name,
-              "its sphere fit names bone '" + name + "', which the case has not",
-              "add the bone, or give the joint's center as [x, y, z]");
+std::string percent(double share) {
+  return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
 }
 
-void warn_bad(const JointFit& fit, const Context& context) {
+void warn_sphere(const JointFit& fit, const Context& context) {
   if (fit.residual_mm > kBadResidual * fit.radius_mm) {
     std::ostringstream line;
     line << "joint " << fit.joint << ": its surfaces are no good sphere: rms residual " << fit.residual_mm
@@ -37,39 +37,88 @@ void warn_bad(const JointFit& fit, const Context& context) {
   }
 }
 
-JointFit fit_center(const Case& patient, Joint& joint, const Context& context) {
-  JointFit out;
-  out.joint = joint.name;
-  out.rule = joint.rule;
-  if (joint.rule == CenterRule::given) return out;
-  const SurfaceMesh& bone = bone_surface(patient, joint, joint.center_bone);
-  const SurfaceMesh& facing = bone_surface(patient, joint, joint.facing_bone);
-  const Points points = facing_vertices(bone, facing);
-  const auto sphere = fit_sphere(points);
-  if (!sphere) {
-    throw Error(ErrorKind::data, "joint " + joint.name,
-                std::to_string(points.rows()) + " vertices of " + joint.center_bone + " face " +
-                    joint.facing_bone + " and lie on no sphere",
-                "give the joint's center as [x, y, z]");
+void warn_rule(const JointFit& fit, double of_axes, const Context& context) {
+  if (fit.rule == CenterRule::facing) {
+    context.warn("joint " + fit.joint +
+                 ": its rule cannot be followed in this case; it lies where its segment is nearest to the "
+                 "parent's bones");
+  } else if (fit.confidence < JointSources::least_confidence) {
+    std::ostringstream line;
+    line << "joint " << fit.joint << ": its centre by " << center_rule_name(fit.rule) << " has confidence "
+         << percent(fit.confidence) << " (rms residual " << fit.residual_mm << " mm, "
+         << percent(fit.inlier_share) << " of " << fit.points << " vertices)";
+    context.warn(line.str());
   }
-  joint.center = sphere->center;
-  out.radius_mm = sphere->radius;
-  out.residual_mm = sphere->residual;
-  out.inlier_share = sphere->inlier_share;
-  out.points = static_cast<std::int32_t>(points.rows());
-  warn_bad(out, context);
-  return out;
+  if (of_axes < JointSources::least_confidence)
+    context.warn("joint " + fit.joint + ": its axes have confidence " + percent(of_axes));
+}
+
+bool has_bone(const Case& patient, const std::string& name) {
+  return std::any_of(patient.bones.begin(), patient.bones.end(),
+                     [&](const CaseBone& b) { return b.name == name; });
+}
+
+// A sphere between two bones that were named for it must be there: nothing stands in for it.
+void need_sphere(const Case& patient, const Joint& joint, const FoundPoint& found) {
+  for (const std::string& name : {joint.center_bone, joint.facing_bone}) {
+    if (has_bone(patient, name)) continue;
+    throw Error(ErrorKind::config, "joint " + joint.name,
+                "its sphere fit names bone '" + name + "', which the case has not",
+                "add the bone, or give the joint's center as [x, y, z]");
+  }
+  if (found.fit.rule == CenterRule::sphere_fit) return;
+  throw Error(
+      ErrorKind::data, "joint " + joint.name,
+      "the vertices of " + joint.center_bone + " that face " + joint.facing_bone + " lie on no sphere",
+      "give the joint's center as [x, y, z]");
+}
+
+// The rest angles that lead from the parent's axes to the joint's. What the limits say of them is for posing:
+// a range reaches to the rest angle.
+void measure_rest(const Eigen::Matrix3d& parent, Joint& joint) {
+  for (AngleAxis& angle : joint.sequence) angle.rest = 0;
+  const std::array<double, 3> rest = kinematics::angles_from_rotation(
+      joint, Eigen::Quaterniond(Eigen::Matrix3d(parent.transpose() * joint.axes)));
+  for (std::size_t a = 0; a < 3; ++a) joint.sequence[a].rest = std::abs(rest[a]) < kRounding ? 0 : rest[a];
+}
+
+void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig& rig,
+               const Context& context) {
+  Joint& joint = rig.skeleton.segments[row].joint;
+  const FoundPoint& found = sources.center(row);
+  const bool two_bones = joint.rule == CenterRule::sphere_fit && !joint.facing_bone.empty();
+  if (two_bones) need_sphere(patient, joint, found);
+  const auto [axes, of_axes] = sources.axes(row);
+  rig.fits.push_back(found.fit);
+  if (two_bones) {
+    warn_sphere(found.fit, context);
+  } else {
+    warn_rule(found.fit, of_axes, context);
+  }
+  rig.fits.back().confidence = std::min(found.fit.confidence, of_axes);
 }
 
 }  // namespace
 
 Rig fit(const Case& patient, const Context& context) {
   Rig rig;
-  rig.skeleton = present_part(patient, context);
-  for (Segment& segment : rig.skeleton.segments) {
+  const Skeleton asked = patient.generic ? generic_tree(patient, context) : present_part(patient, context);
+  rig.skeleton = asked;
+  JointSources sources(patient, asked);
+  for (std::size_t row = 0; row < asked.segments.size(); ++row) {
     context.check_stop();
-    rig.fits.push_back(fit_center(patient, segment.joint, context));
-    context.report(static_cast<double>(rig.fits.size()) / static_cast<double>(rig.skeleton.segments.size()));
+    fit_joint(patient, sources, row, rig, context);
+    context.report(static_cast<double>(row + 1) / static_cast<double>(asked.segments.size()));
+  }
+  for (std::size_t row = 0; row < asked.segments.size(); ++row) {
+    const Segment& from = asked.segments[row];
+    Joint& joint = rig.skeleton.segments[row].joint;
+    joint.center = sources.center(row).at;
+    joint.axes = sources.axes(row).first;
+    joint.rule = rig.fits[row].rule;
+    joint.how.reset();
+    const bool measured = from.joint.how && from.joint.how->measured_rest && from.parent >= 0;
+    if (measured) measure_rest(sources.axes(static_cast<std::size_t>(from.parent)).first, joint);
   }
   return rig;
 }

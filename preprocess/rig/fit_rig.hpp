@@ -8,12 +8,15 @@
 
 namespace ecorche::rig {
 
-/// Keeps given centres; for `sphere_fit` takes the vertices of `center_bone` that face `facing_bone` (found
-/// by proximity), and fits a sphere by RANSAC and a least-squares refinement on the inliers. A residual above
-/// 10 % of the radius, or fewer than half inliers, is a warning with the number. A segment of the skeleton
-/// that owns no bone is dropped into its nearest present ancestor, with a warning that names both (the root
-/// stays). Throws Error{config} when a joint names an absent bone, or when no segment owns a bone, and
-/// Error{data} when the facing vertices lie on no sphere.
+/// Keeps given centres and axes, and finds the others by their rules (joint_sources.hpp), on the vertices of
+/// named regions or on those that face another bone, found by proximity. What is found badly is a warning
+/// with its number: a sphere between two bones with a residual above 10 % of the radius or fewer than half
+/// inliers, anything else below half confidence; so is a rule that cannot be followed, whose joint then lies
+/// where its segment is nearest to the parent's bones. Measured rest angles are those from the parent's axes
+/// to the joint's. A segment of the skeleton that owns no bone is dropped into its nearest present ancestor,
+/// with a warning that names both (the root stays). A generic case gets the tree of generic_tree.hpp. Throws
+/// Error{config} when a sphere fit between two bones names an absent one, when rules go in a circle, or when
+/// no segment owns a bone, and Error{data} when such a sphere fit finds none, or axes come out collinear.
 Rig fit(const Case& patient, const Context& context);
 
 }  // namespace ecorche::rig

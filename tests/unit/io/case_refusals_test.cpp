@@ -54,9 +54,10 @@ TEST_F(CaseRefusals, TheUnchangedCaseIsRead) {
 
 TEST_F(CaseRefusals, KeysAndTypes) {
   refused("unit: mm", "units: mm", "3:units: unknown key 'units' (did you mean 'unit'?)");
-  refused("unit: mm", "regions: r.yaml",
-          "3:regions: unknown key 'regions' (use name, frame, unit, skeleton, skin, bones, tissues, labels, "
-          "volumes)");
+  refused(
+      "unit: mm", "atlas: r.yaml",
+      "3:atlas: unknown key 'atlas' (use name, frame, unit, skeleton, skin, bones, regions, tissues, labels, "
+      "volumes)");
   refused("name: small\n", "", "1: lacks the key 'name' (add it)");
   refused("name: small", "name:", "1:name: must be a plain value, is nothing");
   refused("unit: mm", "unit: [mm]", "3:unit: must be a plain value, is a list");
@@ -109,8 +110,10 @@ TEST_F(CaseRefusals, Files) {
   refused("bones/femur_right.stl", "bones/femur.stl",
           "8:bones[1].file: no such file: ", ErrorKind::missing_input);
   refused("skin.stl", "skn.stl", "5:skin: no such file: ", ErrorKind::missing_input);
-  refused("skeleton.yaml", "human",
-          "4:skeleton: no skeleton template is named 'human' (name a .yaml file beside the case)");
+  refused("skeleton.yaml", "horse",
+          "4:skeleton: no skeleton template is named 'horse' (use human, hand, knee, quadruped or generic, "
+          "or name a .yaml "
+          "file beside the case)");
   refused("file: volumes/ct.nrrd", "file: volumes/ct.nrrd, root: data",
           "12:volumes[0].root: the data folder is not known (name it with --data DIR)");
   refused("file: volumes/ct.nrrd", "file: volumes/ct.nrrd, root: home",

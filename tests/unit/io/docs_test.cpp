@@ -12,11 +12,11 @@
 namespace ecorche::io {
 namespace {
 
-// The first block of YAML after the heading.
-std::string example(const std::string& heading, const char* of = "case.md") {
+// The first block of YAML after the heading that begins with `first`.
+std::string example(const std::string& heading, const char* of = "case.md", const std::string& first = "") {
   std::ifstream file(std::string(ECORCHE_SOURCE "/docs/") + of, std::ios::binary);
   const std::string page(std::istreambuf_iterator<char>(file), {});
-  const std::size_t at = page.find("## " + heading), begin = page.find("```yaml\n", at) + 8;
+  const std::size_t at = page.find("## " + heading), begin = page.find("```yaml\n" + first, at) + 8;
   EXPECT_NE(at, page.npos) << heading;
   return page.substr(begin, page.find("```", begin) - begin);
 }
@@ -25,6 +25,7 @@ TEST(Docs, TheExamplesAreRead) {
   const Scratch scratch;
   scratch.put("case.yaml", example("case.yaml"));
   scratch.put("skeleton.yaml", example("skeleton.yaml"));
+  scratch.put("regions.yaml", example("Joints found from the bones", "case.md", "ecorche_regions"));
   for (const char* folder : {"bones", "muscles"}) std::filesystem::create_directory(scratch / folder);
   const Case small = small_case();
   for (const char* file : {"skin.stl", "bones/hip.stl", "bones/femur.stl", "muscles/rf.stl"})
@@ -35,6 +36,8 @@ TEST(Docs, TheExamplesAreRead) {
   EXPECT_EQ(patient.bones.size(), 2u);
   EXPECT_EQ(patient.bones[1].surface.V.row(0), Eigen::RowVector3d(500, 400, -1000));  // RAS, cm
   EXPECT_EQ(patient.skeleton.segments.size(), 3u);
+  ASSERT_EQ(patient.regions.size(), 4u);
+  EXPECT_EQ(patient.regions[0].points.row(3), patient.bones[1].surface.V.row(7));
   Rig rig;
   rig.skeleton = patient.skeleton;
   const Pose pose = read_pose(scratch.put("pose.yaml", example("pose.yaml")), rig);

@@ -165,7 +165,7 @@ TEST(Skeleton, EveryMistakeIsNamed) {
   joint("", "s.yaml:7:segments.b.joint: lacks the key 'center'");
   joint(", center: [0, 0]", "s.yaml:7:segments.b.joint.center: has 2 values (write 3 numbers)");
   joint(", center: [0, 0, .inf]", "s.yaml:7:segments.b.joint.center[2]: must be a number, is '.inf'");
-  joint(", center: {sphere: 1}", "segments.b.joint.center.sphere: unknown key 'sphere' (use sphere_fit)");
+  joint(", center: {sphere: 1}", "segments.b.joint.center.sphere: unknown key 'sphere'");
   joint(", center: {sphere_fit: {bone: f, facing: f}}", "center.sphere_fit: a bone cannot face itself");
   joint(center + ", kind: bal",
         "s.yaml:7:segments.b.joint.kind: unknown kind of joint 'bal' (did you mean 'ball'?)");
@@ -239,7 +239,9 @@ TEST(Skeleton, TheSchemaListsTheReadersKeys) {
   same(parts.at("segment"), skeleton_keys::segment);
   same(parts.at("joint"), skeleton_keys::joint);
   same(parts.at("center"), skeleton_keys::center);
-  same(parts.at("sphere_fit"), skeleton_keys::sphere_fit);
+  same(parts.at("use"), skeleton_keys::use);
+  same(parts.at("direction"), skeleton_keys::direction);
+  same(parts.at("region"), skeleton_keys::region);
   same(parts.at("axes"), skeleton_keys::axes);
   same(parts.at("coupling"), skeleton_keys::coupling);
   EXPECT_EQ(

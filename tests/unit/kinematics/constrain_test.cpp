@@ -46,6 +46,27 @@ TEST(Constrain, TheRootIsThePlaceOfTheBody) {
   EXPECT_NEAR(pose.rotation[0].angularDistance(Eigen::Quaterniond::Identity()), 2, 1e-12);
 }
 
+// The roll-back of a knee: its own flexion, and another joint's, slide it along its axes at rest.
+TEST(Constrain, SlidesFollowTheirLeaders) {
+  Rig rig = test::chain(3);
+  Joint& knee = rig.skeleton.segments[2].joint;
+  const Joint& hip = rig.skeleton.segments[1].joint;
+  const std::string own = knee.sequence[0].name, other = hip.sequence[1].name;
+  knee.coupled = {{knee.name, own, "y_mm", -5}, {hip.name, other, "y_mm", 2}, {hip.name, other, "z_mm", 1}};
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] =
+      rotation_from_angles(hip, {hip.sequence[0].rest, hip.sequence[1].rest + 0.25, hip.sequence[2].rest});
+  pose.rotation[2] =
+      rotation_from_angles(knee, {knee.sequence[0].rest + 0.5, knee.sequence[1].rest, knee.sequence[2].rest});
+  pose.translation[2] = {7, 8, 9};  // what was asked for is not the joint's to do
+  const Eigen::Quaterniond asked = pose.rotation[2];
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  EXPECT_LT((pose.translation[2] - Vector3d(0, -5 * 0.5 + 2 * 0.25, 0.25)).norm(), 1e-9);
+  EXPECT_LT(pose.rotation[2].angularDistance(asked), 1e-12);  // a slide turns nothing
+  EXPECT_TRUE(clamped.empty());
+}
+
 TEST(Constrain, OnlyFreeJointsMoveAway) {
   Rig rig = test::chain(3);
   rig.skeleton.segments[2].joint.kind = JointKind::free;

@@ -53,6 +53,7 @@ const std::vector<Break> kBreaks{
     {"/ecorche/skeleton/fit_joint", [](Model& m) { m.rig.fits.pop_back(); }},
     {"/ecorche/skeleton/fit_joint", [](Model& m) { m.rig.fits[1].joint = "tip_joint"; }},
     {"/ecorche/skeleton/fit_residual_mm", [](Model& m) { m.rig.fits[1].residual_mm = kNan; }},
+    {"/ecorche/skeleton/fit_residual_mm", [](Model& m) { m.rig.fits[1].confidence = 1.5; }},
     {"/VTKHDF/Points", [](Model& m) { m.nodes(5, 1) = kNanF; }},
     {"/VTKHDF/Points", [](Model& m) { m.nodes.resize(0, 3); }},
     {"/VTKHDF/Connectivity", [](Model& m) { m.tets(7, 3) = static_cast<std::int32_t>(m.nodes.rows()); }},

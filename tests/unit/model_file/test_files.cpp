@@ -60,7 +60,7 @@ Model full_model() {
   segments[2].joint.kind = JointKind::free;
   segments[0].aliases.clear();
   segments[1].aliases = {"Toy1", "mixamorig:Hips", "H\u00fcfte"};
-  model.rig.fits[1] = {"middle_joint", CenterRule::sphere_fit, 12.5, 0.125, 0.75, 321};
+  model.rig.fits[1] = {"middle_joint", CenterRule::sphere_fit, 12.5, 0.125, 0.75, 321, 0.625};
   ModelVolume field{"field", Image(model.volumes[0].image.grid, ScalarType::f32, 2), -1, false, {}};
   const auto values = field.image.scalars<float>();
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i) / 7;
@@ -147,6 +147,7 @@ void expect_same(const Rig& a, const Rig& b) {
     EXPECT_EQ(a.fits[i].residual_mm, b.fits[i].residual_mm);
     EXPECT_EQ(a.fits[i].inlier_share, b.fits[i].inlier_share);
     EXPECT_EQ(a.fits[i].points, b.fits[i].points);
+    EXPECT_EQ(a.fits[i].confidence, b.fits[i].confidence);
   }
 }
 

@@ -137,7 +137,9 @@ TEST(FitRig, mistakes_are_refused_by_name) {
   Case patient = hip_case();
   patient.skeleton.segments[1].joint.facing_bone = "ilium";
   EXPECT_EQ(refusal(patient).kind(), ErrorKind::config);
-  EXPECT_NE(std::string(refusal(patient).what()).find("ilium"), std::string::npos);
+  EXPECT_NE(
+      std::string(refusal(patient).what()).find("its sphere fit names bone 'ilium', which the case has not"),
+      std::string::npos);
   EXPECT_EQ(refusal(patient).where(), "joint thigh_joint");
 
   patient = hip_case();
@@ -151,6 +153,9 @@ TEST(FitRig, mistakes_are_refused_by_name) {
   patient = hip_case();
   patient.bones[1].surface.V.col(2).setConstant(0);  // flat: no sphere anywhere
   EXPECT_EQ(refusal(patient).kind(), ErrorKind::data);
+  EXPECT_NE(
+      std::string(refusal(patient).what()).find("the vertices of femur that face hip_bone lie on no sphere"),
+      std::string::npos);
 
   std::stop_source stop;
   stop.request_stop();

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Named regions of bones: `regions.yaml` of a case, or `regions` of a skeleton.
+#include "io/case/joint_rule_file.hpp"
+#include "io/case/skeleton_file.hpp"
+
+namespace ecorche::io {
+namespace {
+
+using yaml::Value;
+
+constexpr std::array<std::string_view, 2> kBoxKeys{"least", "most"};
+
+Eigen::Vector3d corner(const Value& value, const Frame& frame) {
+  const auto numbers = value.numbers<3>();
+  return frame.point({numbers[0], numbers[1], numbers[2]});
+}
+
+Eigen::AlignedBox3d read_box(const Value& value, const Frame& frame) {
+  value.allow(kBoxKeys);
+  const Value least = value.at("least"), most = value.at("most");
+  const auto low = least.numbers<3>(), high = most.numbers<3>();
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (low[i] > high[i]) value.fail("its least is above its most", "write the smaller corner first");
+  }
+  Eigen::AlignedBox3d box;
+  box.extend(corner(least, frame));
+  box.extend(corner(most, frame));
+  return box;
+}
+
+PlacedRegion read_region(const std::string& name, const Value& value, const Frame& frame) {
+  value.allow(skeleton_keys::region);
+  PlacedRegion placed{{}, value, {}};
+  Region& region = placed.region;
+  region.name = name;
+  if (!yaml::is_identifier(name))
+    value.fail("'" + name + "' is no identifier", "use 1 to 64 of a-z, 0-9 and _");
+  const auto bone = value.find("bone"), segment = value.find("segment");
+  if (bone.has_value() == segment.has_value())
+    value.fail("is on no one place", "name its bone or its segment");
+  if (bone) region.bone = bone->identifier();
+  if (segment) region.segment = segment->identifier();
+  if (const auto of = value.find("of")) {
+    if (of->text() != "bones")
+      of->fail("'" + of->text() + "' holds no boxes", "write of: bones, or leave it out");
+    region.of_bones = true;
+  }
+  if (const auto boxes = value.find("boxes")) {
+    for (const Value& box : boxes->items())
+      region.boxes.push_back(read_box(box, region.of_bones ? Frame{} : frame));
+  }
+  if (const auto vertices = value.find("vertices")) {
+    if (!bone) vertices->fail("count the vertices of a bone", "name the region's bone");
+    for (const Value& vertex : vertices->items()) placed.vertices.push_back(vertex.integer());
+  }
+  if (const auto points = value.find("points")) {
+    const auto items = points->items();
+    region.points.resize(static_cast<Eigen::Index>(items.size()), 3);
+    for (std::size_t i = 0; i < items.size(); ++i)
+      region.points.row(static_cast<Eigen::Index>(i)) = corner(items[i], frame).transpose();
+  }
+  if (region.boxes.empty() && placed.vertices.empty() && region.points.rows() == 0)
+    value.fail("holds nothing", "list boxes, vertices or points");
+  return placed;
+}
+
+}  // namespace
+
+std::vector<PlacedRegion> parse_regions(const Value& value, const Frame& frame) {
+  std::vector<PlacedRegion> out;
+  for (const auto& [name, region] : value.pairs()) out.push_back(read_region(name, region, frame));
+  return out;
+}
+
+}  // namespace ecorche::io

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/rig/bone_points.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "preprocess/rig/facing.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+const Points kNone(0, 3);
+
+Points rows_of(const Points& points, const std::set<Eigen::Index>& rows) {
+  Points out(static_cast<Eigen::Index>(rows.size()), 3);
+  Eigen::Index at = 0;
+  for (const Eigen::Index row : rows) out.row(at++) = points.row(row);
+  return out;
+}
+
+// In shares of `whole`, from a corner at 0 to the other at 1.
+Eigen::AlignedBox3d within(const Eigen::AlignedBox3d& shares, const Eigen::AlignedBox3d& whole) {
+  const Eigen::Vector3d size = whole.sizes();
+  return {whole.min() + shares.min().cwiseProduct(size), whole.min() + shares.max().cwiseProduct(size)};
+}
+
+}  // namespace
+
+const SurfaceMesh* BonePoints::bone(const std::string& name) const {
+  const auto found = std::find_if(patient_.bones.begin(), patient_.bones.end(),
+                                  [&](const CaseBone& b) { return b.name == name; });
+  return found == patient_.bones.end() ? nullptr : &found->surface;
+}
+
+const SurfaceMesh& BonePoints::segment(const std::string& name) {
+  const auto [entry, fresh] = segments_.try_emplace(name);
+  SurfaceMesh& all = entry->second;
+  if (!fresh) return all;
+  Eigen::Index vertices = 0, faces = 0;
+  for (const CaseBone& bone : patient_.bones) {
+    if (bone.segment != name) continue;
+    vertices += bone.surface.V.rows();
+    faces += bone.surface.F.rows();
+  }
+  all.V.resize(vertices, 3);
+  all.F.resize(faces, 3);
+  vertices = faces = 0;
+  for (const CaseBone& bone : patient_.bones) {
+    if (bone.segment != name) continue;
+    all.V.middleRows(vertices, bone.surface.V.rows()) = bone.surface.V;
+    all.F.middleRows(faces, bone.surface.F.rows()) =
+        (bone.surface.F.array() + static_cast<std::int32_t>(vertices)).matrix();
+    vertices += bone.surface.V.rows();
+    faces += bone.surface.F.rows();
+  }
+  return all;
+}
+
+Points BonePoints::region(const std::string& name) {
+  const auto region = std::find_if(patient_.regions.begin(), patient_.regions.end(),
+                                   [&](const Region& r) { return r.name == name; });
+  if (region == patient_.regions.end()) return kNone;
+  const SurfaceMesh* surface = region->bone.empty() ? &segment(region->segment) : bone(region->bone);
+  if (surface == nullptr || surface->V.rows() == 0) return kNone;
+  const Points& V = surface->V;
+  std::set<Eigen::Index> rows;
+  const Eigen::AlignedBox3d whole(V.colwise().minCoeff().transpose(), V.colwise().maxCoeff().transpose());
+  for (const Eigen::AlignedBox3d& said : region->boxes) {
+    const Eigen::AlignedBox3d box = region->of_bones ? within(said, whole) : said;
+    for (Eigen::Index v = 0; v < V.rows(); ++v) {
+      if (box.contains(Eigen::Vector3d(V.row(v).transpose()))) rows.insert(v);
+    }
+  }
+  for (Eigen::Index p = 0; p < region->points.rows(); ++p) {
+    Eigen::Index nearest = 0;
+    (V.rowwise() - region->points.row(p)).rowwise().squaredNorm().minCoeff(&nearest);
+    rows.insert(nearest);
+  }
+  return rows_of(V, rows);
+}
+
+const Points& BonePoints::of(const RegionUse& use) {
+  const Key key{{use.region, use.bone, use.facing, use.segment, use.facing_segment},
+                {use.looks.x(), use.looks.y(), use.looks.z()}};
+  const auto [entry, fresh] = found_.try_emplace(key, 0, 3);
+  if (fresh) entry->second = find(use);
+  return entry->second;
+}
+
+Points BonePoints::find(const RegionUse& use) {
+  if (!use.region.empty()) return region(use.region);
+  if (!use.segment.empty()) {
+    const SurfaceMesh& own = segment(use.segment);
+    return use.facing_segment.empty() ? own.V : facing_vertices(own, segment(use.facing_segment), use.looks);
+  }
+  const SurfaceMesh* own = bone(use.bone);
+  if (own == nullptr) return kNone;
+  if (use.facing.empty()) return own->V;
+  const SurfaceMesh* other = bone(use.facing);
+  return other == nullptr ? kNone : facing_vertices(*own, *other, use.looks);
+}
+
+}  // namespace ecorche::rig

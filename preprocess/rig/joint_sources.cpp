@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/rig/joint_sources.hpp"
+
+#include <algorithm>
+
+#include "core/values/error.hpp"
+#include "preprocess/rig/ellipse_fit.hpp"
+#include "preprocess/rig/facing.hpp"
+#include "preprocess/rig/plane_fit.hpp"
+#include "preprocess/rig/sphere_fit.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+constexpr double kLeastSine = 0.1;  // two directions closer to a line (6 degrees) say nothing of the third
+
+template <class Fit>
+FoundPoint of_fit(CenterRule rule, const Fit& fit, double size, Eigen::Index points) {
+  return {
+      fit.center,
+      {"", rule, size, fit.residual, fit.inlier_share, static_cast<std::int32_t>(points), fit.confidence}};
+}
+
+[[noreturn]] void circle(const std::string& joint) {
+  throw Error(ErrorKind::config, "joint " + joint, "its rule leads back to the joint itself",
+              "break the circle");
+}
+
+// Marks a joint as being worked out, until the end of the scope.
+class Open {
+ public:
+  Open(std::vector<bool>& open, std::size_t row, const std::string& joint) : open_(open), row_(row) {
+    if (open_[row_]) circle(joint);
+    open_[row_] = true;
+  }
+  ~Open() { open_[row_] = false; }
+  Open(const Open&) = delete;
+  Open& operator=(const Open&) = delete;
+
+ private:
+  std::vector<bool>& open_;
+  std::size_t row_;
+};
+
+bool is_fit(CenterRule rule) {
+  return rule == CenterRule::sphere_fit || rule == CenterRule::cylinder_fit ||
+         rule == CenterRule::plane_fit || rule == CenterRule::ellipse_fit;
+}
+bool is_fit(const PointSource& source) {
+  return is_fit(source.rule);
+}
+bool is_fit(const DirectionSource& source) {
+  return source.kind == DirectionSource::Kind::fit;
+}
+
+// The first fit that is good; else the first that is fair; else the first source that is no fit, since
+// nothing says how good a mean is; else the best fit.
+template <class Found, class Sources, class Find, class Confidence>
+std::optional<Found> first_good(const Sources& sources, Find&& find, Confidence&& confidence) {
+  std::optional<Found> fair, plain, best;
+  for (const auto& source : sources) {
+    if (!is_fit(source) && plain) continue;
+    std::optional<Found> found = find(source);
+    if (!found) continue;
+    if (!is_fit(source)) {
+      plain = std::move(found);
+      continue;
+    }
+    const double known = confidence(*found);
+    if (known >= JointSources::least_confidence) return found;
+    if (known >= JointSources::fair_confidence && !fair) fair = found;
+    if (!best || known > confidence(*best)) best = std::move(found);
+  }
+  return fair ? fair : plain ? plain : best;
+}
+
+Eigen::Vector3d mean(const Points& points) {
+  return points.colwise().mean().transpose();
+}
+
+}  // namespace
+
+JointSources::JointSources(const Case& patient, const Skeleton& skeleton)
+    : skeleton_(skeleton),
+      bones_(patient),
+      centers_(skeleton.segments.size()),
+      axes_(skeleton.segments.size()),
+      open_center_(skeleton.segments.size()),
+      open_axes_(skeleton.segments.size()) {}
+
+const std::optional<CylinderFit>& JointSources::cylinder(const Points& points) {
+  const auto [entry, fresh] = cylinders_.try_emplace(&points);
+  if (fresh) entry->second = fit_cylinder(points);
+  return entry->second;
+}
+
+std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse& on) {
+  const Points& points = bones_.of(on);
+  if (points.rows() == 0) return std::nullopt;
+  switch (rule) {
+    case CenterRule::sphere_fit:
+      if (const auto fit = fit_sphere(points)) return of_fit(rule, *fit, fit->radius, points.rows());
+      return std::nullopt;
+    case CenterRule::cylinder_fit:
+      if (const auto& fit = cylinder(points)) return of_fit(rule, *fit, fit->radius, points.rows());
+      return std::nullopt;
+    case CenterRule::plane_fit:
+      if (const auto fit = fit_plane(points)) return of_fit(rule, *fit, 0, points.rows());
+      return std::nullopt;
+    case CenterRule::ellipse_fit:
+      if (const auto fit = fit_ellipse(points))
+        return of_fit(rule, *fit, 0.5 * (fit->long_mm + fit->short_mm), points.rows());
+      return std::nullopt;
+    default:
+      break;
+  }
+  return FoundPoint{mean(points), {"", rule, 0, 0, 1, static_cast<std::int32_t>(points.rows()), 1}};
+}
+
+std::optional<FoundPoint> JointSources::between(const PointSource& source) {
+  const auto a = point(source.parts[0]), b = point(source.parts[1]);
+  if (!a || !b) return std::nullopt;
+  FoundPoint out{a->at + source.share * (b->at - a->at), {}};
+  out.fit.rule = CenterRule::between;
+  out.fit.residual_mm = std::max(a->fit.residual_mm, b->fit.residual_mm);
+  out.fit.inlier_share = std::min(a->fit.inlier_share, b->fit.inlier_share);
+  out.fit.points = a->fit.points + b->fit.points;
+  out.fit.confidence = std::min(a->fit.confidence, b->fit.confidence);
+  return out;
+}
+
+std::optional<FoundPoint> JointSources::point(const PointSource& source) {
+  switch (source.rule) {
+    case CenterRule::given:
+      return FoundPoint{source.point, {}};
+    case CenterRule::between:
+      return between(source);
+    case CenterRule::joint: {
+      const int row = skeleton_.find_joint(source.joint);
+      if (row < 0) return std::nullopt;
+      FoundPoint other = center(static_cast<std::size_t>(row));
+      other.fit.rule = CenterRule::joint;
+      return other;
+    }
+    case CenterRule::first_good:
+      return first_good<FoundPoint>(
+          source.parts, [&](const PointSource& part) { return point(part); },
+          [](const FoundPoint& found) { return found.fit.confidence; });
+    default:
+      return fitted(source.rule, source.on);
+  }
+}
+
+std::optional<FoundPoint> JointSources::by_rule(const Joint& joint) {
+  if (joint.how) return point(joint.how->center);
+  if (joint.rule == CenterRule::given) return FoundPoint{joint.center, {}};
+  if (joint.rule != CenterRule::sphere_fit) return std::nullopt;
+  RegionUse on;
+  on.bone = joint.center_bone;
+  on.facing = joint.facing_bone;
+  return fitted(CenterRule::sphere_fit, on);
+}
+
+FoundPoint JointSources::by_proximity(const Segment& segment) {
+  FoundPoint out;
+  out.fit.rule = CenterRule::facing;
+  out.fit.confidence = 0;
+  const SurfaceMesh& own = bones_.segment(segment.name);
+  if (own.V.rows() > 0) out.at = mean(own.V);
+  if (segment.parent < 0) return out;
+  const SurfaceMesh& parent =
+      bones_.segment(skeleton_.segments[static_cast<std::size_t>(segment.parent)].name);
+  const Points here = facing_vertices(own, parent), there = facing_vertices(parent, own);
+  if (here.rows() > 0 && there.rows() > 0) out.at = 0.5 * (mean(here) + mean(there));
+  out.fit.points = static_cast<std::int32_t>(here.rows() + there.rows());
+  return out;
+}
+
+const FoundPoint& JointSources::center(std::size_t row) {
+  if (centers_[row]) return found(row);
+  const Segment& segment = skeleton_.segments[row];
+  const Open open(open_center_, row, segment.joint.name);
+  const std::optional<FoundPoint> by = by_rule(segment.joint);
+  centers_[row] = by ? *by : by_proximity(segment);
+  centers_[row]->fit.joint = segment.joint.name;
+  return found(row);
+}
+
+std::optional<FoundDirection> JointSources::fitted_axis(const DirectionSource& source) {
+  const Points& points = bones_.of(source.from.on);
+  if (points.rows() == 0) return std::nullopt;
+  FoundDirection out;
+  if (source.from.rule == CenterRule::cylinder_fit) {
+    const auto& fit = cylinder(points);
+    if (!fit) return std::nullopt;
+    out = {fit->axis, fit->confidence};
+  } else if (source.from.rule == CenterRule::plane_fit) {
+    const auto fit = fit_plane(points);
+    if (!fit) return std::nullopt;
+    out = {fit->normal, fit->confidence};
+  } else {
+    const auto fit = fit_ellipse(points);
+    if (!fit) return std::nullopt;
+    out = {fit->normal, fit->confidence};
+  }
+  if (out.along.dot(source.direction) < 0) out.along = -out.along;
+  return out;
+}
+
+std::optional<FoundDirection> JointSources::axis_of(const std::string& joint, int axis) {
+  const int row = skeleton_.find_joint(joint);
+  if (row < 0) return std::nullopt;
+  const auto [frame, confidence] = axes(static_cast<std::size_t>(row));
+  return FoundDirection{frame.col(axis), confidence};
+}
+
+std::optional<FoundDirection> JointSources::direction(const DirectionSource& source, int axis) {
+  using Kind = DirectionSource::Kind;
+  switch (source.kind) {
+    case Kind::given:
+      return FoundDirection{source.direction, 1};
+    case Kind::fit:
+      return fitted_axis(source);
+    case Kind::axis_of:
+      return axis_of(source.joint, axis);
+    case Kind::first_good:
+      return first_good<FoundDirection>(
+          source.choices, [&](const DirectionSource& choice) { return direction(choice, axis); },
+          [](const FoundDirection& found) { return found.confidence; });
+    case Kind::towards:
+      break;
+  }
+  const auto from = point(source.from), to = point(source.to);
+  if (!from || !to || (to->at - from->at).norm() < 1e-6) return std::nullopt;
+  return FoundDirection{(to->at - from->at).normalized(), std::min(from->fit.confidence, to->fit.confidence)};
+}
+
+std::pair<Eigen::Matrix3d, double> JointSources::axes(std::size_t row) {
+  if (!axes_[row]) axes_[row] = find_axes(row);
+  return *axes_[row];
+}
+
+std::pair<Eigen::Matrix3d, double> JointSources::find_axes(std::size_t row) {
+  const Joint& joint = skeleton_.segments[row].joint;
+  if (!joint.how || joint.how->axes.empty()) return {joint.axes, 1};
+  const Open open(open_axes_, row, joint.name);
+  double confidence = 1;
+  const auto found = [&](const std::pair<int, DirectionSource>& said) -> Eigen::Vector3d {
+    const auto along = direction(said.second, said.first);
+    confidence = std::min(confidence, along ? along->confidence : 0);
+    return along ? along->along : Eigen::Vector3d::Unit(said.first);
+  };
+  const auto& [first, second] = std::pair(joint.how->axes[0], joint.how->axes[1]);
+  const int last = 3 - first.first - second.first;
+  Eigen::Matrix3d frame;
+  frame.col(first.first) = found(first);
+  const Eigen::Vector3d other = found(second);
+  const Eigen::Vector3d across = other - frame.col(first.first) * frame.col(first.first).dot(other);
+  if (across.norm() < kLeastSine) {
+    throw Error(ErrorKind::data, "joint " + joint.name, "its two axes come out collinear",
+                "take them from other regions, or give them");
+  }
+  frame.col(second.first) = across.normalized();
+  const double turn = second.first == (first.first + 1) % 3 ? 1 : -1;
+  frame.col(last) = turn * frame.col(first.first).cross(frame.col(second.first));
+  return {frame, confidence};
+}
+
+}  // namespace ecorche::rig

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points and directions of the body out of their rules (core/values/joint_rule.hpp).
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "preprocess/rig/bone_points.hpp"
+#include "preprocess/rig/cylinder_fit.hpp"
+
+namespace ecorche::rig {
+
+/// A point, and how well it was found.
+struct FoundPoint {
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  JointFit fit;  ///< without its joint's name
+};
+
+struct FoundDirection {
+  Eigen::Vector3d along = Eigen::Vector3d::UnitX();  ///< unit
+  double confidence = 1;
+};
+
+class JointSources {
+ public:
+  /// Below this the next of several sources is tried, and a joint is warned of.
+  static constexpr double least_confidence = 0.5;
+  /// Below this a fit gives way even to a mean. Condyles are no cylinders: theirs have 0.2 to 0.5.
+  static constexpr double fair_confidence = 0.2;
+
+  /// Both must outlive this; `skeleton` is the part of the patient's that has bones.
+  JointSources(const Case& patient, const Skeleton& skeleton);
+
+  /// The joint's centre by its rule; where that cannot be followed (bones that the case lacks, points that
+  /// lie on no such shape), midway between the surfaces of segment and parent that face each other, and,
+  /// where the parent has no bone, the middle of the segment's own: those with confidence 0. Throws
+  /// Error{config} when the rule leads back to the joint itself.
+  const FoundPoint& center(std::size_t row);
+
+  /// The joint's axes by their rules (columns x, y, z; orthonormal, right-handed) and the least confidence of
+  /// the two. A direction that cannot be followed is the axis of LPS, with confidence 0. Throws Error{config}
+  /// as above, and Error{data} when the two come out within 6 degrees of a line.
+  std::pair<Eigen::Matrix3d, double> axes(std::size_t row);
+
+ private:
+  const FoundPoint& found(std::size_t row) const { return *centers_[row]; }
+  const std::optional<CylinderFit>& cylinder(const Points& points);
+  std::optional<FoundPoint> point(const PointSource& source);
+  std::optional<FoundPoint> fitted(CenterRule rule, const RegionUse& on);
+  std::optional<FoundPoint> between(const PointSource& source);
+  std::optional<FoundPoint> by_rule(const Joint& joint);
+  std::pair<Eigen::Matrix3d, double> find_axes(std::size_t row);
+  FoundPoint by_proximity(const Segment& segment);
+  std::optional<FoundDirection> direction(const DirectionSource& source, int axis);
+  std::optional<FoundDirection> fitted_axis(const DirectionSource& source);
+  std::optional<FoundDirection> axis_of(const std::string& joint, int axis);
+
+  const Skeleton& skeleton_;
+  BonePoints bones_;
+  std::vector<std::optional<FoundPoint>> centers_;
+  std::vector<std::optional<std::pair<Eigen::Matrix3d, double>>> axes_;
+  /// By the points' own place: centre and axis of a joint ask alike.
+  std::map<const Points*, std::optional<CylinderFit>> cylinders_;
+  std::vector<bool> open_center_, open_axes_;  // being worked out: rules that meet one again go in a circle
+};
+
+}  // namespace ecorche::rig

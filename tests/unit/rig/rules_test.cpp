@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joints by rules on named regions: every source, what stands in for one that cannot be followed, and
+// mistakes.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "core/kinematics/angles.hpp"
+#include "core/values/joint_rule.hpp"
+#include "preprocess/rig/fit_rig.hpp"
+#include "tests/unit/rig/balls.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+using Eigen::Vector3d;
+using Kind = DirectionSource::Kind;
+
+Segment segment(const std::string& name, int parent, JointRule rule = {}) {
+  Segment s;
+  s.name = name;
+  s.parent = parent;
+  s.joint.name = name + "_joint";
+  s.joint.rule = rule.center.rule;
+  s.joint.sequence = {
+      {.name = "flexion", .axis = 0}, {.name = "adduction", .axis = 1}, {.name = "rotation", .axis = 2}};
+  s.joint.how = std::make_shared<const JointRule>(std::move(rule));
+  return s;
+}
+
+PointSource at(CenterRule rule, const std::string& region) {
+  PointSource source;
+  source.rule = rule;
+  source.on.region = region;
+  return source;
+}
+
+PointSource of_joint(const std::string& name) {
+  PointSource source;
+  source.rule = CenterRule::joint;
+  source.joint = name;
+  return source;
+}
+
+DirectionSource from_to(PointSource from, PointSource to) {
+  DirectionSource source;
+  source.kind = Kind::towards;
+  source.from = std::move(from);
+  source.to = std::move(to);
+  return source;
+}
+
+DirectionSource given(const Vector3d& along) {
+  DirectionSource source;
+  source.direction = along;
+  return source;
+}
+
+// Two balls 100 mm apart in one bone of each of two segments; `high` and `low` are boxes round them.
+Case two_segments(JointRule rule) {
+  Case patient;
+  patient.name = "two";
+  patient.skeleton.name = "two";
+  patient.skeleton.segments = {segment("base", -1), segment("tip", 0, std::move(rule))};
+  const SurfaceMesh bone = test::joined(test::ball({0, 0, 100}, 24, 16), test::ball({10, 0, 0}, 15, 16));
+  patient.bones = {{"base_bone", "base", test::ball({0, 0, 150}, 20, 16)}, {"tip_bone", "tip", bone}};
+  Region high, low;
+  high.name = "high";
+  high.bone = "tip_bone";
+  high.boxes = {{Vector3d(-30, -30, 75), Vector3d(30, 30, 125)}};
+  low.name = "low";
+  low.segment = "tip";
+  low.of_bones = true;
+  low.boxes = {{Vector3d(0, 0, 0), Vector3d(1, 1, 0.25)}};
+  patient.regions = {high, low};
+  return patient;
+}
+
+Joint fitted(const Case& patient) {
+  return fit(patient, {}).skeleton.segments[1].joint;
+}
+
+TEST(Rules, boxes_in_millimetres_and_in_shares_of_the_bones) {
+  JointRule rule;
+  rule.center = at(CenterRule::sphere_fit, "high");
+  EXPECT_LT((fitted(two_segments(rule)).center - Vector3d(0, 0, 100)).norm(), 1e-6);
+  rule.center = at(CenterRule::centroid, "low");  // 30 of 139 mm of the box are the whole lower ball
+  EXPECT_LT((fitted(two_segments(rule)).center - Vector3d(10, 0, 0)).norm(), 1e-6);
+}
+
+TEST(Rules, points_find_the_vertices_nearest_to_them_on_another_surface) {
+  JointRule rule;
+  rule.center = at(CenterRule::sphere_fit, "marked");
+  Case patient = two_segments(rule);
+  Region marked;
+  marked.name = "marked";
+  marked.bone = "tip_bone";
+  marked.points = test::ball({0.4, -0.3, 100.5}, 24.3, 9).V;
+  patient.regions.push_back(marked);
+  const Rig rig = fit(patient, {});
+  EXPECT_LT((rig.skeleton.segments[1].joint.center - Vector3d(0, 0, 100)).norm(), 1e-6);
+  EXPECT_LE(rig.fits[1].points, marked.points.rows());
+  EXPECT_EQ(rig.fits[1].rule, CenterRule::sphere_fit);
+  EXPECT_GT(rig.fits[1].confidence, 0.99);
+}
+
+TEST(Rules, a_frame_from_two_vectors_and_their_cross_product) {
+  JointRule rule;
+  rule.center.rule = CenterRule::between;
+  rule.center.parts = {at(CenterRule::centroid, "low"), at(CenterRule::sphere_fit, "high")};
+  rule.center.share = 0.25;
+  rule.axes = {{2, from_to(at(CenterRule::centroid, "low"), at(CenterRule::sphere_fit, "high"))},
+               {0, given(Vector3d(1, 0, 0))}};
+  rule.measured_rest = true;
+  const Joint joint = fitted(two_segments(rule));
+  EXPECT_LT((joint.center - Vector3d(7.5, 0, 25)).norm(), 1e-6);
+  const double lean = std::atan2(10, 100);
+  EXPECT_LT((joint.axes.col(2) - Vector3d(-std::sin(lean), 0, std::cos(lean))).norm(), 1e-6);
+  EXPECT_LT((joint.axes.col(0) - Vector3d(std::cos(lean), 0, std::sin(lean))).norm(), 1e-6);
+  EXPECT_LT((joint.axes.col(1) - Vector3d(0, 1, 0)).norm(), 1e-6);
+  // The base has the axes of LPS: the scan is a turn about y alone.
+  EXPECT_NEAR(joint.sequence[0].rest, 0, 1e-9);
+  EXPECT_NEAR(joint.sequence[1].rest, -lean, 1e-6);
+  EXPECT_NEAR(joint.sequence[2].rest, 0, 1e-9);
+  // All angles zero: the frames are parallel.
+  const Eigen::Matrix3d zero =
+      joint.axes * kinematics::rotation_from_angles(joint, {0, 0, 0}).toRotationMatrix();
+  EXPECT_LT((zero - Eigen::Matrix3d::Identity()).norm(), 1e-6);
+}
+
+TEST(Rules, the_first_source_that_is_found_well_is_taken) {
+  JointRule rule;
+  rule.center.rule = CenterRule::first_good;
+  PointSource absent = at(CenterRule::sphere_fit, "");
+  absent.on.bone = "nobody";
+  rule.center.parts = {absent, of_joint("nobody_joint"), at(CenterRule::centroid, "low")};
+  DirectionSource any;
+  any.kind = Kind::first_good;
+  any.choices = {from_to(of_joint("nobody_joint"), of_joint("base_joint")), given(Vector3d(0, 1, 0))};
+  rule.axes = {{1, any}, {2, given(Vector3d(0, 0, 1))}};
+  const Rig rig = fit(two_segments(rule), {});
+  EXPECT_EQ(rig.fits[1].rule, CenterRule::centroid);
+  EXPECT_EQ(rig.fits[1].confidence, 1);
+  EXPECT_EQ(rig.skeleton.segments[1].joint.axes, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  EXPECT_EQ(rig.skeleton.segments[1].joint.how, nullptr);  // all is said
+}
+
+TEST(Rules, a_rule_that_cannot_be_followed_lies_between_the_nearest_surfaces_and_is_a_warning) {
+  JointRule rule;
+  rule.center = at(CenterRule::sphere_fit, "");
+  rule.center.on.bone = "nobody";
+  rule.axes = {{0, from_to(of_joint("nobody_joint"), of_joint("base_joint"))}, {2, given(Vector3d(0, 0, 1))}};
+  std::vector<std::string> warnings;
+  Context context;
+  context.log = [&](LogLevel level, std::string_view line) {
+    if (level == LogLevel::warning) warnings.emplace_back(line);
+  };
+  const Rig rig = fit(two_segments(rule), context);
+  EXPECT_EQ(rig.fits[1].rule, CenterRule::facing);
+  EXPECT_EQ(rig.fits[1].confidence, 0);
+  const Vector3d& centre = rig.skeleton.segments[1].joint.center;  // the gap is from z 124 to 130
+  EXPECT_LT(centre.head<2>().norm(), 0.5);
+  EXPECT_NEAR(centre.z(), 127, 3);
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_NE(warnings[0].find("joint tip_joint: its rule cannot be followed in this case"), std::string::npos);
+  EXPECT_NE(warnings[1].find("joint tip_joint: its axes have confidence 0 %"), std::string::npos);
+}
+
+TEST(Rules, a_poor_fit_is_a_warning_with_its_numbers) {
+  JointRule rule;
+  rule.center = at(CenterRule::cylinder_fit, "");
+  rule.center.on.segment = "base";
+  Case patient = two_segments(rule);
+  patient.bones[0].surface.V = 40 * Points::Random(patient.bones[0].surface.V.rows(), 3);
+  std::string heard;
+  Context context;
+  context.log = [&](LogLevel, std::string_view line) { heard += line; };
+  const Rig rig = fit(patient, context);
+  EXPECT_LT(rig.fits[1].confidence, 0.5);
+  EXPECT_NE(heard.find("joint tip_joint: its centre by cylinder_fit has confidence"), std::string::npos)
+      << heard;
+}
+
+std::string refusal(const Case& patient, ErrorKind kind) {
+  try {
+    fit(patient, {});
+  } catch (const Error& error) {
+    EXPECT_EQ(static_cast<int>(error.kind()), static_cast<int>(kind));
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Rules, circles_and_collinear_axes_are_refused) {
+  JointRule rule;
+  rule.center = of_joint("tip_joint");
+  EXPECT_NE(refusal(two_segments(rule), ErrorKind::config).find("its rule leads back to the joint itself"),
+            std::string::npos);
+  rule = {};
+  rule.axes = {{0, given(Vector3d(1, 0, 0))}, {2, given(Vector3d(1, 0, 0.05))}};
+  EXPECT_NE(refusal(two_segments(rule), ErrorKind::data).find("its two axes come out collinear"),
+            std::string::npos);
+}
+
+// A row of five balls that nobody joined, and one far to the side of the middle one.
+TEST(Generic, the_tree_follows_the_gaps_and_hangs_from_the_middle) {
+  Case patient;
+  patient.name = "row";
+  patient.generic = true;
+  patient.skeleton.name = "generic";
+  for (const int i : {3, 0, 4, 1, 2})
+    patient.bones.push_back(
+        {"bone_" + std::to_string(i), "part_" + std::to_string(i), test::ball({100.0 * i, 0, 0}, 48, 12)});
+  patient.bones.push_back({"side", "side", test::ball({200, 0, 90}, 40, 12)});
+  const Rig rig = fit(patient, {});
+  const auto& segments = rig.skeleton.segments;
+  ASSERT_EQ(segments.size(), 6U);
+  EXPECT_EQ(segments[0].name, "part_2");
+  EXPECT_EQ(segments[0].joint.kind, JointKind::free);
+  const auto parent = [&](const std::string& name) {
+    const int row = segments[static_cast<std::size_t>(rig.skeleton.find_segment(name))].parent;
+    return row < 0 ? std::string() : segments[static_cast<std::size_t>(row)].name;
+  };
+  EXPECT_EQ(parent("part_1"), "part_2");
+  EXPECT_EQ(parent("part_0"), "part_1");
+  EXPECT_EQ(parent("part_3"), "part_2");
+  EXPECT_EQ(parent("part_4"), "part_3");
+  EXPECT_EQ(parent("side"), "part_2");
+  for (const Segment& s : segments) {
+    EXPECT_TRUE(s.joint.center.allFinite());
+    EXPECT_EQ(s.joint.sequence.size(), 3U);
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::rig
