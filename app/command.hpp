@@ -47,6 +47,7 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen);
 void declare_stream(CLI::App& app, Program& program, Run& chosen);
 void declare_thin(CLI::App& app, Program& program, Run& chosen);
 void declare_refill(CLI::App& app, Program& program, Run& chosen);
+void declare_rig(CLI::App& app, Program& program, Run& chosen);
 void declare_tears(CLI::App& app, Program& program, Run& chosen);
 void declare_deformers(CLI::App& app, Program& program, Run& chosen);
 void declare_path(CLI::App& app, Program& program, Run& chosen);

@@ -21,7 +21,7 @@ Skeleton read_rig(const Program& program, const HangSettings& settings) {
   for (const Segment& segment : skeleton.segments) {
     if (segment.joint.rule == CenterRule::given) continue;
     throw Error(ErrorKind::config, settings.skeleton.string(),
-                "joint '" + segment.joint.name + "' is found by a sphere fit, which needs bones",
+                "joint '" + segment.joint.name + "' is found from bones, which a skeleton alone has not",
                 "write its center, or give a prepared --model");
   }
   return skeleton;

@@ -2,9 +2,9 @@
 // ecorche info MODEL: what a model holds.
 #include <cstdio>
 #include <filesystem>
-#include <numbers>
 
 #include "app/command.hpp"
+#include "app/joint_json.hpp"
 #include "core/model_file/figures.hpp"
 #include "core/model_file/model_file.hpp"
 
@@ -12,9 +12,6 @@ namespace ecorche::app {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr const char* kKinds[] = {"ball", "hinge", "universal", "fixed", "free"};
 
 // Bytes on the disk by part: `/VTKHDF`, `/ecorche/weights`, ...
 std::map<std::string, std::uint64_t> sizes(const std::string& path) {
@@ -24,38 +21,6 @@ std::map<std::string, std::uint64_t> sizes(const std::string& path) {
     parts[dataset.path.substr(0, dataset.path.find('/', from))] += dataset.bytes;
   }
   return parts;
-}
-
-// Infinite limits are null in JSON: it has no word for them.
-Json limit(double radians) {
-  return std::isfinite(radians) ? Json(radians * kDegrees) : Json();
-}
-
-Json joint_json(const Rig& rig, std::size_t row) {
-  const Segment& segment = rig.skeleton.segments[row];
-  const Joint& joint = segment.joint;
-  const JointFit& fit = rig.fits[row];
-  Json angles = Json::array();
-  for (const AngleAxis& angle : joint.sequence) {
-    angles.push_back({{"name", angle.name},
-                      {"rest_deg", angle.rest * kDegrees},
-                      {"min_deg", limit(angle.min)},
-                      {"max_deg", limit(angle.max)}});
-  }
-  return {{"segment", segment.name},
-          {"parent", segment.parent < 0
-                         ? Json()
-                         : Json(rig.skeleton.segments[static_cast<std::size_t>(segment.parent)].name)},
-          {"joint", joint.name},
-          {"kind", kKinds[static_cast<std::size_t>(joint.kind)]},
-          {"center_mm", {joint.center[0], joint.center[1], joint.center[2]}},
-          {"angles", angles},
-          {"fit",
-           {{"rule", fit.rule == CenterRule::given ? "given" : "sphere_fit"},
-            {"radius_mm", fit.radius_mm},
-            {"residual_mm", fit.residual_mm},
-            {"inlier_share", fit.inlier_share},
-            {"points", fit.points}}}};
 }
 
 Json to_json(const std::string& path, const Model& model) {
@@ -153,15 +118,15 @@ std::string to_text(const Json& info) {
     out += line("  %-24s %12.1f", part.c_str(), bytes.get<double>() / 1024);
   }
   out += "\nrig " + text(info["skeleton"]) +
-         ": segment, joint, kind, centre (mm LPS), fit residual (mm), limits (deg)\n";
+         ": segment, joint, kind, centre (mm LPS), fit residual (mm) and confidence, limits (deg)\n";
   for (const Json& row : info["rig"]) {
     const Json& c = row["center_mm"];
     std::string limits;
     for (const Json& angle : row["angles"]) limits += (limits.empty() ? "" : ", ") + range(angle);
-    out += line("  %-20s %-20s %-10s %8.1f %8.1f %8.1f  %-10s %6.3f  %s", text(row["segment"]).c_str(),
+    out += line("  %-20s %-20s %-10s %8.1f %8.1f %8.1f  %-10s %6.3f %4.2f  %s", text(row["segment"]).c_str(),
                 text(row["joint"]).c_str(), text(row["kind"]).c_str(), c[0].get<double>(), c[1].get<double>(),
                 c[2].get<double>(), text(row["fit"]["rule"]).c_str(), row["fit"]["residual_mm"].get<double>(),
-                limits.c_str());
+                row["fit"]["confidence"].get<double>(), limits.c_str());
   }
   out += "\ntissues: name, group, vertices, triangles, follows\n";
   for (const Json& row : info["tissues"]) {

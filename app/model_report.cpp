@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/model_report.hpp"
 
+#include "core/values/joint_rule.hpp"
+
 namespace ecorche::app {
 
 nlohmann::json model_report(bool ok, const Model* model, const Certificate& c, std::size_t checked,
@@ -9,8 +11,18 @@ nlohmann::json model_report(bool ok, const Model* model, const Certificate& c, s
   const auto count = [&](auto of) {
     return model != nullptr ? nlohmann::json(of(*model)) : nlohmann::json();
   };
+  nlohmann::json rig = nlohmann::json::array();
+  for (const JointFit& fit : model != nullptr ? model->rig.fits : std::vector<JointFit>{}) {
+    rig.push_back({{"joint", fit.joint},
+                   {"rule", center_rule_name(fit.rule)},
+                   {"residual_mm", fit.residual_mm},
+                   {"inlier_share", fit.inlier_share},
+                   {"points", fit.points},
+                   {"confidence", fit.confidence}});
+  }
   return {
       {"ok", ok},
+      {"rig", rig},
       {"nodes", count([](const Model& m) { return m.node_count(); })},
       {"tets", count([](const Model& m) { return m.tet_count(); })},
       {"segments", count([](const Model& m) { return m.segment_count(); })},

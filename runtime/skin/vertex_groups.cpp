@@ -10,7 +10,7 @@ namespace ecorche::runtime {
 namespace {
 
 constexpr std::size_t kSize = VertexGroups::size;
-constexpr float kNarrowed = 2e-4F;    // mm that narrowing may move a vertex at rest
+constexpr float kNarrowed = 2e-4F;  // mm that narrowing may move a vertex at rest
 constexpr double kLocalEnough = 1.7;
 
 using Order = std::vector<std::uint32_t>;

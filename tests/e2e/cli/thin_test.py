@@ -223,7 +223,7 @@ class Thin(unittest.TestCase):
                          words=["thin", self.bar, "-o", self.folder / "t.vtp", "--skeleton", self.folder / "arm.yaml",
                                 "--reassign", by_hand])
         (self.folder / "fit.yaml").write_text((ARM % 8).replace("[50, 8, 7.5]", "{sphere_fit: {bone: a, facing: b}}"))
-        self.refused(78, "sphere fit", words=["thin", self.bar, "-o", self.folder / "t.vtp", "--skeleton",
+        self.refused(78, "is found from bones, which a skeleton alone has not", words=["thin", self.bar, "-o", self.folder / "t.vtp", "--skeleton",
                                               self.folder / "fit.yaml"])
 
     def test_usage(self):

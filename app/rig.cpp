@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// `ecorche rig CASE`: the joints of a case, found in seconds, before anything else is prepared.
+#include <cstdio>
+#include <filesystem>
+
+#include "app/case_options.hpp"
+#include "app/command.hpp"
+#include "app/joint_json.hpp"
+#include "core/files/atomic_file.hpp"
+#include "core/kinematics/posed_rest.hpp"
+#include "io/case/case_file.hpp"
+#include "io/surface/surface_file.hpp"
+#include "preprocess/label_surfaces/label_surfaces.hpp"
+#include "preprocess/rig/bone_points.hpp"
+#include "preprocess/rig/fit_rig.hpp"
+
+namespace ecorche::app {
+namespace {
+
+struct Settings {
+  std::filesystem::path case_path, output, bones;
+  io::CaseOptions input;
+};
+
+std::string to_text(const nlohmann::json& rig) {
+  std::string out =
+      "joint, rule, centre (mm LPS), residual (mm), inliers (%), vertices, confidence; rest angles (deg)\n";
+  for (const nlohmann::json& row : rig) {
+    const nlohmann::json &c = row["center_mm"], &fit = row["fit"];
+    char line[256];
+    std::snprintf(line, sizeof line, "  %-24s %-12s %8.1f %8.1f %8.1f %7.2f %5.0f %7d %5.2f ",
+                  row["joint"].get<std::string>().c_str(), fit["rule"].get<std::string>().c_str(),
+                  c[0].get<double>(), c[1].get<double>(), c[2].get<double>(),
+                  fit["residual_mm"].get<double>(), 100 * fit["inlier_share"].get<double>(),
+                  fit["points"].get<int>(), fit["confidence"].get<double>());
+    out += line;
+    for (const nlohmann::json& angle : row["angles"]) {
+      std::snprintf(line, sizeof line, " %s %.1f", angle["name"].get<std::string>().c_str(),
+                    angle["rest_deg"].get<double>());
+      out += line;
+    }
+    out += "\n";
+  }
+  return out + "For training and education, not for planning surgery.";
+}
+
+// Each segment's bones as one surface, LPS mm.
+void write_bones(const std::filesystem::path& folder, const Case& patient, const Skeleton& skeleton) {
+  files::make_folder(folder);
+  rig::BonePoints bones(patient);
+  for (const Segment& segment : skeleton.segments) {
+    const SurfaceMesh& surface = bones.segment(segment.name);
+    if (surface.F.rows() > 0) io::write_surface(folder / (segment.name + ".stl"), surface);
+  }
+}
+
+int run(const Program& program, const Settings& settings) {
+  Case patient = io::read_case(settings.case_path, settings.input, program.context("read"));
+  label_surfaces::resolve(patient, program.context("surfaces"));
+  const Rig rig = rig::fit(patient, program.context("rig"));
+  if (!settings.bones.empty()) write_bones(settings.bones, patient, rig.skeleton);
+  if (!settings.output.empty()) {
+    // The rig as it stands is its own rest: every centre, axis and angle given.
+    const Skeleton given = kinematics::posed_rest(rig, Pose::rest(rig.skeleton.segments.size()));
+    files::write_text(settings.output, io::skeleton_to_yaml(given));
+  }
+  nlohmann::json joints = nlohmann::json::array();
+  for (std::size_t row = 0; row < rig.skeleton.segments.size(); ++row) joints.push_back(joint_json(rig, row));
+  program.result(to_text(joints), {{"skeleton", rig.skeleton.name}, {"rig", joints}});
+  return 0;
+}
+
+}  // namespace
+
+void declare_rig(CLI::App& app, Program& program, Run& chosen) {
+  const auto settings = std::make_shared<Settings>();
+  CLI::App* command = app.add_subcommand("rig", "find the joints of a case, and say how well each was found");
+  command->add_option("CASE", settings->case_path, "a case.yaml, or the folder that holds one")->required();
+  command->add_option("-o,--output", settings->output,
+                      "write the skeleton with every centre, axis and rest angle");
+  command->add_option("--bones", settings->bones, "write each segment's bones as one STL into this folder");
+  add_case_options(*command, settings->input);
+  command->callback(
+      [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`ecorche rig`: the phantom by its own skeleton, by the human template, by nothing at all; parts of it; a body that poses; mistakes."""
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+import yaml
+
+ECORCHE = os.environ["ECORCHE_BIN"]
+CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
+ERROR_LINE = re.compile(r"^error: .+: .+ \(.+\)$", re.M)
+NAMES = {"spine_lumbar": "lumbar", "spine_thoracic": "thorax", "shoulder_girdle_left": "girdle_left", "shoulder_girdle_right": "girdle_right"}
+
+
+def run(*words):
+    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+class Rig(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def case(self, skeleton, keep=lambda bone: True, segments=True):
+        """The phantom's bones and skin alone, with another skeleton."""
+        case = yaml.safe_load((CASE / "case.yaml").read_text())
+        bones = [dict(bone, file=str(CASE / bone["file"]), segment=NAMES.get(bone["segment"], bone["segment"])) for bone in case["bones"] if keep(bone)]
+        if not segments:
+            bones = [{key: value for key, value in bone.items() if key != "segment"} for bone in bones]
+        text = {"name": "phantom", "frame": "LPS", "unit": "mm", "skeleton": skeleton, "skin": str(CASE / "skin.stl"), "bones": bones}
+        folder = self.folder / f"case_{len(list(self.folder.iterdir()))}"
+        folder.mkdir()
+        (folder / "case.yaml").write_text(json.dumps(text))
+        return folder
+
+    def joints(self, *words):
+        done = run("--json", "rig", *words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = json.loads(done.stdout)["rig"]
+        return {row["joint"]: row for row in rows}, done.stderr
+
+    def refused(self, code, part, *words):
+        done = run("rig", *words)
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.assertEqual(len(ERROR_LINE.findall(done.stderr)), 1, done.stderr)
+        self.assertIn(part, done.stderr)
+
+    def test_the_human_template_lies_near_the_truth_and_writes_what_it_found(self):
+        truth, _ = self.joints(CASE)
+        found, _ = self.joints(self.case("human"), "-o", self.folder / "fitted.yaml", "--bones", self.folder / "bones")
+        self.assertEqual(len(found), 21)  # the phantom's mandible moves with its skull: no jaw
+        for joint in ("hip_left", "hip_right", "shoulder_left", "shoulder_right"):
+            away = np.linalg.norm(np.subtract(found[joint]["center_mm"], truth[joint]["center_mm"]))
+            self.assertLess(away, 6, joint)  # a head of the small phantom has a dozen vertices
+            self.assertEqual(found[joint]["fit"]["rule"], "sphere_fit")
+        for joint in ("knee_left", "elbow_right"):
+            self.assertEqual(found[joint]["kind"], "hinge")
+            self.assertLess(found[joint]["fit"]["confidence"], 1)
+        fitted = yaml.safe_load((self.folder / "fitted.yaml").read_text())
+        np.testing.assert_allclose(fitted["segments"]["thigh_left"]["joint"]["center"], found["hip_left"]["center_mm"], atol=1e-9)
+        self.assertTrue((self.folder / "bones" / "thigh_left.stl").stat().st_size > 84)
+        again, _ = self.joints(self.case(str(self.write_fitted())))
+        for joint, row in again.items():
+            np.testing.assert_allclose(row["center_mm"], found[joint]["center_mm"], atol=1e-9)
+            np.testing.assert_allclose([angle["rest_deg"] for angle in row["angles"]], [angle["rest_deg"] for angle in found[joint]["angles"]], atol=1e-6)
+            self.assertEqual(row["fit"]["rule"], "given")
+
+    def write_fitted(self):
+        target = self.folder / "again.yaml"
+        target.write_text((self.folder / "fitted.yaml").read_text())
+        return target
+
+    def test_one_side_only_stands_on_a_root_without_bones(self):
+        found, said = self.joints(self.case("human", lambda bone: bone["name"].endswith("_right") and bone["segment"].startswith(("thigh", "shank", "foot"))))
+        self.assertEqual(sorted(found), ["ankle_right", "hip_right", "knee_right", "pelvis"])
+        self.assertIn("segment lumbar has no bone in this case: it is dropped into pelvis", said)
+
+    def test_generic_needs_no_segments_and_joins_neighbours(self):
+        found, _ = self.joints(self.case("generic", segments=False))
+        self.assertEqual(len(found), len(yaml.safe_load((CASE / "case.yaml").read_text())["bones"]))
+        parents = {joint: row["parent"] for joint, row in found.items()}
+        self.assertEqual(sum(parent is None for parent in parents.values()), 1)
+        for a, b in (("humerus_left", "scapula_left"), ("tibia_right", "femur_right"), ("foot_bones_left", "toe_bones_left")):
+            self.assertTrue(parents[a] == b or parents[b] == a, (a, b, parents))
+
+    def test_text_names_rule_and_confidence(self):
+        done = run("rig", CASE)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, r"hip_left +sphere_fit +.* \d\.\d\d")
+
+    def test_mistakes(self):
+        self.refused(78, "no skeleton template is named 'horse'", self.case("horse"))
+        folder = self.case("human")
+        text = json.loads((folder / "case.yaml").read_text())
+        text["regions"] = "regions.yaml"
+        (folder / "case.yaml").write_text(json.dumps(text))
+        (folder / "regions.yaml").write_text("ecorche_regions: 1\nregions:\n  a: {bone: femur, boxes: [{least: [0, 0, 0], most: [1, 1, 1]}]}\n")
+        self.refused(78, "regions.yaml:3:regions.a.bone: unknown bone 'femur'", folder)
+        skeleton = "ecorche_skeleton: 1\nname: a\nsegments:\n  pelvis: {joint: {name: root, center: [0, 0, 0]}}\n  thigh_left: {parent: pelvis, joint: {name: hip, %s}}\n"
+        legs = lambda bone: bone["segment"] in ("pelvis", "thigh_left")  # noqa: E731
+        for number, (joint, code, part) in enumerate((("center: {joint: hip}", 78, "joint hip: its rule leads back to the joint itself"),
+                                                      ("center: [0, 0, 0], axes: {x: {from: [0, 0, 0], to: [0, 0, 1]}, z: [0, 0, 1]}", 65, "joint hip: its two axes come out collinear"),
+                                                      ("center: {centroid: {region: head}}", 78, "unknown region 'head'"),
+                                                      ("center: [0, 0, 0], limits_deg: {x: [3, 2]}", 78, "the least angle is above the most"))):
+            file = self.folder / f"skeleton_{number}.yaml"
+            file.write_text(skeleton % joint)
+            self.refused(code, part, self.case(str(file), legs))
+        self.refused(66, "nowhere: cannot be opened", self.folder / "nowhere")
+        self.refused(64, "CASE")
+
+
+if __name__ == "__main__":
+    unittest.main()
