@@ -11,7 +11,7 @@ namespace ecorche::rig {
 /// minimum spanning tree of the gaps (Kruskal), hung from the segment that leaves the smallest largest part
 /// when it is taken out (sizes are those of the bones' boxes). Every joint is a ball without limits, named
 /// like its segment, with the axes of LPS; the root is free. Its centre is that of the sphere through the
-/// surface that faces its parent, where that is a fair one; else midway between the
+/// surface that faces its parent, where that is a good one; else midway between the
 /// two facing surfaces.
 Skeleton generic_tree(const Case& patient, const Context& context);
 

@@ -53,10 +53,11 @@ bool is_fit(const DirectionSource& source) {
   return source.kind == DirectionSource::Kind::fit;
 }
 
-// The first fit that is good; else the first that is fair; else the first source that is no fit, since
+// The first fit that is good; else the first that reaches `fair`; else the first source that is no fit, since
 // nothing says how good a mean is; else the best fit.
 template <class Found, class Sources, class Find, class Confidence>
-std::optional<Found> first_good(const Sources& sources, Find&& find, Confidence&& confidence) {
+std::optional<Found> first_good(const Sources& sources, double fair_enough, Find&& find,
+                                Confidence&& confidence) {
   std::optional<Found> fair, plain, best;
   for (const auto& source : sources) {
     if (!is_fit(source) && plain) continue;
@@ -68,7 +69,7 @@ std::optional<Found> first_good(const Sources& sources, Find&& find, Confidence&
     }
     const double known = confidence(*found);
     if (known >= JointSources::least_confidence) return found;
-    if (known >= JointSources::fair_confidence && !fair) fair = found;
+    if (known >= fair_enough && !fair) fair = found;
     if (!best || known > confidence(*best)) best = std::move(found);
   }
   return fair ? fair : plain ? plain : best;
@@ -144,7 +145,7 @@ std::optional<FoundPoint> JointSources::point(const PointSource& source) {
     }
     case CenterRule::first_good:
       return first_good<FoundPoint>(
-          source.parts, [&](const PointSource& part) { return point(part); },
+          source.parts, least_confidence, [&](const PointSource& part) { return point(part); },
           [](const FoundPoint& found) { return found.fit.confidence; });
     default:
       return fitted(source.rule, source.on);
@@ -225,7 +226,7 @@ std::optional<FoundDirection> JointSources::direction(const DirectionSource& sou
       return axis_of(source.joint, axis);
     case Kind::first_good:
       return first_good<FoundDirection>(
-          source.choices, [&](const DirectionSource& choice) { return direction(choice, axis); },
+          source.choices, fair_axis, [&](const DirectionSource& choice) { return direction(choice, axis); },
           [](const FoundDirection& found) { return found.confidence; });
     case Kind::towards:
       break;

@@ -26,8 +26,10 @@ class JointSources {
  public:
   /// Below this the next of several sources is tried, and a joint is warned of.
   static constexpr double least_confidence = 0.5;
-  /// Below this a fit gives way even to a mean. Condyles are no cylinders: theirs have 0.2 to 0.5.
-  static constexpr double fair_confidence = 0.2;
+  /// From this on an axis is taken rather than one that was not fitted. Condyles are no cylinders (0.1 to
+  /// 0.4): their axis holds, but their centre by it differs by a centimetre from left to right, where their
+  /// mean does not.
+  static constexpr double fair_axis = 0.1;
 
   /// Both must outlive this; `skeleton` is the part of the patient's that has bones.
   JointSources(const Case& patient, const Skeleton& skeleton);
