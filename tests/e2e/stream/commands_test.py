@@ -82,9 +82,16 @@ class Commands(unittest.TestCase):
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertIn(message, result.stderr)
         (self.path / "clips" / "broken.bvh").write_text("HIERARCHY\n")
-        with Server(MODEL, options=["--clips", str(self.path / "clips")]) as server, Client("127.0.0.1", server.port) as client:
-            client.open()
-            self.assertEqual([clip.name for clip in client.clips()], ["walk"])  # the other is left out, with a warning
+        head, _, motion = (self.path / "clips" / "walk.bvh").read_text().partition("Frames:")
+        _, frame_time, *frames = motion.strip().splitlines()
+        (self.path / "clips" / "long.bvh").write_text("\n".join([head + "Frames: 36001", frame_time] + [frames[0]] * 36001) + "\n")
+        with Server(MODEL, options=["--clips", str(self.path / "clips")]) as server:
+            with Client("127.0.0.1", server.port) as client:
+                client.open()
+                self.assertEqual([clip.name for clip in client.clips()], ["walk"])  # the others are left out, with a warning
+            _, _, err = server.stop()
+            self.assertIn("broken.bvh", err)
+            self.assertIn("cut it into clips of at most 36000", err)
 
     def test_a_changed_file_is_read_again(self):
         model = self.path / "body.hdf"
