@@ -51,10 +51,10 @@ Client::Client(const wire::Address& address, const std::string& name, const Acce
   hello_ = std::move(*answer.envelope.mutable_server_hello());
 }
 
-wire::Frame Client::call(v1::Envelope request) {
+wire::Frame Client::call(v1::Envelope request, std::shared_ptr<const wire::Payload> payload) {
   const std::uint64_t id = ++last_request_;
   request.set_request_id(id);
-  send(request);
+  send(request, std::move(payload));
   const auto until = Clock::now() + patience;
   while (auto frame = read_frame(until)) {
     if (frame->envelope.request_id() != id) {
@@ -69,9 +69,10 @@ wire::Frame Client::call(v1::Envelope request) {
               "try again");
 }
 
-void Client::send(const v1::Envelope& envelope) {
-  const wire::EncodedFrame frame = wire::encode(envelope);
+void Client::send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload) {
+  const wire::EncodedFrame frame = wire::encode(envelope, std::move(payload));
   socket_.write(std::as_bytes(std::span(frame.head)), Clock::now() + patience);
+  if (frame.payload) socket_.write(*frame.payload, Clock::now() + patience);
 }
 
 std::optional<wire::Frame> Client::receive(Clock::time_point until) {

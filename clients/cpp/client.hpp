@@ -43,10 +43,10 @@ class Client {
 
   /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
   /// answer is a Status that is not OK.
-  wire::Frame call(v1::Envelope request);
+  wire::Frame call(v1::Envelope request, std::shared_ptr<const wire::Payload> payload = nullptr);
 
   /// Sends what has no direct answer: poses.
-  void send(const v1::Envelope& envelope);
+  void send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload = nullptr);
 
   /// The next message; nothing when none came whole until `until`. Throws when the server ends the
   /// connection.

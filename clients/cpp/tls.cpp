@@ -30,8 +30,8 @@ std::string last_reason() {
 
 struct Tls::Impl {
   struct Free {
-    void operator()(SSL_CTX* context) const { SSL_CTX_free(context); }
-    void operator()(SSL* ssl) const { SSL_free(ssl); }
+    void operator()(SSL_CTX* it) const { SSL_CTX_free(it); }
+    void operator()(SSL* it) const { SSL_free(it); }
   };
   std::unique_ptr<SSL_CTX, Free> context{SSL_CTX_new(TLS_client_method())};
   std::unique_ptr<SSL, Free> ssl;

@@ -193,6 +193,21 @@ class Client:
         self._sequence = resumed.last_sequence
         return resumed
 
+    def probe(self, points, to_rest=True, volumes=(), gradient=False, tissue=False):
+        """Points (#P x 3, mm, LPS) of the posed body back to the scan, or the other way; a dictionary of arrays with a row per
+        point: points, and as asked gradient (9 numbers), tissue and values."""
+        payload = np.ascontiguousarray(points, dtype="<f8")
+        request = envelope_pb2.Envelope()
+        probe = request.probe_points
+        probe.direction = probe.DIRECTION_POSED_TO_REST if to_rest else probe.DIRECTION_REST_TO_POSED
+        probe.points.type, probe.points.components, probe.points.count = common_pb2.SCALAR_TYPE_F64, 3, len(payload)
+        probe.volumes.extend(volumes)
+        probe.deformation_gradient, probe.tissue = gradient, tissue
+        answer, found = self._call(request, payload.tobytes().ljust(aligned(payload.nbytes), b"\0"))
+        probed = answer.probed
+        parts = {"points": probed.points, "gradient": probed.deformation_gradient, "tissue": probed.tissue, "values": probed.values}
+        return {name: array(part, found) for name, part in parts.items() if part.components}
+
     def clips(self):
         """Motion that the server can play on this body: a list of v1.ClipSummary."""
         request = envelope_pb2.Envelope()
@@ -247,10 +262,10 @@ class Client:
             elif kind == "pose_ack":
                 self.acks.append(envelope.pose_ack)
 
-    def _call(self, request):
+    def _call(self, request, payload=b""):
         self._requests += 1
         request.request_id = self._requests
-        self._socket.sendall(encode(request))
+        self._socket.sendall(encode(request, payload))
         until = time.monotonic() + self.timeout
         while True:
             message = self._read(until)

@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint32_t kProtocol = 1;
 constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY,    v1::FEATURE_CONTROL,
                                v1::FEATURE_RESUME,  v1::FEATURE_CLIPS,      v1::FEATURE_INVERSE_KINEMATICS,
-                               v1::FEATURE_RELOAD,  v1::FEATURE_THRESHOLDS, v1::FEATURE_SPHERES};
+                               v1::FEATURE_RELOAD,  v1::FEATURE_THRESHOLDS, v1::FEATURE_SPHERES,
+                               v1::FEATURE_PROBE};
 
 void describe(const Limits& limits, v1::Limits& out) {
   out.set_hello_bytes(limits.hello_bytes);
@@ -92,6 +93,8 @@ void Connection::handle(const wire::Frame& frame) {
       return handle_release(request);
     case v1::Envelope::kSetThresholds:
       return handle_thresholds(request);
+    case v1::Envelope::kProbePoints:
+      return handle_probe(frame);
     case v1::Envelope::kSolveIk:
       return handle_solve(request);
     case v1::Envelope::kListClips:

@@ -15,6 +15,7 @@
 namespace ecorche::server {
 
 struct IkOutcome;
+struct ProbeAsked;
 
 /// Two coroutines on the I/O thread:
 ///
@@ -72,6 +73,10 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void handle_claim(const v1::Envelope& request);
   void handle_release(const v1::Envelope& request);
   void handle_thresholds(const v1::Envelope& request);
+  // probe_commands.cpp
+  void handle_probe(const wire::Frame& frame);
+  void answer_probe(std::uint64_t id, const std::shared_ptr<ProbeAsked>& asked,
+                    const std::shared_ptr<const ProbeFrame>& body);
   // motion_commands.cpp
   void handle_solve(const v1::Envelope& request);
   void solved(std::uint64_t id, const v1::SolveIk& request, const IkOutcome& outcome);
@@ -118,6 +123,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   std::string resume_token_;
   std::set<std::uint32_t> subscriptions_;
   int solving_ = 0;  ///< inverse kinematics under way
+  int probing_ = 0;  ///< probes that wait for a pose or a worker
   std::uint64_t last_sequence_ = 0;
 
   const Clock::time_point born_ = Clock::now();

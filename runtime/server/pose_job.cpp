@@ -45,9 +45,10 @@ std::vector<std::uint32_t> all_wanted(const PoseJob& job) {
   return rows;
 }
 
-// Quality and volumes by tets look at every tet; meshes only at those that their vertices hang on, spheres at
-// none.
+// Quality, probes and volumes by tets look at every tet; meshes only at those that their vertices hang on,
+// spheres at none.
 runtime::NodesOf nodes_wanted(const PoseJob& job) {
+  if (job.probe) return runtime::NodesOf::body;
   for (const Subscription& subscription : job.subscriptions) {
     const auto* mesh = std::get_if<MeshWant>(&subscription.want);
     const auto* volume = std::get_if<VolumeWant>(&subscription.want);
@@ -186,6 +187,11 @@ Status run(const PoseJob& job, runtime::PosedBody& body) {
   if (!posed) return {};
 
   return guarded([&] {
+    if (job.probe) {
+      job.model->probe().follow(body.nodes, job.probe->tree);
+      job.probe->sequence = job.request.sequence;
+      job.on_probe();
+    }
     for (const Subscription& subscription : job.subscriptions) {
       const auto* want = std::get_if<MeshWant>(&subscription.want);
       if (want) hand_over(job, mesh_frame(job, subscription, *want, body, timings));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/framing.hpp"
+#include "runtime/probe/probe.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/asio.hpp"
 #include "runtime/server/served_model.hpp"
@@ -39,6 +40,12 @@ struct PosedFrame {
   std::optional<std::uint64_t> digest = {};  ///< XXH64 of the payload, where PoseJob::digests asks for it
 };
 
+/// A posed body as probes ask it. Not written once it is shown to them.
+struct ProbeFrame {
+  std::uint64_t sequence = 0;
+  runtime::Probe::PosedTree tree;
+};
+
 struct PoseJob {
   std::shared_ptr<const ServedModel> model;
   PoseRequest request;
@@ -47,9 +54,11 @@ struct PoseJob {
   std::uint64_t volume_voxels = 0;  ///< Limits
   runtime::QualityThresholds thresholds;
   bool digests = false;
-  /// Called on the worker, in this order: the outcome once, then every frame, meshes before volumes (which
-  /// take longer).
+  std::shared_ptr<ProbeFrame> probe;  ///< to be filled; null where nobody probes
+  /// Called on the worker, in this order: the outcome once, `probe` once it is filled, then every frame,
+  /// meshes before volumes (which take longer).
   std::function<void(PoseOutcome)> on_outcome;
+  std::function<void()> on_probe;
   std::function<void(PosedFrame)> on_frame;
 };
 

@@ -67,4 +67,10 @@ ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& m
   topology = std::move(payload);
 }
 
+const runtime::Probe& ServedModel::probe() const {
+  std::call_once(probe_made_,
+                 [this] { probe_ = std::make_unique<const runtime::Probe>(poser.shared_model()); });
+  return *probe_;
+}
+
 }  // namespace ecorche::server

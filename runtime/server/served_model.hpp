@@ -3,10 +3,12 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "core/values/model.hpp"
 #include "proto/framing.hpp"
+#include "runtime/probe/probe.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/clip.hpp"
 #include "runtime/skin/body_poser.hpp"
@@ -14,12 +16,14 @@
 
 namespace ecorche::server {
 
-/// Immutable after construction; shared by every thread.
+/// Does not change after construction; shared by every thread.
 struct ServedModel {
   /// `name` is what OpenModel asks for; `clips` are of the model's rig.
   ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> clips = {});
 
   const Model& model() const { return poser.model(); }
+  /// Made when somebody first probes, on a worker.
+  const runtime::Probe& probe() const;
 
   runtime::BodyPoser poser;
   runtime::VolumePoser volumes;
@@ -29,6 +33,10 @@ struct ServedModel {
   v1::ModelOpened opened;                         ///< without session, role and triangles
   std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`
   std::shared_ptr<const wire::Payload> topology;  ///< the triangles of every tissue
+
+ private:
+  mutable std::once_flag probe_made_;
+  mutable std::unique_ptr<const runtime::Probe> probe_;
 };
 
 }  // namespace ecorche::server

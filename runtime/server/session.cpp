@@ -7,6 +7,12 @@
 #include <utility>
 
 namespace ecorche::server {
+namespace {
+
+// So long after the last probe, poses are still made ready for the next.
+constexpr auto kProbing = std::chrono::seconds(1);
+
+}  // namespace
 
 void Skipped::add(std::uint64_t sequence) {
   ++count;
@@ -172,7 +178,7 @@ std::optional<Clock::time_point> Session::waiting() const {
 }
 
 void Session::start_job() {
-  if (busy_ || (!slot_ && fresh_.empty())) return;
+  if (busy_ || (!slot_ && fresh_.empty() && probes_.empty())) return;
   const auto now = Clock::now();
   if (now < next_start_) {
     if (std::exchange(pacing_, true)) return;
@@ -210,6 +216,9 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
       self->finish_pose(outcome, *skipped, *said, refresh);
     });
   };
+  job->on_probe = [self, frame = job->probe] {
+    net::post(self->io_, [self, frame] { self->probe_ready(frame); });
+  };
   job->on_frame = [self](PosedFrame frame) {
     net::post(self->io_, [self, frame = std::move(frame)] { self->publish(frame); });
   };
@@ -222,6 +231,8 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
         net::post(io, [self = std::move(self), job = std::move(job), guard = std::move(guard), status] {
           if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
           self->busy_ = false;
+          // Asked for, and not made: the pose could not be.
+          if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
           self->start_job();
         });
       });
@@ -235,6 +246,9 @@ void Session::take_up(PoseJob& job) {
   job.volume_voxels = limits_.volume_voxels;
   job.thresholds = thresholds_;
   job.digests = recording_ != nullptr;
+  const bool probing = !probes_.empty() || (probed_ && Clock::now() - *probed_ < kProbing);
+  if (probing) job.probe = spare_probe();
+  if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
   for (const Row& row : rows_) {
     if (!refresh || fresh_.contains(row.subscription.id)) job.subscriptions.push_back(row.subscription);
   }
@@ -245,6 +259,26 @@ void Session::take_up(PoseJob& job) {
   } else {
     job.request = *std::exchange(slot_, std::nullopt);
   }
+}
+
+void Session::probe(Ready ready) {
+  probed_ = Clock::now();
+  if (probe_frame_) return ready(probe_frame_);
+  probes_.push_back(std::move(ready));
+  start_job();
+}
+
+// One that nobody asks any more, or a new one: the one that is shown and the one being made are two.
+std::shared_ptr<ProbeFrame> Session::spare_probe() {
+  for (const auto& frame : probe_frames_) {
+    if (frame.use_count() == 1) return frame;
+  }
+  return probe_frames_.emplace_back(std::make_shared<ProbeFrame>());
+}
+
+void Session::probe_ready(const std::shared_ptr<ProbeFrame>& frame) {
+  probe_frame_ = frame;
+  for (const Ready& ready : std::exchange(probes_, {})) ready(frame);
 }
 
 void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,

@@ -93,6 +93,11 @@ class Session : public std::enable_shared_from_this<Session> {
   const runtime::QualityThresholds& thresholds() const { return thresholds_; }
   void set_thresholds(const runtime::QualityThresholds& thresholds);
 
+  /// Calls `ready` with the posed body, at once where it is at hand; null where it cannot be posed. As long
+  /// as somebody asks every second, every pose is made ready.
+  using Ready = std::function<void(const std::shared_ptr<const ProbeFrame>&)>;
+  void probe(Ready ready);
+
   /// What is shown from now on goes into it, until it is taken away.
   void record(std::shared_ptr<Recording> recording) { recording_ = std::move(recording); }
   const std::shared_ptr<Recording>& recording() const { return recording_; }
@@ -114,6 +119,8 @@ class Session : public std::enable_shared_from_this<Session> {
   };
 
   void tell_control();
+  std::shared_ptr<ProbeFrame> spare_probe();
+  void probe_ready(const std::shared_ptr<ProbeFrame>& frame);
   void take(PoseRequest request);
   void start_job();
   void submit(std::shared_ptr<PoseJob> job, bool refresh);
@@ -154,6 +161,11 @@ class Session : public std::enable_shared_from_this<Session> {
   std::shared_ptr<ClipPlayer> player_;
   runtime::QualityThresholds thresholds_;
   std::shared_ptr<Recording> recording_;
+  std::vector<std::shared_ptr<ProbeFrame>> probe_frames_;  ///< to be filled again once nobody asks them
+  std::shared_ptr<const ProbeFrame> probe_frame_;          ///< of the pose that is shown
+  std::vector<Ready> probes_;                              ///< wait for one
+  std::optional<Clock::time_point> probed_;
+
   std::uint64_t recorded_job_ = 0;  ///< PoseJob::number of the last recorded pose
 };
 

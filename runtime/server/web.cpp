@@ -56,10 +56,6 @@ class Stream {
 
   // Beast ends its streams by these, found by their argument.
   friend void beast_close_socket(Stream& stream) { stream.transport().close(); }
-  friend void teardown(beast::role_type, Stream& stream, error_code& ec) {
-    ec = {};
-    stream.transport().close();
-  }
   template <class Handler>
   friend void async_teardown(beast::role_type, Stream& stream, Handler&& handler) {
     stream.spawn(stream.finish(), [handler = std::forward<Handler>(handler)](

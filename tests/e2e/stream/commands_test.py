@@ -12,6 +12,7 @@ import threading
 import time
 import unittest
 
+import numpy as np
 from ecorche_client import Client, ServerError
 from serving import ECORCHE, Server
 
@@ -70,6 +71,24 @@ class Commands(unittest.TestCase):
             result = run("stream", server.address, "--replay", recording, "--json")
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn("is not the one that was recorded", result.stderr)
+
+    def test_points_go_both_ways(self):
+        with Server(MODEL) as server, Client("127.0.0.1", server.port) as client:
+            body = client.open()
+            pose = body.rest_pose()
+            pose[1] = (np.cos(0.1), np.sin(0.1), 0, 0)
+            client.subscribe_mesh(["skin"])
+            sequence = client.send_pose(pose)
+            skin = [frame for frame in client.frames(1) if frame.pose_sequence == sequence][0].positions["skin"]
+            middle = skin.mean(axis=0, keepdims=True) + [[0, 0, 0], [5, 0, 0], [1e4, 0, 0]]
+            there = client.probe(middle, volumes=[volume.name for volume in body.message.volumes], gradient=True, tissue=True)
+            inside = ~np.isnan(there["points"][:, 0])
+            self.assertFalse(inside[2])
+            self.assertEqual(there["gradient"].shape, (3, 9))
+            self.assertEqual(there["values"].shape, (3, len(body.message.volumes)))
+            self.assertEqual(there["tissue"][2], -1)
+            back = client.probe(there["points"][inside], to_rest=False)
+            np.testing.assert_allclose(back["points"], middle[inside], atol=1e-2)
 
     def test_what_is_no_clip(self):
         for name, content, code, message in (("Run.bvh", "", 78, "clients could not ask for a clip of this name"),

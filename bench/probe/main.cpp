@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// One point a millisecond through a body that streams at 90 Hz, over loopback; then 10000 points a message.
+// usage: bench_probe MODEL.hdf [SECONDS] [TISSUE...]    (10 seconds, all tissues)
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "clients/cpp/client.hpp"
+#include "core/model_file/model_file.hpp"
+#include "proto/arrays.hpp"
+#include "proto/convert.hpp"
+#include "runtime/server/server.hpp"
+
+namespace {
+
+using namespace ecorche;
+using client::Clock;
+
+double milliseconds(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+void print(const char* what, std::vector<double> took) {
+  std::sort(took.begin(), took.end());
+  const auto at = [&](double share) {
+    return took[static_cast<std::size_t>(share * static_cast<double>(took.size() - 1))];
+  };
+  std::printf("%s: %zu, p50 %.3f ms, p90 %.3f ms, p99 %.3f ms, max %.3f ms\n", what, took.size(), at(0.5),
+              at(0.9), at(0.99), took.back());
+}
+
+v1::ModelOpened open(client::Client& client) {
+  v1::Envelope request;
+  request.mutable_open_model()->set_session("probed");
+  request.mutable_open_model()->set_without_triangles(true);
+  return client.call(request).envelope.model_opened();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) return std::fprintf(stderr, "usage: bench_probe MODEL.hdf [SECONDS] [TISSUE...]\n"), 64;
+  const double seconds = argc > 2 ? std::atof(argv[2]) : 10;
+  const auto model = std::make_shared<const Model>(model_file::read(argv[1], Context{}));
+  tbb::task_arena arena;
+  server::Workers workers(2, [&](const server::Job& job) { arena.execute(job); });
+  server::Options options;
+  options.listen.port = 0;
+  server::Server server(options, {{"body", model}}, workers);
+  std::thread serving([&] { server.run(); });
+  const wire::Address address{"127.0.0.1", server.port()};
+
+  std::atomic<bool> done = false;
+  std::atomic<std::uint64_t> frames = 0;
+  client::Client poser(address, "bench_probe");
+  const v1::ModelOpened opened = open(poser);
+  v1::Envelope subscribe;
+  for (int i = 3; i < argc; ++i) subscribe.mutable_subscribe()->mutable_mesh()->add_tissues(argv[i]);
+  subscribe.mutable_subscribe()->mutable_mesh();
+  poser.call(subscribe);
+  std::thread posing([&] {
+    auto due = Clock::now();
+    for (std::uint64_t sequence = 1; !done; ++sequence) {
+      v1::Envelope envelope;
+      v1::PoseUpdate& update = *envelope.mutable_pose_update();
+      Pose pose = Pose::rest(model->segment_count());
+      for (std::size_t j = 1; j < pose.rotation.size(); ++j)
+        pose.rotation[j] =
+            Eigen::AngleAxisd(0.1 * std::sin(0.05 * static_cast<double>(sequence)), Eigen::Vector3d::UnitX());
+      update.set_sequence(sequence);
+      update.set_rig_digest(opened.rig_digest());
+      wire::to_proto(pose, update);
+      poser.send(envelope);
+      due += std::chrono::nanoseconds(1'000'000'000 / 90);
+      while (auto frame = poser.receive(due)) frames += frame->envelope.has_mesh_frame() ? 1 : 0;
+    }
+  });
+
+  // The middle of the body's nodes, so that the point is inside most of the time.
+  client::Client prober(address, "bench_probe");
+  open(prober);
+  const auto ask = [&](std::size_t count) {
+    std::vector<double> points;
+    const std::size_t nodes = model->node_count();
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto row = static_cast<Eigen::Index>(nodes * (i + 1) / (count + 1));
+      for (int axis = 0; axis < 3; ++axis) points.push_back(model->nodes(row, axis));
+    }
+    wire::Payload payload;
+    v1::Envelope envelope;
+    envelope.mutable_probe_points()->set_direction(v1::ProbePoints::DIRECTION_POSED_TO_REST);
+    envelope.mutable_probe_points()->set_deformation_gradient(true);
+    *envelope.mutable_probe_points()->mutable_points() =
+        wire::append(payload, std::span<const double>(points), 3);
+    const auto start = Clock::now();
+    prober.call(std::move(envelope), std::make_shared<const wire::Payload>(std::move(payload)));
+    return milliseconds(Clock::now() - start);
+  };
+  for (int i = 0; i < 200; ++i) ask(1);  // warm
+  std::vector<double> one, many;
+  const std::uint64_t before = frames;
+  const auto start = Clock::now();
+  auto due = start;
+  while (milliseconds(Clock::now() - start) < 1000 * seconds) {
+    one.push_back(ask(1));
+    due = std::max(due + std::chrono::milliseconds(1), Clock::now());
+    std::this_thread::sleep_until(due);
+  }
+  const double took = milliseconds(Clock::now() - start) / 1000;
+  std::printf("%.1f probes and %.1f frames a second of %zu bytes so far\n",
+              static_cast<double>(one.size()) / took, static_cast<double>(frames - before) / took,
+              static_cast<std::size_t>(poser.bytes_received()));
+  for (int i = 0; i < 50; ++i) many.push_back(ask(10000));
+  print("1 point", one);
+  print("10000 points", many);
+  done = true;
+  posing.join();
+  server.stop();
+  serving.join();
+}
