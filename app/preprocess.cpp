@@ -178,11 +178,11 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::Range(Options::nodes_range.low, Options::nodes_range.high))
       ->capture_default_str();
   std::vector<std::string> solvers = strings(weights::solver_names());
-  const std::string automatic = solvers.front();
   solvers.insert(solvers.begin(), "auto");
   command
       ->add_option("--solver", o.solver,
-                   "who solves for the weights: auto (" + automatic + "), " + listed(weights::solver_names()))
+                   "who solves for the weights: auto (" + solvers[1] + ", and amg for large meshes), " +
+                       listed(weights::solver_names()))
       ->check(CLI::IsMember(solvers))
       ->capture_default_str();
   command->add_option("--cor-sigma", o.cor_sigma, "width of the similarity of weights (LeHodgins16 eq. 1)")

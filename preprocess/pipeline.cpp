@@ -197,10 +197,8 @@ double peak_rss_mib() {
 Result run(const Case& patient, const Options& options, const Context& outer, const StageCallback& on_stage) {
   check_options(options);
   const std::string_view mesher_name = options.mesher.empty() ? tet::mesher_names().front() : options.mesher;
-  const std::string_view solver_name =
-      options.solver == "auto" ? weights::solver_names().front() : options.solver;
   const std::unique_ptr<tet::Mesher> mesher = tet::make_mesher(mesher_name);
-  weights::make_solver(solver_name);  // refuses an unknown name now, not after the mesher
+  weights::make_solver(options.solver);  // refuses an unknown name now, not after the mesher
 
   Result result;
   Model& model = result.model;
@@ -241,14 +239,16 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   });
   labels.reset();  // each value goes when its last reader is done
 
+  std::string solver_name;
   {
     weights::Options o;
-    o.solver = solver_name;
+    o.solver = options.solver;
     weights::WeightsResult solved = stage([&] {
       return weights::solve_weights(*mesh, patient, model.bone_segment, model.segment_count(), o, context);
     });
     model.weights = std::move(solved.weights);
     model.certificate = solved.certificate;
+    solver_name = solved.solver;
   }
   model.nodes = mesh->V.cast<float>();
   model.tets = std::move(mesh->T);

@@ -41,11 +41,12 @@ std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
 struct WeightsResult {
   Weights weights;          ///< as stored: clamped to [0, 1], cut at 1e-6, rows renormalised
   Eigen::MatrixXd solved;   ///< #nodes by #segments, before repair; kept only when asked
+  std::string solver;       ///< who solved
   Certificate certificate;  ///< the solver's, weights' and off-diagonal members are filled
 };
 
 struct Options {
-  std::string_view solver = "auto";  ///< auto, cholmod, eigen
+  std::string_view solver = "auto";  ///< auto, cholmod, eigen, amg
   bool keep_solved = false;
 };
 
@@ -61,8 +62,10 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
                             const std::vector<std::int32_t>& bone_segment, std::size_t segments,
                             const Options& options, const Context& context);
 
-/// `cholmod` (GPL builds) and `eigen`; the first is `auto`'s choice.
+/// `cholmod` (GPL builds), `eigen`, and `amg`; the first is the one for small systems.
 std::vector<std::string_view> solver_names();
+/// What `auto` means for so many unknowns: a factorization up to where multigrid overtakes it.
+std::string_view solver_for(std::int64_t unknowns);
 std::unique_ptr<solve::SpdSolver> make_solver(std::string_view name);  ///< Error{usage} for an unknown name
 
 }  // namespace ecorche::weights

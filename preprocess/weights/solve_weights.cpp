@@ -124,7 +124,7 @@ Weights store(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& co
 WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
                             const std::vector<std::int32_t>& bone_segment, std::size_t segments,
                             const Options& options, const Context& context) {
-  const auto solver = make_solver(options.solver);
+  make_solver(options.solver);  // refuses an unknown name before anything slow
   const auto nodes = static_cast<std::size_t>(mesh.V.rows());
   WeightsResult result;
   Certificate& certificate = result.certificate;
@@ -160,6 +160,9 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
     if (owner[n] >= 0)
       boundary(static_cast<Eigen::Index>(n), column_of[static_cast<std::size_t>(owner[n])]) = 1;
   }
+  const auto unknowns = std::count(fixed.begin(), fixed.end(), std::uint8_t{0});
+  result.solver = options.solver == "auto" ? solver_for(unknowns) : options.solver;
+  const auto solver = make_solver(result.solver);
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
   MonotoneResult monotone = solve_monotone(std::move(L), fixed, boundary, *solver, scaled);

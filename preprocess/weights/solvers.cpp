@@ -10,10 +10,19 @@ namespace ecorche::weights {
 
 std::vector<std::string_view> solver_names() {
 #ifdef ECORCHE_GPL
-  return {"cholmod", "eigen"};
+  return {"cholmod", "amg", "eigen"};
 #else
-  return {"eigen"};
+  return {"eigen", "amg"};
 #endif
+}
+
+std::string_view solver_for(std::int64_t unknowns) {
+#ifdef ECORCHE_GPL
+  constexpr std::int64_t kFactored = 300'000;  // bench/solvers
+#else
+  constexpr std::int64_t kFactored = 15'000;
+#endif
+  return unknowns <= kFactored ? solver_names().front() : "amg";
 }
 
 std::unique_ptr<solve::SpdSolver> make_solver(std::string_view name) {
@@ -21,6 +30,7 @@ std::unique_ptr<solve::SpdSolver> make_solver(std::string_view name) {
 #ifdef ECORCHE_GPL
   if (name == "cholmod") return make_cholmod_solver();
 #endif
+  if (name == "amg") return solve::make_multigrid_solver();
   if (name == "eigen") return solve::make_eigen_solver();
   std::string known = "auto";
   for (const std::string_view each : solver_names()) known.append(", ").append(each);
