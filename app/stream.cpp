@@ -26,11 +26,11 @@ struct Settings {
   std::string address;
   std::string open, session;
   MotionChoice motion;
-  double rate = 90, seconds = 10;
+  double rate = 90, max_rate = 0, seconds = 10;
   std::vector<std::string> tissues;
   std::string volume;
-  std::string skinning = "cor", sampling = "trilinear";
-  bool quality = false;
+  std::string skinning = "cor", sampling = "trilinear", encoding = "f32";
+  bool quality = false, normals = false;
   std::string model;
   std::uint64_t check_every = 1;
   client::Access access;
@@ -71,6 +71,11 @@ v1::Skinning skinning_to_proto(runtime::Skinning skinning) {
       break;
   }
   return v1::SKINNING_COR;
+}
+
+v1::Encoding encoding_to_proto(const std::string& encoding) {
+  if (encoding == "u16") return v1::ENCODING_U16;
+  return encoding == "u16-delta" ? v1::ENCODING_U16_DELTA : v1::ENCODING_F32;
 }
 
 // The motion's poses, or the rest pose alone; one after another, `rate` times a second.
@@ -161,9 +166,11 @@ class Stream {
 
   void subscribe() {
     v1::Envelope mesh;
+    mesh.mutable_subscribe()->set_max_rate(settings_.max_rate);
     v1::MeshSelection& selection = *mesh.mutable_subscribe()->mutable_mesh();
     selection.mutable_tissues()->Assign(settings_.tissues.begin(), settings_.tissues.end());
-    selection.set_encoding(v1::ENCODING_F32);
+    selection.set_encoding(encoding_to_proto(settings_.encoding));
+    selection.set_normals(settings_.normals);
     selection.set_quality(settings_.quality);
     client_.call(std::move(mesh));
     if (settings_.volume.empty()) return;
@@ -225,6 +232,7 @@ class Stream {
                     "use a server that keeps the protocol");
       }
       if (mesh.quality().verdict() == v1::PoseQuality::VERDICT_WARN) ++warned_;
+      decode(mesh, frame.payload);
       if (settings_.volume.empty()) settled_ = std::max(settled_, mesh.pose_sequence());
       take_frame(mesh.pose_sequence(), meshes_, std::move(frame));
     } else if (envelope.has_volume_frame()) {
@@ -233,6 +241,16 @@ class Stream {
       settled_ = std::max(settled_, volume.pose_sequence());
       take_frame(volume.pose_sequence(), volumes_, std::move(frame));
     }
+  }
+
+  // As float32 stands in the payload, only a check wants it decoded.
+  void decode(const v1::MeshFrame& mesh, const wire::Payload& payload) {
+    if (mesh.encoding() == v1::ENCODING_F32 && !check_) return;
+    const Status status = decoder_.decode(mesh, payload, decoded_);
+    if (status.ok()) return;
+    v1::Status told;
+    wire::to_proto(status, told);
+    throw client::to_error("frame " + std::to_string(mesh.frame()), told);
   }
 
   void take_ack(const v1::PoseAck& ack) {
@@ -252,8 +270,10 @@ class Stream {
                   "a frame of pose " + std::to_string(sequence) + ", which was not sent",
                   "use a server that keeps the protocol");
     }
-    if (check_ && ++offered_ % settings_.check_every == 0)
-      check_->add(std::move(frame), sequence == 0 ? rest_ : sent->second.pose);
+    if (check_ && ++offered_ % settings_.check_every == 0) {
+      auto tissues = &arrivals == &meshes_ ? std::exchange(decoded_, {}) : std::vector<wire::DecodedTissue>();
+      check_->add(std::move(frame), std::move(tissues), sequence == 0 ? rest_ : sent->second.pose);
+    }
     // Volumes come later than the meshes of the same pose; nothing comes from before both.
     if (settings_.volume.empty() || &arrivals == &volumes_)
       sent_.erase(sent_.begin(), sent_.lower_bound(sequence));
@@ -327,6 +347,8 @@ class Stream {
   Client client_;
   v1::ModelOpened opened_;
   Pose rest_;
+  wire::MeshDecoder decoder_;
+  std::vector<wire::DecodedTissue> decoded_;  // the frame that came last
   std::unique_ptr<StreamCheck> check_;
   bool same_model_ = true;
 
@@ -369,9 +391,18 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("--skinning", settings->skinning, "skinning of the nodes")
       ->check(CLI::IsMember({"cor", "dqs", "lbs"}))
       ->capture_default_str();
+  command->add_option("--encoding", settings->encoding, "of the meshes")
+      ->check(CLI::IsMember({"f32", "u16", "u16-delta"}))
+      ->capture_default_str();
+  command->add_option("--max-rate", settings->max_rate, "mesh frames per second at most; 0: one per pose")
+      ->check(CLI::Range(0.0, 1e5))
+      ->capture_default_str();
+  command->add_flag("--normals", settings->normals, "unit normals beside the positions");
   command->add_flag("--quality", settings->quality, "let the server judge every pose");
-  command->add_option("--model", settings->model,
-                      "check every frame, byte for byte, against offline posing of this model file");
+  command->add_option(
+      "--model", settings->model,
+      "check every frame against offline posing of this model file: float32 and volumes byte for "
+      "byte, u16 within half a step");
   command->add_option("--check-every", settings->check_every, "check only every Nth frame")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 32))
       ->capture_default_str();

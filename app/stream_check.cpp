@@ -17,20 +17,41 @@ namespace {
 
 constexpr std::size_t kLongestQueue = 8;
 constexpr std::uint64_t kMostLines = 5;
+constexpr double kFloatRounding = 4e-7;   // a few units in the last place
+constexpr double kKernelRounding = 1e-3;  // mm
+const double kWorstCosine = std::cos(1.01 * 3.14159265358979 / 180);
 
-// How two arrays of positions differ, in words.
-std::string difference(std::span<const float> got, std::span<const float> expected) {
+// How two arrays of positions differ, in words; empty where they agree. `step`: of the u16 encodings; 0: to
+// the last bit.
+std::string difference(std::span<const float> got, std::span<const float> expected, double step) {
   double worst = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < got.size(); ++i) {
     if (std::memcmp(&got[i], &expected[i], sizeof(float)) == 0) continue;
+    const double off = std::abs(static_cast<double>(got[i]) - expected[i]);
+    if (step > 0 && off <= step / 2 + kFloatRounding * std::abs(expected[i]) + kKernelRounding) continue;
     ++count;
-    worst = std::max(worst, std::abs(static_cast<double>(got[i]) - expected[i]));
+    worst = std::max(worst, off);
   }
+  if (count == 0) return {};
   char text[96];
   std::snprintf(text, sizeof text, "%zu of %zu coordinates differ, by %.3g mm at most", count, got.size(),
                 worst);
   return text;
+}
+
+// Unit vectors against those of the kernels, in 32767ths; zeros must be zeros.
+bool normals_agree(std::span<const float> got, std::span<const std::int16_t> expected) {
+  for (std::size_t i = 0; i + 2 < got.size(); i += 3) {
+    double cosine = 0;
+    bool none = true;
+    for (std::size_t c = 0; c < 3; ++c) {
+      cosine += got[i + c] * expected[i + c] / 32767.0;
+      none = none && expected[i + c] == 0;
+    }
+    if (none ? cosine != 0 : cosine < kWorstCosine) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -38,7 +59,7 @@ std::string difference(std::span<const float> got, std::span<const float> expect
 StreamCheck::StreamCheck(std::shared_ptr<const Model> model, runtime::Skinning skinning,
                          runtime::Sampling sampling, std::function<void(std::string_view)> say)
     : poser_(std::move(model)),
-      body_(poser_.make_frame()),
+      body_(poser_.make_frame({.positions = true, .quantised = false, .normals = true})),
       skinning_(skinning),
       sampling_(sampling),
       say_(std::move(say)),
@@ -48,10 +69,10 @@ StreamCheck::~StreamCheck() {
   finish();
 }
 
-void StreamCheck::add(wire::Frame frame, const Pose& pose) {
+void StreamCheck::add(wire::Frame frame, std::vector<wire::DecodedTissue> tissues, const Pose& pose) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return items_.size() < kLongestQueue; });
-  items_.push_back({std::move(frame), pose});
+  items_.push_back({std::move(frame), std::move(tissues), pose});
   changed_.notify_all();
 }
 
@@ -93,31 +114,27 @@ std::string StreamCheck::compare(const Item& item) {
   const std::uint64_t sequence = envelope.has_mesh_frame() ? envelope.mesh_frame().pose_sequence()
                                                            : envelope.volume_frame().pose_sequence();
   const std::string problem = envelope.has_mesh_frame()
-                                  ? compare_mesh(envelope.mesh_frame(), item.frame.payload, item.pose)
+                                  ? compare_mesh(envelope.mesh_frame(), item.tissues, item.pose)
                                   : compare_volume(envelope.volume_frame(), item.frame.payload, item.pose);
   return problem.empty() ? problem : "pose " + std::to_string(sequence) + ": " + problem;
 }
 
-std::string StreamCheck::compare_mesh(const v1::MeshFrame& frame, const wire::Payload& payload,
-                                      const Pose& pose) {
-  std::vector<std::uint32_t> tissues;
-  for (const v1::MeshArray& array : frame.arrays()) tissues.push_back(array.tissue());
+std::string StreamCheck::compare_mesh(const v1::MeshFrame& frame,
+                                      const std::vector<wire::DecodedTissue>& tissues, const Pose& pose) {
+  std::vector<std::uint32_t> rows;
+  for (const wire::DecodedTissue& tissue : tissues) rows.push_back(tissue.tissue);
   const auto& rest = poser_.model().tissues;
-  if (tissues.empty() || tissues.back() >= rest.size() || !std::is_sorted(tissues.begin(), tissues.end())) {
-    return "its table of tissues is not that of the model";
-  }
-  if (const Status status = poser_.run(pose, skinning_, tissues, body_); !status.ok()) return status.message;
-  for (const v1::MeshArray& array : frame.arrays()) {
-    const std::string& name = rest[array.tissue()].name;
-    std::span<const float> got;
-    if (array.kind() != v1::MeshArray::KIND_POSITIONS || !wire::find(array.array(), payload, 3, got)) {
-      return "tissue '" + name + "' has no readable positions";
-    }
-    const std::vector<float>& expected = body_.tissues[array.tissue()];
-    if (got.size() != expected.size())
-      return "tissue '" + name + "' has " + std::to_string(got.size() / 3) + " vertices";
-    if (std::memcmp(got.data(), expected.data(), got.size_bytes()) != 0)
-      return "tissue '" + name + "': " + difference(got, expected);
+  if (rows.empty() || rows.back() >= rest.size()) return "its table of tissues is not that of the model";
+  if (const Status status = poser_.run(pose, skinning_, rows, body_); !status.ok()) return status.message;
+  const double step = frame.encoding() == v1::ENCODING_F32 ? 0 : frame.box().step();
+  for (const wire::DecodedTissue& tissue : tissues) {
+    const std::string name = "tissue '" + rest[tissue.tissue].name + "'";
+    const std::vector<float>& expected = body_.tissues[tissue.tissue];
+    if (tissue.positions.size() != expected.size())
+      return name + " has " + std::to_string(tissue.positions.size() / 3) + " vertices";
+    if (const std::string off = difference(tissue.positions, expected, step); !off.empty())
+      return name + ": " + off;
+    if (!normals_agree(tissue.normals, body_.normals[tissue.tissue])) return name + ": its normals differ";
   }
   return {};
 }

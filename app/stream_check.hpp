@@ -10,16 +10,19 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "proto/framing.hpp"
+#include "proto/mesh_decoder.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::app {
 
-/// Poses every frame again, on a thread of its own beside the stream, and compares byte for byte. A short
-/// queue: where checking is slower than the stream, add() waits, the frame before is acknowledged late, and
-/// the server skips.
+/// Poses every frame again, on a thread of its own beside the stream, and compares: float32 and volumes byte
+/// for byte, u16 within half a step and the rounding of float32, normals within a degree. A short queue:
+/// where checking is slower than the stream, add() waits, the frame before is acknowledged late, and the
+/// server skips.
 class StreamCheck {
  public:
   /// `say` gets a line for each of the first mismatches, from the checking thread.
@@ -29,8 +32,8 @@ class StreamCheck {
   StreamCheck(const StreamCheck&) = delete;
   StreamCheck& operator=(const StreamCheck&) = delete;
 
-  /// A MeshFrame or VolumeFrame, and the pose it should show.
-  void add(wire::Frame frame, const Pose& pose);
+  /// A MeshFrame, decoded, or a VolumeFrame, and the pose it should show.
+  void add(wire::Frame frame, std::vector<wire::DecodedTissue> tissues, const Pose& pose);
 
   struct Result {
     std::uint64_t checked = 0, mismatches = 0;
@@ -41,11 +44,13 @@ class StreamCheck {
  private:
   struct Item {
     wire::Frame frame;
+    std::vector<wire::DecodedTissue> tissues;
     Pose pose;
   };
   void work();
   std::string compare(const Item& item);
-  std::string compare_mesh(const v1::MeshFrame& frame, const wire::Payload& payload, const Pose& pose);
+  std::string compare_mesh(const v1::MeshFrame& frame, const std::vector<wire::DecodedTissue>& tissues,
+                           const Pose& pose);
   std::string compare_volume(const v1::VolumeFrame& frame, const wire::Payload& payload, const Pose& pose);
 
   runtime::BodyPoser poser_;

@@ -40,7 +40,9 @@ Client::Client(const wire::Address& address, const std::string& name, const Acce
   hello.set_protocol_min(1);
   hello.set_protocol_max(1);
   hello.set_client(name.substr(0, 64));
-  hello.add_encodings(v1::ENCODING_F32);
+  // MeshDecoder reads them all.
+  for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
+    hello.add_encodings(encoding);
   hello.set_token(access.token);
   hello.set_resume_token(access.resume_token);
   wire::Frame answer = call(std::move(envelope));

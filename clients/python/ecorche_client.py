@@ -26,9 +26,11 @@ import time
 
 import numpy as np
 
-from ecorche.v1 import common_pb2, envelope_pb2
+import ecorche_encodings
+from ecorche.v1 import common_pb2, envelope_pb2, stream_pb2
 
 ALIGNMENT = 16
+ENCODINGS = {"f32": common_pb2.ENCODING_F32, "u16": common_pb2.ENCODING_U16, "u16-delta": common_pb2.ENCODING_U16_DELTA}
 SCALARS = {
     common_pb2.SCALAR_TYPE_U8: np.dtype("<u1"), common_pb2.SCALAR_TYPE_I8: np.dtype("<i1"),
     common_pb2.SCALAR_TYPE_U16: np.dtype("<u2"), common_pb2.SCALAR_TYPE_I16: np.dtype("<i2"),
@@ -88,12 +90,33 @@ class Body:
 
 
 class MeshFrame:
-    """`positions`: #V x 3 float32, mm, LPS, by tissue name."""
+    """`positions`: #V x 3 float32, mm, LPS, by tissue name; `normals` likewise where they were asked for.
 
-    def __init__(self, message, payload, body):
+    `keyframes` is kept from frame to frame: the numbers of the last keyframe of every subscription and level."""
+
+    def __init__(self, message, payload, body, keyframes):
         self.message = message
         self.subscription, self.pose_sequence = message.subscription, message.pose_sequence
-        self.positions = {body.tissues[entry.tissue]: array(entry.array, payload) for entry in message.arrays}
+        self.positions, self.normals = {}, {}
+        numbers = {}
+        place = message.subscription, message.level
+        if message.encoding == common_pb2.ENCODING_U16_DELTA and message.keyframe != message.frame:
+            number, key = keyframes.get(place, (None, {}))
+            if number != message.keyframe:
+                raise ValueError(f"frame {message.frame} is against keyframe {message.keyframe}, which did not come")
+        else:
+            key = None
+        for entry in message.arrays:
+            name, rows = body.tissues[entry.tissue], array(entry.array, payload)
+            if entry.kind == stream_pb2.MeshArray.KIND_NORMALS:
+                self.normals[name] = ecorche_encodings.normals(rows)
+            elif message.encoding == common_pb2.ENCODING_F32:
+                self.positions[name] = rows
+            else:
+                numbers[name] = rows if key is None else ecorche_encodings.decode_delta(rows[:, 0], key[name])
+                self.positions[name] = ecorche_encodings.positions(numbers[name], message.box)
+        if message.encoding == common_pb2.ENCODING_U16_DELTA and key is None:
+            keyframes[place] = message.frame, numbers
 
 
 class VolumeFrame:
@@ -124,6 +147,7 @@ class Client:
         self._sequence = 0
         self._waiting = []
         self._address, self._access = (host, port), {"tls_ca": tls_ca, "token": token}
+        self._keyframes = {}
         self._buffer = bytearray()
         self._socket = socket.create_connection((host, port), timeout)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -141,7 +165,7 @@ class Client:
         hello.client_hello.client = name
         hello.client_hello.token = token
         hello.client_hello.resume_token = resume_token
-        hello.client_hello.encodings.append(common_pb2.ENCODING_F32)
+        hello.client_hello.encodings.extend(ENCODINGS.values())
         self.server = self._call(hello)[0].server_hello
 
     def __enter__(self):
@@ -169,11 +193,12 @@ class Client:
         self.model_changed = False
         return self.body
 
-    def subscribe_mesh(self, tissues=(), quality=False):
-        """Frames of these tissues, of all by default; returns the subscription's number."""
+    def subscribe_mesh(self, tissues=(), quality=False, encoding="f32", normals=False):
+        """Frames of these tissues, of all by default; returns the subscription's number. `encoding`: of ENCODINGS."""
         request = envelope_pb2.Envelope()
         request.subscribe.mesh.tissues.extend(tissues)
-        request.subscribe.mesh.encoding = common_pb2.ENCODING_F32
+        request.subscribe.mesh.encoding = ENCODINGS[encoding]
+        request.subscribe.mesh.normals = normals
         request.subscribe.mesh.quality = quality
         return self._call(request)[0].subscribed.subscription
 
@@ -256,7 +281,7 @@ class Client:
             envelope, payload = message
             kind = envelope.WhichOneof("message")
             if kind == "mesh_frame":
-                yield MeshFrame(envelope.mesh_frame, payload, self.body)
+                yield MeshFrame(envelope.mesh_frame, payload, self.body, self._keyframes)
             elif kind == "volume_frame":
                 yield VolumeFrame(envelope.volume_frame, payload)
             elif kind == "pose_ack":

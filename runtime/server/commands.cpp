@@ -6,6 +6,7 @@
 
 #include "proto/convert.hpp"
 #include "runtime/server/connection.hpp"
+#include "runtime/server/mesh_streams.hpp"
 #include "runtime/server/tls.hpp"
 
 namespace ecorche::server {
@@ -45,7 +46,8 @@ Status check_hello(const v1::ClientHello& hello) {
   const auto& encodings = hello.encodings();
   if (!encodings.empty() &&
       std::find(encodings.begin(), encodings.end(), v1::ENCODING_F32) == encodings.end()) {
-    return {StatusCode::failed_precondition, "hello: this server writes ENCODING_F32 only (read it)"};
+    return {StatusCode::failed_precondition,
+            "hello: every client reads ENCODING_F32, since any frame may come so (read it)"};
   }
   return {};
 }
@@ -78,7 +80,7 @@ void Connection::handle(const wire::Frame& frame) {
     case v1::Envelope::kPoseUpdate:
       return handle_pose(request.pose_update());
     case v1::Envelope::kFrameAck:
-      outbox_.acknowledge(request.frame_ack().subscription(), request.frame_ack().frame());
+      outbox_.acknowledge(request.frame_ack().subscription(), request.frame_ack().frame(), Clock::now());
       wake_.cancel();
       return;
     case v1::Envelope::kPing: {
@@ -135,7 +137,8 @@ void Connection::handle_hello(const v1::Envelope& request) {
   hello.set_server("ecorche " + house_.options().version);
   for (const v1::Feature feature : kFeatures) hello.add_features(feature);
   if (!house_.options().record_folder.empty()) hello.add_features(v1::FEATURE_RECORD);
-  hello.add_encodings(v1::ENCODING_F32);
+  for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
+    hello.add_encodings(encoding);
   describe(house_.limits(), *hello.mutable_limits());
   resume_token_ = random_token();
   hello.set_resume_token(resume_token_);
@@ -198,11 +201,12 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
                                                  " subscriptions already (Unsubscribe one first)"});
   }
   v1::Envelope envelope;
-  const std::uint32_t subscription =
+  const Subscription& subscription =
       session_->subscribe(*this, {.id = 0, .want = want, .request = request.subscribe()});
-  subscriptions_.insert(subscription);
-  envelope.mutable_subscribed()->set_subscription(subscription);
-  answer(id, std::move(envelope));
+  subscriptions_.insert(subscription.id);
+  envelope.mutable_subscribed()->set_subscription(subscription.id);
+  auto payload = describe(*session_->model(), subscription.streams, *envelope.mutable_subscribed());
+  answer(id, std::move(envelope), std::move(payload));
 }
 
 void Connection::handle_unsubscribe(const v1::Envelope& request) {

@@ -245,10 +245,17 @@ net::awaitable<void> Connection::write_frames() {
   }
 }
 
-void Connection::deliver(const PosedFrame& frame) {
-  if (closed_ || ending_) return;
-  outbox_.offer(frame.subscription, frame.number, frame.bytes);
+bool Connection::deliver(const PosedFrame& frame) {
+  if (closed_ || ending_) return true;
+  const bool taken =
+      outbox_.offer(frame.subscription, frame.level, frame.number, frame.keyframe, frame.bytes);
   wake_.cancel();
+  return taken;
+}
+
+std::uint32_t Connection::ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
+                                    bool still) {
+  return outbox_.ask_level(subscription, finest, coarsest, still, Clock::now());
 }
 
 void Connection::answer(std::uint64_t request_id, v1::Envelope envelope,

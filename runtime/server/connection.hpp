@@ -54,7 +54,9 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   net::awaitable<void> hold_back();
   net::awaitable<void> discard();
 
-  void deliver(const PosedFrame& frame) override;
+  bool deliver(const PosedFrame& frame) override;
+  std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
+                          bool still) override;
   void pose_done(const PoseOutcome& outcome, const Skipped& skipped) override;
 
   void control_changed(v1::Role role, bool vacant) override;

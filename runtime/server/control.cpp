@@ -31,7 +31,7 @@ void Connection::resume(const std::string& token, v1::ServerHello& hello) {
   resumed.set_role(role_);
   resumed.set_last_sequence(last_sequence_);
   for (const Asked& asked : place->asked) {
-    const std::uint32_t number = session_->subscribe(*this, asked);
+    const std::uint32_t number = session_->subscribe(*this, asked).id;
     subscriptions_.insert(number);
     v1::ResumedSubscription& one = *resumed.add_subscriptions();
     one.set_was(asked.id);

@@ -10,18 +10,36 @@ void Outbox::answer(wire::EncodedFrame frame) {
   answers_.push_back(std::make_shared<const wire::EncodedFrame>(std::move(frame)));
 }
 
-void Outbox::offer(std::uint32_t subscription, std::uint64_t number, SharedFrame frame) {
-  Lane& lane = lanes_[subscription];
-  if (lane.waiting) ++replaced_;
-  lane.waiting = std::move(frame);
-  lane.waiting_number = number;
+std::uint32_t Outbox::ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
+                                bool still, Clock::time_point now) {
+  Lane& asked = lane(subscription);
+  const std::uint32_t level = asked.flow.level(finest, coarsest, now);
+  return asked.level = still ? finest : level;
 }
 
-void Outbox::acknowledge(std::uint32_t subscription, std::uint64_t number) {
-  const auto lane = lanes_.find(subscription);
-  if (lane == lanes_.end()) return;
-  auto& in_flight = lane->second.in_flight;
-  while (!in_flight.empty() && in_flight.front().number <= number) in_flight.pop_front();
+bool Outbox::offer(std::uint32_t subscription, std::uint32_t level, std::uint64_t number,
+                   std::uint64_t keyframe, SharedFrame frame) {
+  Lane& to = lane(subscription);
+  if (level != to.level) return true;
+  const bool is_key = keyframe == number;
+  if (keyframe != 0 && !is_key && keyframe != to.keyframes[level]) return false;
+  if (to.newest.frame) ++replaced_;
+  to.newest = {};
+  if (is_key) {
+    // One of another level is lost with it.
+    if (to.keyframe.frame) {
+      ++replaced_;
+      std::erase_if(to.keyframes, [&](const auto& entry) { return entry.second == to.keyframe.number; });
+    }
+    to.keyframes[level] = number;
+  }
+  (is_key ? to.keyframe : to.newest) = {std::move(frame), number};
+  return true;
+}
+
+void Outbox::acknowledge(std::uint32_t subscription, std::uint64_t number, Clock::time_point now) {
+  const auto found = lanes_.find(subscription);
+  if (found != lanes_.end()) found->second.flow.arrived(number, now);
 }
 
 SharedFrame Outbox::next(Clock::time_point now) {
@@ -32,24 +50,25 @@ SharedFrame Outbox::next(Clock::time_point now) {
     return frame;
   }
   // Starting behind the lane that was served last, so that a busy one cannot starve the others.
-  auto lane = lanes_.upper_bound(last_lane_);
-  for (std::size_t tried = 0; tried < lanes_.size(); ++tried, ++lane) {
-    if (lane == lanes_.end()) lane = lanes_.begin();
-    Lane& candidate = lane->second;
-    if (!candidate.waiting || candidate.in_flight.size() >= limit_) continue;
-    last_lane_ = lane->first;
+  auto next = lanes_.upper_bound(last_lane_);
+  for (std::size_t tried = 0; tried < lanes_.size(); ++tried, ++next) {
+    if (next == lanes_.end()) next = lanes_.begin();
+    Lane& candidate = next->second;
+    Waiting& waiting = candidate.keyframe.frame ? candidate.keyframe : candidate.newest;
+    if (!waiting.frame || !candidate.flow.may_leave(now)) continue;
+    last_lane_ = next->first;
     last_was_posed_ = true;
-    candidate.in_flight.push_back({candidate.waiting_number, now});
-    return std::exchange(candidate.waiting, nullptr);
+    candidate.flow.left(waiting.number, now);
+    return std::exchange(waiting, {}).frame;
   }
   return nullptr;
 }
 
 std::optional<Clock::time_point> Outbox::oldest_in_flight() const {
   std::optional<Clock::time_point> oldest;
-  for (const auto& [id, lane] : lanes_) {
-    if (!lane.in_flight.empty())
-      oldest = std::min(oldest.value_or(Clock::time_point::max()), lane.in_flight.front().left);
+  for (const auto& [id, waiting] : lanes_) {
+    if (const auto left = waiting.flow.oldest())
+      oldest = std::min(oldest.value_or(Clock::time_point::max()), *left);
   }
   return oldest;
 }

@@ -10,21 +10,31 @@
 
 #include "proto/framing.hpp"
 #include "runtime/server/asio.hpp"
+#include "runtime/server/flow.hpp"
 
 namespace ecorche::server {
 
 using SharedFrame = std::shared_ptr<const wire::EncodedFrame>;
 
-/// Answers leave in order and are never dropped. Of each subscription at most `in_flight` frames are on their
-/// way unacknowledged; then one waits, and a newer one replaces it.
+/// Answers leave in order and are never dropped. Of each subscription at most `in_flight` frames, or as
+/// many as the way holds (Flow), are unacknowledged; then one waits, and a newer one replaces it. A keyframe
+/// that waits is not replaced by the deltas against it: it leaves before them.
 class Outbox {
  public:
   explicit Outbox(std::uint32_t in_flight) : limit_(in_flight) {}
 
   void answer(wire::EncodedFrame frame);
-  void offer(std::uint32_t subscription, std::uint64_t number, SharedFrame frame);
+  /// The level of detail that the next frame of the subscription should have; see Flow. `still`: the finest,
+  /// since nothing newer waits.
+  std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
+                          bool still, Clock::time_point now);
+  /// `keyframe`: number of the frame that must have come before; its own where it is one; 0: needs none.
+  /// False, and nothing is taken, where that one never left and does not wait either. A frame of another
+  /// level than was asked for is for others.
+  bool offer(std::uint32_t subscription, std::uint32_t level, std::uint64_t number, std::uint64_t keyframe,
+             SharedFrame frame);
   /// Frame `number` of the subscription arrived, and with it every older one.
-  void acknowledge(std::uint32_t subscription, std::uint64_t number);
+  void acknowledge(std::uint32_t subscription, std::uint64_t number, Clock::time_point now);
   /// Drops what waits for the subscription.
   void forget(std::uint32_t subscription) { lanes_.erase(subscription); }
 
@@ -41,15 +51,18 @@ class Outbox {
   std::uint64_t replaced() const { return replaced_; }
 
  private:
-  struct InFlight {
-    std::uint64_t number;
-    Clock::time_point left;
+  struct Waiting {
+    SharedFrame frame;
+    std::uint64_t number = 0;
   };
   struct Lane {
-    SharedFrame waiting;
-    std::uint64_t waiting_number = 0;
-    std::deque<InFlight> in_flight;
+    explicit Lane(std::uint32_t few) : flow(few) {}
+    Waiting keyframe, newest;                          ///< the keyframe leaves first
+    std::uint32_t level = 0;                           ///< that was asked for last
+    std::map<std::uint32_t, std::uint64_t> keyframes;  ///< by level: number of the last one that was taken
+    Flow flow;
   };
+  Lane& lane(std::uint32_t subscription) { return lanes_.try_emplace(subscription, limit_).first->second; }
 
   std::uint32_t limit_;
   std::deque<SharedFrame> answers_;

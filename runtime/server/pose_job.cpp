@@ -4,10 +4,11 @@
 #include <new>
 #include <utility>
 
-#include "proto/arrays.hpp"
 #include "proto/convert.hpp"
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/server/mesh_stream.hpp"
 #include "runtime/server/recording.hpp"
+#include "runtime/server/volume_stream.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -30,20 +31,40 @@ Status guarded(Work&& work) {
   }
 }
 
-// Every tissue that some subscription shows, ascending.
-std::vector<std::uint32_t> all_wanted(const PoseJob& job) {
-  std::vector<bool> wanted(job.model->model().tissues.size());
-  for (const Subscription& subscription : job.subscriptions) {
-    if (const auto* mesh = std::get_if<MeshWant>(&subscription.want)) {
-      for (const std::uint32_t tissue : mesh->tissues) wanted[tissue] = true;
+// What the tissues of the model are posed for: every tissue that some subscription shows.
+struct Wanted {
+  explicit Wanted(std::size_t tissues)
+      : shown(tissues), positions(tissues), numbers(tissues), normals(tissues) {}
+
+  std::vector<bool> shown, positions, numbers, normals;  // by row of Model::tissues
+
+  void add(const MeshStream& stream) {
+    // Who moves the vertices itself needs the nodes alone.
+    if (stream.want().control_nodes && !stream.want().quality) return;
+    for (const std::uint32_t tissue : stream.want().tissues) {
+      shown[tissue] = true;
+      if (stream.needs_positions()) positions[tissue] = true;
+      if (stream.needs_numbers()) numbers[tissue] = true;
+      if (stream.want().normals) normals[tissue] = true;
     }
   }
-  std::vector<std::uint32_t> rows;
-  for (std::uint32_t row = 0; row < wanted.size(); ++row) {
-    if (wanted[row]) rows.push_back(row);
+  static std::vector<std::uint32_t> rows(const std::vector<bool>& which) {
+    std::vector<std::uint32_t> rows;
+    for (std::uint32_t row = 0; row < which.size(); ++row) {
+      if (which[row]) rows.push_back(row);
+    }
+    return rows;
   }
-  return rows;
-}
+  // Gives the body the arrays that are wanted and takes the others away, so that nothing is written in vain.
+  void shape(const Model& model, runtime::PosedBody& body) const {
+    for (std::size_t t = 0; t < shown.size(); ++t) {
+      const auto size = static_cast<std::size_t>(model.tissues[t].V.size());
+      body.tissues[t].resize(positions[t] ? size : 0);
+      body.quantised[t].resize(numbers[t] ? size : 0);
+      body.normals[t].resize(normals[t] ? size : 0);
+    }
+  }
+};
 
 // Quality, probes and volumes by tets look at every tet; meshes only at those that their vertices hang on,
 // spheres at none.
@@ -52,7 +73,8 @@ runtime::NodesOf nodes_wanted(const PoseJob& job) {
   for (const Subscription& subscription : job.subscriptions) {
     const auto* mesh = std::get_if<MeshWant>(&subscription.want);
     const auto* volume = std::get_if<VolumeWant>(&subscription.want);
-    if ((mesh && mesh->quality) || (volume && !volume->by_spheres)) return runtime::NodesOf::body;
+    if ((mesh && (mesh->quality || mesh->control_nodes)) || (volume && !volume->by_spheres))
+      return runtime::NodesOf::body;
   }
   return runtime::NodesOf::tissues;
 }
@@ -75,90 +97,87 @@ void describe(const runtime::PoseQuality& quality, const std::vector<std::uint32
   out.set_max_bone_rigidity(quality.thresholds.max_bone_rigidity_mm);
 }
 
-PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, const MeshWant& want,
-                      const runtime::PosedBody& body, const v1::ServerTimings& timings) {
-  const auto start = Clock::now();
+void describe(const ClampedJoint& clamped, const Skeleton& skeleton, v1::ClampedJoint& out) {
+  out.set_joint(static_cast<std::uint32_t>(clamped.joint));
+  out.set_name(skeleton.segments[static_cast<std::size_t>(clamped.joint)].joint.name);
+  out.set_removed(clamped.removed);
+}
+
+PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std::size_t at,
+                      const runtime::PosedBody& body, bool fits, const v1::ServerTimings& timings) {
+  MeshStream& stream = *subscription.streams[at];
   v1::Envelope envelope;
   v1::MeshFrame& frame = *envelope.mutable_mesh_frame();
   frame.set_subscription(subscription.id);
   frame.set_frame(job.number);
   frame.set_pose_sequence(job.request.sequence);
   frame.set_topology_digest(job.model->opened.topology_digest());
-  frame.set_encoding(v1::ENCODING_F32);
-
-  auto payload = std::make_shared<wire::Payload>();
-  std::size_t bytes = 0;
-  for (const std::uint32_t tissue : want.tissues)
-    bytes += wire::aligned(body.tissues[tissue].size() * sizeof(float));
-  payload->reserve(bytes);
-  for (const std::uint32_t tissue : want.tissues) {
-    v1::MeshArray& array = *frame.add_arrays();
-    array.set_tissue(tissue);
-    array.set_kind(v1::MeshArray::KIND_POSITIONS);
-    *array.mutable_array() = wire::append(*payload, std::span<const float>(body.tissues[tissue]), 3);
-  }
-  if (want.quality) {
-    describe(runtime::measure(job.model->model(), body, want.tissues, job.thresholds, job.model->closed),
-             want.tissues, *frame.mutable_quality());
-  }
   *frame.mutable_timings() = timings;
-  frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
-  return {subscription.id, job.number,
-          std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
-}
-
-Status check_size(const ImageGrid& grid, const PoseJob& job) {
-  if (grid.voxels() <= job.volume_voxels) return {};
-  return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(grid.voxels()) +
-                                              " voxels (at most " + std::to_string(job.volume_voxels) +
-                                              "; keep the body nearer to the scan)"};
-}
-
-// The voxels of `frame` and its description; a status where there can be none.
-Status fill_volume(const PoseJob& job, const VolumeWant& want, const runtime::PosedBody& body,
-                   v1::VolumeFrame& frame, std::shared_ptr<const wire::Payload>& payload) {
-  const Model& model = job.model->model();
-  const ModelVolume& volume = model.volumes[want.volume];
-  Image image;
-  if (want.by_spheres) {
-    const runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
-    const runtime::LatticeBox box = runtime::box_for(set, want.region);
-    if (Status status = check_size(grid_of(set.lattice, box), job); !status.ok()) return status;
-    image = runtime::refill(set, box, volume.image, volume.background, want.sampling);
-  } else {
-    const ImageGrid grid = runtime::grow_to(volume.image.grid, body.nodes);
-    if (Status status = check_size(grid, job); !status.ok()) return status;
-    runtime::VolumePoser::Scratch scratch;
-    job.model->volumes.pose(body.nodes, volume, want.sampling, grid, image, scratch);
+  if (stream.want().quality) {
+    const auto start = Clock::now();
+    const std::vector<std::uint32_t>& tissues = stream.want().tissues;
+    describe(job.model->meter.measure(body, tissues, job.thresholds), tissues, *frame.mutable_quality());
+    frame.mutable_timings()->set_measured(microseconds(Clock::now() - start));
   }
-  const ImageGrid grid = image.grid;
-  wire::to_proto(grid, *frame.mutable_grid());
-  v1::Array& voxels = *frame.mutable_voxels();
-  voxels.set_type(wire::to_proto(image.type));
-  voxels.set_components(static_cast<std::uint32_t>(image.components));
-  voxels.set_count(grid.voxels());
-  voxels.set_offset(0);
-  image.bytes.resize(wire::aligned(image.bytes.size()));
-  payload = std::make_shared<const wire::Payload>(std::move(image.bytes));
-  return {};
+  for (const ClampedJoint& clamped : body.clamped) {
+    describe(clamped, job.model->model().rig.skeleton, *frame.add_clamped());
+  }
+  const auto start = Clock::now();
+  auto payload = std::make_shared<wire::Payload>();
+  stream.write(body, fits, (subscription.keyframes >> at & 1) != 0, frame, *payload);
+  frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
+  return {.subscription = subscription.id,
+          .level = stream.level(),
+          .number = job.number,
+          .keyframe = frame.keyframe(),
+          .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
 }
 
-PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, const VolumeWant& want,
-                        const runtime::PosedBody& body, const v1::ServerTimings& timings) {
+PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, const runtime::PosedBody& body,
+                        const v1::ServerTimings& timings) {
   const auto start = Clock::now();
   v1::Envelope envelope;
   v1::VolumeFrame& frame = *envelope.mutable_volume_frame();
   frame.set_subscription(subscription.id);
   frame.set_frame(job.number);
   frame.set_pose_sequence(job.request.sequence);
-  frame.set_volume(want.volume);
-  std::shared_ptr<const wire::Payload> payload;
-  const Status status = guarded([&] { return fill_volume(job, want, body, frame, payload); });
+  frame.set_volume(subscription.volume->want().volume);
+  auto payload = std::make_shared<wire::Payload>();
+  const Status status = guarded([&] {
+    return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
+                                      frame, *payload);
+  });
+  if (!status.ok()) payload->clear();
   wire::to_proto(status, *frame.mutable_status());
   *frame.mutable_timings() = timings;
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
-  return {subscription.id, job.number,
-          std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
+  return {.subscription = subscription.id,
+          .level = 0,
+          .number = job.number,
+          .keyframe = frame.keyframe(),
+          .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
+}
+
+Status pose(const PoseJob& job, runtime::PosedBody& body, bool& fits) {
+  const runtime::BodyPoser& poser = job.model->poser;
+  // A session's body is made at its first pose: sessions that only wait cost nothing.
+  if (body.segments.empty()) body = poser.make_frame({.positions = false});
+  Wanted wanted(poser.model().tissues.size());
+  for (const Subscription& subscription : job.subscriptions) {
+    if (!subscription.streams.empty()) wanted.add(*subscription.streams[0]);
+  }
+  const std::vector<std::uint32_t> tissues = Wanted::rows(wanted.shown),
+                                   numbers = Wanted::rows(wanted.numbers);
+  wanted.shape(poser.model(), body);
+  const auto pose_once = [&] {
+    return poser.run(job.request.pose, job.request.skinning, tissues, body, nodes_wanted(job));
+  };
+  if (Status status = pose_once(); !status.ok()) return status;
+  fits = fits_box(body, numbers);
+  if (fits) return {};
+  wanted.positions = wanted.shown;
+  wanted.shape(poser.model(), body);
+  return pose_once();
 }
 
 void hand_over(const PoseJob& job, PosedFrame frame) {
@@ -173,12 +192,8 @@ Status run(const PoseJob& job, runtime::PosedBody& body) {
   PoseOutcome outcome;
   outcome.sequence = job.request.sequence;
   outcome.timings.set_waited(microseconds(start - job.request.arrived));
-  outcome.status = guarded([&] {
-    // A session's body is made at its first pose: sessions that only wait cost nothing.
-    if (body.segments.empty()) body = job.model->poser.make_frame();
-    return job.model->poser.run(job.request.pose, job.request.skinning, all_wanted(job), body,
-                                nodes_wanted(job));
-  });
+  bool fits = true;  // the box of the u16 encodings
+  outcome.status = guarded([&] { return pose(job, body, fits); });
   outcome.timings.set_posed(microseconds(Clock::now() - start));
   const v1::ServerTimings timings = outcome.timings;
   const bool posed = outcome.status.ok();
@@ -186,20 +201,29 @@ Status run(const PoseJob& job, runtime::PosedBody& body) {
   job.on_outcome(std::move(outcome));
   if (!posed) return {};
 
+  // The streams that somebody wants a frame of.
+  const auto each_stream = [&](auto&& work) {
+    for (const Subscription& subscription : job.subscriptions) {
+      for (std::size_t i = 0; i < subscription.streams.size(); ++i) {
+        if ((subscription.levels >> i & 1) != 0) work(subscription, i);
+      }
+    }
+  };
   return guarded([&] {
     if (job.probe) {
       job.model->probe().follow(body.nodes, job.probe->tree);
       job.probe->sequence = job.request.sequence;
       job.on_probe();
     }
+    each_stream([&](const Subscription& subscription, std::size_t i) {
+      hand_over(job, mesh_frame(job, subscription, i, body, fits, timings));
+    });
     for (const Subscription& subscription : job.subscriptions) {
-      const auto* want = std::get_if<MeshWant>(&subscription.want);
-      if (want) hand_over(job, mesh_frame(job, subscription, *want, body, timings));
+      if (subscription.volume) hand_over(job, volume_frame(job, subscription, body, timings));
     }
-    for (const Subscription& subscription : job.subscriptions) {
-      const auto* want = std::get_if<VolumeWant>(&subscription.want);
-      if (want) hand_over(job, volume_frame(job, subscription, *want, body, timings));
-    }
+    // Once everything is on its way.
+    each_stream(
+        [&](const Subscription& subscription, std::size_t i) { subscription.streams[i]->settle(body); });
     return Status{};
   });
 }

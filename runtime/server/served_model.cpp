@@ -47,9 +47,13 @@ void describe(const ModelVolume& volume, v1::Volume& out) {
 ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves)
     : poser(model),
       volumes(model),
-      closed(runtime::closed_surfaces(*model)),
+      meter(model),
+      levels(make_levels(*model)),
       summary(summarize(std::move(name), *model)) {
   for (Clip& clip : moves) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
+  runtime::PosedBody body = poser.make_frame({.positions = false});
+  const Pose rest = Pose::rest(model->segment_count());
+  if (poser.run(rest, runtime::Skinning::lbs, {}, body, runtime::NodesOf::tissues).ok()) step = body.box.step;
   opened.set_model(summary.name());
   opened.set_identity(summary.identity());
   opened.set_rig_digest(model_file::rig_digest(model->rig));

@@ -9,8 +9,9 @@
 #include "core/values/model.hpp"
 #include "proto/framing.hpp"
 #include "runtime/probe/probe.hpp"
-#include "runtime/quality/pose_quality.hpp"
+#include "runtime/quality/quality_meter.hpp"
 #include "runtime/server/clip.hpp"
+#include "runtime/server/mesh_rows.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/volume_poser.hpp"
 
@@ -27,7 +28,9 @@ struct ServedModel {
 
   runtime::BodyPoser poser;
   runtime::VolumePoser volumes;
-  std::vector<std::uint8_t> closed;  ///< runtime::closed_surfaces
+  runtime::QualityMeter meter;
+  std::vector<MeshParts> levels;  ///< of detail, from 1 on
+  float step = 0;                 ///< mm, of the u16 encodings
   std::vector<std::shared_ptr<const Clip>> clips;
   v1::ModelSummary summary;
   v1::ModelOpened opened;                         ///< without session, role and triangles

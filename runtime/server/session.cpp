@@ -6,11 +6,28 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/server/mesh_streams.hpp"
+#include "runtime/server/volume_stream.hpp"
+
 namespace ecorche::server {
 namespace {
 
 // So long after the last probe, poses are still made ready for the next.
 constexpr auto kProbing = std::chrono::seconds(1);
+// Between keyframes that laggards ask for: one must not make everybody's frames three times as large.
+constexpr std::chrono::milliseconds kKeyframePause{100};
+// Without another pose for so long, the body stands still, and is shown in full detail.
+constexpr std::chrono::milliseconds kStill{150};
+
+double rate_of(const Want& want) {
+  return std::visit([](const auto& w) { return w.max_rate; }, want);
+}
+
+bool same(const Pose& a, const Pose& b) {
+  const auto equal = [](const auto& x, const auto& y) { return x.coeffs() == y.coeffs(); };
+  return a.root_translation == b.root_translation && a.translation == b.translation &&
+         std::equal(a.rotation.begin(), a.rotation.end(), b.rotation.begin(), b.rotation.end(), equal);
+}
 
 }  // namespace
 
@@ -28,7 +45,8 @@ Session::Session(net::io_context& io, Workers& workers, std::shared_ptr<const Se
       name_(std::move(name)),
       named_(named),
       limits_(limits),
-      pace_(io) {
+      pace_(io),
+      clock_(io) {
   present_.pose = Pose::rest(model_->model().segment_count());
   player_ = std::make_shared<ClipPlayer>(io, [this](const Pose& pose) {
     PoseRequest request;
@@ -107,21 +125,27 @@ void Session::retire(std::uint64_t identity) {
   for (Member* member : members_) member->model_changed(identity);
 }
 
-std::uint32_t Session::subscribe(Member& member, const Asked& asked) {
+const Subscription& Session::subscribe(Member& member, const Asked& asked) {
   const Want& want = asked.want;
   auto row =
       std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.subscription.want == want; });
   if (row == rows_.end()) {
-    const std::uint32_t number = asked.id != 0 ? asked.id : ++last_subscription_;
-    row = rows_.insert(
-        row, {.subscription = {.id = number, .want = want}, .request = asked.request, .members = {}});
+    const auto* mesh = std::get_if<MeshWant>(&want);
+    Row made;
+    made.subscription.id = asked.id != 0 ? asked.id : ++last_subscription_;
+    made.subscription.want = want;
+    made.request = asked.request;
+    const auto* volume = std::get_if<VolumeWant>(&want);
+    if (mesh) made.subscription.streams = open_streams(*model_, *mesh);
+    if (volume) made.subscription.volume = std::make_shared<VolumeStream>(*volume);
+    row = rows_.insert(row, std::move(made));
   }
   row->members.insert(&member);
-  const std::uint32_t id = row->subscription.id;
-  fresh_.insert(id);
+  row->subscription.keyframes = ~0U;
+  fresh_.insert(row->subscription.id);
   // Once the answer with the number is on its way.
   net::post(io_, [self = shared_from_this()] { self->start_job(); });
-  return id;
+  return row->subscription;
 }
 
 std::vector<Asked> Session::asked_by(Member& member) const {
@@ -249,10 +273,29 @@ void Session::take_up(PoseJob& job) {
   const bool probing = !probes_.empty() || (probed_ && Clock::now() - *probed_ < kProbing);
   if (probing) job.probe = spare_probe();
   if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
-  for (const Row& row : rows_) {
-    if (!refresh || fresh_.contains(row.subscription.id)) job.subscriptions.push_back(row.subscription);
+  const auto now = Clock::now();
+  if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
+  const bool still = refresh || now - moved_ > kStill;
+  std::set<std::uint32_t> later;
+  for (Row& row : rows_) {
+    const bool fresh = fresh_.contains(row.subscription.id);
+    if (!fresh && (refresh || held_back(row, now))) continue;
+    ask_levels(row, still, now);
+    if (const double rate = rate_of(row.subscription.want); rate > 0)
+      row.next_due = std::max(row.next_due + duration(1 / rate), now);
+    const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
+    job.subscriptions.push_back(row.subscription);
+    if (asked == 0) continue;
+    if (refresh || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) {
+      row.subscription.keyframes &= ~asked;
+      row.last_keyframe = now;
+    } else {
+      job.subscriptions.back().keyframes = 0;
+      later.insert(row.subscription.id);
+    }
   }
-  fresh_.clear();
+  fresh_ = std::move(later);
+  keep_time();
   if (refresh) {
     job.request = present_;
     job.request.arrived = Clock::now();
@@ -281,6 +324,52 @@ void Session::probe_ready(const std::shared_ptr<ProbeFrame>& frame) {
   for (const Ready& ready : std::exchange(probes_, {})) ready(frame);
 }
 
+// Too early for the row's rate; it is served when it is due.
+bool Session::held_back(Row& row, Clock::time_point now) const {
+  if (rate_of(row.subscription.want) == 0 || now >= row.next_due) return false;
+  row.refresh_at = row.next_due;
+  return true;
+}
+
+// What each member's way takes; whoever got less detail gets all once the body stands still.
+void Session::ask_levels(Row& row, bool still, Clock::time_point now) const {
+  row.refresh_at.reset();
+  Subscription& subscription = row.subscription;
+  if (subscription.streams.empty()) return;
+  const std::uint32_t finest = subscription.streams.front()->level(),
+                      coarsest = subscription.streams.back()->level();
+  subscription.levels = 0;
+  for (Member* member : row.members)
+    subscription.levels |= 1U << (member->ask_level(subscription.id, finest, coarsest, still) - finest);
+  if (subscription.levels > 1) row.refresh_at = now + kStill;
+}
+
+void Session::keep_time() {
+  std::optional<Clock::time_point> next;
+  for (const Row& row : rows_) {
+    if (row.refresh_at) next = std::min(next.value_or(Clock::time_point::max()), *row.refresh_at);
+  }
+  if (next == clock_at_) return;
+  clock_at_ = next;
+  if (!next) {
+    clock_.cancel();
+    return;
+  }
+  clock_.expires_at(*next);
+  clock_.async_wait([weak = weak_from_this()](const boost::system::error_code& ec) {
+    const auto self = weak.lock();
+    if (!self || ec) return;
+    self->clock_at_.reset();
+    for (Row& row : self->rows_) {
+      if (!row.refresh_at || *row.refresh_at > Clock::now()) continue;
+      row.refresh_at.reset();
+      self->fresh_.insert(row.subscription.id);
+    }
+    self->keep_time();
+    self->start_job();
+  });
+}
+
 void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,
                           bool refresh) {
   if (refresh) return;
@@ -296,8 +385,15 @@ void Session::publish(const PosedFrame& frame) {
   const auto row = std::find_if(rows_.begin(), rows_.end(),
                                 [&](const Row& r) { return r.subscription.id == frame.subscription; });
   if (row == rows_.end()) return;
-  if (recording_ && frame.number == recorded_job_) recording_->add(frame, row->request);
-  for (Member* member : row->members) member->deliver(frame);
+  if (recording_ && frame.number == recorded_job_ && frame.keyframe == 0)
+    recording_->add(frame, row->request);
+  bool all = true;
+  for (Member* member : row->members) all = member->deliver(frame) && all;
+  if (all) return;
+  // With the next pose, or, where none comes, of the present one.
+  const auto& streams = row->subscription.streams;
+  row->subscription.keyframes |= streams.empty() ? 1U : 1U << (frame.level - streams.front()->level());
+  fresh_.insert(row->subscription.id);
 }
 
 }  // namespace ecorche::server

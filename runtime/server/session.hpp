@@ -32,7 +32,11 @@ struct Skipped {
 class Member {
  public:
   virtual ~Member() = default;
-  virtual void deliver(const PosedFrame& frame) = 0;
+  /// False where the member has not got the keyframe that the frame is against, and so not the frame either.
+  virtual bool deliver(const PosedFrame& frame) = 0;
+  /// The level of detail that suits the member's way for its next frame; `still`: nothing newer waits.
+  virtual std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
+                                  bool still) = 0;
   /// Only to the member that holds control.
   virtual void pose_done(const PoseOutcome& outcome, const Skipped& skipped) = 0;
   /// `vacant`: nobody holds control.
@@ -72,9 +76,9 @@ class Session : public std::enable_shared_from_this<Session> {
   bool release(Member& member);
   bool controls(const Member& member) const { return controller_ == &member; }
 
-  /// The subscription's number, the same for equal wants; `asked.id` where that is not 0 and the want is new.
-  /// Frames follow, the present pose first.
-  std::uint32_t subscribe(Member& member, const Asked& asked);
+  /// The subscription, the same for equal wants, of number `asked.id` where that is not 0 and the want is
+  /// new; good until the next call. Frames follow, the present pose first.
+  const Subscription& subscribe(Member& member, const Asked& asked);
   std::vector<Asked> asked_by(Member& member) const;
   /// False where the member has no such subscription.
   bool unsubscribe(Member& member, std::uint32_t id);
@@ -116,6 +120,9 @@ class Session : public std::enable_shared_from_this<Session> {
     Subscription subscription;
     v1::Subscribe request;
     std::set<Member*> members;
+    std::optional<Clock::time_point> last_keyframe;  ///< when the last one was made that somebody lacked
+    Clock::time_point next_due{};                    ///< of max_rate
+    std::optional<Clock::time_point> refresh_at;     ///< when the present pose is to be shown (again)
   };
 
   void tell_control();
@@ -125,6 +132,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void start_job();
   void submit(std::shared_ptr<PoseJob> job, bool refresh);
   void take_up(PoseJob& job);
+  bool held_back(Row& row, Clock::time_point now) const;
+  void ask_levels(Row& row, bool still, Clock::time_point now) const;
+  void keep_time();
   void finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job, bool refresh);
   void publish(const PosedFrame& frame);
 
@@ -156,6 +166,9 @@ class Session : public std::enable_shared_from_this<Session> {
   net::steady_timer pace_;
   Clock::time_point next_start_ = Clock::now();
   bool pacing_ = false;
+  net::steady_timer clock_;  ///< for the rows' refresh_at
+  std::optional<Clock::time_point> clock_at_;
+  Clock::time_point moved_ = Clock::now();  ///< when the pose last became another one
 
   std::uint64_t last_sequence_ = 0;
   std::shared_ptr<ClipPlayer> player_;

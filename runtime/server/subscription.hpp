@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -17,7 +18,14 @@ namespace ecorche::server {
 
 struct MeshWant {
   std::vector<std::uint32_t> tissues;  ///< rows of Model::tissues, ascending
+  v1::Encoding encoding = v1::ENCODING_F32;
+  bool normals = false;
   bool quality = false;
+  std::optional<runtime::Region> region;  ///< in the scan
+  std::uint32_t level = 0;                ///< of detail
+  bool adaptive = false;                  ///< coarser levels too, where the network asks for it
+  bool control_nodes = false;
+  double max_rate = 0;  ///< frames per second; 0: every pose
   bool operator==(const MeshWant&) const = default;
 };
 
@@ -26,15 +34,26 @@ struct VolumeWant {
   runtime::Sampling sampling = runtime::Sampling::trilinear;
   bool by_spheres = false;
   std::optional<runtime::Region> region;  ///< by spheres only
+  std::vector<ImageGrid> slices;          ///< one pixel thick; by tets only
+  bool compressed = false;
+  bool changed_bricks = false;  ///< by tets only
+  double max_rate = 0;          ///< as of MeshWant
   bool operator==(const VolumeWant&) const = default;
 };
 
 using Want = std::variant<MeshWant, VolumeWant>;
 
+class MeshStream;
+class VolumeStream;
+
 /// Equal wants share one number within a session, and so one encoding of every frame.
 struct Subscription {
   std::uint32_t id = 0;
   Want want;
+  std::vector<std::shared_ptr<MeshStream>> streams;  ///< of a mesh, one per level, finest first
+  std::shared_ptr<VolumeStream> volume;
+  std::uint32_t levels = 1;     ///< bit i: a frame of streams[i] is wanted
+  std::uint32_t keyframes = 0;  ///< bit i: somebody cannot read deltas of streams[i] before the next keyframe
 };
 
 /// Reads a request against a model: not_found for names it lacks, unimplemented for what this server cannot

@@ -49,6 +49,29 @@ class Stream(unittest.TestCase):
                 self.assertLessEqual(report["frames"], report["poses"] - report["skipped"] + 1)
                 self.assertLessEqual(report["latency_ms"]["p50"], report["latency_ms"]["max"])
 
+    def test_every_encoding_within_its_bound(self):
+        sizes = {}
+        with Server(MODEL) as server:
+            for encoding in ("f32", "u16", "u16-delta"):
+                result = stream(server.address, "--motion", clip(), "--rate", 60, "--seconds", 1, "--encoding", encoding, "--normals",
+                                "--model", MODEL, "--json")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                report = json.loads(result.stdout)
+                print(encoding, report)
+                self.assertEqual(report["mismatches"], 0)
+                self.assertEqual(report["checked"], report["frames"])
+                sizes[encoding] = report["bytes"] / report["frames"]
+        self.assertLess(sizes["u16"], 0.6 * sizes["f32"])
+        self.assertLess(sizes["u16-delta"], 0.8 * sizes["u16"])
+
+    def test_a_rate_holds_frames_back(self):
+        with Server(MODEL) as server:
+            result = stream(server.address, "--motion", clip(), "--rate", 60, "--seconds", 1, "--max-rate", 10, "--model", MODEL, "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads(result.stdout)
+            self.assertLessEqual(report["frames"], 10 * report["seconds"] + 3, report)
+            self.assertEqual(report["mismatches"], 0)
+
     def test_volumes_and_quality(self):
         with h5py.File(MODEL) as file:
             volumes = list(file["ecorche/volumes"])

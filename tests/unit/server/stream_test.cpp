@@ -6,7 +6,7 @@
 #include "core/model_file/model_file.hpp"
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
-#include "runtime/quality/pose_quality.hpp"
+#include "runtime/quality/quality_meter.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/resample.hpp"
 #include "runtime/volume/volume_poser.hpp"
@@ -45,8 +45,9 @@ TEST(Stream, HelloTellsLimitsAndEncodings) {
   EXPECT_EQ(client.server().server(), "ecorche test");
   EXPECT_EQ(client.server().limits().connections(), 256U);
   EXPECT_EQ(client.server().limits().payload_bytes(), 1U << 20);
-  ASSERT_EQ(client.server().encodings_size(), 1);
-  EXPECT_EQ(client.server().encodings(0), v1::ENCODING_F32);
+  const auto& encodings = client.server().encodings();
+  EXPECT_EQ(std::vector<int>(encodings.begin(), encodings.end()),
+            (std::vector<int>{v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA}));
 }
 
 TEST(Stream, ModelsAreListed) {
@@ -197,7 +198,7 @@ TEST(Stream, QualityComesWhereItWasAskedFor) {
   const v1::PoseQuality& quality = frame.envelope.mesh_frame().quality();
   const Offline offline(client.bent(0.8));
   const runtime::PoseQuality expected =
-      runtime::measure(server.model(), offline.body, offline.poser.all_tissues());
+      runtime::QualityMeter(offline.poser.shared_model()).measure(offline.body, offline.poser.all_tissues());
   EXPECT_EQ(quality.verdict(), expected.pass ? v1::PoseQuality::VERDICT_PASS : v1::PoseQuality::VERDICT_WARN);
   EXPECT_EQ(quality.inverted_tets(), expected.inverted_tets);
   EXPECT_EQ(quality.min_det_f(), expected.min_det_f);
@@ -206,6 +207,7 @@ TEST(Stream, QualityComesWhereItWasAskedFor) {
   for (std::size_t t = 0; t < expected.tissues.size(); ++t)
     EXPECT_EQ(quality.tissues(static_cast<int>(t)).has_share(), expected.tissues[t].closed) << t;
   EXPECT_GT(quality.max_volume_change(), 0);
+  EXPECT_EQ(frame.envelope.mesh_frame().clamped_size(), static_cast<int>(offline.body.clamped.size()));
 }
 
 TEST(Stream, ClampedJointsAreNamed) {

@@ -55,16 +55,26 @@ TEST(Subscription, WhatCannotBeDoneSaysSo) {
       {"rate",
        [](v1::Subscribe& s) {
          s.mutable_mesh();
-         s.set_max_rate(30);
+         s.set_max_rate(-1);
        },
+       StatusCode::invalid_argument},
+      {"encoding", [](v1::Subscribe& s) { s.mutable_mesh()->set_encoding(static_cast<v1::Encoding>(4)); },
        StatusCode::unimplemented},
-      {"u16", [](v1::Subscribe& s) { s.mutable_mesh()->set_encoding(v1::ENCODING_U16); },
+      {"encoding", [](v1::Subscribe& s) { s.mutable_mesh()->set_encoding(static_cast<v1::Encoding>(-1)); },
        StatusCode::unimplemented},
-      {"delta", [](v1::Subscribe& s) { s.mutable_mesh()->set_encoding(v1::ENCODING_U16_DELTA); },
-       StatusCode::unimplemented},
-      {"normals", [](v1::Subscribe& s) { s.mutable_mesh()->set_normals(true); }, StatusCode::unimplemented},
-      {"mesh region", [](v1::Subscribe& s) { s.mutable_mesh()->mutable_region(); },
-       StatusCode::unimplemented},
+      {"level", [](v1::Subscribe& s) { s.mutable_mesh()->set_level(4); }, StatusCode::invalid_argument},
+      {"nodes and more",
+       [](v1::Subscribe& s) {
+         s.mutable_mesh()->set_control_nodes(true);
+         s.mutable_mesh()->set_encoding(v1::ENCODING_U16);
+       },
+       StatusCode::invalid_argument},
+      {"mesh region",
+       [](v1::Subscribe& s) {
+         s.mutable_mesh()->mutable_region()->mutable_min()->set_x(1);
+         s.mutable_mesh()->mutable_region()->mutable_max()->set_x(0);
+       },
+       StatusCode::invalid_argument},
       {"region",
        [&](v1::Subscribe& s) {
          s.mutable_volume()->set_volume(ct);
@@ -74,15 +84,15 @@ TEST(Subscription, WhatCannotBeDoneSaysSo) {
       {"slices",
        [&](v1::Subscribe& s) {
          s.mutable_volume()->set_volume(ct);
-         s.mutable_volume()->add_slices();
+         s.mutable_volume()->add_slices()->set_size_u(5);
        },
-       StatusCode::unimplemented},
-      {"compressed",
+       StatusCode::invalid_argument},
+      {"too many slices",
        [&](v1::Subscribe& s) {
          s.mutable_volume()->set_volume(ct);
-         s.mutable_volume()->set_compressed(true);
+         for (int i = 0; i < 17; ++i) s.mutable_volume()->add_slices();
        },
-       StatusCode::unimplemented},
+       StatusCode::invalid_argument},
   };
   for (const Case& c : cases) {
     v1::Subscribe request;

@@ -42,10 +42,14 @@ Clip turning_clip(const Model& model) {
   return clip;
 }
 
-TestServer::TestServer(const Limits& limits) : TestServer(with(limits)) {}
+Model TestServer::toy() {
+  return test::toy_model();
+}
 
-TestServer::TestServer(Options options, Seams seams)
-    : model_(std::make_shared<const Model>(test::toy_model())), workers_(2, [](const Job& job) { job(); }) {
+TestServer::TestServer(const Limits& limits, const Model& model) : TestServer(with(limits), {}, model) {}
+
+TestServer::TestServer(Options options, Seams seams, const Model& model)
+    : model_(std::make_shared<const Model>(model)), workers_(2, [](const Job& job) { job(); }) {
   spdlog::set_level(spdlog::level::off);
   options.listen.port = 0;
   options.version = "test";
@@ -75,8 +79,8 @@ void TestServer::join() {
   if (thread_.joinable()) thread_.join();
 }
 
-TestClient::TestClient(const TestServer& server, const std::string& session, const client::Access& access)
-    : client_(server.address(), "test", access) {
+TestClient::TestClient(const wire::Address& address, const std::string& session, const client::Access& access)
+    : client_(address, "test", access) {
   v1::Envelope open;
   open.mutable_open_model()->set_model("toy");
   open.mutable_open_model()->set_session(session);

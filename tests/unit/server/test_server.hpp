@@ -25,9 +25,9 @@ Clip turning_clip(const Model& model);
 /// Serves the toy body as `toy`, with the clip `turning`, and the same under `twin`, until destroyed.
 class TestServer {
  public:
-  explicit TestServer(const Limits& limits = {});
+  explicit TestServer(const Limits& limits = {}, const Model& model = toy());
   /// Listens on free ports, whatever the options say of them.
-  explicit TestServer(Options options, Seams seams = {});
+  explicit TestServer(Options options, Seams seams = {}, const Model& model = toy());
   ~TestServer();
 
   wire::Address address() const { return {"127.0.0.1", server_->port()}; }
@@ -40,6 +40,8 @@ class TestServer {
   void join();
 
  private:
+  static Model toy();
+
   std::shared_ptr<const Model> model_;
   std::mutex mutex_;
   std::function<ModelParts()> read_;
@@ -52,6 +54,9 @@ class TestServer {
 class TestClient {
  public:
   explicit TestClient(const TestServer& server, const std::string& session = {},
+                      const client::Access& access = {})
+      : TestClient(server.address(), session, access) {}
+  explicit TestClient(const wire::Address& address, const std::string& session = {},
                       const client::Access& access = {});
 
   const v1::ModelOpened& opened() const { return opened_; }

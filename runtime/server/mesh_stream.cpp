@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/server/mesh_stream.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "proto/arrays.hpp"
+#include "proto/oct16.hpp"
+
+namespace ecorche::server {
+namespace {
+
+constexpr std::size_t kBlocksPerRun = 32;         // 16384 vertices
+constexpr std::size_t kNumbersPerRun = 64 << 10;  // looked at in one go
+
+v1::MeshArray& add_array(v1::MeshFrame& frame, std::uint32_t tissue, v1::MeshArray::Kind kind) {
+  v1::MeshArray& array = *frame.add_arrays();
+  array.set_tissue(tissue);
+  array.set_kind(kind);
+  return array;
+}
+
+// The rows of `part` of an array of three per vertex.
+template <class T>
+std::vector<T> picked(const std::vector<T>& all, const MeshRows& part) {
+  std::vector<T> out(3 * part.vertices.size());
+  for (std::size_t i = 0; i < part.vertices.size(); ++i)
+    std::copy_n(&all[3 * std::size_t{part.vertices[i]}], 3, &out[3 * i]);
+  return out;
+}
+
+// A number on the side of the box stands for anything beyond it too.
+bool inside(std::span<const std::uint16_t> numbers) {
+  unsigned outside = 0;
+  for (const std::uint16_t n : numbers)
+    outside |= static_cast<unsigned>(static_cast<std::uint16_t>(n + 1) <= 1);
+  return outside == 0;
+}
+
+}  // namespace
+
+bool fits_box(const runtime::PosedBody& body, std::span<const std::uint32_t> tissues) {
+  return std::all_of(tissues.begin(), tissues.end(), [&](std::uint32_t tissue) {
+    const std::span<const std::uint16_t> numbers = body.quantised[tissue];
+    const std::size_t runs = (numbers.size() + kNumbersPerRun - 1) / kNumbersPerRun;
+    if (runs < 2) return inside(numbers);
+    std::atomic<bool> good = true;
+    tbb::parallel_for(std::size_t{0}, runs, [&](std::size_t r) {
+      const std::size_t first = r * kNumbersPerRun;
+      if (!inside(numbers.subspan(first, std::min(kNumbersPerRun, numbers.size() - first)))) good = false;
+    });
+    return good.load();
+  });
+}
+
+MeshStream::MeshStream(MeshWant want, std::uint32_t level, std::shared_ptr<const MeshParts> parts,
+                       std::vector<std::uint32_t> nodes)
+    : want_(std::move(want)), level_(level), parts_(std::move(parts)), nodes_(std::move(nodes)) {
+  if (parts_) gathered_.resize(want_.tissues.size());
+}
+
+void MeshStream::gather(const runtime::PosedBody& body) {
+  if (!parts_) return;
+  tbb::parallel_for(std::size_t{0}, gathered_.size(), [&](std::size_t t) {
+    const MeshRows& part = (*parts_)[t];
+    gathered_[t].resize(3 * part.vertices.size());
+    const std::vector<std::uint16_t>& all = body.quantised[want_.tissues[t]];
+    for (std::size_t i = 0; i < part.vertices.size(); ++i)
+      std::copy_n(&all[3 * std::size_t{part.vertices[i]}], 3, &gathered_[t][3 * i]);
+  });
+}
+
+std::size_t MeshStream::vertices(const runtime::PosedBody& body, std::size_t t) const {
+  if (parts_) return (*parts_)[t].vertices.size();
+  const std::uint32_t tissue = want_.tissues[t];
+  return std::max(body.tissues[tissue].size(), body.quantised[tissue].size()) / 3;
+}
+
+std::span<const std::uint16_t> MeshStream::numbers(const runtime::PosedBody& body, std::size_t t) const {
+  if (parts_) return gathered_[t];
+  return body.quantised[want_.tissues[t]];
+}
+
+void MeshStream::append_normals(const runtime::PosedBody& body, std::size_t t, v1::MeshFrame& frame,
+                                wire::Payload& payload) {
+  const std::uint32_t tissue = want_.tissues[t];
+  const auto append = [&](std::span<const std::int16_t> unit) {
+    std::vector<std::int8_t> packed(unit.size() / 3 * 2);
+    wire::to_oct16(unit, packed);
+    *add_array(frame, tissue, v1::MeshArray::KIND_NORMALS).mutable_array() =
+        wire::append(payload, std::span<const std::int8_t>(packed), 2);
+  };
+  if (parts_) {
+    append(picked(body.normals[tissue], (*parts_)[t]));
+  } else {
+    append(body.normals[tissue]);
+  }
+}
+
+void MeshStream::write_nodes(const runtime::PosedBody& body, v1::MeshFrame& frame,
+                             wire::Payload& payload) const {
+  std::vector<float> nodes(3 * nodes_.size());
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    std::copy_n(&body.nodes[3 * std::size_t{nodes_[i]}], 3, &nodes[3 * i]);
+  *add_array(frame, 0, v1::MeshArray::KIND_NODES).mutable_array() =
+      wire::append(payload, std::span<const float>(nodes), 3);
+  std::vector<double> motions;
+  for (const RigidTransform& segment : body.segments) {
+    const Eigen::Matrix3d turn = segment.q.toRotationMatrix();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) motions.push_back(turn(r, c));
+      motions.push_back(segment.t[r]);
+    }
+  }
+  *add_array(frame, 0, v1::MeshArray::KIND_SEGMENTS).mutable_array() =
+      wire::append(payload, std::span<const double>(motions), 12);
+}
+
+bool MeshStream::keyframe_due(std::uint64_t frame) const {
+  // Deltas that have grown to half a keyframe: the pose is another one by now. Those of a small mesh are as
+  // large from the first.
+  const bool grown = 2 * last_bytes_ > keyframe_bytes_ && 2 * last_bytes_ > 3 * first_bytes_;
+  return keyframe_ == 0 || frame - keyframe_ >= keyframe_interval || grown;
+}
+
+void MeshStream::write(const runtime::PosedBody& body, bool fits, bool keyframe, v1::MeshFrame& frame,
+                       wire::Payload& payload) {
+  const v1::Encoding encoding = fits ? want_.encoding : v1::ENCODING_F32;
+  frame.set_encoding(encoding);
+  frame.set_level(level_);
+  if (want_.control_nodes) return write_nodes(body, frame, payload);
+  if (encoding != v1::ENCODING_F32) {
+    v1::QuantiseBox& box = *frame.mutable_box();
+    box.set_low_x(body.box.low[0]);
+    box.set_low_y(body.box.low[1]);
+    box.set_low_z(body.box.low[2]);
+    box.set_step(body.box.step);
+    gather(body);
+  }
+  if (encoding == v1::ENCODING_U16_DELTA && !keyframe && !keyframe_due(frame.frame()))
+    return write_deltas(body, frame, payload);
+
+  std::size_t bytes = 0;
+  const std::size_t row = encoding == v1::ENCODING_F32 ? 3 * sizeof(float) : 3 * sizeof(std::uint16_t);
+  for (std::size_t t = 0; t < want_.tissues.size(); ++t)
+    bytes +=
+        wire::aligned(vertices(body, t) * row) + wire::aligned(want_.normals ? 2 * vertices(body, t) : 0);
+  payload.reserve(bytes);
+  for (std::size_t t = 0; t < want_.tissues.size(); ++t) {
+    const std::uint32_t tissue = want_.tissues[t];
+    v1::Array& array = *add_array(frame, tissue, v1::MeshArray::KIND_POSITIONS).mutable_array();
+    if (encoding != v1::ENCODING_F32) {
+      array = wire::append(payload, numbers(body, t), 3);
+    } else if (parts_) {
+      array = wire::append(payload, std::span<const float>(picked(body.tissues[tissue], (*parts_)[t])), 3);
+    } else {
+      array = wire::append(payload, std::span<const float>(body.tissues[tissue]), 3);
+    }
+    if (want_.normals) append_normals(body, t, frame, payload);
+  }
+  if (encoding != v1::ENCODING_U16_DELTA) return;
+  frame.set_keyframe(frame.frame());
+  keyframe_ = frame.frame();
+  keyframe_bytes_ = payload.size();
+  first_bytes_ = last_bytes_ = 0;
+  unsettled_ = true;
+}
+
+void MeshStream::settle(const runtime::PosedBody& body) {
+  if (!std::exchange(unsettled_, false)) return;
+  if (keys_.empty()) {
+    for (std::uint32_t t = 0; t < want_.tissues.size(); ++t) {
+      keys_.emplace_back(numbers(body, t).size() / 3);
+      for (std::size_t b = 0; b < keys_[t].blocks(); b += kBlocksPerRun) {
+        runs_.push_back({t, static_cast<std::uint32_t>(b),
+                         static_cast<std::uint32_t>(std::min(keys_[t].blocks(), b + kBlocksPerRun))});
+      }
+    }
+    pieces_.resize(runs_.size());
+  }
+  tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t r) {
+    const Run& run = runs_[r];
+    keys_[run.tissue].prepare(numbers(body, run.tissue), run.first, run.end);
+  });
+}
+
+void MeshStream::write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) {
+  tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t r) {
+    const Run& run = runs_[r];
+    pieces_[r].clear();
+    keys_[run.tissue].encode(numbers(body, run.tissue), run.first, run.end, pieces_[r]);
+  });
+  std::size_t bytes = 0;
+  for (const auto& piece : pieces_) bytes += wire::aligned(piece.size());
+  if (want_.normals) bytes += keyframe_bytes_ / 3;
+  payload.reserve(bytes);
+  std::size_t r = 0;
+  for (std::uint32_t t = 0; t < want_.tissues.size(); ++t) {
+    v1::Array& array = *add_array(frame, want_.tissues[t], v1::MeshArray::KIND_POSITIONS).mutable_array();
+    array.set_type(v1::SCALAR_TYPE_U8);
+    array.set_components(1);
+    array.set_offset(payload.size());
+    for (; r < runs_.size() && runs_[r].tissue == t; ++r)
+      payload.insert(payload.end(), pieces_[r].begin(), pieces_[r].end());
+    array.set_count(payload.size() - array.offset());
+    payload.resize(wire::aligned(payload.size()));
+    if (want_.normals) append_normals(body, t, frame, payload);
+  }
+  frame.set_keyframe(keyframe_);
+  last_bytes_ = payload.size();
+  if (first_bytes_ == 0) first_bytes_ = last_bytes_;
+}
+
+}  // namespace ecorche::server

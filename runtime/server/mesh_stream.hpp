@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frames of one mesh subscription, one after another.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "ecorche/v1/envelope.pb.h"
+#include "proto/delta.hpp"
+#include "proto/framing.hpp"
+#include "runtime/server/mesh_rows.hpp"
+#include "runtime/server/subscription.hpp"
+#include "runtime/skin/body_poser.hpp"
+
+namespace ecorche::server {
+
+/// Writes the arrays of each frame, and keeps the keyframe that deltas are against. One job of the session at
+/// a time uses it, on a worker.
+class MeshStream {
+ public:
+  /// Frames from one keyframe to the next: fewer than 1 % are keyframes, so that the tail of latencies is not
+  /// theirs.
+  static constexpr std::uint64_t keyframe_interval = 128;
+
+  /// `parts`: of the tissues of `want`, one for each, null where they are whole. `nodes`: of
+  /// MeshWant::control_nodes.
+  MeshStream(MeshWant want, std::uint32_t level, std::shared_ptr<const MeshParts> parts,
+             std::vector<std::uint32_t> nodes = {});
+
+  const MeshWant& want() const { return want_; }
+  std::uint32_t level() const { return level_; }
+  const MeshParts* parts() const { return parts_.get(); }
+  const std::vector<std::uint32_t>& nodes() const { return nodes_; }
+
+  /// What the frame needs of the posed body.
+  bool needs_numbers() const { return want_.encoding != v1::ENCODING_F32; }
+  bool needs_positions() const {
+    return (want_.encoding == v1::ENCODING_F32 && !want_.control_nodes) || want_.quality;
+  }
+
+  /// Fills encoding, arrays, box and keyframe of `frame`, whose number is set. `keyframe`: somebody needs
+  /// one. A body with a vertex outside its box goes out as float32 (`fits` is false; `body` then has
+  /// positions).
+  void write(const runtime::PosedBody& body, bool fits, bool keyframe, v1::MeshFrame& frame,
+             wire::Payload& payload);
+  /// After a keyframe has left: readies it for the deltas to come. Cheap where nothing is to be done.
+  void settle(const runtime::PosedBody& body);
+
+ private:
+  void write_nodes(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) const;
+  void write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload);
+  void append_normals(const runtime::PosedBody& body, std::size_t t, v1::MeshFrame& frame,
+                      wire::Payload& payload);
+  /// The numbers of tissue `t` of the want, gathered where it is a part.
+  void gather(const runtime::PosedBody& body);
+  std::size_t vertices(const runtime::PosedBody& body, std::size_t t) const;
+  std::span<const std::uint16_t> numbers(const runtime::PosedBody& body, std::size_t t) const;
+  bool keyframe_due(std::uint64_t frame) const;
+
+  struct Run {
+    std::uint32_t tissue, first, end;  // row of `want_.tissues`, blocks
+  };
+
+  MeshWant want_;
+  std::uint32_t level_;
+  std::shared_ptr<const MeshParts> parts_;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<std::vector<std::uint16_t>> gathered_;  // of parts, one per tissue of the want
+  std::vector<wire::DeltaKey> keys_;                  // one per tissue of the want
+  std::vector<Run> runs_;
+  std::vector<std::vector<std::byte>> pieces_;  // one per run
+  std::uint64_t keyframe_ = 0;                  // number of its frame; 0: none yet
+  std::size_t keyframe_bytes_ = 0;
+  std::size_t first_bytes_ = 0, last_bytes_ = 0;  // of the deltas against it
+  bool unsettled_ = false;
+};
+
+/// Whether every vertex of the tissues lies inside the box: none has a number on its side.
+bool fits_box(const runtime::PosedBody& body, std::span<const std::uint32_t> tissues);
+
+}  // namespace ecorche::server

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a mesh subscription starts with.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "runtime/server/mesh_stream.hpp"
+#include "runtime/server/served_model.hpp"
+
+namespace ecorche::server {
+
+/// A stream for every level that may come, finest first.
+std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, const MeshWant& want);
+
+/// Fills all but the subscription's number: what the levels hold, how vertices hang on control nodes. Null
+/// where the answer needs no arrays.
+std::shared_ptr<const wire::Payload> describe(const ServedModel& model,
+                                              const std::vector<std::shared_ptr<MeshStream>>& streams,
+                                              v1::Subscribed& out);
+
+}  // namespace ecorche::server

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frames of one volume subscription, one after another.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "proto/framing.hpp"
+#include "runtime/server/served_model.hpp"
+#include "runtime/server/subscription.hpp"
+
+namespace ecorche::server {
+
+/// Keeps the posed volume from frame to frame, so that only what moved is made again, and what changed since
+/// the keyframe. One job of the session at a time uses it, on a worker.
+class VolumeStream {
+ public:
+  /// Frames from one keyframe to the next.
+  static constexpr std::uint64_t keyframe_interval = 128;
+
+  explicit VolumeStream(VolumeWant want) : want_(std::move(want)) {}
+
+  const VolumeWant& want() const { return want_; }
+
+  /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
+  /// needs one. resource_exhausted beyond `most_voxels`.
+  Status write(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
+               bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
+
+ private:
+  Status write_spheres(const Model& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
+                       v1::VolumeFrame& frame, wire::Payload& payload);
+  void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
+                    wire::Payload& payload);
+  void write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
+  void put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,
+           wire::Payload& payload) const;
+
+  VolumeWant want_;
+  runtime::PosedVolume kept_;
+  runtime::VolumePoser::Scratch scratch_;
+  std::vector<std::uint8_t> changed_;  // a brick each: since the keyframe
+  ImageGrid keyframe_grid_;
+  std::uint64_t keyframe_ = 0;  // number of its frame; 0: none yet
+};
+
+}  // namespace ecorche::server
