@@ -75,6 +75,11 @@ std::optional<Found> first_good(const Sources& sources, double fair_enough, Find
   return fair ? fair : plain ? plain : best;
 }
 
+// Never beside nothing, the zero vector.
+bool collinear(const Eigen::Vector3d& unit, const Eigen::Vector3d& beside) {
+  return !beside.isZero() && unit.cross(beside).norm() < kLeastSine;
+}
+
 Eigen::Vector3d mean(const Points& points) {
   return points.colwise().mean().transpose();
 }
@@ -215,7 +220,8 @@ std::optional<FoundDirection> JointSources::axis_of(const std::string& joint, in
   return FoundDirection{frame.col(axis), confidence};
 }
 
-std::optional<FoundDirection> JointSources::direction(const DirectionSource& source, int axis) {
+std::optional<FoundDirection> JointSources::direction(const DirectionSource& source, int axis,
+                                                      const Eigen::Vector3d& beside) {
   using Kind = DirectionSource::Kind;
   switch (source.kind) {
     case Kind::given:
@@ -226,7 +232,11 @@ std::optional<FoundDirection> JointSources::direction(const DirectionSource& sou
       return axis_of(source.joint, axis);
     case Kind::first_good:
       return first_good<FoundDirection>(
-          source.choices, fair_axis, [&](const DirectionSource& choice) { return direction(choice, axis); },
+          source.choices, fair_axis,
+          [&](const DirectionSource& choice) {
+            auto found = direction(choice, axis, beside);
+            return found && collinear(found->along, beside) ? std::nullopt : found;
+          },
           [](const FoundDirection& found) { return found.confidence; });
     case Kind::towards:
       break;
@@ -246,18 +256,19 @@ std::pair<Eigen::Matrix3d, double> JointSources::find_axes(std::size_t row) {
   if (!joint.how || joint.how->axes.empty()) return {joint.axes, 1};
   const Open open(open_axes_, row, joint.name);
   double confidence = 1;
-  const auto found = [&](const std::pair<int, DirectionSource>& said) -> Eigen::Vector3d {
-    const auto along = direction(said.second, said.first);
+  const auto found = [&](const std::pair<int, DirectionSource>& said,
+                         const Eigen::Vector3d& beside) -> Eigen::Vector3d {
+    const auto along = direction(said.second, said.first, beside);
     confidence = std::min(confidence, along ? along->confidence : 0);
     return along ? along->along : Eigen::Vector3d::Unit(said.first);
   };
   const auto& [first, second] = std::pair(joint.how->axes[0], joint.how->axes[1]);
   const int last = 3 - first.first - second.first;
   Eigen::Matrix3d frame;
-  frame.col(first.first) = found(first);
-  const Eigen::Vector3d other = found(second);
+  frame.col(first.first) = found(first, Eigen::Vector3d::Zero());
+  const Eigen::Vector3d other = found(second, frame.col(first.first));
   const Eigen::Vector3d across = other - frame.col(first.first) * frame.col(first.first).dot(other);
-  if (across.norm() < kLeastSine) {
+  if (collinear(other, frame.col(first.first))) {
     throw Error(ErrorKind::data, "joint " + joint.name, "its two axes come out collinear",
                 "take them from other regions, or give them");
   }

@@ -54,7 +54,9 @@ class JointSources {
   std::optional<FoundPoint> by_rule(const Joint& joint);
   std::pair<Eigen::Matrix3d, double> find_axes(std::size_t row);
   FoundPoint by_proximity(const Segment& segment);
-  std::optional<FoundDirection> direction(const DirectionSource& source, int axis);
+  // Of several choices none that lies along `beside` (zero: nothing does).
+  std::optional<FoundDirection> direction(const DirectionSource& source, int axis,
+                                          const Eigen::Vector3d& beside);
   std::optional<FoundDirection> fitted_axis(const DirectionSource& source);
   std::optional<FoundDirection> axis_of(const std::string& joint, int axis);
 

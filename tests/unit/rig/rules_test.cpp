@@ -145,6 +145,19 @@ TEST(Rules, the_first_source_that_is_found_well_is_taken) {
   EXPECT_EQ(rig.skeleton.segments[1].joint.how, nullptr);  // all is said
 }
 
+// An arm stretched out sidewards: its long axis is where the flexion axis of a hanging one would be.
+TEST(Rules, of_several_directions_none_along_the_first_axis_is_taken) {
+  JointRule rule;
+  DirectionSource any;
+  any.kind = Kind::first_good;
+  any.choices = {given(Vector3d(1, 0, 0.01).normalized()), given(Vector3d(0, 0, 1))};
+  rule.axes = {{2, given(Vector3d(-1, 0, 0))}, {0, any}};
+  const Eigen::Matrix3d axes = fitted(two_segments(rule)).axes;
+  EXPECT_EQ(axes.col(2), Vector3d(-1, 0, 0));
+  EXPECT_EQ(axes.col(0), Vector3d(0, 0, 1));
+  EXPECT_EQ(axes.col(1), Vector3d(0, 1, 0));
+}
+
 TEST(Rules, a_rule_that_cannot_be_followed_lies_between_the_nearest_surfaces_and_is_a_warning) {
   JointRule rule;
   rule.center = at(CenterRule::sphere_fit, "");

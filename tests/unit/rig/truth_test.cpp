@@ -12,6 +12,7 @@
 #include "phantom/bones.hpp"
 #include "phantom/isosurface.hpp"
 #include "preprocess/rig/fit_rig.hpp"
+#include "tests/unit/rig/balls.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -192,6 +193,35 @@ TEST(Truth, the_human_template_finds_the_phantoms_joints_from_its_bones_alone) {
     EXPECT_NEAR(joint("elbow").sequence[0].rest, at.elbow_flexion, 0.05);
     const Vector3d thigh = (mirrored(at.hip) - mirrored(at.knee)).normalized();
     EXPECT_LT(degrees(joint("hip").axes.col(2), thigh), 1);
+  }
+}
+
+// A ball for a bone, anywhere: no template refuses a body, however it lies and whatever it lacks.
+TEST(Truth, every_template_finds_joints_on_whatever_bones_there_are) {
+  for (const char* name : {"human", "hand", "knee", "quadruped"}) {
+    for (const std::uint32_t seed : {1U, 2U, 3U, 4U}) {
+      io::PlacedSkeleton placed =
+          io::parse_skeleton(io::yaml::Value::parse(io::skeleton_template(name).value(), name), io::Frame{});
+      Case patient;
+      patient.name = name;
+      patient.skeleton = placed.skeleton;
+      std::mt19937 random(seed);
+      std::uniform_real_distribution<double> share(0, 1), place(-300, 300);
+      for (const Segment& segment : placed.skeleton.segments) {
+        if (seed > 1 && share(random) < 0.25) continue;
+        patient.bones.push_back({segment.name + "_bone", segment.name,
+                                 test::ball({place(random), place(random), place(random)}, 20, 8)});
+      }
+      io::place_regions({}, placed.regions, patient);
+      const Rig rig = fit(patient, {});
+      for (std::size_t row = 0; row < rig.fits.size(); ++row) {
+        const Joint& joint = rig.skeleton.segments[row].joint;
+        EXPECT_TRUE(joint.center.allFinite() && joint.axes.allFinite()) << name << " " << joint.name;
+        EXPECT_LT((joint.axes.transpose() * joint.axes - Eigen::Matrix3d::Identity()).norm(), 1e-9);
+        EXPECT_NEAR(joint.axes.determinant(), 1, 1e-9);
+        for (const AngleAxis& angle : joint.sequence) EXPECT_TRUE(std::isfinite(angle.rest)) << joint.name;
+      }
+    }
   }
 }
 
