@@ -40,7 +40,7 @@ std::optional<Cylinder> through(const Eigen::Vector3d& a, const Eigen::Vector3d&
   const Eigen::Vector2d ab((b - a).dot(across.u), (b - a).dot(across.v));
   const Eigen::Vector2d ac((c - a).dot(across.u), (c - a).dot(across.v));
   const double det = 2 * (ab.x() * ac.y() - ab.y() * ac.x());
-  if (std::abs(det) < 1e-9 * (ab.squaredNorm() + ac.squaredNorm())) return std::nullopt;
+  if (!(std::abs(det) > 1e-9 * (ab.squaredNorm() + ac.squaredNorm()))) return std::nullopt;
   const Eigen::Vector2d from_a((ac.y() * ab.squaredNorm() - ab.y() * ac.squaredNorm()) / det,
                                (ab.x() * ac.squaredNorm() - ac.x() * ab.squaredNorm()) / det);
   return Cylinder{a + from_a.x() * across.u + from_a.y() * across.v, axis, from_a.norm()};
