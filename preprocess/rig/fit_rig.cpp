@@ -73,13 +73,18 @@ void need_sphere(const Case& patient, const Joint& joint, const FoundPoint& foun
       "give the joint's center as [x, y, z]");
 }
 
-// The rest angles that lead from the parent's axes to the joint's. What the limits say of them is for posing:
-// a range reaches to the rest angle.
+// The rest angles that lead from the parent's axes to the joint's. Limits that leave them out are widened to
+// them: the scanned pose is allowed.
 void measure_rest(const Eigen::Matrix3d& parent, Joint& joint) {
   for (AngleAxis& angle : joint.sequence) angle.rest = 0;
   const std::array<double, 3> rest = kinematics::angles_from_rotation(
       joint, Eigen::Quaterniond(Eigen::Matrix3d(parent.transpose() * joint.axes)));
-  for (std::size_t a = 0; a < 3; ++a) joint.sequence[a].rest = std::abs(rest[a]) < kRounding ? 0 : rest[a];
+  for (std::size_t a = 0; a < 3; ++a) {
+    AngleAxis& angle = joint.sequence[a];
+    angle.rest = std::abs(rest[a]) < kRounding ? 0 : rest[a];
+    angle.min = std::min(angle.min, angle.rest);
+    angle.max = std::max(angle.max, angle.rest);
+  }
 }
 
 void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig& rig,
