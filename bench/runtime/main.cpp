@@ -19,6 +19,7 @@
 #include "bench/runtime/figure.hpp"
 #include "bench/runtime/plain_eigen.hpp"
 #include "bench/runtime/probing.hpp"
+#include "bench/runtime/sampling_floor.hpp"
 #include "core/kinematics/forward.hpp"
 #include "core/model_file/model_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
@@ -214,6 +215,9 @@ class Bench {
         row("290 x 169 x 940", fine, 5);
         row("slice of 512 x 512", slice, 15);
         row("region of 256^3", region, 5);
+        line("    its samples alone", threads, samples_alone(sampled, sampling, region));
+        if (sampling == runtime::Sampling::nearest)
+          line("    its bytes copied", threads, copy_alone(sampled, region));
       }
     }
   }

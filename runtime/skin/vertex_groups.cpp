@@ -10,8 +10,8 @@ namespace ecorche::runtime {
 namespace {
 
 constexpr std::size_t kSize = VertexGroups::size;
-constexpr float kNarrowed = 2e-4F;  // mm that narrowing may move a vertex at rest
-constexpr double kLocalEnough = 1.7;
+constexpr float kNarrowed = 2e-4F;    // mm that narrowing may move a vertex at rest
+constexpr double kLocalEnough = 1.7;  // palettes of the own order over those of Morton's, where it is kept
 
 using Order = std::vector<std::uint32_t>;
 
