@@ -42,30 +42,44 @@ HWY_INLINE void fetch(const float* posed, const std::uint32_t* lanes, std::size_
 #endif
 }
 
-// Entries of a column of the table. A gather costs sixteen loads; looking up in registers by the low four
-// bits and choosing among at most four by the high ones costs a third of that.
-struct Picks {
+// The corners of a vector of vertices, by their bytes in the palette. A gather costs sixteen loads: tables in
+// registers answer 32 entries at once, and the high bit chooses between two of them.
+#if HWY_TARGET <= HWY_AVX3
+struct Corner {
   hn::Vec<I> at;
-  std::size_t count;
+  hn::Mask<F> beyond;
 
-  HWY_INLINE V operator()(const float* column) const {
-#if HWY_CAP_GE512
-    const auto low = hn::IndicesFromVec(F(), hn::And(at, hn::Set(I(), 15)));
-    V found = hn::TableLookupLanes(hn::Load(F(), column), low);
-    for (int first = 16; static_cast<std::size_t>(first) < count; first += 16) {
-      const auto beyond = hn::RebindMask(F(), hn::Gt(at, hn::Set(I(), first - 1)));
-      found = hn::IfThenElse(beyond, hn::TableLookupLanes(hn::Load(F(), column + first), low), found);
-    }
-    return found;
-#else
-    return hn::GatherIndex(F(), column, at);
-#endif
+  explicit HWY_INLINE Corner(const std::uint8_t* corners)
+      : at(hn::PromoteTo(I(), hn::LoadU(U8(), corners))),
+        beyond(hn::RebindMask(F(), hn::Gt(at, hn::Set(I(), 31)))) {}
+
+  template <bool kLong>
+  HWY_INLINE V of(const float* column) const {
+    const V low{_mm512_permutex2var_ps(hn::Load(F(), column).raw, at.raw, hn::Load(F(), column + 16).raw)};
+    if constexpr (!kLong) return low;
+    const V high{
+        _mm512_permutex2var_ps(hn::Load(F(), column + 32).raw, at.raw, hn::Load(F(), column + 48).raw)};
+    return hn::IfThenElse(beyond, high, low);
   }
 };
+#else
+struct Corner {
+  hn::Vec<I> at;
 
-HWY_INLINE V3 corner(const Table& table, const std::uint8_t* corners, std::size_t count) {
-  const Picks pick{hn::PromoteTo(I(), hn::LoadU(U8(), corners)), count};
-  return {pick(table.x), pick(table.y), pick(table.z)};
+  explicit HWY_INLINE Corner(const std::uint8_t* corners)
+      : at(hn::PromoteTo(I(), hn::LoadU(U8(), corners))) {}
+
+  template <bool kLong>
+  HWY_INLINE V of(const float* column) const {
+    return hn::GatherIndex(F(), column, at);
+  }
+};
+#endif
+
+template <bool kLong>
+HWY_INLINE V3 corner(const Table& table, const std::uint8_t* corners) {
+  const Corner at(corners);
+  return {at.of<kLong>(table.x), at.of<kLong>(table.y), at.of<kLong>(table.z)};
 }
 
 struct Numbers {
@@ -86,30 +100,40 @@ HWY_INLINE V share(const std::int16_t* from) {
   return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(I16(), from)));
 }
 
-void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
+template <bool kLong>
+HWY_INLINE void move_group(const TissueVertices& job, std::size_t g, const Table& table) {
   const VertexGroups& groups = job.groups;
+  const VertexGroups::Group& group = groups.groups[g];
+  const std::size_t count = groups.group_vertices(g);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(F())) {
+    const std::uint8_t* corners = &groups.corner[4 * kSize * g + i];
+    const V3 x0 = corner<kLong>(table, corners);
+    const V3 e1 = minus(corner<kLong>(table, corners + kSize), x0);
+    const V3 e2 = minus(corner<kLong>(table, corners + 2 * kSize), x0);
+    const V3 e3 = minus(corner<kLong>(table, corners + 3 * kSize), x0);
+    const Numbers n = barycentric(groups, group, i);
+    const Places places{kSize * g + i, std::min(count - i, hn::Lanes(F())),
+                        groups.in_order ? nullptr : &groups.vertex[kSize * g + i]};
+    put_position(job.out, places,
+                 plus(x0, plus(times(e1, n.b[0]), plus(times(e2, n.b[1]), times(e3, n.b[2])))));
+    if (job.out.normals == nullptr) continue;
+    const std::int16_t* shares = &groups.normal[3 * kSize * g + i];
+    put_normal(
+        job.out, places,
+        plus(times(cross(e2, e3), share(shares)), plus(times(cross(e3, e1), share(shares + kSize)),
+                                                       times(cross(e1, e2), share(shares + 2 * kSize)))));
+  }
+}
+
+void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
   Table table;
   for (std::size_t g = begin; g < end; ++g) {
-    const VertexGroups::Group& group = groups.groups[g];
-    fetch(job.posed.data(), &groups.lanes[group.lanes], group.count, table);
-    const std::size_t count = groups.group_vertices(g);
-    for (std::size_t i = 0; i < count; i += hn::Lanes(F())) {
-      const std::uint8_t* corners = &groups.corner[4 * kSize * g + i];
-      const V3 x0 = corner(table, corners, group.count);
-      const V3 e1 = minus(corner(table, corners + kSize, group.count), x0);
-      const V3 e2 = minus(corner(table, corners + 2 * kSize, group.count), x0);
-      const V3 e3 = minus(corner(table, corners + 3 * kSize, group.count), x0);
-      const Numbers n = barycentric(groups, group, i);
-      const Places places{kSize * g + i, std::min(count - i, hn::Lanes(F())),
-                          groups.in_order ? nullptr : &groups.vertex[kSize * g + i]};
-      put_position(job.out, places,
-                   plus(x0, plus(times(e1, n.b[0]), plus(times(e2, n.b[1]), times(e3, n.b[2])))));
-      if (job.out.normals == nullptr) continue;
-      const std::int16_t* shares = &groups.normal[3 * kSize * g + i];
-      put_normal(
-          job.out, places,
-          plus(times(cross(e2, e3), share(shares)), plus(times(cross(e3, e1), share(shares + kSize)),
-                                                         times(cross(e1, e2), share(shares + 2 * kSize)))));
+    const VertexGroups::Group& group = job.groups.groups[g];
+    fetch(job.posed.data(), &job.groups.lanes[group.lanes], group.count, table);
+    if (group.count <= 32) {
+      move_group<false>(job, g, table);
+    } else {
+      move_group<true>(job, g, table);
     }
   }
 }
