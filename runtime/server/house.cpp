@@ -9,6 +9,8 @@ namespace {
 
 // Recordings of a rig that can be played; the oldest goes.
 constexpr std::size_t kMostRecorded = 16;
+// Recordings under way, which grow in memory, and those that the folder may hold.
+constexpr std::ptrdiff_t kMostRecording = 4, kMostFiles = 256;
 
 // [a-z0-9_]{1,64}
 bool identifier(const std::string& name) {
@@ -143,6 +145,20 @@ Status House::recording_path(const std::string& name, std::filesystem::path& out
   std::error_code ec;
   if (std::filesystem::exists(out, ec))
     return {StatusCode::already_exists, "record: there is a recording '" + name + "' (choose another name)"};
+  return {};
+}
+
+Status House::room_for_recording() const {
+  const auto running = std::count_if(sessions_.begin(), sessions_.end(),
+                                     [](const auto& entry) { return entry.second->recording() != nullptr; });
+  if (running >= kMostRecording) {
+    return {StatusCode::resource_exhausted,
+            "record: " + std::to_string(running) + " recordings run already (try again later)"};
+  }
+  std::error_code ec;
+  const std::filesystem::directory_iterator files(options_.record_folder, ec);
+  if (!ec && std::distance(begin(files), end(files)) >= kMostFiles)
+    return {StatusCode::resource_exhausted, "record: the server's folder is full (ask who runs it)"};
   return {};
 }
 

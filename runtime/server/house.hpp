@@ -51,6 +51,8 @@ class House {
   void add_clip(std::uint64_t rig_digest, Clip clip);
   /// Where a recording of this name goes: invalid_argument, failed_precondition, already_exists.
   Status recording_path(const std::string& name, std::filesystem::path& out) const;
+  /// resource_exhausted where four run, or the folder holds 256 files.
+  Status room_for_recording() const;
 
   /// Reads a model again, aside, and calls `done` on the I/O thread.
   void reload(const std::string& name, std::function<void(const Status&)> done);

@@ -106,6 +106,21 @@ TEST_F(RecordingTest, NamesFoldersAndOrderAreChecked) {
   EXPECT_TRUE(session.steps.empty());
 }
 
+TEST_F(RecordingTest, FourAtOnceAndAFolderThatIsNotFull) {
+  const TestServer server(options());
+  std::vector<std::unique_ptr<TestClient>> clients;
+  for (int i = 0; i < 5; ++i) {
+    clients.push_back(std::make_unique<TestClient>(server));
+    if (i < 4) clients.back()->client().call(record(true, "take_" + std::to_string(i)));
+  }
+  EXPECT_EQ(error_of_call(clients[4]->client(), record(true, "take_4")), ErrorKind::temporary);
+  clients[0]->client().call(record(false));
+  for (int i = 0; i < 255; ++i) std::ofstream(folder_ / std::to_string(i)) << i;
+  EXPECT_EQ(error_of_call(clients[4]->client(), record(true, "take_4")), ErrorKind::temporary);
+  std::filesystem::remove(folder_ / "0");
+  clients[4]->client().call(record(true, "take_4"));
+}
+
 TEST_F(RecordingTest, EndsAtItsLimitAndIsWholeUpToThere) {
   Options small = options();
   small.limits.record_bytes = 2048;
