@@ -20,7 +20,8 @@ v1::Skinning skinning_to_proto(runtime::Skinning skinning) {
 
 // Whether a frame's bytes follow from the pose alone, whatever was sent before.
 bool stands_alone(const v1::Subscribe& request) {
-  return !request.has_mesh() || request.mesh().encoding() != v1::ENCODING_U16_DELTA;
+  if (!request.has_mesh()) return !request.volume().changed_bricks();
+  return request.mesh().encoding() != v1::ENCODING_U16_DELTA && !request.mesh().adaptive();
 }
 
 }  // namespace
