@@ -12,10 +12,12 @@
 #include "tests/support/toy_model.hpp"
 
 // HDF5 1.10 itself loses a block whenever it refuses a damaged header (tests/unit/model_file/test_files.cpp).
+// NOLINTBEGIN(bugprone-reserved-identifier): the name is LeakSanitizer's.
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() {
   return "leak:libhdf5_serial";
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace ecorche::fuzz {
 namespace {
