@@ -2,8 +2,10 @@
 #include "app/balls_of_file.hpp"
 
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "app/pose_frames.hpp"
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
 #include "core/model_file/model_file.hpp"
@@ -56,7 +58,7 @@ void hang_on(const fs::path& path, const std::vector<std::string>& names, const 
 std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const fs::path& skeleton, const fs::path& rig) {
   if (!is_model(skeleton)) {
     io::VolumetricSkeletonFile file = io::read_volumetric_skeleton(skeleton);
-    if (rig.empty()) return {std::move(file.skeleton), {}};
+    if (rig.empty()) return {std::move(file.skeleton), Rig()};
     Rig moved_by = read_rig(rig);
     hang_on(skeleton, file.segments, moved_by, file.skeleton);
     return {std::move(file.skeleton), std::move(moved_by)};
@@ -84,6 +86,23 @@ runtime::BallSet posed_balls(const VolumetricSkeleton& skeleton, const ImageGrid
   runtime::move_balls(skeleton, motions, set);
   runtime::bridge(seams, motions, set);
   return set;
+}
+
+PlacedBalls read_placed_balls(const Program& program, const fs::path& skeleton, const fs::path& rig,
+                              const std::string& pose) {
+  if (!pose.empty() && rig.empty() && !is_model(skeleton))
+    throw Error(ErrorKind::usage, "--rig", "a pose needs a rig", "add --rig SKELETON.yaml or MODEL.hdf");
+  PlacedBalls out;
+  std::tie(out.skeleton, out.rig) = read_skeleton_and_rig(skeleton, rig);
+  if (pose.empty()) {
+    out.set = runtime::balls_at_rest(out.skeleton, out.skeleton.grid);
+    return out;
+  }
+  const Pose wanted = read_frames(program, {pose, {}, {}, {}}, out.rig).front().pose;
+  std::size_t clamped = 0;
+  out.set = posed_balls(out.skeleton, out.skeleton.grid, out.rig, wanted, {}, clamped);
+  if (clamped > 0) program.note("note: limits held back " + std::to_string(clamped) + " joint(s)");
+  return out;
 }
 
 }  // namespace ecorche::app

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <utility>
 
+#include "app/command.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/skeleton.hpp"
 #include "core/values/volumetric_skeleton.hpp"
@@ -25,5 +27,16 @@ std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const std::filesystem::
 /// limits held back.
 runtime::BallSet posed_balls(const VolumetricSkeleton& skeleton, const ImageGrid& lattice, const Rig& rig,
                              Pose pose, const runtime::Seams& seams, std::size_t& clamped);
+
+/// A skeleton, the rig that moves it, and its balls in `pose` (a file, or lib:NAME), at rest without one.
+struct PlacedBalls {
+  VolumetricSkeleton skeleton;
+  Rig rig;
+  runtime::BallSet set;
+};
+
+/// Throws as read_skeleton_and_rig and read_frames do; Error{usage} for a pose without a rig.
+PlacedBalls read_placed_balls(const Program& program, const std::filesystem::path& skeleton,
+                              const std::filesystem::path& rig, const std::string& pose);
 
 }  // namespace ecorche::app

@@ -7,7 +7,6 @@
 
 #include "app/balls_of_file.hpp"
 #include "app/command.hpp"
-#include "app/pose_frames.hpp"
 #include "runtime/spheres/spatial_index.hpp"
 
 namespace ecorche::app {
@@ -25,40 +24,28 @@ struct Settings {
   std::array<Body, 2> bodies;
 };
 
-struct Placed {
-  runtime::BallSet set;
-  std::vector<std::string> segment;  // of every ball; empty where it hangs on none
-};
-
-Placed place(const Program& program, const Body& body) {
-  if (!body.pose.empty() && body.rig.empty() && body.skeleton.extension() != ".hdf")
-    throw Error(ErrorKind::usage, "--rig", "a pose needs a rig", "add --rig SKELETON.yaml or MODEL.hdf");
-  const auto [skeleton, rig] = read_skeleton_and_rig(body.skeleton, body.rig);
-  Placed out;
-  if (body.pose.empty()) {
-    out.set = runtime::balls_at_rest(skeleton, skeleton.grid);
-  } else {
-    std::size_t clamped = 0;
-    const Pose pose = read_frames(program, {body.pose, {}, {}, {}}, rig).front().pose;
-    out.set = posed_balls(skeleton, skeleton.grid, rig, pose, {}, clamped);
-  }
-  for (const std::int32_t row : skeleton.segment) {
-    const auto s = static_cast<std::size_t>(row);
-    out.segment.push_back(row >= 0 && s < rig.skeleton.segments.size() ? rig.skeleton.segments[s].name : "");
-  }
-  out.segment.resize(skeleton.size());
-  return out;
+// The segment that a ball hangs on; empty where it hangs on none.
+std::string segment_of(const PlacedBalls& body, std::size_t ball) {
+  if (ball >= body.skeleton.segment.size()) return {};
+  const std::int32_t row = body.skeleton.segment[ball];
+  const auto& segments = body.rig.skeleton.segments;
+  return row >= 0 && static_cast<std::size_t>(row) < segments.size()
+             ? segments[static_cast<std::size_t>(row)].name
+             : std::string();
 }
 
 int run(const Program& program, const Settings& s) {
-  const Placed a = place(program, s.bodies[0]), b = place(program, s.bodies[1]);
+  const auto read = [&](const Body& body) {
+    return read_placed_balls(program, body.skeleton, body.rig, body.pose);
+  };
+  const PlacedBalls a = read(s.bodies[0]), b = read(s.bodies[1]);
   const auto start = std::chrono::steady_clock::now();
   const auto found = runtime::contact(a.set, b.set);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   json result{{"ok", true}, {"meet", found.has_value()}, {"seconds", spent.count()}};
   std::string text = "the bodies do not meet";
   if (found) {
-    const std::string &first = a.segment[found->a], &second = b.segment[found->b];
+    const std::string first = segment_of(a, found->a), second = segment_of(b, found->b);
     result.update({{"pairs", found->pairs},
                    {"depth_mm", found->depth_mm},
                    {"place", found->place},

@@ -6,7 +6,6 @@
 
 #include "app/balls_of_file.hpp"
 #include "app/command.hpp"
-#include "app/pose_frames.hpp"
 #include "core/files/atomic_file.hpp"
 #include "runtime/spheres/spatial_index.hpp"
 
@@ -26,19 +25,8 @@ runtime::Vec3 place(const std::vector<double>& xyz) {
   return {xyz[0], xyz[1], xyz[2]};
 }
 
-runtime::BallSet placed(const Program& program, const Settings& s, const VolumetricSkeleton& skeleton,
-                        const Rig& rig) {
-  if (s.pose.empty()) return runtime::balls_at_rest(skeleton, skeleton.grid);
-  std::size_t clamped = 0;
-  const Pose pose = read_frames(program, {s.pose, {}, {}, {}}, rig).front().pose;
-  return posed_balls(skeleton, skeleton.grid, rig, pose, {}, clamped);
-}
-
 int run(const Program& program, const Settings& s) {
-  if (!s.pose.empty() && s.rig.empty() && s.skeleton.extension() != ".hdf")
-    throw Error(ErrorKind::usage, "--rig", "a pose needs a rig", "add --rig SKELETON.yaml or MODEL.hdf");
-  const auto [skeleton, rig] = read_skeleton_and_rig(s.skeleton, s.rig);
-  const runtime::BallSet set = placed(program, s, skeleton, rig);
+  const auto [skeleton, rig, set] = read_placed_balls(program, s.skeleton, s.rig, s.pose);
   json points = json::array();
   std::string table = "x_mm,y_mm,z_mm,radius_mm\n";
   double length = 0, narrowest = 0;

@@ -243,7 +243,7 @@ Status Connection::check_pose(const v1::PoseUpdate& update, PoseRequest& out) co
   if (update.rig_digest() != model.opened.rig_digest()) {
     return {StatusCode::invalid_argument, "pose: meant for another rig (send ModelOpened.rig_digest)"};
   }
-  if (const Status status = check_sequence(update.sequence()); !status.ok()) return status;
+  if (Status status = check_sequence(update.sequence()); !status.ok()) return status;
   out.sequence = update.sequence();
   out.skinning = skinning_of(update.skinning());
   return wire::from_proto(update, model.model().segment_count(), out.pose);
@@ -274,10 +274,6 @@ void Connection::pose_done(const PoseOutcome& outcome, const Skipped& skipped) {
   last_sequence_ = std::max(last_sequence_, outcome.sequence);  // of a clip that the server plays
   v1::Envelope envelope;
   v1::PoseAck& ack = *envelope.mutable_pose_ack();
-  Metrics& metrics = house_.metrics();
-  metrics.took(Metrics::Stage::waited, 1e-6 * static_cast<double>(outcome.timings.waited()));
-  metrics.took(Metrics::Stage::posed, 1e-6 * static_cast<double>(outcome.timings.posed()));
-  metrics.skipped(skipped.count);
   ack.set_sequence(outcome.sequence);
   wire::to_proto(outcome.status, *ack.mutable_status());
   const auto& segments = session_->model()->model().rig.skeleton.segments;

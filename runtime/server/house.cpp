@@ -72,7 +72,7 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {StatusCode::resource_exhausted,
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
-  out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits);
+  out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits, metrics_);
   sessions_.emplace(name, out);
   return {};
 }

@@ -130,6 +130,7 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
           .level = stream.level(),
           .number = job.number,
           .keyframe = frame.keyframe(),
+          .encoded = frame.timings().encoded(),
           .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
 }
 
@@ -155,6 +156,7 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
           .level = 0,
           .number = job.number,
           .keyframe = frame.keyframe(),
+          .encoded = frame.timings().encoded(),
           .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
 }
 

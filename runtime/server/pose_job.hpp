@@ -38,7 +38,8 @@ struct PosedFrame {
   std::uint32_t level = 0;  ///< of detail
   std::uint64_t number = 0;
   std::uint64_t keyframe =
-      0;  ///< number of the frame that must have come before; 0: none; its own: it is one
+      0;                      ///< number of the frame that must have come before; 0: none; its own: it is one
+  std::uint64_t encoded = 0;  ///< time that it took, microseconds
   std::shared_ptr<const wire::EncodedFrame> bytes;
   std::optional<std::uint64_t> digest = {};  ///< XXH64 of the payload, where PoseJob::digests asks for it
 };

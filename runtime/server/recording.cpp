@@ -18,10 +18,10 @@ v1::Skinning skinning_to_proto(runtime::Skinning skinning) {
   return skinning == runtime::Skinning::lbs ? v1::SKINNING_LBS : v1::SKINNING_COR;
 }
 
-// Whether a frame's bytes follow from the pose alone, whatever was sent before.
+// Whether a frame's bytes follow from the pose, and not from how soon the client took those before. (Frames
+// against keyframes never come here.)
 bool stands_alone(const v1::Subscribe& request) {
-  if (!request.has_mesh()) return !request.volume().changed_bricks();
-  return request.mesh().encoding() != v1::ENCODING_U16_DELTA && !request.mesh().adaptive();
+  return !request.mesh().adaptive();
 }
 
 }  // namespace

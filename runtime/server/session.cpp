@@ -38,8 +38,9 @@ void Skipped::add(std::uint64_t sequence) {
 }
 
 Session::Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model,
-                 std::string name, bool named, const Limits& limits)
+                 std::string name, bool named, const Limits& limits, Metrics& metrics)
     : io_(io),
+      metrics_(metrics),
       workers_(workers),
       model_(std::move(model)),
       name_(std::move(name)),
@@ -373,6 +374,9 @@ void Session::keep_time() {
 void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,
                           bool refresh) {
   if (refresh) return;
+  metrics_.took(Metrics::Stage::waited, 1e-6 * static_cast<double>(outcome.timings.waited()));
+  metrics_.took(Metrics::Stage::posed, 1e-6 * static_cast<double>(outcome.timings.posed()));
+  metrics_.skipped(skipped.count);
   if (outcome.status.ok()) present_ = job.request;
   if (outcome.status.ok() && recording_) {
     recording_->add(job.request);
@@ -382,6 +386,7 @@ void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, co
 }
 
 void Session::publish(const PosedFrame& frame) {
+  metrics_.took(Metrics::Stage::encoded, 1e-6 * static_cast<double>(frame.encoded));
   const auto row = std::find_if(rows_.begin(), rows_.end(),
                                 [&](const Row& r) { return r.subscription.id == frame.subscription; });
   if (row == rows_.end()) return;

@@ -12,6 +12,7 @@
 
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/clip.hpp"
+#include "runtime/server/metrics.hpp"
 #include "runtime/server/options.hpp"
 #include "runtime/server/pose_job.hpp"
 #include "runtime/server/recording.hpp"
@@ -57,7 +58,7 @@ struct Asked {
 class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model, std::string name,
-          bool named, const Limits& limits);
+          bool named, const Limits& limits, Metrics& metrics);
   ~Session();
 
   const std::string& name() const { return name_; }
@@ -139,6 +140,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void publish(const PosedFrame& frame);
 
   net::io_context& io_;
+  Metrics& metrics_;
   Workers& workers_;
   std::shared_ptr<const ServedModel> model_;
   std::string name_;

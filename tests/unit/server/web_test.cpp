@@ -76,6 +76,9 @@ TEST(Web, MetricsCountWhatHappened) {
   EXPECT_EQ(sample(page, "ecorche_sessions"), 1);
   EXPECT_EQ(sample(page, "ecorche_frames_sent_total"), 6);
   EXPECT_EQ(sample(page, "ecorche_stage_seconds_count{stage=\"posed\"}"), 5);
+  EXPECT_EQ(sample(page, "ecorche_stage_seconds_count{stage=\"waited\"}"), 5);
+  EXPECT_EQ(sample(page, "ecorche_stage_seconds_count{stage=\"encoded\"}"), 6);
+  EXPECT_GT(sample(page, "ecorche_stage_seconds_sum{stage=\"encoded\"}"), 0);
   EXPECT_EQ(sample(page, "ecorche_stage_seconds_count{stage=\"written\"}"), 6);
   EXPECT_EQ(sample(page, "ecorche_limits_hit_total{limit=\"subscriptions\"}"), 1);
   EXPECT_EQ(sample(page, "ecorche_sent_bytes_total"), static_cast<double>(client.client().bytes_received()));
