@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "app/certificate_report.hpp"
 #include "app/command.hpp"
 #include "app/joint_json.hpp"
 #include "core/model_file/figures.hpp"
@@ -12,6 +13,13 @@ namespace ecorche::app {
 namespace {
 
 using Json = nlohmann::json;
+
+constexpr const char* claims = "\nFor training and education, not for planning surgery.";
+
+// Text of a file may be anything, but JSON is UTF-8.
+Json valid(const Json& json) {
+  return Json::parse(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
 
 // Bytes on the disk by part: `/VTKHDF`, `/ecorche/weights`, ...
 std::map<std::string, std::uint64_t> sizes(const std::string& path) {
@@ -74,8 +82,7 @@ Json to_json(const std::string& path, const Model& model) {
   model_file::for_each_figure(model.certificate, [&](std::string_view name, auto value) {
     out["certificate"][std::string(name)] = value;
   });
-  // Text of a file may be anything, but JSON is UTF-8.
-  return Json::parse(out.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return valid(out);
 }
 
 // Text of a file goes to a terminal: nothing in it may steer that terminal.
@@ -148,7 +155,7 @@ std::string to_text(const Json& info) {
   out += "\nprovenance\n";
   for (const auto& [key, value] : info["provenance"].items())
     out += "  " + printable(key) + ": " + text(value) + "\n";
-  return out + "\nFor training and education, not for planning surgery.";
+  return out + claims;
 }
 
 }  // namespace
@@ -156,10 +163,19 @@ std::string to_text(const Json& info) {
 void declare_info(CLI::App& app, Program& program, Run& chosen) {
   auto* command = app.add_subcommand("info", "what a model holds: counts, sizes, rig, tissues, certificate");
   auto path = std::make_shared<std::string>();
+  auto certificate = std::make_shared<bool>(false);
   command->add_option("model", *path, "the model, a .hdf file")->required();
-  command->callback([path, &program, &chosen] {
-    chosen = [path, &program] {
-      const Json info = to_json(*path, model_file::read(*path, program.context("reading")));
+  command->add_flag("--certificate", *certificate,
+                    "only the certificate: every figure, its bound, and why that bound");
+  command->callback([path, certificate, &program, &chosen] {
+    chosen = [path, certificate, &program] {
+      const Model model = model_file::read(*path, program.context("reading"));
+      if (*certificate) {
+        program.result(certificate_text(model.certificate) + claims,
+                       valid({{"name", model.name}, {"certificate", certificate_json(model.certificate)}}));
+        return 0;
+      }
+      const Json info = to_json(*path, model);
       program.result(to_text(info), info);
       return 0;
     };

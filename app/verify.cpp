@@ -8,6 +8,7 @@
 #include "app/model_report.hpp"
 #include "core/model_file/figures.hpp"
 #include "core/model_file/model_file.hpp"
+#include "preprocess/bounds.hpp"
 #include "preprocess/pipeline.hpp"
 
 namespace ecorche::app {

@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 
 #include "core/kinematics/forward.hpp"
 #include "preprocess/geometry/closest_point.hpp"
@@ -223,41 +222,6 @@ Certificate measure(const Model& model, const Context& context) {
 
   out.bone_rigidity_mm = bone_rigidity(model, context);
   return out;
-}
-
-std::vector<std::string> broken_bounds(const Certificate& c) {
-  std::vector<std::string> broken;
-  const auto check = [&](bool kept, std::string_view name, double value, std::string_view bound) {
-    if (kept) return;  // a NaN keeps no bound
-    std::ostringstream line;
-    line << name << " is " << value << ", the bound is " << bound;
-    broken.push_back(line.str());
-  };
-  // A weight is a share; rows that miss 1 would move a body far from the origin as a whole.
-  check(c.min_weight >= 0, "min_weight", c.min_weight, ">= 0");
-  check(c.max_weight <= 1, "max_weight", c.max_weight, "<= 1");
-  check(c.row_sum_error <= 1e-6, "row_sum_error", c.row_sum_error, "<= 1e-6");
-  // The maximum principle holds for the equation and nearly for its elements: beyond 1e-3 the mesh is to
-  // blame, and a repair of 1e-2 moves a node by 1 % of what its bones differ.
-  check(c.solved_min_weight >= -1e-3, "solved_min_weight", c.solved_min_weight, ">= -1e-3");
-  check(c.solved_max_weight <= 1 + 1e-3, "solved_max_weight", c.solved_max_weight, "<= 1.001");
-  check(c.repaired_largest_change <= 1e-2, "repaired_largest_change", c.repaired_largest_change, "<= 1e-2");
-  // A direct factor keeps row sums to some 1e-13 and residuals to some 1e-12; what is far above was not
-  // solved.
-  check(c.solved_row_sum_error <= 1e-9, "solved_row_sum_error", c.solved_row_sum_error, "<= 1e-9");
-  check(c.solver_residual <= 1e-8, "solver_residual", c.solver_residual, "<= 1e-8");
-  // Volumes are posed by the inverse of each tet's map, which an inverted or flat tet does not have.
-  check(c.inverted_tets == 0, "inverted_tets", static_cast<double>(c.inverted_tets), "0");
-  check(c.degenerate_tets == 0, "degenerate_tets", static_cast<double>(c.degenerate_tets), "0");
-  // The map of a sliver magnifies rounding by about 1 / sin(angle): at 0.5 degrees by 115, so that float32
-  // nodes (1e-4 mm at one metre) still give 0.01 mm.
-  check(c.min_dihedral_deg >= 0.5, "min_dihedral_deg", c.min_dihedral_deg, ">= 0.5");
-  // Outside, an affine map of a tet some 3 mm wide is extrapolated; half a thigh away it no longer belongs to
-  // this body, and the usual reason is another frame. Nearer ones are only warned of: tissues may stick out.
-  check(c.max_outside_mm <= 50, "max_outside_mm", c.max_outside_mm, "<= 50");
-  // Bones are rigid by definition; this is some ten times float32 rounding at two metres.
-  check(c.bone_rigidity_mm <= 1e-3, "bone_rigidity_mm", c.bone_rigidity_mm, "<= 1e-3");
-  return broken;
 }
 
 }  // namespace ecorche::preprocess

@@ -10,6 +10,7 @@
 #include <optional>
 #include <sstream>
 
+#include "preprocess/bounds.hpp"
 #include "preprocess/cor/centres.hpp"
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/provenance.hpp"

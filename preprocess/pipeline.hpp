@@ -57,7 +57,7 @@ using StageCallback = std::function<void(std::string_view name, int index, int c
 
 /// Deterministic: the same case and options give the same model whatever the number of threads.
 /// Throws Error{usage} for an option out of range, what the stages throw, and Error{data} for a model that
-/// breaks the bounds below.
+/// breaks its bounds (bounds.hpp).
 Result run(const Case& patient, const Options& options, const Context& context,
            const StageCallback& on_stage);
 
@@ -66,9 +66,6 @@ Result run(const Case& patient, const Options& options, const Context& context,
 /// which is their nearest. The probe pose of the bones turns every joint by 0.6 rad about (1, 2, 3), all at
 /// once, and shifts the root by 0.2 m.
 Certificate measure(const Model& model, const Context& context);
-
-/// The bounds that a certificate must keep (DESIGN 7); empty when it does, else one line per broken bound.
-std::vector<std::string> broken_bounds(const Certificate& certificate);
 
 /// Largest resident memory of this process so far, MiB (VmHWM of Linux; 0 where that cannot be read).
 double peak_rss_mib();

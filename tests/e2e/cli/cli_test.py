@@ -98,6 +98,22 @@ class Cli(unittest.TestCase):
         self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--pose", pose), 78, "third_elbow")
         self.assertFalse((self.folder / "p").exists() and any((self.folder / "p").iterdir()), "nothing may be written")
 
+    def test_the_certificate_is_read_beside_its_bounds_and_the_docs_say_the_same(self):
+        done = run("--json", "info", "--certificate", MODEL)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = json.loads(done.stdout)["certificate"]
+        self.assertEqual({row["figure"]: row["value"] for row in rows}, json.loads(run("--json", "info", MODEL).stdout)["certificate"])
+        self.assertTrue(all(row["kept"] for row in rows))
+        judged = [(row["figure"], row["bound"], row["reason"]) for row in rows if row["bound"]]
+        docs = (pathlib.Path(__file__).parents[3] / "docs" / "model.md").read_text()
+        table = docs.split("| figure | bound | because |\n|---|---|---|\n")[1].split("\n\n")[0]
+        said = [tuple(cell.strip().strip("`") for cell in line.strip("|").split("|")) for line in table.splitlines()]
+        self.assertEqual(said, judged)
+        text = run("info", "--certificate", MODEL).stdout
+        for figure, bound, reason in judged:
+            self.assertRegex(text, rf"(?m)^{figure} +[-0-9.e+]+  {re.escape(bound)} +{re.escape(reason)}$")
+        self.assertIn("not for planning surgery", text)
+
     def test_tets_go_to_other_programs(self):
         files = [self.folder / name for name in ("a.vtu", "a.msh", "a.ele", "a.inp", "a.mcnp.inp")]
         done = run("--json", "export", MODEL, "-o", *files)

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "preprocess/bounds.hpp"
 #include "preprocess/pipeline.hpp"
 #include "tests/support/toy_model.hpp"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "preprocess/bounds.hpp"
 #include "preprocess/pipeline.hpp"
 
 #include <gtest/gtest.h>
