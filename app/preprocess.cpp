@@ -11,9 +11,11 @@
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/model_report.hpp"
+#include "app/stage_folder.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
+#include "io/surface/surface_file.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/thin/thinning.hpp"
@@ -29,6 +31,8 @@ struct Settings {
   fs::path case_path, output;
   io::CaseOptions input;
   preprocess::Options options;
+  fs::path cache;  // empty: nothing is kept
+  double cache_gib = 8;
 };
 
 // Runs one step that is not the pipeline's, and times it alike.
@@ -37,7 +41,7 @@ void timed(std::vector<StageTime>& stages, const std::string& name, F&& step) {
   const auto start = std::chrono::steady_clock::now();
   step();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-  stages.push_back({name, spent.count(), preprocess::peak_rss_mib()});
+  stages.push_back({name, spent.count(), preprocess::peak_rss_mib(), false});
 }
 
 std::string stage_table(const std::vector<StageTime>& stages) {
@@ -45,7 +49,8 @@ std::string stage_table(const std::vector<StageTime>& stages) {
   char line[80];
   double seconds = 0, peak = 0;
   for (const StageTime& s : stages) {
-    std::snprintf(line, sizeof line, "%-12s %10.2f %10.0f\n", s.name.c_str(), s.seconds, s.peak_rss_mib);
+    std::snprintf(line, sizeof line, "%-12s %10.2f %10.0f%s\n", s.name.c_str(), s.seconds, s.peak_rss_mib,
+                  s.kept ? "  kept" : "");
     out += line;
     seconds += s.seconds;
     peak = std::max(peak, s.peak_rss_mib);
@@ -85,8 +90,24 @@ void check_output(const fs::path& path) {
   const files::AtomicFile probe(path);
 }
 
+// The worst tets beside the model that is not written, for ParaView.
+std::string write_refused(const fs::path& output, const preprocess::WorstTets& worst) {
+  const fs::path path = fs::path(output).replace_extension(".refused.vtu");
+  const std::vector<float> label(worst.label.begin(), worst.label.end());
+  const std::vector<float> row(worst.tet.begin(), worst.tet.end());
+  io::write_tets(path, worst.V, worst.T, {},
+                 {{"label", 1, label},
+                  {"tet", 1, row},
+                  {"least_dihedral_deg", 1, worst.least_deg},
+                  {"greatest_dihedral_deg", 1, worst.greatest_deg},
+                  {"volume_mm3", 1, worst.volume_mm3}});
+  return "its " + std::to_string(worst.tet.size()) + " worst tets are in " + path.string();
+}
+
 int run(const Program& program, const Settings& settings) {
   check_output(settings.output);
+  std::optional<StageFolder> kept;
+  if (!settings.cache.empty()) kept.emplace(settings.cache, settings.cache_gib);
   std::vector<StageTime> stages;
   Case patient;
   timed(stages, "read",
@@ -99,11 +120,15 @@ int run(const Program& program, const Settings& settings) {
   context.stop = program.stop;
   context.progress = [&](double fraction) { bar.report(fraction); };
   context.log = [&](LogLevel level, std::string_view line) { bar.log(level, line); };
-  preprocess::Result made =
-      preprocess::run(patient, settings.options, context, [&](std::string_view name, int index, int count) {
-        bar = program.context(std::to_string(index + 1) + "/" + std::to_string(count) + " " +
-                              std::string(name));
-      });
+  preprocess::Hooks hooks;
+  hooks.on_stage = [&](std::string_view name, int index, int count) {
+    bar = program.context(std::to_string(index + 1) + "/" + std::to_string(count) + " " + std::string(name));
+  };
+  hooks.store = kept ? &*kept : nullptr;
+  hooks.on_refusal = [&](const preprocess::WorstTets& worst) {
+    return write_refused(settings.output, worst);
+  };
+  const preprocess::Result made = preprocess::run(patient, settings.options, context, hooks);
   stages.insert(stages.end(), made.stages.begin(), made.stages.end());
   timed(stages, "write", [&] { model_file::write(made.model, settings.output, program.context("write")); });
 
@@ -116,7 +141,8 @@ int run(const Program& program, const Settings& settings) {
   }
   nlohmann::json report = model_report(true, &made.model, made.model.certificate, digests.size(), bad);
   for (const StageTime& s : stages) {
-    report["stages"].push_back({{"name", s.name}, {"seconds", s.seconds}, {"peak_rss_mib", s.peak_rss_mib}});
+    report["stages"].push_back(
+        {{"name", s.name}, {"seconds", s.seconds}, {"peak_rss_mib", s.peak_rss_mib}, {"kept", s.kept}});
   }
   report["peak_rss_mib"] = preprocess::peak_rss_mib();
   program.result(text_report(made.model, settings, stages), report);
@@ -200,6 +226,16 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
                    "also thin the body to a volumetric skeleton of this thinness (0.48 is the paper's), for "
                    "pose --deformer spheres")
       ->check(CLI::Range(thin::least_thinness, thin::most_thinness));
+  CLI::Option* cache = command->add_option("--cache", settings->cache,
+                                           "a folder that keeps what the stages made: a run that was "
+                                           "interrupted goes on from there, and a run with "
+                                           "other options makes again only what they change");
+  command
+      ->add_option("--cache-gib", settings->cache_gib,
+                   "the folder's limit; what was not used for longest goes first")
+      ->needs(cache)
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
   add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

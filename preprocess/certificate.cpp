@@ -11,6 +11,7 @@
 
 #include "core/kinematics/forward.hpp"
 #include "preprocess/geometry/closest_point.hpp"
+#include "preprocess/geometry/dihedral.hpp"
 #include "preprocess/pipeline.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
@@ -19,10 +20,6 @@ namespace {
 
 // A vertex this near to its tet is in it: the accuracy of rest in, rest out.
 constexpr double kInside = 1e-3;  // mm
-
-// Six volumes over the cube of the longest edge: below it a tet is flat or a needle, and its gradients are
-// rounding. Slivers above it are held by the bound on their angles.
-constexpr double kDegenerate = 1e-9;
 
 using Range = tbb::blocked_range<std::int64_t>;
 constexpr std::int64_t kGrain = 1 << 14;
@@ -80,33 +77,12 @@ struct TetsPart {
   std::uint64_t inverted = 0, degenerate = 0;
 
   void add(std::int64_t tet) {
-    const auto corner = corners_of(*model, tet);
-    const double det =
-        tet_det(corner[0].transpose(), corner[1].transpose(), corner[2].transpose(), corner[3].transpose());
-    double longest = 0;  // squared
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (std::size_t b = a + 1; b < 4; ++b)
-        longest = std::max(longest, (corner[a] - corner[b]).squaredNorm());
-    }
-    if (det < 0) {
-      ++inverted;
-    } else if (!(det > kDegenerate * longest * std::sqrt(longest))) {
-      ++degenerate;
-      return;  // its angles say nothing
-    }
-    // Outward normals of the faces opposite each corner, up to a common sign.
-    std::array<Eigen::Vector3d, 4> normal;
-    const auto face = [&](std::size_t a, std::size_t b, std::size_t c) -> Eigen::Vector3d {
-      return (corner[b] - corner[a]).cross(corner[c] - corner[a]).normalized();
-    };
-    normal = {face(1, 2, 3), face(0, 3, 2), face(0, 1, 3), face(0, 2, 1)};
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (std::size_t b = a + 1; b < 4; ++b) {
-        const double cosine = -normal[a].dot(normal[b]);
-        least_cosine = std::min(least_cosine, cosine);
-        greatest_cosine = std::max(greatest_cosine, cosine);
-      }
-    }
+    const geometry::TetShape shape = geometry::tet_shape(corners_of(*model, tet));
+    inverted += shape.inverted() ? 1 : 0;
+    degenerate += shape.flat ? 1 : 0;
+    if (shape.flat) return;  // its angles say nothing
+    least_cosine = std::min(least_cosine, shape.least_cosine);
+    greatest_cosine = std::max(greatest_cosine, shape.greatest_cosine);
   }
   void merge(const TetsPart& other) {
     least_cosine = std::min(least_cosine, other.least_cosine);

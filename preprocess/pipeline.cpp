@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "preprocess/bounds.hpp"
+#include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/cor/centres.hpp"
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/provenance.hpp"
@@ -39,29 +40,62 @@ constexpr double kFarVoxels = 5;
 // Announces, times and measures the stages, in the order of their names.
 class Stages {
  public:
-  Stages(std::vector<std::string_view> names, const Context& context, const StageCallback& on_stage,
+  Stages(std::vector<std::string_view> names, const Context& context, const Hooks& hooks,
          std::vector<StageTime>& times)
-      : names_(std::move(names)), context_(context), on_stage_(on_stage), times_(times) {}
+      : names_(std::move(names)), context_(context), hooks_(hooks), times_(times) {}
 
+  /// `stage()`.
   template <class F>
   auto operator()(F&& stage) {
+    return timed([&](std::string_view, bool&) { return stage(); });
+  }
+
+  /// `stage(context)`, or what an earlier run kept of it: all that it reads are the `inputs`.
+  template <class F, class... Inputs>
+  auto kept(F&& stage, const Inputs&... inputs) {
+    return timed([&](std::string_view name, bool& found) {
+      using Value = decltype(stage(context_));
+      if (hooks_.store == nullptr) return stage(context_);
+      const std::string key = cache::key(*hooks_.store, name, inputs...);
+      std::optional<Value> value = cache::take<Value>(*hooks_.store, key, context_);
+      found = value.has_value();
+      return found ? std::move(*value) : cache::make_and_keep(*hooks_.store, key, context_, stage);
+    });
+  }
+
+ private:
+  template <class F>
+  auto timed(F&& stage) {
     const std::string_view name = names_.at(times_.size());
-    if (on_stage_) on_stage_(name, static_cast<int>(times_.size()), static_cast<int>(names_.size()));
+    if (hooks_.on_stage) {
+      hooks_.on_stage(name, static_cast<int>(times_.size()), static_cast<int>(names_.size()));
+    }
     context_.check_stop();
+    bool found = false;
     const auto start = std::chrono::steady_clock::now();
-    auto made = stage();
+    auto made = stage(name, found);
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-    times_.push_back({std::string(name), spent.count(), peak_rss_mib()});
+    times_.push_back({std::string(name), spent.count(), peak_rss_mib(), found});
     context_.check_stop();
     return made;
   }
 
- private:
   std::vector<std::string_view> names_;
   const Context& context_;
-  const StageCallback& on_stage_;
+  const Hooks& hooks_;
   std::vector<StageTime>& times_;
 };
+
+// `work()`; where it refuses and the mesh has tets to blame, they are shown.
+template <class F, class M>
+auto showing_worst_tets(const Hooks& hooks, F&& work, M&& mesh) {
+  try {
+    return work();
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::data || !hooks.on_refusal) throw;
+    throw blaming_worst_tets(error, mesh(), hooks.on_refusal);
+  }
+}
 
 std::string describe(const tet::SliverReport& slivers) {
   std::ostringstream line;
@@ -195,7 +229,7 @@ double peak_rss_mib() {
   return 0;
 }
 
-Result run(const Case& patient, const Options& options, const Context& outer, const StageCallback& on_stage) {
+Result run(const Case& patient, const Options& options, const Context& outer, const Hooks& hooks) {
   check_options(options);
   const std::string_view mesher_name = options.mesher.empty() ? tet::mesher_names().front() : options.mesher;
   const std::unique_ptr<tet::Mesher> mesher = tet::make_mesher(mesher_name);
@@ -210,43 +244,55 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
     if (level == LogLevel::warning) result.warnings.emplace_back(line);
     if (outer.log) outer.log(level, line);
   };
-  Stages stage(stage_names(options), context, on_stage, result.stages);
+  Stages stage(stage_names(options), context, hooks, result.stages);
 
   model.name = patient.name;
   model.rig = stage([&] { return rig::fit(patient, context); });
   model.bone_segment = owners(patient, model.rig.skeleton);
   for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);
 
-  std::optional<Image> labels = stage([&] {
-    voxel::Options o;
-    o.voxel_mm = options.voxel_mm;
-    return std::optional(voxel::voxelize(patient, o, context));
-  });
+  std::optional<Image> labels = stage.kept(
+      [&](const Context& inner) {
+        voxel::Options o;
+        o.voxel_mm = options.voxel_mm;
+        return voxel::voxelize(patient, o, inner);
+      },
+      patient, options.voxel_mm);
   const double voxel_mm = labels->grid.spacing[0];
   if (options.spheres_tp) {
     model.spheres.push_back(
         stage([&] { return thin::body_spheres(*labels, model.rig.skeleton, *options.spheres_tp, context); }));
   }
 
-  std::optional<TetMesh> mesh = stage([&] {
-    tet::Options o;
-    o.max_tets = options.max_tets;
-    o.max_nodes = options.max_nodes;
-    TetMesh made = mesher->mesh({patient, *labels}, o, context);
-    const tet::SliverReport slivers = tet::relax_slivers(made, {}, context);
-    if (slivers.before > 0) context.info(describe(slivers));
-    tet::canonicalize(made);
-    return std::optional(std::move(made));
-  });
+  std::optional<TetMesh> mesh = stage.kept(
+      [&](const Context& inner) {
+        tet::Options o;
+        o.max_tets = options.max_tets;
+        o.max_nodes = options.max_nodes;
+        TetMesh made = mesher->mesh({patient, *labels}, o, inner);
+        const tet::SliverReport slivers = tet::relax_slivers(made, {}, inner);
+        if (slivers.before > 0) inner.info(describe(slivers));
+        tet::canonicalize(made);
+        return made;
+      },
+      patient, *labels, mesher_name, options.max_tets, options.max_nodes);
   labels.reset();  // each value goes when its last reader is done
 
   std::string solver_name;
   {
     weights::Options o;
     o.solver = options.solver;
-    weights::WeightsResult solved = stage([&] {
-      return weights::solve_weights(*mesh, patient, model.bone_segment, model.segment_count(), o, context);
-    });
+    weights::WeightsResult solved = showing_worst_tets(
+        hooks,
+        [&] {
+          return stage.kept(
+              [&](const Context& inner) {
+                return weights::solve_weights(*mesh, patient, model.bone_segment, model.segment_count(), o,
+                                              inner);
+              },
+              patient, *mesh, model.bone_segment, model.segment_count(), options.solver);
+        },
+        [&]() -> const TetMesh& { return *mesh; });
     model.weights = std::move(solved.weights);
     model.certificate = solved.certificate;
     solver_name = solved.solver;
@@ -259,15 +305,23 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
     if (options.spheres_by == "weights") spheres.segment = thin::attach_by_weights(spheres, model, context);
   }
 
-  model.cor = stage([&] {
-    return cor::centres(model.nodes, model.tets, model.weights, model.segment_count(), {options.cor_sigma},
-                        context);
-  });
-  model.tissues = stage(
-      [&] { return bind_tissues(gather_tissues(patient, model.bone_segment), model, voxel_mm, context); });
+  model.cor = stage.kept(
+      [&](const Context& inner) {
+        return cor::centres(model.nodes, model.tets, model.weights, model.segment_count(),
+                            {options.cor_sigma}, inner);
+      },
+      model.nodes, model.tets, model.weights, model.segment_count(), options.cor_sigma);
+  std::vector<Tissue> tissues = gather_tissues(patient, model.bone_segment);
+  model.tissues = stage.kept(
+      [&](const Context& inner) { return bind_tissues(std::move(tissues), model, voxel_mm, inner); }, tissues,
+      model.nodes, model.tets, voxel_mm);
   model.volumes = gather_volumes(patient);
   model.provenance = provenance(patient, options, mesher_name, solver_name, voxel_mm);
-  model.certificate = stage([&] { return certify(model, context); });
+  model.certificate = showing_worst_tets(
+      hooks, [&] { return stage([&] { return certify(model, context); }); },
+      [&] {
+        return TetMesh{model.nodes.cast<double>(), model.tets, model.tet_label};
+      });
   return result;
 }
 

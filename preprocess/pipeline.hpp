@@ -11,6 +11,8 @@
 #include "core/values/case.hpp"
 #include "core/values/context.hpp"
 #include "core/values/model.hpp"
+#include "preprocess/cache/stage_store.hpp"
+#include "preprocess/worst_tets.hpp"
 
 namespace ecorche::preprocess {
 
@@ -44,6 +46,7 @@ struct StageTime {
   std::string name;
   double seconds = 0;
   double peak_rss_mib = 0;  ///< of the process, at the end of the stage
+  bool kept = false;        ///< taken from the store, made by an earlier run
 };
 
 struct Result {
@@ -52,14 +55,22 @@ struct Result {
   std::vector<std::string> warnings;  ///< as they were logged, in that order
 };
 
-/// `on_stage(name, index, count)` is called as each stage starts (may be empty).
-using StageCallback = std::function<void(std::string_view name, int index, int count)>;
+/// What a run tells and asks on its way. All may be left out.
+struct Hooks {
+  /// As each stage starts.
+  std::function<void(std::string_view name, int index, int count)> on_stage = {};
+  /// Where stages are kept from run to run. The rig and the certificate are not: the one takes as long as its
+  /// key, the other must be measured on what is there.
+  StageStore* store = nullptr;
+  /// Called where weights or certificate are refused and the mesh has tets to blame, with the worst of them.
+  /// What it returns is put before the error's advice: where to look.
+  std::function<std::string(const WorstTets&)> on_refusal = {};
+};
 
-/// Deterministic: the same case and options give the same model whatever the number of threads.
-/// Throws Error{usage} for an option out of range, what the stages throw, and Error{data} for a model that
-/// breaks its bounds (bounds.hpp).
-Result run(const Case& patient, const Options& options, const Context& context,
-           const StageCallback& on_stage);
+/// Deterministic: the same case and options give the same model whatever the number of threads, and whether
+/// its stages were kept or made. Throws Error{usage} for an option out of range, what the stages throw, and
+/// Error{data} for a model that breaks its bounds (bounds.hpp).
+Result run(const Case& patient, const Options& options, const Context& context, const Hooks& hooks = {});
 
 /// Certificate of a model, measured on what is stored; members that only the solver knows are copied from
 /// `model`. `outside` counts the vertices that are more than 1e-3 mm from the tet to which they are bound,

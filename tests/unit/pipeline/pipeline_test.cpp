@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/bounds.hpp"
 #include "preprocess/pipeline.hpp"
+#include "preprocess/bounds.hpp"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -39,9 +39,9 @@ std::string bytes_of(const Model& model, const std::string& name) {
 
 // The error of a run, or a failed test.
 Error refusal(const Case& patient, const Options& options, const Context& context = {},
-              const StageCallback& on_stage = {}) {
+              const Hooks& hooks = {}) {
   try {
-    run(patient, options, context, on_stage);
+    run(patient, options, context, hooks);
   } catch (const Error& error) {
     return error;
   }
@@ -53,10 +53,11 @@ TEST(Pipeline, spheres_are_a_stage_where_they_are_asked_for) {
   Options options = coarse("lattice");
   options.spheres_tp = 0.3;
   std::vector<std::string> announced;
-  const Result with = run(test::two_bones(), options, {}, [&](std::string_view name, int, int count) {
-    EXPECT_EQ(count, 8);
-    announced.emplace_back(name);
-  });
+  const Result with =
+      run(test::two_bones(), options, {}, {.on_stage = [&](std::string_view name, int, int count) {
+            EXPECT_EQ(count, 8);
+            announced.emplace_back(name);
+          }});
   ASSERT_EQ(announced.size(), 8U);
   EXPECT_EQ(announced[2], "spheres");
   ASSERT_EQ(with.model.spheres.size(), 1U);
@@ -83,12 +84,12 @@ class EveryMesher : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryMesher, makes_a_model_within_its_bounds) {
   std::vector<std::string> announced;
-  const Result result =
-      run(test::two_bones(), coarse(GetParam()), {}, [&](std::string_view name, int index, int count) {
-        EXPECT_EQ(index, static_cast<int>(announced.size()));
-        EXPECT_EQ(count, 7);
-        announced.emplace_back(name);
-      });
+  const Result result = run(test::two_bones(), coarse(GetParam()), {},
+                            {.on_stage = [&](std::string_view name, int index, int count) {
+                              EXPECT_EQ(index, static_cast<int>(announced.size()));
+                              EXPECT_EQ(count, 7);
+                              announced.emplace_back(name);
+                            }});
   EXPECT_EQ(announced, (std::vector<std::string>{"rig", "voxelize", "mesh", "weights", "cor", "mapping",
                                                  "certificate"}));
   ASSERT_EQ(result.stages.size(), announced.size());
@@ -154,11 +155,11 @@ TEST(Pipeline, a_stop_ends_every_stage) {
     Context context;
     context.stop = stop.get_token();
     int last = -1;
-    const Error error =
-        refusal(test::two_bones(), coarse("lattice"), context, [&](std::string_view, int index, int) {
-          last = index;
-          if (index == stage) stop.request_stop();
-        });
+    const Error error = refusal(test::two_bones(), coarse("lattice"), context,
+                                {.on_stage = [&](std::string_view, int index, int) {
+                                  last = index;
+                                  if (index == stage) stop.request_stop();
+                                }});
     EXPECT_EQ(error.kind(), ErrorKind::interrupted);
     EXPECT_EQ(last, stage);
   }
@@ -205,7 +206,7 @@ TEST(Pipeline, options_out_of_range_are_refused_before_any_work) {
   for (const auto& [where, spoil] : cases) {
     Options options = coarse("lattice");
     spoil(options);
-    const Error error = refusal(test::two_bones(), options, {}, no_stage);
+    const Error error = refusal(test::two_bones(), options, {}, {.on_stage = no_stage});
     EXPECT_EQ(error.kind(), ErrorKind::usage) << error.what();
     if (!where.empty()) {
       EXPECT_EQ(error.where(), where);
