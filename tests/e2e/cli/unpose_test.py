@@ -6,12 +6,16 @@ import json
 import pathlib
 import re
 import shutil
+import sys
 import tempfile
 import unittest
 
 import numpy as np
 
 from posed_files import CASE, MODEL, corners, run
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "bench"))
+import voxels  # noqa: E402
 
 AWAY = "ecorche_pose: 1\nskeleton: phantom\nroot: {translation_mm: [40, -3, 7], rotation: [0.9, 0.1, 0.3, 0.3]}\n" \
        "joints:\n  knee_right: {flexion_deg: 50}\n  hip_right: {flexion_deg: 30}\n  elbow_left: {flexion_deg: 60}\n"
@@ -102,6 +106,32 @@ class Unpose(unittest.TestCase):
         (self.folder / "other.vtu").write_bytes(data)
         self.assert_error(run("unpose", self.folder / "other.vtu", "-o", back), 65, "have no volume at rest")
         self.assertFalse(back.exists() and list(back.iterdir()))
+
+
+class Boundary(unittest.TestCase):
+    """bench/voxels.py, by which the benches say what lies off a boundary."""
+
+    def test_what_lies_off_a_boundary(self):
+        coarse = np.random.default_rng(1).integers(0, 3, (5, 4, 4))
+        labels = coarse.repeat(3, axis=0).repeat(3, axis=1).repeat(3, axis=2)
+        for neighbours, most in ((6, 1), (26, 3)):
+            for of, asked in (("labels", labels), ("object", (labels != 0).astype(int))):
+                padded, deep = np.pad(asked, 1), labels != 0
+                for step in np.ndindex(3, 3, 3):
+                    if sum(abs(s - 1) for s in step) <= most:
+                        deep = deep & (padded[tuple(slice(s, s + n) for s, n in zip(step, labels.shape))] == asked)
+                self.assertGreater(deep.sum(), 0)
+                self.assertTrue((voxels.off_boundary(labels, neighbours, of) == deep).all(), (neighbours, of))
+
+    def test_pieces_of_one_lattice(self):
+        values = np.arange(60).reshape(3, 4, 5)
+        whole = voxels.Volume(values, np.array([2.0, 4, 6]), np.array([1.0, -2, 3]))
+        piece = voxels.Volume(values[1:, :3, 2:].copy(), np.array([4.0, 4, 9]), whole.spacing)
+        piece.values[0, 1, 1] = -1
+        same = np.zeros(values.shape, bool)
+        same[1:, :3, 2:] = True
+        same[1, 1, 3] = False
+        self.assertTrue((voxels.same_on_grid_of(whole, piece) == same).all())
 
 
 if __name__ == "__main__":
