@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -84,44 +85,67 @@ std::int32_t cubes_along(std::int32_t voxels) {
 
 using Rows = std::vector<std::int32_t>;
 
-// The balls of every slab of cubes along the last axis, rows ascending.
-std::vector<Rows> in_slabs(const std::vector<FixedBall>& balls, std::int32_t slabs) {
-  std::vector<Rows> out(static_cast<std::size_t>(slabs));
-  for (std::size_t b = 0; b < balls.size(); ++b) {
-    if (balls[b].limit <= 0) continue;
-    for (std::int32_t s = balls[b].low[2] / kCube; s <= balls[b].high[2] / kCube; ++s) {
-      out[static_cast<std::size_t>(s)].push_back(static_cast<std::int32_t>(b));
+// The balls of every row of cubes along the first axis, rows of balls ascending: what one task looks at.
+struct CubeRows {
+  std::int32_t across, slabs;      // rows along the second and third axis
+  std::vector<std::size_t> first;  // of every row of cubes, and one more
+  Rows balls;
+
+  CubeRows(const std::vector<FixedBall>& all, const LatticeBox& box)
+      : across(cubes_along(box.size[1])), slabs(cubes_along(box.size[2])) {
+    first.assign(static_cast<std::size_t>(across) * static_cast<std::size_t>(slabs) + 1, 0);
+    for (const FixedBall& ball : all) each(ball, [&](std::size_t row) { ++first[row + 1]; });
+    for (std::size_t row = 1; row < first.size(); ++row) first[row] += first[row - 1];
+    balls.resize(first.back());
+    std::vector<std::size_t> at(first.begin(), first.end() - 1);
+    for (std::size_t b = 0; b < all.size(); ++b)
+      each(all[b], [&](std::size_t row) { balls[at[row]++] = static_cast<std::int32_t>(b); });
+  }
+
+  std::size_t count() const { return first.size() - 1; }
+  std::span<const std::int32_t> of(std::size_t row) const {
+    return {balls.data() + first[row], first[row + 1] - first[row]};
+  }
+
+ private:
+  template <class F>
+  void each(const FixedBall& ball, F&& f) const {
+    if (ball.limit <= 0) return;
+    for (std::int32_t s = ball.low[2] / kCube; s <= ball.high[2] / kCube; ++s) {
+      for (std::int32_t j = ball.low[1] / kCube; j <= ball.high[1] / kCube; ++j)
+        f(static_cast<std::size_t>(j) + static_cast<std::size_t>(across) * static_cast<std::size_t>(s));
     }
   }
-  return out;
-}
+};
 
 // One thread's work on one box.
 class Descent {
  public:
-  Descent(const std::vector<FixedBall>& balls, const LatticeBox& box,
+  Descent(const std::vector<FixedBall>& balls, const LatticeBox& box, const BrickMask& mask,
           const std::function<void(const Tile&)>& f)
-      : balls_(balls), box_(box), f_(f) {}
+      : balls_(balls),
+        box_(box),
+        mask_(mask),
+        f_(f),
+        cubes_(static_cast<std::size_t>(cubes_along(box.size[0]))) {}
 
-  // The cubes of a row along i, of the slab's balls.
-  void row(const Rows& slab, std::int32_t j, std::int32_t k) {
-    row_.clear();
-    for (const std::int32_t b : slab) {
+  // The cubes of a row along i.
+  void row(std::span<const std::int32_t> row, std::int32_t j, std::int32_t k) {
+    if (row.empty()) return;
+    for (CubeBalls& cube : cubes_) cube.clear();
+    for (const std::int32_t b : row) {
       const FixedBall& ball = balls_[static_cast<std::size_t>(b)];
-      if (ball.low[1] < j + kCube && ball.high[1] >= j) row_.push_back(b);
+      const auto seen = [&](std::size_t a, std::int32_t first) {
+        return static_cast<std::int32_t>(ball.centre[a] - 16 * std::int64_t{first});
+      };
+      const std::int32_t y = seen(1, j), z = seen(2, k);
+      for (std::int32_t c = ball.low[0] / kCube; c <= ball.high[0] / kCube; ++c)
+        cubes_[static_cast<std::size_t>(c)].push(seen(0, kCube * c), y, z, ball.limit, b);
     }
-    if (row_.empty()) return;
-    for (std::int32_t i = 0; i < box_.size[0]; i += kCube) {
-      reaching_.clear();
-      for (const std::int32_t b : row_) {
-        const FixedBall& ball = balls_[static_cast<std::size_t>(b)];
-        if (ball.low[0] >= i + kCube || ball.high[0] < i) continue;
-        const auto seen = [&](std::size_t a, std::int32_t first) {
-          return static_cast<std::int32_t>(ball.centre[a] - 16 * std::int64_t{first});
-        };
-        reaching_.push(seen(0, i), seen(1, j), seen(2, k), ball.limit, b);
-      }
-      kernels::narrow(reaching_, {0, 0, 0}, kCube, level_[0]);
+    for (std::size_t c = 0; c < cubes_.size(); ++c) {
+      const std::int32_t i = kCube * static_cast<std::int32_t>(c);
+      if (cubes_[c].size == 0 || (mask_ && !mask_.has(i, j, k))) continue;
+      kernels::narrow(cubes_[c], {0, 0, 0}, kCube, level_[0]);
       halve(0, kCube, {i, j, k});
     }
   }
@@ -149,9 +173,9 @@ class Descent {
 
   const std::vector<FixedBall>& balls_;
   const LatticeBox& box_;
+  const BrickMask& mask_;
   const std::function<void(const Tile&)>& f_;
-  Rows row_;
-  CubeBalls reaching_;
+  std::vector<CubeBalls> cubes_;
   std::array<CubeBalls, 3> level_;
   TileOwners owners_;
 };
@@ -217,7 +241,7 @@ LatticeBox box_within(const ImageGrid& lattice, const Vec3& low, const Vec3& hig
 }
 
 void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context,
-               const std::function<void(const Tile&)>& f) {
+               const std::function<void(const Tile&)>& f, const BrickMask& mask) {
   std::vector<FixedBall> balls(set.balls.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, balls.size(), 4096), [&](const auto& range) {
     for (std::size_t b = range.begin(); b < range.end(); ++b) {
@@ -225,16 +249,15 @@ void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context
       if (!fix(set.balls[b], box, balls[b])) balls[b].limit = 0;
     }
   });
-  const std::vector<Rows> slabs = in_slabs(balls, cubes_along(box.size[2]));
-  tbb::enumerable_thread_specific<Descent> descents([&] { return Descent(balls, box, f); });
-  const std::int32_t across = cubes_along(box.size[1]);
+  const CubeRows rows(balls, box);
+  tbb::enumerable_thread_specific<Descent> descents([&] { return Descent(balls, box, mask, f); });
   std::atomic<std::int64_t> done{0};
-  const std::int64_t all = std::int64_t{across} * static_cast<std::int64_t>(slabs.size());
+  const auto all = static_cast<std::int64_t>(rows.count());
   tbb::parallel_for(std::int64_t{0}, all, [&](std::int64_t task) {
     if (context.stop.stop_requested()) return;
-    const auto slab = static_cast<std::size_t>(task / across);
-    descents.local().row(slabs[slab], static_cast<std::int32_t>(task % across) * kCube,
-                         static_cast<std::int32_t>(slab) * kCube);
+    descents.local().row(rows.of(static_cast<std::size_t>(task)),
+                         static_cast<std::int32_t>(task % rows.across) * kCube,
+                         static_cast<std::int32_t>(task / rows.across) * kCube);
     const std::int64_t now = ++done;
     if (now % 64 == 0) context.report(static_cast<double>(now) / static_cast<double>(all));
   });

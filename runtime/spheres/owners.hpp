@@ -11,6 +11,7 @@
 #include "core/values/context.hpp"
 #include "runtime/spheres/balls.hpp"
 #include "runtime/spheres/tile_owners.hpp"
+#include "runtime/volume/bricks.hpp"
 
 namespace ecorche::runtime {
 
@@ -53,10 +54,10 @@ struct Tile {
   }
 };
 
-/// Calls `f` once for every tile of the box that holds an owned voxel, from any thread and in any order.
-/// Throws as grown_box, and Error{interrupted} on a stop.
+/// Calls `f` once for every tile of the box that holds an owned voxel, from any thread and in any order; with
+/// a mask, of its bricks only (bricks of the box). Throws as grown_box, and Error{interrupted} on a stop.
 void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context,
-               const std::function<void(const Tile&)>& f);
+               const std::function<void(const Tile&)>& f, const BrickMask& mask = {});
 
 /// Of every voxel of the box the row of the ball that owns it, TileOwners::none where none does. Throws as
 /// for_tiles.

@@ -23,6 +23,8 @@ constexpr double kReach = 2;
 // A ball that sticks out of a larger one by less adds nothing, voxels.
 constexpr double kSlack = 0.5;
 constexpr double kMostSteps = 64;
+// Motions for every step of the ball that takes most: strides are whole numbers of them.
+constexpr int kShares = 4;
 // Two motions that differ by less are one: radians, and mm.
 constexpr double kSame = 1e-9;
 
@@ -183,16 +185,18 @@ struct Turn {
 
 // So many steps that a swept ball leaves no scallop deeper than half a voxel: balls of radius r that lie 2 w
 // apart leave r - sqrt(r^2 - w^2) <= 1/2 where w^2 <= r - 1/4.
-int steps_of(const Turn& turn, const std::vector<Seam::Sheet>& sheet, const ImageGrid& lattice) {
-  const Vec3 middle = lattice.index({turn.joint.x(), turn.joint.y(), turn.joint.z()});
-  double most = 1;
-  for (const Seam::Sheet& at : sheet) {
-    const double way =
-        turn.angle() * std::sqrt(distance2(at.voxel, middle)) + turn.shift() / lattice.spacing[0];
-    const double apart = 2 * std::sqrt(std::max(std::sqrt(at.radius2) - 0.25, 0.5));
-    most = std::max(most, std::ceil(way / apart));
-  }
-  return static_cast<int>(std::min(most, kMostSteps));
+int steps_of(const Turn& turn, const Seam::Sheet& at, const Vec3& joint, double voxel_mm) {
+  const double way = turn.angle() * std::sqrt(distance2(at.voxel, joint)) + turn.shift() / voxel_mm;
+  const double apart = 2 * std::sqrt(std::max(std::sqrt(at.radius2) - 0.25, 0.5));
+  return static_cast<int>(std::clamp(std::ceil(way / apart), 1.0, kMostSteps));
+}
+
+// Large balls near the joint go in longer strides than small ones far out.
+std::vector<int> steps_of(const Turn& turn, const std::vector<Seam::Sheet>& sheet, const ImageGrid& lattice) {
+  const Vec3 joint = lattice.index({turn.joint.x(), turn.joint.y(), turn.joint.z()});
+  std::vector<int> out;
+  for (const Seam::Sheet& at : sheet) out.push_back(steps_of(turn, at, joint, lattice.spacing[0]));
+  return out;
 }
 
 }  // namespace
@@ -204,15 +208,18 @@ void bridge(const Seams& seams, std::span<const RigidTransform> motions, BallSet
       const auto s = static_cast<std::size_t>(child), p = static_cast<std::size_t>(seams.parent[s]);
       const Turn turn{motions[p], motions[s], Vector3d(seams.joint[s].data())};
       if (turn.angle() < kSame && turn.shift() < kSame) continue;
-      const int steps = steps_of(turn, seam.sheet, set.lattice);
-      for (int i = 0; i <= steps; ++i) {
-        const RigidTransform share = turn.at(static_cast<double>(i) / steps);
+      const std::vector<int> steps = steps_of(turn, seam.sheet, set.lattice);
+      const int shares = kShares * *std::max_element(steps.begin(), steps.end());
+      for (int i = 0; i <= shares; ++i) {
+        const RigidTransform share = turn.at(static_cast<double>(i) / shares);
         const Affine motion{share.q.toRotationMatrix(), share.t};
         const Affine forth = index * motion * space;
         const auto row = static_cast<std::int32_t>(set.back.size());
         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(set.back.emplace_back().data()) =
             forth.linear.transpose();
-        for (const Seam::Sheet& at : seam.sheet) {
+        for (std::size_t b = 0; b < steps.size(); ++b) {
+          if (i < shares && i % (shares / steps[b]) != 0) continue;
+          const Seam::Sheet& at = seam.sheet[b];
           const Vector3d to = forth * Vector3d(at.voxel.data());
           set.balls.push_back({at.voxel, {to.x(), to.y(), to.z()}, at.radius2, at.radius2, row});
         }
