@@ -1,17 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// Why inverse kinematics is damped least squares: against cyclic coordinate descent on a prepared body, both
-// with the same limits, from rest to points that poses within the limits reach.
+// Why inverse kinematics is damped least squares: against coordinate descent and FABRIK on prepared bodies,
+// all within the same limits and couplings.
 //
-// usage: bench_ik MODEL.hdf
+// usage: bench_ik MODEL.hdf...
+//
+// far:  from the scan to where random poses within the limits take random points of 1, 2 or 4 ends.
+// drag: a random point of a random segment drawn along a closed curve, 5 mm a frame, through and out of its
+//       reach; each frame starts at the last one's pose.
+// free: as far, on the same skeleton with every joint a ball without limits or couplings: what the methods
+// were
+//       made for.
+// pull: the same of a hand or the head, feet pinned by two points each, the head looking at what is pulled,
+// the root
+//       free to go. Only ours does that.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
+#include <numbers>
 #include <random>
 #include <vector>
 
+#include "bench/ik/peers.hpp"
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
-#include "core/kinematics/ik.hpp"
 #include "core/model_file/model_file.hpp"
 
 namespace {
@@ -19,112 +31,209 @@ namespace {
 using namespace ecorche;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
+using kinematics::IkProblem;
+using kinematics::IkResult;
 
-// Cyclic coordinate descent (Wang and Chen 1991): joint by joint from the target's to the root's child, each
-// turned so that the point comes nearest to its goal, then constrained. Several targets: a pass for each.
-kinematics::IkResult ccd(const Rig& rig, const Pose& start, const kinematics::IkProblem& problem) {
-  kinematics::IkResult out;
-  out.pose = start;
-  std::vector<ClampedJoint> clamped;
-  clamped.reserve(rig.skeleton.segments.size());
-  std::vector<RigidTransform> motion = kinematics::forward(rig, out.pose);
-  const auto away = [&](const kinematics::IkTarget& t) {
-    return (motion[t.segment] * t.point - t.goal).norm();
-  };
-  for (out.steps = 0; out.steps < 10 * problem.most_steps; ++out.steps) {
-    out.reached = std::all_of(problem.targets.begin(), problem.targets.end(),
-                              [&](const auto& t) { return away(t) <= problem.tolerance_mm; });
-    if (out.reached) break;
-    for (const kinematics::IkTarget& target : problem.targets) {
-      for (int s = static_cast<int>(target.segment);
-           rig.skeleton.segments[static_cast<std::size_t>(s)].parent >= 0;
-           s = rig.skeleton.segments[static_cast<std::size_t>(s)].parent) {
-        const auto j = static_cast<std::size_t>(s);
-        const Joint& joint = rig.skeleton.segments[j].joint;
-        const Vector3d center = motion[j] * joint.center;
-        const Vector3d from = motion[target.segment] * target.point - center, to = target.goal - center;
-        if (from.norm() < 1e-6 || to.norm() < 1e-6) continue;
-        const Quaterniond turn = Quaterniond::FromTwoVectors(from, to);
-        const Vector3d v = (motion[j].q.toRotationMatrix() * joint.axes).transpose() * turn.vec();
-        out.pose.rotation[j] = out.pose.rotation[j] * Quaterniond(turn.w(), v.x(), v.y(), v.z());
-        clamped.clear();
-        kinematics::constrain(rig.skeleton, out.pose, clamped);
-        kinematics::forward(rig, out.pose, motion);
-      }
-    }
-  }
-  for (const kinematics::IkTarget& target : problem.targets) out.away_mm.push_back(away(target));
-  return out;
-}
+using Solve = std::function<IkResult(const Rig&, const Pose&, const IkProblem&)>;
+struct Method {
+  const char* name;
+  Solve solve;
+};
+const Method kMethods[] = {{"damped least squares", kinematics::solve_ik},
+                           {"coordinate descent", bench::coordinate_descent},
+                           {"FABRIK", bench::fabrik}};
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr int kFar = 300, kCurves = 20, kFrames = 240;
+constexpr double kWay = 5;  // mm a frame
 
 struct Tally {
-  std::vector<double> micros, away;
+  std::vector<double> micros, away, jump;
   int reached = 0;
+  double removed = 0;
+
+  static double at(std::vector<double>& x, double share) {
+    if (x.empty()) return 0;
+    std::sort(x.begin(), x.end());
+    return x[static_cast<std::size_t>(share * static_cast<double>(x.size() - 1))];
+  }
   void print(const char* name) {
-    std::sort(micros.begin(), micros.end());
-    std::sort(away.begin(), away.end());
-    const auto at = [](const std::vector<double>& x, double share) {
-      return x[static_cast<std::size_t>(share * static_cast<double>(x.size() - 1))];
-    };
-    std::printf("  %-22s %5.1f %%  %7.0f %7.0f %7.0f us   %7.2f %7.2f mm\n", name,
+    std::printf("  %-21s %5.1f %%  %6.0f %6.0f %6.0f   %6.2f %7.2f   %6.1f %6.1f   %.0e\n", name,
                 100.0 * reached / static_cast<double>(micros.size()), at(micros, 0.5), at(micros, 0.99),
-                micros.back(), at(away, 0.5), at(away, 0.99));
+                at(micros, 1), at(away, 0.5), at(away, 0.99), at(jump, 0.99), at(jump, 1), removed);
+  }
+
+  Pose step(const Rig& rig, const Pose& start, const IkProblem& problem, const Solve& solve, bool follows) {
+    const auto begin = std::chrono::steady_clock::now();
+    IkResult result = solve(rig, start, problem);
+    micros.push_back(
+        std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+    away.push_back(*std::max_element(result.away_mm.begin(), result.away_mm.end()));
+    reached += result.reached ? 1 : 0;
+    double most = 0;
+    for (std::size_t j = 0; j < start.rotation.size(); ++j)
+      most = std::max(most, result.pose.rotation[j].angularDistance(start.rotation[j]) * kDegrees);
+    if (follows) jump.push_back(most);
+    Pose again = result.pose;
+    std::vector<ClampedJoint> clamped;
+    kinematics::constrain(rig.skeleton, again, clamped);
+    for (const ClampedJoint& c : clamped) removed = std::max(removed, c.removed * kDegrees);
+    return result.pose;
   }
 };
 
-template <class Solve>
-void run(Tally& tally, const Rig& rig, const kinematics::IkProblem& problem, Solve&& solve) {
-  const auto begin = std::chrono::steady_clock::now();
-  const kinematics::IkResult result = solve(rig, Pose::rest(rig.skeleton.segments.size()), problem);
-  tally.micros.push_back(
-      std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
-  tally.away.push_back(*std::max_element(result.away_mm.begin(), result.away_mm.end()));
-  tally.reached += result.reached ? 1 : 0;
+std::vector<std::size_t> ends_of(const Skeleton& skeleton) {
+  std::vector<std::size_t> out;
+  for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
+    if (std::none_of(skeleton.segments.begin(), skeleton.segments.end(),
+                     [&](const Segment& o) { return o.parent == static_cast<int>(s); }))
+      out.push_back(s);
+  }
+  return out;
 }
+
+Rig without_limits(Rig rig) {
+  for (Segment& segment : rig.skeleton.segments) {
+    segment.joint.coupled.clear();
+    if (segment.parent >= 0) segment.joint.kind = JointKind::ball;
+    for (AngleAxis& angle : segment.joint.sequence) {
+      angle.min = -std::numeric_limits<double>::infinity();
+      angle.max = -angle.min;
+    }
+  }
+  return rig;
+}
+
+class Bench {
+ public:
+  explicit Bench(const Rig& rig) : rig_(rig), joints_(rig.skeleton.segments.size()) {}
+
+  void far(std::size_t targets, const char* name = "far") {
+    std::vector<std::size_t> ends = ends_of(rig_.skeleton);
+    Tally tally[3];
+    for (int round = 0; round < kFar; ++round) {
+      const auto motion = kinematics::forward(rig_, any_pose());
+      IkProblem problem;
+      std::shuffle(ends.begin(), ends.end(), random_);
+      for (std::size_t t = 0; t < std::min(targets, ends.size()); ++t) {
+        const Vector3d point = rig_.skeleton.segments[ends[t]].joint.center + 60 * any_point();
+        problem.targets.push_back({ends[t], point, motion[ends[t]] * point, 1});
+      }
+      for (std::size_t m = 0; m < 3; ++m)
+        tally[m].step(rig_, Pose::rest(joints_), problem, kMethods[m].solve, false);
+    }
+    std::printf("%s, %zu target%s\n", name, targets, targets == 1 ? "" : "s");
+    for (std::size_t m = 0; m < 3; ++m) tally[m].print(kMethods[m].name);
+  }
+
+  void drag(std::size_t targets) {
+    Tally tally[3];
+    for (int curve = 0; curve < kCurves; ++curve) {
+      IkProblem problem;
+      std::vector<Curve> curves;
+      for (std::size_t t = 0; t < targets; ++t) {
+        const std::size_t segment = 1 + random_() % (joints_ - 1);
+        const Vector3d point = rig_.skeleton.segments[segment].joint.center + 100 * any_point();
+        problem.targets.push_back({segment, point, point, 1});
+        curves.push_back(any_curve(point));
+      }
+      for (std::size_t m = 0; m < 3; ++m) along(tally[m], problem, curves, kMethods[m].solve);
+    }
+    std::printf("drag, %zu target%s\n", targets, targets == 1 ? "" : "s");
+    for (std::size_t m = 0; m < 3; ++m) tally[m].print(kMethods[m].name);
+  }
+
+  void pull() {
+    const auto row = [&](const char* name) { return rig_.skeleton.find_segment(name); };
+    const int feet[] = {row("foot_left"), row("foot_right")}, head = row("head");
+    const int hands[] = {row("hand_left"), row("hand_right"), head};
+    if (std::min({feet[0], feet[1], hands[0], hands[1], head}) < 0) return;
+    Tally tally;
+    for (int curve = 0; curve < kCurves; ++curve) {
+      const auto pulled = static_cast<std::size_t>(hands[curve % 3]);
+      const Vector3d point = rig_.skeleton.segments[pulled].joint.center + 60 * any_point();
+      IkProblem problem;
+      problem.move_root = true;
+      problem.targets.push_back({pulled, point, point, 1});
+      for (const int foot : feet) {
+        const auto f = static_cast<std::size_t>(foot);
+        const Vector3d ankle = rig_.skeleton.segments[f].joint.center;
+        for (const Vector3d& by : {Vector3d(0, 0, 0), Vector3d(0, -120, -50)})
+          problem.targets.push_back({f, ankle + by, ankle + by, 3});
+      }
+      const auto h = static_cast<std::size_t>(head);
+      if (pulled != h)
+        problem.looks.push_back({h, rig_.skeleton.segments[h].joint.center + Vector3d(0, -80, 60),
+                                 -Vector3d::UnitY(), point, 0.2});
+      along(tally, problem, {any_curve(point)}, kMethods[0].solve);
+    }
+    std::printf("pull, feet pinned, the head looks\n");
+    tally.print(kMethods[0].name);
+  }
+
+ private:
+  // From where the point is, around and back.
+  struct Curve {
+    Vector3d begin, a, b;
+    Vector3d at(int frame) const {
+      const double turn = 2 * std::numbers::pi * frame / kFrames;
+      return begin + (1 - std::cos(turn)) * a + std::sin(turn) * b;
+    }
+  };
+
+  Vector3d any_point() { return {normal_(random_), normal_(random_), normal_(random_)}; }
+
+  Curve any_curve(const Vector3d& begin) {
+    const double radius = kWay * kFrames / (2 * std::numbers::pi);
+    const Vector3d a = any_point().normalized();
+    return {begin, radius * a, radius * a.cross(any_point()).normalized()};
+  }
+
+  Pose any_pose() {
+    Pose pose = Pose::rest(joints_);
+    for (std::size_t j = 1; j < joints_; ++j) {
+      const Quaterniond any =
+          Quaterniond(normal_(random_), normal_(random_), normal_(random_), normal_(random_)).normalized();
+      pose.rotation[j] = Quaterniond::Identity().slerp(0.4, any);
+    }
+    std::vector<ClampedJoint> clamped;
+    kinematics::constrain(rig_.skeleton, pose, clamped);
+    return pose;
+  }
+
+  void along(Tally& tally, IkProblem problem, const std::vector<Curve>& curves, const Solve& solve) const {
+    Pose pose = Pose::rest(joints_);
+    for (int frame = 0; frame <= kFrames; ++frame) {
+      for (std::size_t c = 0; c < curves.size(); ++c) problem.targets[c].goal = curves[c].at(frame);
+      for (kinematics::IkLook& look : problem.looks) look.at = problem.targets[0].goal;
+      pose = tally.step(rig_, pose, problem, solve, true);
+    }
+  }
+
+  const Rig& rig_;
+  std::size_t joints_;
+  std::mt19937 random_{1};
+  std::normal_distribution<double> normal_;
+};
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: bench_ik MODEL.hdf\n");
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: bench_ik MODEL.hdf...\n");
     return 64;
   }
-  const Rig rig = model_file::read(argv[1], Context{}).rig;
-  const std::size_t joints = rig.skeleton.segments.size();
-  // Leaves: what one drags.
-  std::vector<std::size_t> ends;
-  for (std::size_t s = 0; s < joints; ++s) {
-    const bool leaf = std::none_of(rig.skeleton.segments.begin(), rig.skeleton.segments.end(),
-                                   [&](const Segment& o) { return o.parent == static_cast<int>(s); });
-    if (leaf) ends.push_back(s);
-  }
-  std::mt19937 random(1);
-  std::normal_distribution<double> normal;
-  std::printf("reached; time p50, p99, most; distance p50, p99 (%zu joints)\n", joints);
-  for (const std::size_t targets : {std::size_t{1}, std::size_t{2}, std::size_t{4}}) {
-    Tally least, descent;
-    for (int round = 0; round < 300; ++round) {
-      Pose pose = Pose::rest(joints);
-      for (std::size_t j = 1; j < joints; ++j) {
-        const Quaterniond any =
-            Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
-        pose.rotation[j] = Quaterniond::Identity().slerp(0.4, any);
-      }
-      std::vector<ClampedJoint> clamped;
-      kinematics::constrain(rig.skeleton, pose, clamped);
-      const auto motion = kinematics::forward(rig, pose);
-      kinematics::IkProblem problem;
-      std::shuffle(ends.begin(), ends.end(), random);
-      for (std::size_t t = 0; t < std::min(targets, ends.size()); ++t) {
-        const Vector3d point = rig.skeleton.segments[ends[t]].joint.center;
-        problem.targets.push_back({ends[t], point, motion[ends[t]] * point, 1});
-      }
-      run(least, rig, problem, kinematics::solve_ik);
-      run(descent, rig, problem, ccd);
-    }
-    std::printf("%zu target%s\n", targets, targets == 1 ? "" : "s");
-    least.print("damped least squares");
-    descent.print("coordinate descent");
+  for (int i = 1; i < argc; ++i) {
+    const Rig rig = model_file::read(argv[i], Context{}).rig;
+    std::printf("%s: %zu joints\n  %-21s %7s  %20s   %14s   %13s   %s\n", argv[i],
+                rig.skeleton.segments.size(), "", "reached", "us: p50, p99, most", "mm: p50, p99",
+                "deg a frame: p99, most", "deg beyond limits");
+    Bench bench(rig);
+    for (const std::size_t targets : {std::size_t{1}, std::size_t{2}, std::size_t{4}}) bench.far(targets);
+    for (const std::size_t targets : {std::size_t{1}, std::size_t{3}}) bench.drag(targets);
+    bench.pull();
+    const Rig free = without_limits(rig);
+    Bench(free).far(2, "free");
   }
   return 0;
 }
