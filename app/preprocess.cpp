@@ -11,6 +11,7 @@
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/model_report.hpp"
+#include "app/report/page.hpp"
 #include "app/stage_folder.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
@@ -33,6 +34,7 @@ struct Settings {
   preprocess::Options options;
   fs::path cache;  // empty: nothing is kept
   double cache_gib = 8;
+  fs::path report;  // empty: none
 };
 
 // Runs one step that is not the pipeline's, and times it alike.
@@ -82,12 +84,27 @@ std::string text_report(const Model& model, const Settings& settings, const std:
 }
 
 // What would fail only after minutes of work is refused first.
-void check_output(const fs::path& path) {
-  if (path.extension() != ".hdf") {
-    throw Error(ErrorKind::usage, "--output", "'" + path.string() + "' does not end in .hdf",
+void check_outputs(const Settings& settings) {
+  if (settings.output.extension() != ".hdf") {
+    throw Error(ErrorKind::usage, "--output", "'" + settings.output.string() + "' does not end in .hdf",
                 "name it so: ParaView opens VTKHDF files by that ending");
   }
-  const files::AtomicFile probe(path);
+  const files::AtomicFile model(settings.output);
+  if (settings.report.empty()) return;
+  if (settings.report.extension() != ".html") {
+    throw Error(ErrorKind::usage, "--report", "'" + settings.report.string() + "' does not end in .html",
+                "name it so");
+  }
+  const files::AtomicFile report(settings.report);
+}
+
+// `context`, whose warnings are also put behind `warnings`.
+Context noting(Context context, std::vector<std::string>& warnings) {
+  context.log = [&warnings, said = std::move(context.log)](LogLevel level, std::string_view line) {
+    if (level == LogLevel::warning) warnings.emplace_back(line);
+    if (said) said(level, line);
+  };
+  return context;
 }
 
 // The worst tets beside the model that is not written, for ParaView.
@@ -105,14 +122,17 @@ std::string write_refused(const fs::path& output, const preprocess::WorstTets& w
 }
 
 int run(const Program& program, const Settings& settings) {
-  check_output(settings.output);
+  check_outputs(settings);
   std::optional<StageFolder> kept;
   if (!settings.cache.empty()) kept.emplace(settings.cache, settings.cache_gib);
   std::vector<StageTime> stages;
+  std::vector<std::string> warnings;
   Case patient;
-  timed(stages, "read",
-        [&] { patient = io::read_case(settings.case_path, settings.input, program.context("read")); });
-  timed(stages, "surfaces", [&] { label_surfaces::resolve(patient, program.context("surfaces")); });
+  timed(stages, "read", [&] {
+    patient = io::read_case(settings.case_path, settings.input, noting(program.context("read"), warnings));
+  });
+  timed(stages, "surfaces",
+        [&] { label_surfaces::resolve(patient, noting(program.context("surfaces"), warnings)); });
 
   // The pipeline has one context for all stages; each stage has a bar of its own.
   Context bar = program.context("preprocess");
@@ -138,6 +158,10 @@ int run(const Program& program, const Settings& settings) {
   if (bad > 0) {
     throw Error(ErrorKind::io, settings.output.string(),
                 std::to_string(bad) + " datasets came back changed from the disk", "check the disk");
+  }
+  if (!settings.report.empty()) {
+    warnings.insert(warnings.end(), made.warnings.begin(), made.warnings.end());
+    files::write_text(settings.report, report::page({made.model, stages, warnings}));
   }
   nlohmann::json report = model_report(true, &made.model, made.model.certificate, digests.size(), bad);
   for (const StageTime& s : stages) {
@@ -236,6 +260,10 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
       ->needs(cache)
       ->check(CLI::Range(0.01, 1e6))
       ->capture_default_str();
+  command->add_option(
+      "--report", settings->report,
+      "a page (.html) of what was made: certificate, slices with bones and weights, rig, quality, "
+      "times, warnings with pictures of where they are");
   add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

@@ -48,10 +48,10 @@ struct IkResult {
 /// angles that the joints above the targets have, from `start`: what is needed moves, and little else. An
 /// angle that would pass its limit goes up to it, and the others take what is left; coupled angles follow
 /// theirs in the slopes too. Where that ends short of the goals (a straight limb, a corner of limits), the
-/// way is tried again from angles nearer to the middle of their ranges; such a pose is taken where it reaches,
-/// or comes at least a quarter nearer, lest a drag should jump. For a drag, start from the last pose.
-/// Deterministic; well below a millisecond. bench/ik holds it against coordinate descent and FABRIK. Throws Error{internal} for a segment that is
-/// not there, and what `constrain` throws.
+/// way is tried again from angles nearer to the middle of their ranges; such a pose is taken where it
+/// reaches, or comes at least a quarter nearer, lest a drag should jump. For a drag, start from the last
+/// pose. Deterministic; well below a millisecond. bench/ik holds it against coordinate descent and FABRIK.
+/// Throws Error{internal} for a segment that is not there, and what `constrain` throws.
 IkResult solve_ik(const Rig& rig, const Pose& start, const IkProblem& problem);
 
 }  // namespace ecorche::kinematics
