@@ -20,6 +20,7 @@
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
+#include "runtime/settle/unfold.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/resample.hpp"
 #include "runtime/volume/volume_poser.hpp"
@@ -41,7 +42,7 @@ struct Settings {
   std::string sampling = "trilinear";
   std::string grid = "posed";
   std::string deformer = "tets";
-  bool tets = false, field = false, as_case = false, bridge = false;
+  bool tets = false, field = false, as_case = false, bridge = false, unfold = false;
   std::vector<std::string> tet_formats{"vtu"};
 
   bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
@@ -157,6 +158,16 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
             {"max_volume_change", quality.thresholds.max_volume_change},
             {"max_bone_rigidity_mm", quality.thresholds.max_bone_rigidity_mm}}},
           {"purpose", "training and education, not planning of surgery"}};
+}
+
+// Unfolds the body; what that did.
+json unfolded_json(const Model& model, runtime::PosedBody& body, const Context& context) {
+  const runtime::Unfolding done = runtime::unfold(model, body, context);
+  return {{"inverted_tets_before", done.inverted_before},
+          {"inverted_rest_mm3_before", done.rest_mm3_before},
+          {"squeezed_by_bones", done.held},
+          {"moved_nodes", done.moved_nodes},
+          {"largest_move_mm", done.largest_move_mm}};
 }
 
 // Writes one posed body. Every file is checked for a stop request before it is begun.
@@ -328,8 +339,10 @@ int run(const Program& program, const Settings& settings) {
     // Quality looks at every tissue, whichever are written.
     const Status status = poser.run(frame.pose, skinning, poser.all_tissues(), body);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
-    const json quality =
+    const json unfolded = settings.unfold ? unfolded_json(*model, body, context) : json();
+    json quality =
         quality_json(*model, body, runtime::measure(*model, body, poser.all_tissues(), {}, closed));
+    if (settings.unfold) quality["unfolded"] = unfolded;
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
     if (settings.as_case)
       io::write_case(folder,
@@ -369,6 +382,8 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
                    "how volumes follow: tets, or spheres (the model's volumetric skeleton, refilled)")
       ->check(CLI::IsMember({"tets", "spheres"}))
       ->capture_default_str();
+  command->add_flag("--unfold", s->unfold,
+                    "move what lies about inverted tets until none is inverted that no bones squeeze");
   command->add_flag("--bridge", s->bridge,
                     "of the spheres: fill what opens between segments that turn against each other");
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")

@@ -81,6 +81,23 @@ class Unpose(unittest.TestCase):
             self.assertLess(np.abs(corners(CASE / f"bones/{bone}.stl") - corners(back / f"bones/{bone}.stl")).mean(), 1)
         self.assertLess(self.labels_that_differ(back / "volumes/labels.nrrd"), 0.06)
 
+    def test_unfolding_leaves_less_inverted_and_comes_back(self):
+        (self.folder / "away.yaml").write_text("ecorche_pose: 1\nskeleton: phantom\njoints:\n  knee_right: {flexion_deg: 110}\n")
+        found = {}
+        for name, words in (("skinned", ()), ("unfolded", ("--unfold",))):
+            quality = json.loads((self.pose("--tets", "--tissues", "skin", *words) / "quality.json").read_text())
+            trip = json.loads(self.ok("--json", "unpose", self.folder / "posed", "-o", self.folder / name).stdout)["round_trip"]
+            found[name] = quality, trip
+        (before, there), (after, again) = found["skinned"], found["unfolded"]
+        self.assertNotIn("unfolded", before)
+        self.assertEqual(after["unfolded"]["inverted_tets_before"], before["inverted_tets"])
+        self.assertGreater(before["inverted_tets"], 20)
+        self.assertLess(after["inverted_rest_mm3"], 0.5 * before["inverted_rest_mm3"])
+        # What is no longer inverted fills a place of its own, where another part may lie: ways back differ, and are told.
+        self.assertNotEqual(again["mean_mm"], there["mean_mm"])
+        self.assertLess(again["mean_mm"], 2)
+        self.assertEqual(after["bone_rigidity_mm"], before["bone_rigidity_mm"])
+
     def test_what_is_drawn_on_the_posed_body_comes_back(self):
         posed = self.pose("--tissues", "liver", "--format", "ply", "--volumes", "ct", "--volume-format", "mha", "--tets")
         drawn = self.folder / "target.ply"
