@@ -17,6 +17,7 @@
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
 #include "io/surface/surface_file.hpp"
+#include "preprocess/check/inspect_case.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/thin/thinning.hpp"
@@ -35,6 +36,7 @@ struct Settings {
   fs::path cache;  // empty: nothing is kept
   double cache_gib = 8;
   fs::path report;  // empty: none
+  bool check = false;
 };
 
 // Runs one step that is not the pipeline's, and times it alike.
@@ -81,6 +83,18 @@ std::string text_report(const Model& model, const Settings& settings, const std:
       << spheres_line(model) << c.outside_vertices << " tissue vertices outside the mesh, the farthest "
       << c.max_outside_mm << " mm\n";
   return out.str();
+}
+
+// As `ecorche check` looks: warnings are passed on, notes left out; a case that cannot be prepared is
+// refused.
+void inspect(const Case& patient, const Context& context) {
+  const check::Report report = check::inspect(patient, context);
+  for (const check::Finding& finding : report.findings) {
+    if (finding.severity == check::Severity::error)
+      throw Error(ErrorKind::data, finding.where, finding.what, finding.mend);
+    if (finding.severity == check::Severity::warning)
+      context.warn(finding.where + ": " + finding.what + " (" + finding.mend + ")");
+  }
 }
 
 // What would fail only after minutes of work is refused first.
@@ -133,6 +147,9 @@ int run(const Program& program, const Settings& settings) {
   });
   timed(stages, "surfaces",
         [&] { label_surfaces::resolve(patient, noting(program.context("surfaces"), warnings)); });
+
+  if (settings.check)
+    timed(stages, "check", [&] { inspect(patient, noting(program.context("check"), warnings)); });
 
   // The pipeline has one context for all stages; each stage has a bar of its own.
   Context bar = program.context("preprocess");
@@ -264,6 +281,8 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
       "--report", settings->report,
       "a page (.html) of what was made: certificate, slices with bones and weights, rig, quality, "
       "times, warnings with pictures of where they are");
+  command->add_flag("--check", settings->check,
+                    "first look at the case as `ecorche check` does, and refuse what it calls an error");
   add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

@@ -91,6 +91,17 @@ class Cli(unittest.TestCase):
         case.write_text(text + "\nsurprise: 1\n")
         self.assert_error(run("preprocess", case, "-o", self.folder / "m.hdf"), 78, "case.yaml:", "surprise")
 
+    def test_a_case_is_looked_at_first_where_asked(self):
+        case = self.folder / "case"
+        shutil.copytree(CASE, case)
+        text = (case / "case.yaml").read_text()
+        (case / "case.yaml").write_text(re.sub(r"(?m)^skin: .*$", "skin: {file: skin.stl, unit: um}", text))
+        looked = run("check", case)
+        self.assertEqual(looked.returncode, 65, looked.stdout)
+        refused = run("preprocess", case, "-o", self.folder / "m.hdf", "--check")
+        self.assertEqual(refused.returncode, 65, refused.stderr)
+        self.assertIn(re.search(r"(?m)^error: ([^:]*: [^,(]*)", looked.stdout).group(1).strip(), refused.stderr)
+
     def test_a_wrong_pose_is_refused(self):
         pose = self.folder / "pose.yaml"
         skeleton = re.search(r"^name: (\S+)", (CASE / "skeleton.yaml").read_text(), re.M).group(1)
