@@ -3,7 +3,8 @@
 """Thirty stated poses: twelve of a stride, twelve of one joint about half way, six of a whole body. Written as pose files.
 
 The angles are anatomical, in degrees. A joint or an angle that the model does not have is left out; where nothing is left
-of a pose (no legs, say) the pose is left out too.
+of a pose (no legs, say), the model's own limited angles take its place: one alone, or all at once and half as far, in even steps
+up to 90 degrees from rest or the limit.
 """
 import argparse
 import json
@@ -49,6 +50,26 @@ def stated():
     return out
 
 
+def own(rig, count):
+    """As many poses of the angles of `rig` that have a limit: half of them of one angle alone, half of all at once."""
+    ends = {}
+    for row in rig:
+        for angle in row["angles"]:
+            bounds = [limit - angle["rest_deg"] for limit in (angle["min_deg"], angle["max_deg"]) if limit is not None]
+            if bounds:
+                ends[row["joint"], angle["name"]] = angle["rest_deg"], max(-90.0, min(90.0, max(bounds, key=abs)))
+    out, singles = {}, count - count // 2
+    rounds = -(-singles // max(1, len(ends)))
+    for i in range(singles if ends else 0):
+        (joint, angle), (rest, far) = list(ends.items())[i % len(ends)]
+        out[f"single_{i + 1:02d}"] = {joint: {angle: rest + far * (i // len(ends) + 1) / rounds}}
+    for i in range(count // 2 if ends else 0):
+        pose = out[f"all_{i + 1:02d}"] = {}
+        for (joint, angle), (rest, far) in ends.items():
+            pose.setdefault(joint, {})[angle] = rest + far / 2 * (i + 1) / (count // 2)
+    return out
+
+
 def rigid(count):
     """Turns of the whole body: about axes spread over the sphere (a golden spiral), by 20 to 160 degrees."""
     out = {}
@@ -67,14 +88,16 @@ def write(model, folder, rigid_turns=6):
     head = f"# SPDX-License-Identifier: Apache-2.0\necorche_pose: 1\nskeleton: {info['skeleton']}\n"
     folder.mkdir(parents=True, exist_ok=True)
     names = []
-    for name, joints in stated().items():
+    poses = {name: joints for name, joints in stated().items()
+             if any(angle in known.get(joint, ()) for joint, angles in joints.items() for angle in angles)}
+    poses.update(own(info["rig"], len(stated()) - len(poses)))
+    for name, joints in poses.items():
         lines = ""
         for joint, angles in joints.items():
             kept = ", ".join(f"{angle}_deg: {value:.6g}" for angle, value in angles.items() if angle in known.get(joint, ()))
             lines += f"  {joint}: {{{kept}}}\n" if kept else ""
-        if lines:
-            (folder / f"{name}.yaml").write_text(f"{head}joints:\n{lines}")
-            names.append(name)
+        (folder / f"{name}.yaml").write_text(f"{head}joints:\n{lines}")
+        names.append(name)
     turns = rigid(rigid_turns)
     for name, turn in turns.items():
         (folder / f"{name}.yaml").write_text(f"{head}root: {{rotation: [{', '.join(f'{x:.17g}' for x in turn)}]}}\n")
