@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the header of an image file declares, read by ourselves before ITK may allocate a byte for it.
+// What the header of an image file declares, read by ourselves before anything is allocated for it. ITK's
+// reading of the header is a second opinion; voxels are ours alone: MetaIO takes a packed image that does not
+// say its packed size for zeros, and niftilib mixes up `a.nii` and `a.nii.gz` side by side.
 #pragma once
 
 #include <array>
@@ -9,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/values/image.hpp"
 
@@ -28,11 +31,16 @@ struct ImageHeader {
   std::uint64_t data_offset = 0;    ///< of the first voxel byte, or of the gzip stream, in `data_file`
   std::uint64_t stream_offset = 0;  ///< of the first voxel byte in what that stream inflates to
   std::optional<std::uint64_t> packed_bytes;  ///< as the header declares, where it does
+  std::uint64_t skipped_lines = 0;  ///< lines of `data_file` from `data_offset` on that are no voxels
+  std::uint64_t skipped_bytes = 0;  ///< bytes behind those lines that are no voxels; raw only
+  bool at_end = false;              ///< raw voxels are the last bytes of `data_file`, whatever is before them
+  bool swapped = false;             ///< voxels are in the other byte order
+  std::optional<ImageGrid> grid;    ///< of NIfTI, and a NRRD that says its space: ITK 5.2 turns LAS wrongly
 
   // NIfTI only.
-  bool swapped = false;  ///< voxels are in the other byte order
-  bool planar = false;   ///< one volume a component
-  bool scaled = false;   ///< stored integers become real values: slope * stored + intercept
+  bool second_version = false;  ///< ITK 5.2 does not read it
+  bool planar = false;  ///< one volume a component
+  bool scaled = false;  ///< stored integers become real values: slope * stored + intercept
   double slope = 1, intercept = 0;
 
   /// Bytes of all voxels as stored; the parsers keep it at most `largest_image_bytes`.
@@ -40,7 +48,8 @@ struct ImageHeader {
 };
 
 /// The header of a `.nrrd` or `.nhdr`. `head` holds the file's beginning (the first MiB at least, or all of
-/// it). Throws Error{data} for anything but a 3-D image, raw or gzip, of a ScalarType, in mm.
+/// it). Throws Error{data} for anything but a 3-D image, raw or gzip, of a ScalarType, in mm, in LPS, RAS,
+/// LAS or no space at all.
 ImageHeader parse_nrrd_header(std::string_view head, const std::filesystem::path& path);
 
 /// The free `key:=value` pairs of a NRRD's header, nothing of another format's. Throws Error{missing_input}
@@ -57,16 +66,22 @@ ImageHeader parse_meta_header(std::string_view head, const std::filesystem::path
 /// here, it refuses an image that does not say where it lies (neither qform nor sform).
 ImageHeader parse_nifti_header(std::string_view head, const std::filesystem::path& path);
 
+/// Makes `data_offset` the byte where the voxels or their stream begin: behind skipped lines, before the end.
+void place_data(ImageHeader& header);
+
 /// Fills `image`, whose grid and type are set, from the file that `header` was read from and that
 /// `check_payload` has passed. Throws Error{io}.
-void read_nifti_voxels(const ImageHeader& header, Image& image);
+void read_voxels(const ImageHeader& header, const std::filesystem::path& path, Image& image);
+
+/// The voxels of a checked file as they are stored. Throws Error{io}.
+std::vector<std::byte> stored_voxels(const ImageHeader& header, const std::filesystem::path& path);
 
 /// What a gzip stream at the beginning of `packed` inflates to, at most `limit` bytes of it. Throws
 /// Error{data}.
 std::string inflate_head(std::string_view packed, std::size_t limit, const std::filesystem::path& path);
 
 /// Holds the declared bytes against the data file: its length where raw, its whole inflated stream where gzip
-/// (counted without storing it: teem and MetaIO take a stream that ends early for a whole one). Throws
+/// (counted without storing it, so that a lying header costs nothing). Throws
 /// Error{data}.
 void check_payload(const ImageHeader& header, const std::filesystem::path& path);
 

@@ -57,12 +57,11 @@ inline std::int64_t integer(std::string_view text, std::int64_t least, std::int6
 /// A data file named by a header: a plain name beside it. Anything else could read any file of the machine.
 inline std::filesystem::path beside(const std::filesystem::path& path, std::string_view name) {
   const bool plain = !name.empty() && name != "." && name != ".." &&
-                     name.find_first_of("/\\%") == name.npos && words(name).size() == 1 &&
-                     fields::lower(name.substr(0, 4)) != "list" &&
+                     name.find_first_of("/\\%") == name.npos && fields::lower(name.substr(0, 4)) != "list" &&
                      name.find_first_of(std::string_view("\0", 1)) == name.npos;
   if (!plain) {
     refuse(path, "its voxels are in '" + std::string(name.substr(0, 80)) + "'",
-           "put them in one file beside the header, named without folders, spaces or patterns");
+           "put them in one file beside the header, named without folders or patterns");
   }
   return path.parent_path() / name;
 }

@@ -39,6 +39,15 @@ ImageHeader parse_nifti(const std::string& head, const Path& path) {
   return header;
 }
 
+// Without a second opinion. Scaled integers become float, as ITK has it.
+Image as_declared(const ImageHeader& declared) {
+  Image image;
+  image.type = declared.scaled && declared.type != ScalarType::f64 ? ScalarType::f32 : declared.type;
+  image.components = declared.components;
+  image.grid.size = declared.size;
+  return image;
+}
+
 // Two readers, one header: where they disagree, neither is believed.
 void check_agreement(const ImageHeader& declared, const Image& seen, const Path& path) {
   const bool real = seen.type == ScalarType::f32 || seen.type == ScalarType::f64;
@@ -94,19 +103,16 @@ Image read_image(const Path& path) {
            "convert it to .nrrd, .mha or .nii.gz");
   }
   const std::string head = read_head(path);
-  const ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
-                               : format == Format::meta ? parse_meta_header(head, path)
-                                                        : parse_nifti(head, path);
+  ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
+                         : format == Format::meta ? parse_meta_header(head, path)
+                                                  : parse_nifti(head, path);
+  place_data(declared);
   check_payload(declared, path);
-  Image image = itk_images::read_header(path, format);
+  Image image = declared.second_version ? as_declared(declared) : itk_images::read_header(path, format);
   check_agreement(declared, image, path);
+  if (declared.grid) image.grid = *declared.grid;
   check_grid(image.grid, path);
-  if (format == Format::nifti) {
-    read_nifti_voxels(declared, image);
-  } else {
-    image.bytes.resize(declared.voxel_bytes());
-    itk_images::read_voxels(path, format, image);
-  }
+  read_voxels(declared, path, image);
   return image;
 }
 

@@ -50,13 +50,28 @@ class Complaints {
   std::streambuf* before_;
 };
 
+// "itk::ERROR: NrrdImageIO(0x55e1): what" and lines of teem's become one line without addresses.
+std::string one_line(std::string_view text) {
+  const std::size_t address = text.find("(0x"), close = text.find("): ", address);
+  if (address != text.npos && close != text.npos) text.remove_prefix(close + 3);
+  std::string out;
+  for (const char c : text) {
+    if (c != '\n' && c != '\r' && c != '\t') {
+      out += c;
+    } else if (!out.empty() && out.back() != ' ') {
+      out += ' ';
+    }
+  }
+  return out.substr(0, out.find_last_not_of(' ') + 1);
+}
+
 template <class F>
 auto guarded(ErrorKind kind, const std::filesystem::path& path, F&& f) {
   const Complaints kept;
   try {
     return f();
   } catch (const itk::ExceptionObject& error) {
-    throw Error(kind, path.string(), error.GetDescription(),
+    throw Error(kind, path.string(), one_line(error.GetDescription()),
                 kind == ErrorKind::io ? "check the disk" : "write the image again");
   }
 }
@@ -130,18 +145,6 @@ Image read_header(const std::filesystem::path& path, Format format) {
       for (unsigned row = 0; row < 3; ++row) image.grid.direction[3 * row + axis] = column.at(row);
     }
     return image;
-  });
-}
-
-void read_voxels(const std::filesystem::path& path, Format format, Image& image) {
-  guarded(ErrorKind::data, path, [&] {
-    const auto io = make(format, path);
-    io->ReadImageInformation();
-    itk::ImageIORegion whole(3);
-    for (unsigned axis = 0; axis < 3; ++axis) whole.SetSize(axis, io->GetDimensions(axis));
-    io->SetIORegion(whole);
-    io->Read(image.bytes.data());
-    return 0;
   });
 }
 

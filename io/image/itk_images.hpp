@@ -14,9 +14,6 @@ enum class Format { nrrd, meta, nifti };
 /// Throws Error{data} for what ITK refuses.
 Image read_header(const std::filesystem::path& path, Format format);
 
-/// Fills `image`, which `read_header` made and the caller has given its bytes.
-void read_voxels(const std::filesystem::path& path, Format format, Image& image);
-
 /// Throws Error{io}.
 void write(const std::filesystem::path& path, Format format, const Image& image, bool compress);
 

@@ -94,21 +94,25 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   header.type = type_from(needed(fields, "ElementType", path), path);
   fields::check_size(header, path);
   if (!truth(fields, "BinaryData", false)) refuse(path, "its voxels are text", "save it as binary");
-  if (value_of(fields, "HeaderSize", "0") != "0") {
-    refuse(path, "its header asks to skip " + fields.at("HeaderSize") + " bytes",
-           "write it without HeaderSize");
-  }
   header.gzip = truth(fields, "CompressedData", false);
   if (header.gzip && fields.contains("CompressedDataSize")) {
     header.packed_bytes = static_cast<std::uint64_t>(fields::integer(fields.at("CompressedDataSize"), 0,
                                                                      std::numeric_limits<std::int64_t>::max(),
                                                                      "CompressedDataSize", path));
   }
+  header.swapped = scalar_bytes(header.type) > 1 && (truth(fields, "BinaryDataByteOrderMSB", false) ||
+                                                     truth(fields, "ElementByteOrderMSB", false));
   const std::string data = needed(fields, "ElementDataFile", path);
+  const std::int64_t skip = fields::integer(value_of(fields, "HeaderSize", "0"), -1,
+                                            std::numeric_limits<std::int64_t>::max(), "HeaderSize", path);
   header.data_file = path;
   if (data != "LOCAL" && data != "Local" && data != "local") {
     header.data_file = fields::beside(path, data);
-    header.data_offset = 0;
+    header.data_offset = static_cast<std::uint64_t>(std::max<std::int64_t>(skip, 0));
+    header.at_end = skip < 0 && !header.gzip;
+  } else if (skip != 0) {
+    refuse(path, "its header asks to skip " + fields.at("HeaderSize") + " bytes of its own file",
+           "write it without HeaderSize");
   }
   return header;
 }

@@ -38,6 +38,9 @@ struct Fields {
   std::array<std::int64_t, 8> dim{};
   int datatype = 0, units = 0, qform = 0, sform = 0;
   double offset = 0, slope = 0, intercept = 0;
+  std::array<double, 8> pixdim{};
+  std::array<double, 6> quaternion{};  // b, c, d and the offsets
+  std::array<double, 12> rows{};       // of the sform
 };
 
 Fields first_version(const Bytes& bytes) {
@@ -50,7 +53,60 @@ Fields first_version(const Bytes& bytes) {
   f.units = bytes.at<std::uint8_t>(123);
   f.qform = bytes.at<std::int16_t>(252);
   f.sform = bytes.at<std::int16_t>(254);
+  for (std::size_t i = 0; i < 8; ++i) f.pixdim[i] = static_cast<double>(bytes.at<float>(76 + 4 * i));
+  for (std::size_t i = 0; i < 6; ++i) f.quaternion[i] = static_cast<double>(bytes.at<float>(256 + 4 * i));
+  for (std::size_t i = 0; i < 12; ++i) f.rows[i] = static_cast<double>(bytes.at<float>(280 + 4 * i));
   return f;
+}
+
+Fields second_version(const Bytes& bytes) {
+  Fields f;
+  for (std::size_t i = 0; i < 8; ++i) f.dim[i] = bytes.at<std::int64_t>(16 + 8 * i);
+  f.datatype = bytes.at<std::int16_t>(12);
+  f.offset = static_cast<double>(bytes.at<std::int64_t>(168));
+  f.slope = bytes.at<double>(176);
+  f.intercept = bytes.at<double>(184);
+  f.units = bytes.at<std::int32_t>(500);
+  f.qform = bytes.at<std::int32_t>(344);
+  f.sform = bytes.at<std::int32_t>(348);
+  for (std::size_t i = 0; i < 8; ++i) f.pixdim[i] = bytes.at<double>(104 + 8 * i);
+  for (std::size_t i = 0; i < 6; ++i) f.quaternion[i] = bytes.at<double>(352 + 8 * i);
+  for (std::size_t i = 0; i < 12; ++i) f.rows[i] = bytes.at<double>(400 + 8 * i);
+  return f;
+}
+
+// Where both forms stand, the qform: it is right-angled, and ITK takes it too. NIfTI's x and y point right
+// and anterior.
+ImageGrid grid_of(const Fields& f, const std::array<std::int32_t, 3>& size) {
+  std::array<std::array<double, 3>, 3> axis{};
+  std::array<double, 3> origin{};
+  if (f.qform > 0) {
+    const auto [b, c, d, x, y, z] = f.quaternion;
+    const double a = std::sqrt(std::max(0.0, 1 - b * b - c * c - d * d));
+    const double side = f.pixdim[0] < 0 ? -1 : 1;
+    axis = {
+        {{a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)},
+         {2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)},
+         {side * 2 * (b * d + a * c), side * 2 * (c * d - a * b), side * (a * a + d * d - c * c - b * b)}}};
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (double& v : axis[k]) v *= f.pixdim[k + 1];
+    }
+    origin = {x, y, z};
+  } else {
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t k = 0; k < 3; ++k) axis[k][row] = f.rows[4 * row + k];
+      origin[row] = f.rows[4 * row + 3];
+    }
+  }
+  ImageGrid grid;
+  grid.size = size;
+  for (std::size_t k = 0; k < 3; ++k) {
+    grid.spacing[k] = std::hypot(axis[k][0], axis[k][1], axis[k][2]);
+    for (std::size_t row = 0; row < 3; ++row)
+      grid.direction[3 * row + k] = (row < 2 ? -1 : 1) * axis[k][row] / grid.spacing[k];
+    grid.origin[k] = (k < 2 ? -1 : 1) * origin[k];
+  }
+  return grid;
 }
 
 void set_type(ImageHeader& header, int datatype, const Path& path) {
@@ -116,25 +172,26 @@ ImageHeader parse_nifti_header(std::string_view head, const Path& path) {
   if (head.size() < 348)
     refuse(path, "is no NIfTI: it has " + std::to_string(head.size()) + " bytes of header");
   const Bytes plain(head, false), swapped(head, true);
-  if (plain.at<std::int32_t>(0) == 540 || swapped.at<std::int32_t>(0) == 540)
-    refuse(path, "is a NIfTI-2", "save it as NIfTI-1, .nrrd or .mha");
-  const bool swap = swapped.at<std::int32_t>(0) == 348;
-  if (!swap && plain.at<std::int32_t>(0) != 348)
-    refuse(path, "is no NIfTI: its header does not say 348 bytes");
-  const std::string_view magic = head.substr(344, 4);
-  if (magic == std::string_view("ni1\0", 4))
+  const bool second = plain.at<std::int32_t>(0) == 540 || swapped.at<std::int32_t>(0) == 540;
+  const std::int32_t length = second ? 540 : 348;
+  const bool swap = swapped.at<std::int32_t>(0) == length;
+  if ((!swap && plain.at<std::int32_t>(0) != length) || head.size() < static_cast<std::size_t>(length))
+    refuse(path, "is no NIfTI: its header does not say 348 bytes, or 540 of a NIfTI-2, or ends before");
+  const std::string_view magic = head.substr(second ? 4 : 344, 4);
+  if (magic == std::string_view("ni1\0", 4) || magic == std::string_view("ni2\0", 4))
     refuse(path, "its voxels are in another file", "save it as one .nii or .nii.gz");
-  if (magic != std::string_view("n+1\0", 4))
-    refuse(path, "is no NIfTI: it lacks the magic 'n+1'",
+  if (magic != std::string_view(second ? "n+2\0" : "n+1\0", 4))
+    refuse(path, "is no NIfTI: it lacks the magic 'n+1', or 'n+2' of a NIfTI-2",
            "Analyze files do not say left from right: convert it");
   ImageHeader header;
-  const Fields f = first_version(swap ? swapped : plain);
+  const Bytes& bytes = swap ? swapped : plain;
+  const Fields f = second ? second_version(bytes) : first_version(bytes);
   set_size(header, f, path);
   set_type(header, f.datatype, path);
   fields::check_size(header, path);
-  if (!(f.offset >= 352 && f.offset <= 1e6) || f.offset != std::floor(f.offset))
+  if (!(f.offset >= length + 4 && f.offset <= 1e6) || f.offset != std::floor(f.offset))
     refuse(path, "its voxels begin at byte " + std::to_string(f.offset),
-           "they must begin at 352 or a little later");
+           "they must begin at 352, or 544 of a NIfTI-2, or a little later");
   if ((f.units & 7) != 0 && (f.units & 7) != 2)
     refuse(path, "its unit of length is NIfTI's " + std::to_string(f.units & 7), "write it in mm");
   // Without either there is a convention for axes, but nobody keeps to it: left and right would be a guess.
@@ -144,6 +201,8 @@ ImageHeader parse_nifti_header(std::string_view head, const Path& path) {
   header.slope = header.scaled ? f.slope : 1;
   header.intercept = header.scaled && std::isfinite(f.intercept) ? f.intercept : 0;
   header.swapped = swap;
+  header.second_version = second;
+  header.grid = grid_of(f, header.size);
   header.planar = f.dim[0] >= 5 && f.datatype != 128 && f.datatype != 2304;
   header.data_file = path;
   header.data_offset = static_cast<std::uint64_t>(f.offset);

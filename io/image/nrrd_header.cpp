@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // https://teem.sourceforge.net/nrrd/format.html
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <map>
 
 #include "io/image/header.hpp"
@@ -125,6 +127,73 @@ void check_unit(const Fields& fields, const Path& path) {
   }
 }
 
+// Lines go first; bytes are those of the voxels, so that of a stream they are inflated ones; -1: all but the
+// voxels.
+void read_skips(const Fields& fields, ImageHeader& header, const Path& path) {
+  const auto number = [&](const char* key, std::int64_t least) {
+    const auto found = fields.find(key);
+    return found == fields.end() ? 0
+                                 : fields::integer(found->second, least, std::int64_t{1} << 40, key, path);
+  };
+  header.skipped_lines = static_cast<std::uint64_t>(number("lineskip", 0));
+  const std::int64_t bytes = number("byteskip", header.gzip ? 0 : -1);
+  header.at_end = bytes < 0;
+  if (bytes > 0)
+    (header.gzip ? header.stream_offset : header.skipped_bytes) = static_cast<std::uint64_t>(bytes);
+}
+
+// Vectors such as "(1,0,0) (0, 1, 0) none": those in parentheses.
+std::vector<std::array<double, 3>> vectors(const Fields& fields, const char* key) {
+  std::vector<std::array<double, 3>> out;
+  const auto found = fields.find(key);
+  std::string_view rest = found == fields.end() ? std::string_view() : std::string_view(found->second);
+  for (std::size_t open = rest.find('('); open != rest.npos; open = rest.find('(')) {
+    const std::size_t close = std::min(rest.find(')', open), rest.size());
+    std::string inside(rest.substr(open + 1, close - open - 1));
+    std::replace(inside.begin(), inside.end(), ',', ' ');
+    const auto numbers = fields::words(inside);
+    std::array<double, 3> v{};
+    v.fill(std::nan(""));
+    for (std::size_t i = 0; i < 3 && numbers.size() == 3; ++i) {
+      const auto [end, error] =
+          std::from_chars(numbers[i].data(), numbers[i].data() + numbers[i].size(), v[i]);
+      if (error != std::errc() || end != numbers[i].data() + numbers[i].size()) v[i] = std::nan("");
+    }
+    out.push_back(v);
+    rest.remove_prefix(std::min(close + 1, rest.size()));
+  }
+  return out;
+}
+
+// The grid in LPS of an image that says its space and directions.
+std::optional<ImageGrid> grid_of(const Fields& fields, const ImageHeader& header, const Path& path) {
+  static const std::map<std::string, std::array<double, 3>, std::less<>> spaces{
+      {"left-posterior-superior", {1, 1, 1}},   {"lps", {1, 1, 1}},
+      {"right-anterior-superior", {-1, -1, 1}}, {"ras", {-1, -1, 1}},
+      {"left-anterior-superior", {1, -1, 1}},   {"las", {1, -1, 1}}};
+  const auto said = fields.find("space");
+  if (said == fields.end()) return std::nullopt;
+  std::string name = fields::lower(said->second);
+  std::replace(name.begin(), name.end(), ' ', '-');
+  const auto space = spaces.find(name);
+  if (space == spaces.end()) {
+    refuse(path,
+           "its space is '" + said->second.substr(0, 40) + "', which does not say where the patient lies",
+           "write it as left-posterior-superior");
+  }
+  const auto axes = vectors(fields, "spacedirections"), origin = vectors(fields, "spaceorigin");
+  if (axes.size() != 3 || origin.size() > 1) return std::nullopt;  // teem's to refuse
+  ImageGrid grid;
+  grid.size = header.size;
+  for (std::size_t a = 0; a < 3; ++a) {
+    grid.spacing[a] = std::hypot(axes[a][0], axes[a][1], axes[a][2]);
+    for (std::size_t row = 0; row < 3; ++row)
+      grid.direction[3 * row + a] = space->second[row] * axes[a][row] / grid.spacing[a];
+    grid.origin[a] = origin.empty() ? 0 : space->second[a] * origin[0][a];
+  }
+  return grid;
+}
+
 }  // namespace
 
 std::map<std::string, std::string> read_nrrd_keys(const Path& path) {
@@ -163,18 +232,16 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   if (!header.gzip && encoding != "raw") {
     refuse(path, "its encoding is '" + encoding + "'", "save it as raw or gzip");
   }
-  for (const char* skip : {"byteskip", "lineskip"}) {
-    const auto found = fields.find(skip);
-    if (found != fields.end() && found->second != "0") {
-      refuse(path, "its header asks to skip " + found->second + " bytes or lines", "write it without skips");
-    }
-  }
-  const auto detached = fields.find("datafile");
   header.data_file = path;
-  if (detached != fields.end()) {
+  if (const auto detached = fields.find("datafile"); detached != fields.end()) {
     header.data_file = fields::beside(path, detached->second);
     header.data_offset = 0;
   }
+  read_skips(fields, header, path);
+  const auto endian = fields.find("endian");
+  header.swapped =
+      scalar_bytes(header.type) > 1 && endian != fields.end() && fields::lower(endian->second) == "big";
+  header.grid = grid_of(fields, header, path);
   return header;
 }
 

@@ -2,8 +2,10 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <array>
+#include <cstring>
 #include <fstream>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "io/image/header.hpp"
@@ -17,7 +19,7 @@ using Path = std::filesystem::path;
 
 constexpr std::size_t kBlock = std::size_t{1} << 18;
 
-// Counts what a zlib or gzip stream (or several in a row) inflates to, at most `limit` + one block.
+// Inflates a zlib or gzip stream (or several in a row), at most `limit` + one block.
 class Inflater {
  public:
   Inflater() { good_ = inflateInit2(&stream_, 15 + 32) == Z_OK; }  // 32: either kind of header
@@ -25,8 +27,9 @@ class Inflater {
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
-  // False when the bytes are damaged.
-  bool feed(std::vector<unsigned char>& in, std::size_t bytes, std::uint64_t limit) {
+  // False when the bytes are damaged. `take` gets the inflated bytes, piece by piece.
+  template <class F>
+  bool feed(std::vector<unsigned char>& in, std::size_t bytes, std::uint64_t limit, F&& take) {
     stream_.next_in = in.data();
     stream_.avail_in = static_cast<uInt>(bytes);
     while (good_ && stream_.avail_in > 0 && count_ <= limit) {
@@ -38,7 +41,9 @@ class Inflater {
       stream_.next_out = out_.data();
       stream_.avail_out = static_cast<uInt>(out_.size());
       const int code = inflate(&stream_, Z_NO_FLUSH);
-      count_ += out_.size() - stream_.avail_out;
+      const std::size_t some = out_.size() - stream_.avail_out;
+      take(count_, out_.data(), some);
+      count_ += some;
       ended_ = code == Z_STREAM_END;
       good_ =
           good_ && (code == Z_OK || code == Z_STREAM_END || (code == Z_BUF_ERROR && stream_.avail_in == 0));
@@ -55,25 +60,61 @@ class Inflater {
   std::vector<unsigned char> out_ = std::vector<unsigned char>(kBlock);
 };
 
-void check_stream(const ImageHeader& header, std::uint64_t packed, const Path& path) {
-  std::ifstream file(header.data_file, std::ios::binary);
-  file.seekg(static_cast<std::streamoff>(header.data_offset));
+std::uint64_t length_of(const Path& file) {
+  std::error_code error;
+  const std::uint64_t length = std::filesystem::file_size(file, error);
+  return error ? 0 : length;
+}
+
+// What lies behind `data_offset`.
+std::uint64_t present(const ImageHeader& header) {
+  const std::uint64_t length = length_of(header.data_file);
+  return length - std::min(header.data_offset, length);
+}
+
+// The bytes from `data_offset` on.
+class DataFile {
+ public:
+  explicit DataFile(const ImageHeader& header)
+      : name_(header.data_file.string()), file_(header.data_file, std::ios::binary) {
+    file_.seekg(static_cast<std::streamoff>(header.data_offset));
+  }
+  void read(void* to, std::uint64_t bytes) {
+    file_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
+    if (static_cast<std::uint64_t>(file_.gcount()) != bytes)
+      throw Error(ErrorKind::io, name_, "reading failed", "check the disk");
+  }
+
+ private:
+  std::string name_;
+  std::ifstream file_;
+};
+
+// Inflates what the header declares, one byte more where there is more. Returns how much that was, nothing
+// where the stream ends early.
+template <class F>
+std::optional<std::uint64_t> inflate_all(const ImageHeader& header, const Path& path, F&& take) {
+  DataFile file(header);
   const std::uint64_t expected = header.stream_offset + header.voxel_bytes();
   Inflater inflater;
   std::vector<unsigned char> block(kBlock);
-  for (std::uint64_t left = packed; left > 0 && inflater.count() <= expected;) {
+  for (std::uint64_t left = header.packed_bytes.value_or(present(header));
+       left > 0 && inflater.count() <= expected;) {
     const std::uint64_t some = std::min<std::uint64_t>(left, block.size());
-    file.read(reinterpret_cast<char*>(block.data()), static_cast<std::streamsize>(some));
-    if (static_cast<std::uint64_t>(file.gcount()) != some) {
-      throw Error(ErrorKind::io, header.data_file.string(), "reading failed", "check the disk");
-    }
-    if (!inflater.feed(block, some, expected)) refuse(path, "its compressed voxels are damaged");
+    file.read(block.data(), some);
+    if (!inflater.feed(block, some, expected, take)) refuse(path, "its compressed voxels are damaged");
     left -= some;
   }
-  if (inflater.count() != expected || !inflater.ended()) {
-    refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its compressed data hold " +
-                     (inflater.count() > expected ? "more" : std::to_string(inflater.count())));
-  }
+  if (!inflater.ended() && inflater.count() == expected) return std::nullopt;
+  return inflater.count();
+}
+
+void check_stream(const ImageHeader& header, const Path& path) {
+  const std::uint64_t expected = header.stream_offset + header.voxel_bytes();
+  const auto count = inflate_all(header, path, [](std::uint64_t, const unsigned char*, std::size_t) {});
+  if (count == expected) return;
+  refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its compressed data hold " +
+                   (count && *count > expected ? "more" : std::to_string(count.value_or(expected))));
 }
 
 }  // namespace
@@ -99,32 +140,60 @@ std::string inflate_head(std::string_view packed, std::size_t limit, const Path&
   return out;
 }
 
+void place_data(ImageHeader& header) {
+  if (header.at_end) {
+    const std::uint64_t length = length_of(header.data_file);
+    header.data_offset = length - std::min(length, header.voxel_bytes());
+    return;
+  }
+  if (header.skipped_lines > 0) {
+    std::ifstream file(header.data_file, std::ios::binary);
+    file.seekg(static_cast<std::streamoff>(header.data_offset));
+    for (std::uint64_t line = 0; file && line < header.skipped_lines; ++line) {
+      file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+      header.data_offset += static_cast<std::uint64_t>(file.gcount());
+    }
+  }
+  header.data_offset += header.skipped_bytes;
+}
+
 void check_payload(const ImageHeader& header, const Path& path) {
-  std::error_code error;
-  const std::uint64_t length = std::filesystem::file_size(header.data_file, error);
-  if (error || !std::filesystem::is_regular_file(header.data_file)) {
+  if (!std::filesystem::is_regular_file(header.data_file)) {
     throw Error(ErrorKind::missing_input, header.data_file.string(), "cannot be opened",
                 "the header " + path.string() + " names it");
   }
-  const std::uint64_t present = length - std::min<std::uint64_t>(header.data_offset, length);
-  const std::uint64_t expected = header.voxel_bytes();
+  const std::uint64_t there = present(header), expected = header.voxel_bytes();
   if (!header.gzip) {
-    if (present != expected) {
+    if (there != expected) {
       refuse(path,
-             "declares " + std::to_string(expected) + " bytes of voxels, but has " + std::to_string(present));
+             "declares " + std::to_string(expected) + " bytes of voxels, but has " + std::to_string(there));
     }
     return;
   }
-  const std::uint64_t packed = header.packed_bytes.value_or(present);
-  if (packed > present) {
+  const std::uint64_t packed = header.packed_bytes.value_or(there);
+  if (packed > there) {
     refuse(path,
-           "declares " + std::to_string(packed) + " compressed bytes, but has " + std::to_string(present));
+           "declares " + std::to_string(packed) + " compressed bytes, but has " + std::to_string(there));
   }
   if (expected / largest_inflation > packed) {
     refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its " +
                      std::to_string(packed) + " compressed bytes cannot hold them");
   }
-  check_stream(header, packed, path);
+  check_stream(header, path);
+}
+
+std::vector<std::byte> stored_voxels(const ImageHeader& header, const Path& path) {
+  std::vector<std::byte> out(header.voxel_bytes());
+  if (!header.gzip) {
+    DataFile(header).read(out.data(), out.size());
+    return out;
+  }
+  const std::uint64_t skip = header.stream_offset;
+  inflate_all(header, path, [&](std::uint64_t at, const unsigned char* from, std::size_t some) {
+    const std::uint64_t begin = std::max(at, skip), end = std::min(at + some, skip + out.size());
+    if (begin < end) std::memcpy(out.data() + (begin - skip), from + (begin - at), end - begin);
+  });
+  return out;
 }
 
 }  // namespace ecorche::io

@@ -58,6 +58,7 @@ SurfaceMesh decode(std::string_view file, const std::string& where) {
   std::string joined;
   while (const auto next = lines.next()) {
     std::string_view line = whole_line(lines, *next, joined);
+    line = line.substr(0, line.find('#'));
     const std::string_view word = bytes::cut_word(line);
     if (word == "v") {
       std::array<double, 3> p{};
@@ -69,7 +70,7 @@ SurfaceMesh decode(std::string_view file, const std::string& where) {
         corners.push_back(read_corner(c, mesh.points(), lines));
       if (corners.size() < before + 3) lines.fail("a face has fewer than three corners");
       ends.push_back(corners.size());
-    } else if (!word.empty() && word.front() != '#' &&
+    } else if (!word.empty() &&
                std::find(kPassedOver.begin(), kPassedOver.end(), word) == kPassedOver.end()) {
       lines.fail("'" + std::string(word.substr(0, 40)) + "' is no keyword of a polygonal OBJ",
                  "save the surface as polygons");

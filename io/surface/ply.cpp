@@ -86,7 +86,9 @@ class HeaderReader {
 
  private:
   std::string_view next_line() {
-    const std::size_t end = file_.substr(0, std::size_t{1} << 20).find('\n', at_);
+    // The first line tells how all end: a carriage return alone is one of them.
+    if (at_ == 0 && file_.starts_with("ply\r") && !file_.starts_with("ply\r\n")) end_ = '\r';
+    const std::size_t end = file_.substr(0, std::size_t{1} << 20).find(end_, at_);
     if (end == file_.npos) refuse(where_, at_ == 0 ? "is no PLY" : "its header does not end");
     std::string_view line = file_.substr(at_, end - at_);
     if (line.ends_with('\r')) line.remove_suffix(1);
@@ -150,6 +152,7 @@ class HeaderReader {
   const std::string& where_;
   Header header_;
   std::size_t at_ = 0;
+  char end_ = '\n';
 };
 
 // Scalars one after the other, out of words or bytes.
@@ -252,8 +255,14 @@ void read_vertices(const Element& element, Data& data, MeshBuilder& mesh) {
   }
 }
 
-void add_strips(const std::vector<std::int64_t>& corners, MeshBuilder& mesh) {
-  std::span<const std::int64_t> rest(corners);
+// Polygons and strips, which may stand before the vertices: they wait for all of them.
+struct Faces {
+  std::vector<std::int64_t> corners;
+  std::vector<std::size_t> ends;
+  std::vector<bool> strip;
+};
+
+void add_strips(std::span<const std::int64_t> rest, MeshBuilder& mesh) {
   while (!rest.empty()) {
     std::size_t end = 0;
     while (end < rest.size() && rest[end] != -1) ++end;
@@ -262,28 +271,33 @@ void add_strips(const std::vector<std::int64_t>& corners, MeshBuilder& mesh) {
   }
 }
 
-void read_faces(const Element& element, Data& data, MeshBuilder& mesh) {
+void add_faces(const Faces& faces, MeshBuilder& mesh) {
+  std::size_t begin = 0;
+  for (std::size_t f = 0; f < faces.ends.size(); ++f) {
+    const auto corners = std::span(faces.corners).subspan(begin, faces.ends[f] - begin);
+    faces.strip[f] ? add_strips(corners, mesh) : mesh.add_polygon(corners);
+    begin = faces.ends[f];
+  }
+}
+
+void read_faces(const Element& element, Data& data, const std::string& where, Faces& faces) {
   const auto is_corners = [](const Property& p) {
     return p.count && !bytes::is_real(p.type) && (p.name == "vertex_indices" || p.name == "vertex_index");
   };
   bool found = false;
   for (const Property& p : element.properties) found = found || is_corners(p);
   if (!found && element.count > 0)
-    refuse(mesh.where(), "its element '" + element.name + "' has no list 'vertex_indices'");
-  std::vector<std::int64_t> corners;
+    refuse(where, "its element '" + element.name + "' has no list 'vertex_indices'");
   for (std::uint64_t i = 0; i < element.count; ++i) {
     for (const Property& property : element.properties) {
       if (!is_corners(property)) {
         data.skip(property);
         continue;
       }
-      corners.resize(data.length(property));
-      for (std::int64_t& c : corners) c = data.whole(property.type);
-      if (element.name == "face") {
-        mesh.add_polygon(corners);
-      } else {
-        add_strips(corners, mesh);
-      }
+      for (std::size_t left = data.length(property); left > 0; --left)
+        faces.corners.push_back(data.whole(property.type));
+      faces.ends.push_back(faces.corners.size());
+      faces.strip.push_back(element.name != "face");
     }
   }
 }
@@ -294,12 +308,13 @@ SurfaceMesh decode(std::string_view file, const std::string& where) {
   const Header header = HeaderReader(file, where).read();
   Data data(header, file, where);
   MeshBuilder mesh(where);
+  Faces faces;
   for (const Element& element : header.elements) {
     data.check_count(element);
     if (element.name == "vertex") {
       read_vertices(element, data, mesh);
     } else if (element.name == "face" || element.name == "tristrips") {
-      read_faces(element, data, mesh);
+      read_faces(element, data, where, faces);
     } else if (!element.properties.empty()) {
       for (std::uint64_t i = 0; i < element.count; ++i) {
         for (const Property& property : element.properties) data.skip(property);
@@ -307,6 +322,7 @@ SurfaceMesh decode(std::string_view file, const std::string& where) {
     }
   }
   data.check_end();
+  add_faces(faces, mesh);
   return mesh.finish();
 }
 

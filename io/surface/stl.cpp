@@ -102,7 +102,7 @@ class Words {
     return text_.substr(begin, at_ - begin);
   }
   void skip_line() {
-    while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+    while (at_ < text_.size() && text_[at_] != '\n' && text_[at_] != '\r') ++at_;
   }
   void expect(std::string_view expected) {
     const std::string_view word = next();

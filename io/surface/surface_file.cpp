@@ -48,7 +48,9 @@ TaggedSurface read_tagged_surface(const std::filesystem::path& path) {
     throw Error(ErrorKind::data, where, "'" + extension + "' surfaces cannot be read",
                 "convert it to .stl, .obj, .ply, .off, .vtp, .vtk, .gltf or .glb");
   }
-  const std::string bytes = files::read_text(path, kLargestFile);
+  const std::string file = files::read_text(path, kLargestFile);
+  std::string_view bytes = file;
+  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);  // what some editors put before a text
   if (extension == ".stl") return {stl::decode(bytes, where), stl::space_tag(bytes), {}};
   if (extension == ".obj") return {obj::decode(bytes, where), obj::space_tag(bytes), {}};
   if (extension == ".ply") return {ply::decode(bytes, where), ply::space_tag(bytes), {}};

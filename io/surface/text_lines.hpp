@@ -11,7 +11,7 @@
 
 namespace ecorche::io::bytes {
 
-/// Walks the lines of a file; `\r` before `\n` is no part of them.
+/// Walks the lines of a file, which end in `\n`, `\r\n` or, on machines of old, `\r`.
 class Lines {
  public:
   Lines(std::string_view text, const std::string& where) : text_(text), where_(where) {}
@@ -19,11 +19,9 @@ class Lines {
   /// The next line, nothing at the end.
   std::optional<std::string_view> next() {
     if (at_ >= text_.size()) return std::nullopt;
-    std::size_t end = text_.find('\n', at_);
-    if (end == text_.npos) end = text_.size();
-    std::string_view line = text_.substr(at_, end - at_);
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    at_ = std::min(end + 1, text_.size());
+    const std::size_t end = std::min(text_.find_first_of("\r\n", at_), text_.size());
+    const std::string_view line = text_.substr(at_, end - at_);
+    at_ = std::min(end + (text_.substr(end).starts_with("\r\n") ? 2 : 1), text_.size());
     ++number_;
     return line;
   }

@@ -219,6 +219,11 @@ class Reader {
       const std::size_t components = count(1);
       const std::size_t tuples = count(1, std::max<std::size_t>(components, 1));
       const std::string word = next_word();
+      if (word == "string") {
+        end_line();
+        for (std::size_t i = 0; i < components * tuples; ++i) skip_string();
+        continue;
+      }
       const auto scalar = scalar_from(word);
       if (!scalar)
         refuse(where_, "its field data are of type '" + word.substr(0, 40) + "'",
@@ -226,6 +231,21 @@ class Reader {
       end_line();
       for (std::size_t i = 0; i < components * tuples; ++i) real(*scalar);
     }
+  }
+
+  // A line where text; where binary the two highest bits of the first byte say how many bytes hold the length
+  // (vtkDataWriter::WriteArray): 3 one, 2 two, 1 four, 0 eight.
+  void skip_string() {
+    if (text_) {
+      next_line();
+      return;
+    }
+    const auto first = static_cast<unsigned char>(*take(Scalar::u8));
+    std::uint64_t length = first & 63U;
+    for (int more = (1 << (3 - (first >> 6))) - 1; more > 0; --more)
+      length = length << 8 | static_cast<unsigned char>(*take(Scalar::u8));
+    if (length > rest_.size()) refuse(where_, "a string of its field data is longer than the file");
+    rest_.remove_prefix(length);
   }
 
   std::string_view rest_;

@@ -4,12 +4,14 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <vtkCellArray.h>
+#include <vtkFieldData.h>
 #include <vtkNew.h>
 #include <vtkOBJWriter.h>
 #include <vtkPLYWriter.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataWriter.h>
+#include <vtkStringArray.h>
 #include <vtkStripper.h>
 #include <vtkTriangleFilter.h>
 #include <vtkXMLPolyDataWriter.h>
@@ -76,6 +78,14 @@ void vtk_write(const std::filesystem::path& path, const SurfaceMesh& mesh, const
     stripper->Update();
     data = stripper->GetOutput();
     if (data->GetNumberOfStrips() == 0) throw std::runtime_error("VTK made no strip");
+  }
+  if (form.starts_with("strings ")) {  // of lengths that take one byte and two
+    how = form.substr(8);
+    const vtkNew<vtkStringArray> names;
+    names->SetName("names");
+    for (const char* name : {"one", "", "two words"}) names->InsertNextValue(name);
+    names->InsertNextValue(std::string(100, 'x'));
+    data->GetFieldData()->AddArray(names);
   }
   const std::string extension = path.extension().string();
   if (extension == ".ply") {

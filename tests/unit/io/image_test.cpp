@@ -179,7 +179,7 @@ TEST(Image, EveryMistakeInANrrdIsNamed) {
   refused("encoding: raw", "encoding: bzip2", "its encoding is 'bzip2' (save it as raw or gzip)");
   refused("encoding: raw", "encoding: gzip", "compressed voxels are damaged");
   refused("encoding: raw", "encoding: raw\nencoding: raw", "its header gives 'encoding' twice");
-  refused("encoding: raw", "encoding: raw\nbyte skip: 4", "its header asks to skip 4 bytes or lines");
+  refused("encoding: raw", "encoding: raw\nbyte skip: 4", "declares 24 bytes of voxels, but has 20");
   refused("encoding: raw", "data file: ../other.raw\nencoding: raw", "its voxels are in '../other.raw'");
   refused("encoding: raw", "data file: /etc/passwd\nencoding: raw", "its voxels are in '/etc/passwd'");
   refused("encoding: raw", "data file: LIST\nencoding: raw", "its voxels are in 'LIST'");
@@ -217,7 +217,7 @@ TEST(Image, EveryMistakeInAMetaImageIsNamed) {
   refused("BinaryData = True", "BinaryData = False", "its voxels are text");
   refused("ElementSpacing = 1 2 3", "ElementSpacing = 1 -2 3", "ct.mha: ");
   refused("TransformMatrix = 1 0 0", "TransformMatrix = 1 1 0", "its axes are not orthonormal");
-  refused("NDims = 3", "NDims = 3\nHeaderSize = -1", "its header asks to skip -1 bytes");
+  refused("NDims = 3", "NDims = 3\nHeaderSize = -1", "its header asks to skip -1 bytes of its own file");
   refused("= LOCAL", "= a/b.raw", "its voxels are in 'a/b.raw' (put them in one file beside the header");
   refused("= LOCAL", "= LIST", "its voxels are in 'LIST'");
   refused("CompressedData = False", "CompressedData = True\nCompressedDataSize = 25",

@@ -1,19 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """NIfTI against nibabel, both ways: frames, types, scales, components, byte orders."""
-import json
-import pathlib
-import shutil
 import subprocess
-import sys
-import tempfile
 import unittest
 
 import nibabel
 import numpy
 
-IO_FILES = sys.argv.pop(1)
-TYPES = {"u8": "u1", "i8": "i1", "u16": "u2", "i16": "i2", "u32": "u4", "i32": "i4", "f32": "f4", "f64": "f8"}
+from described import IO_FILES, TYPES, Described
+
 LPS = numpy.diag([-1.0, -1, 1, 1])
 # Oblique, with a reversed axis: what a scanner writes.
 TURN = numpy.array([[0, -2.0, 0.0, 5], [1.5, 0, 0, 6], [0, 0, -3, 7], [0, 0, 0, 1]])
@@ -24,33 +19,12 @@ def oblique():
     return numpy.array([[c, 0, -s, 12], [0, 1, 0, -7], [s, 0, c, 30], [0, 0, 0, 1]]) @ TURN
 
 
-class Nifti(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
-        self.random = numpy.random.default_rng(5)
+class Nifti(Described):
+    def assert_ras_frame(self, grid, affine):
+        self.assert_frame(grid, LPS @ affine)
 
-    def describe(self, path):
-        raw = self.folder / "raw"
-        done = subprocess.run([IO_FILES, "describe", str(path), str(raw)], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        grid = json.loads(done.stdout)
-        shape = [grid["components"], *grid["size"]]
-        return grid, numpy.frombuffer(raw.read_bytes(), TYPES[grid["type"]]).reshape(shape, order="F")
-
-    def refused(self, path, *parts):
-        done = subprocess.run([IO_FILES, "describe", str(path), str(self.folder / "raw")], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 65, done.stdout + done.stderr)
-        for part in parts:
-            self.assertIn(part, done.stderr)
-
-    def assert_frame(self, grid, affine):
-        lps = LPS @ affine
-        for key, index in (("origin", [0, 0, 0]), ("i", [1, 0, 0]), ("j", [0, 1, 0]), ("k", [0, 0, 1])):
-            numpy.testing.assert_allclose(grid[key], (lps @ [*index, 1])[:3], atol=2e-5)
-
-    def save(self, array, affine, name, change=None):
-        image = nibabel.Nifti1Image(array, affine)
+    def save(self, array, affine, name, change=None, version=nibabel.Nifti1Image):
+        image = version(array, affine)
         image.set_qform(affine, 1)
         image.set_sform(affine, 1)
         if change:
@@ -66,8 +40,33 @@ class Nifti(unittest.TestCase):
                     array = self.random.integers(0, 100, (4, 5, 3)).astype(code)
                     grid, voxels = self.describe(self.save(array, affine, file))
                     self.assertEqual(grid["type"], name)
-                    self.assert_frame(grid, affine)
+                    self.assert_ras_frame(grid, affine)
                     numpy.testing.assert_array_equal(voxels[0], array)
+
+    def test_nifti_2(self):
+        for change in (None, lambda i: i.set_sform(None, code=0), lambda i: i.set_qform(None, code=0),
+                       lambda i: i.header.set_slope_inter(0.5, -3)):
+            for name in ("two.nii", "two.nii.gz"):
+                for affine in (TURN, oblique(), TURN @ numpy.diag([-1.0, 1, 1, 1])):
+                    array = self.random.integers(0, 100, (4, 5, 3)).astype("i2")
+                    path = self.save(array, affine, name, change, nibabel.Nifti2Image)
+                    grid, voxels = self.describe(path)
+                    self.assert_ras_frame(grid, affine)
+                    numpy.testing.assert_allclose(voxels[0], nibabel.load(path).get_fdata(), atol=1e-4)
+
+    def test_where_both_forms_stand_the_qform_counts(self):
+        array = self.random.integers(0, 100, (4, 5, 3)).astype("i2")
+        for version in (nibabel.Nifti1Image, nibabel.Nifti2Image):
+            path = self.save(array, oblique(), "a.nii", lambda image: image.set_sform(TURN, code=2), version)
+            self.assert_ras_frame(self.describe(path)[0], oblique())
+        self.refused(self.save(array, numpy.diag([2e6, 1, 1, 1]), "far.nii"), "its spacing is 2000000.000000 (it must be positive, mm)")
+        self.save(array, TURN, "a.nii").rename(self.folder / "b.nii")
+        (self.folder / "c.nii").write_bytes(self.save(array, TURN, "c.nii.gz").read_bytes())
+        self.refused(self.folder / "c.nii", "is packed by gzip (name it .nii.gz)")
+        packed = bytearray((self.folder / "c.nii.gz").read_bytes())
+        packed[12:40] = bytes(28)
+        (self.folder / "d.nii.gz").write_bytes(packed)
+        self.refused(self.folder / "d.nii.gz", "its gzip stream is damaged")
 
     def test_qform_or_sform_alone(self):
         for which in ("qform", "sform"):
@@ -75,7 +74,7 @@ class Nifti(unittest.TestCase):
                 image.set_qform(oblique() if which == "qform" else None, code=1 if which == "qform" else 0)
                 image.set_sform(oblique() if which == "sform" else None, code=2 if which == "sform" else 0)
             grid, _ = self.describe(self.save(numpy.zeros((4, 5, 3), "i2"), oblique(), "a.nii", only))
-            self.assert_frame(grid, oblique())
+            self.assert_ras_frame(grid, oblique())
         self.refused(self.save(numpy.zeros((4, 5, 3), "i2"), TURN, "b.nii",
                                lambda image: (image.set_qform(None, code=0), image.set_sform(None, code=0))),
                      "does not say where it lies: qform_code and sform_code are 0")
@@ -136,8 +135,14 @@ class Nifti(unittest.TestCase):
         self.refused(changed(42, b"\xff\xff"), "axis 1 has -1 voxels")
         self.refused(changed(108, b"\0\0\0\0"), "its voxels begin at byte 0")
         self.refused(changed(0, b"", "c.nii.gz"), "is not packed by gzip")
-        nibabel.save(nibabel.Nifti2Image(numpy.zeros((4, 5, 3), "i2"), TURN), self.folder / "two.nii")
-        self.refused(self.folder / "two.nii", "is a NIfTI-2 (save it as NIfTI-1, .nrrd or .mha)")
+        two = self.save(numpy.zeros((4, 5, 3), "i2"), TURN, "two.nii", version=nibabel.Nifti2Image).read_bytes()
+        for at, value, part in ((4, b"ni2\0", "its voxels are in another file"), (4, b"n+1\0", "or 'n+2' of a NIfTI-2"),
+                                (168, (352).to_bytes(8, "little"), "its voxels begin at byte 352"),
+                                (16, (2).to_bytes(8, "little"), "has 2 axes"), (500, b"\1", "unit of length is NIfTI's 1")):
+            (self.folder / "two.nii").write_bytes(two[:at] + value + two[at + len(value):])
+            self.refused(self.folder / "two.nii", part)
+        (self.folder / "two.nii").write_bytes(two[:400])
+        self.refused(self.folder / "two.nii", "or 540 of a NIfTI-2, or ends before")
         for size in range(0, len(good), 7):
             (self.folder / "cut.nii").write_bytes(good[:size])
             self.refused(self.folder / "cut.nii", "error: ")

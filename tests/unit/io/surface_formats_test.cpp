@@ -169,6 +169,50 @@ TEST(SurfaceFormats, PlyStripsAndForeignElementsAreRead) {
   EXPECT_EQ(read.mesh.V.row(4), Eigen::RowVector3d(0, 2, 3));
 }
 
+// Line ends of three kinds, a byte order mark, words behind a face: what editors and old programs leave.
+TEST(SurfaceFormats, TextsOfOtherMachinesAreRead) {
+  const Scratch scratch;
+  foreign::vtk_write(scratch / "a.ply", ball(), "text");
+  foreign::vtk_write(scratch / "a.obj", ball(), "");
+  write_surface(scratch / "a.off", ball());
+  scratch.put("a.stl",
+              "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
+              "endfacet\nendsolid a\n");
+  for (const std::string name : {"a.ply", "a.obj", "a.off", "a.stl"}) {
+    const std::string unix = scratch.get(name);
+    const auto expected = soup(read_surface(scratch / name));
+    for (const std::string end : {"\r\n", "\r"}) {
+      std::string text;
+      for (const char c : unix) text += c == '\n' ? end : std::string(1, c);
+      EXPECT_EQ(soup(read_surface(scratch.put("b" + name, text))), expected) << name << end.size();
+    }
+    EXPECT_EQ(soup(read_surface(scratch.put("b" + name, "\xef\xbb\xbf" + unix))), expected) << name;
+  }
+  EXPECT_EQ(read_surface(scratch.put("c.obj", "v 0 0 0 # low\nv 1 0 0\nv 0 1 0\nf 1 2 3 # the only one\n"))
+                .F.rows(),
+            1);
+}
+
+TEST(SurfaceFormats, PlyFacesMayStandBeforeTheirVertices) {
+  const Scratch scratch;
+  const SurfaceMesh read = read_surface(scratch.put(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\nelement vertex 3\n"
+      "property float x\nproperty float y\nproperty float z\nend_header\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n"));
+  EXPECT_EQ(read.F.rows(), 1);
+  EXPECT_EQ(read.V.row(2), Eigen::RowVector3d(0, 1, 0));
+}
+
+TEST(SurfaceFormats, VtkFieldDataOfStringsArePassedOver) {
+  const Scratch scratch;
+  for (const std::string form : {"text", "binary", "text4", "binary4"}) {
+    foreign::vtk_write(scratch / "a.vtk", ball(), form);
+    foreign::vtk_write(scratch / "b.vtk", ball(), "strings " + form);
+    EXPECT_NE(scratch.get("b.vtk").find("string"), std::string::npos);
+    EXPECT_EQ(soup(read_surface(scratch / "b.vtk")), soup(read_surface(scratch / "a.vtk"))) << form;
+  }
+}
+
 TEST(SurfaceFormats, TitlesOfVtkFilesNameTheirSpace) {
   const Scratch scratch;
   foreign::vtk_write(scratch / "a.vtk", ball(), "binary");

@@ -1,35 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Our own reading of NIfTI's voxels: niftilib, and so ITK, takes those of `a.nii` for `a.nii.gz` where both
-// lie side by side. ITK still reads the header a second time.
-#include <zlib.h>
-
+// Voxels as they are stored become voxels of this machine: byte order, components together, scale.
 #include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <memory>
 
 #include "io/image/header.hpp"
-#include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
 namespace {
-
-// zlib reads plain files and gzip streams alike.
-std::vector<std::byte> stored_bytes(const ImageHeader& header) {
-  const auto path = header.data_file;
-  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
-  std::vector<std::byte> out(header.voxel_bytes());
-  const std::uint64_t skip = header.gzip ? header.stream_offset : header.data_offset;
-  bool good = file != nullptr && gzseek(file.get(), static_cast<z_off_t>(skip), SEEK_SET) >= 0;
-  for (std::size_t at = 0; good && at < out.size();) {
-    const auto some = static_cast<unsigned>(std::min<std::size_t>(out.size() - at, std::size_t{1} << 28));
-    const int got = gzread(file.get(), out.data() + at, some);
-    good = got > 0;
-    at += static_cast<std::size_t>(std::max(got, 0));
-  }
-  if (!good) throw Error(ErrorKind::io, path.string(), "reading failed", "check the disk");
-  return out;
-}
 
 void swap_bytes(std::vector<std::byte>& bytes, std::size_t size) {
   for (std::size_t at = 0; size > 1 && at + size <= bytes.size(); at += size)
@@ -61,8 +38,8 @@ void scale(const Image& stored, const ImageHeader& header, Image& image) {
 
 }  // namespace
 
-void read_nifti_voxels(const ImageHeader& header, Image& image) {
-  std::vector<std::byte> bytes = stored_bytes(header);
+void read_voxels(const ImageHeader& header, const std::filesystem::path& path, Image& image) {
+  std::vector<std::byte> bytes = stored_voxels(header, path);
   const std::size_t size = scalar_bytes(header.type);
   if (header.swapped) swap_bytes(bytes, size);
   if (header.planar && header.components > 1)
