@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Figures of thinning, one JSON object on stdout; bench/volumetric/run calls it for every body.
 //   bench_volumetric times BODY           distance transform beside ITK's and VTK's, thinning, extraction
-//   bench_volumetric curve BODY           voxels against TP, its exponential fit, the paper's counts
-// BODY: ellipsoid, surface FILE, labels FILE, above LOW FILE (an image; resampled to its finest edge), or
-// paper LOW FILE: the same stretched to the 290 x 169 x 940 voxels of Gagvani01's volume.
+//   bench_volumetric curve BODY           voxels and loss against TP, exponential fits, the paper's counts
+// BODY: ellipsoid, surface FILE [EDGE], labels FILE, above LOW FILE (an image; resampled to its finest edge),
+// or paper LOW FILE: the same stretched to the 290 x 169 x 940 voxels of Gagvani01's volume.
 #include <tbb/info.h>
 
 #include <algorithm>
@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "bench/volumetric/curve.hpp"
 #include "bench/volumetric/foreign_distance.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
@@ -64,7 +65,9 @@ Mask body(const std::vector<std::string>& words) {
   if (words[0] == "surface") {
     Case patient;
     patient.skin = io::read_surface(words.at(1));
-    return thin::segment(voxel::voxelize(patient, {}, {}), {}, {});
+    voxel::Options options;
+    if (words.size() > 2) options.voxel_mm = std::stod(words[2]);
+    return thin::segment(voxel::voxelize(patient, options, {}), {}, {});
   }
   thin::Segmentation how;
   how.largest = true;
@@ -76,10 +79,6 @@ Mask body(const std::vector<std::string>& words) {
         thin::to_isotropic(image, 0, 0, how.low ? thin::Sampling::trilinear : thin::Sampling::nearest, {});
   }
   return thin::segment(image, how, {});
-}
-
-std::size_t object_voxels(const Mask& mask) {
-  return static_cast<std::size_t>(std::count(mask.inside.begin(), mask.inside.end(), 1));
 }
 
 // Seconds: the median of `runs` after one that is not counted, with the best and the worst.
@@ -131,49 +130,6 @@ Json times(const Mask& mask) {
     out[name] = {{"best_s", std::min(first.seconds, second.seconds)},
                  {"differing", differing(map, first.squares)}};
     out[name]["times_ours"] = out[name]["best_s"].get<double>() / out["distance"]["best_s"].get<double>();
-  }
-  return out;
-}
-
-// log(count) = log(a) - b tp by least squares over the counts of at least ten.
-Json exponential_fit(const Json& points) {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  for (const Json& p : points) {
-    if (p[1].get<double>() < 10) continue;
-    const double u = p[0].get<double>(), v = std::log(p[1].get<double>());
-    n += 1, x += u, y += v, xx += u * u, xy += u * v, yy += v * v;
-  }
-  const double slope = (n * xy - x * y) / (n * xx - x * x), level = (y - slope * x) / n;
-  const double r = (n * xy - x * y) / std::sqrt((n * xx - x * x) * (n * yy - y * y));
-  return {{"a", std::exp(level)}, {"b", -slope}, {"r2", r * r}};
-}
-
-Json curve(const Mask& mask) {
-  const auto object = static_cast<double>(object_voxels(mask));
-  const thin::DistanceMap map = thin::distance_map(mask, DistanceMetric::euclidean, {});
-  const VolumetricSkeleton thick = thin::thin(map, mask.grid, 0, {});
-  Json out{{"size", mask.grid.size}, {"object", object_voxels(mask)}, {"voxels_against_tp", Json::array()}};
-  for (int step = 2; step <= 24; ++step) {
-    const double tp = 0.05 * step;
-    out["voxels_against_tp"].push_back({tp, thin::thinner(thick, tp).size()});
-  }
-  out["fit"] = exponential_fit(out["voxels_against_tp"]);
-  // The paper's skeletons at the same share: 42298 were 0.33 % of its body, of which the others are taken
-  // too.
-  std::vector<float> deficits = thick.deficit;
-  std::sort(deficits.begin(), deficits.end(), std::greater<>());
-  for (const double paper : {42298.0, 33630.0, 20000.0, 9666.0, 3980.0, 1017.0, 231.0}) {
-    const double share = 0.33 / 42298 * paper;  // percent
-    const auto want = std::min(deficits.size() - 1, static_cast<std::size_t>(share / 100 * object));
-    const VolumetricSkeleton s = thin::thinner(thick, std::max(0.0, static_cast<double>(deficits[want])));
-    const auto parent = thin::spanning_tree(s, {}, {});
-    const std::size_t components = thin::component_count(parent);
-    out["at_the_papers_shares"].push_back({{"paper", paper},
-                                           {"share_percent", share},
-                                           {"tp", s.thinness},
-                                           {"voxels", s.size()},
-                                           {"edges", s.size() - components},
-                                           {"components", components}});
   }
   return out;
 }

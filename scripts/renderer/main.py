@@ -38,6 +38,7 @@ def parse():
     parser.add_argument("--segment", help="whose weight is drawn on a model (default: the third of the skeleton)")
     parser.add_argument("--cut", type=float, help="y of the cutting plane through a model, mm (default: the middle)")
     parser.add_argument("--beside", action="store_true", help="volumes side by side")
+    parser.add_argument("--grey", action="store_true", help="volumes of bytes are grey values, not labels")
     parser.add_argument("--view", choices=sorted(scene.VIEWS), default="front",
                         help="from where surfaces side by side are seen (default %(default)s)")
     return parser.parse_args()
@@ -63,7 +64,7 @@ def main():
         else:
             save(scene.row_of_surfaces(surfaces, args.view, args.height), "row")
     elif all(path.suffix == ".nrrd" for path in args.paths):
-        frames = volumes.rendered(args.paths, args.view, args.height)
+        frames = volumes.rendered(args.paths, args.view, args.height, args.grey)
         if args.beside:
             save(slices.picture(np.concatenate(frames, axis=1)), "beside")
         else:

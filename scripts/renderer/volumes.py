@@ -15,11 +15,11 @@ import bodies
 from scene import VIEWS, distinct
 
 
-def property_for(voxels):
-    """Labels (few small whole numbers): flesh thin, the rest solid in colours of their own. Grey values: a thin haze over
-    everything that is not the least value, solid towards the largest."""
+def property_for(voxels, grey):
+    """Labels (bytes, unless they are said to be grey): flesh thin, the rest solid in colours of their own. Grey values: a thin haze
+    over everything that is not the least value, solid towards the largest."""
     look, colour, opacity = vtkVolumeProperty(), vtkColorTransferFunction(), vtkPiecewiseFunction()
-    labels = voxels.dtype == np.uint8
+    labels = voxels.dtype == np.uint8 and not grey
     low, high = float(voxels.min()), float(np.percentile(voxels, 99.9))
     if labels:
         for value in range(int(voxels.max()) + 1):
@@ -53,6 +53,8 @@ def shot(image, look, bounds, view, height):
     """RGB rows, top first, of one volume fitted to `bounds`, parallel projection."""
     mapper, volume = vtkFixedPointVolumeRayCastMapper(), vtkVolume()
     mapper.SetInputData(image)
+    mapper.AutoAdjustSampleDistancesOff()  # a slow machine shows the same
+    mapper.SetSampleDistance(0.5 * min(image.GetSpacing()))
     volume.SetMapper(mapper)
     volume.SetProperty(look)
     direction, up = (np.array(v, float) for v in VIEWS[view])
@@ -85,14 +87,14 @@ def shot(image, look, bounds, view, height):
     return vtk_to_numpy(out.GetPointData().GetScalars()).reshape(rows, columns, -1)[::-1, :, :3].copy()
 
 
-def rendered(paths, view, height):
+def rendered(paths, view, height, grey=False):
     """A picture of each volume, all through one window on space."""
     read = [bodies.read_placed_image(path) for path in paths]
     if any(voxels is None for voxels, _, _ in read):
         raise SystemExit("error: render: a volume must have one value a voxel (name other images)")
     low = np.min([origin for _, _, origin in read], axis=0)
     high = np.max([origin + spacing * (np.array(voxels.shape[::-1]) - 1) for voxels, spacing, origin in read], axis=0)
-    look = property_for(read[0][0])
+    look = property_for(read[0][0], grey)
     return [shot(placed(*one), look, (low, high), view, height) for one in read]
 
 
