@@ -21,6 +21,7 @@ struct Settings {
   std::filesystem::path folder;
   std::string size = "standard";
   std::uint64_t seed = 1;
+  double voxel_mm = 0;
   bool bar = false;
 };
 
@@ -45,9 +46,9 @@ void check_target(const std::filesystem::path& folder) {
 
 int run(const Program& program, const Settings& settings) {
   check_target(settings.folder);
-  const phantom::Phantom made =
-      settings.bar ? phantom::make_bar(size_of(settings), program.context("bar"))
-                   : phantom::make(size_of(settings), settings.seed, program.context("phantom"));
+  const phantom::Phantom made = settings.bar ? phantom::make_bar(size_of(settings), program.context("bar"))
+                                             : phantom::make(size_of(settings), settings.seed,
+                                                             program.context("phantom"), settings.voxel_mm);
   const Case& patient = made.patient;
   io::write_case(settings.folder, patient, program.context("write"));
   if (!made.clips.empty()) files::make_folder(settings.folder / "motion");
@@ -98,7 +99,12 @@ void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
       ->capture_default_str();
   command->add_option("--seed", settings->seed, "draws the body's proportions and the noise of the CT")
       ->capture_default_str();
-  command->add_flag("--bar", settings->bar, "the bar of Sujar18 figure 7 instead of a patient");
+  CLI::Option* voxel = command
+                           ->add_option("--voxel", settings->voxel_mm,
+                                        "edge of the scan's voxels, mm (default: 6, 4 or 2.5, by the size)")
+                           ->check(CLI::Range(0.5, 20.0));
+  command->add_flag("--bar", settings->bar, "the bar of Sujar18 figure 7 instead of a patient")
+      ->excludes(voxel);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
 }

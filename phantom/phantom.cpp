@@ -89,7 +89,7 @@ std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resol
 
 }  // namespace
 
-Phantom make(Size size, std::uint64_t seed, const Context& context) {
+Phantom make(Size size, std::uint64_t seed, const Context& context, double voxel_mm) {
   const Resolution resolution = resolution_of(size);
   const Body body = make_body(seed);
   const Landmarks& at = body.at;
@@ -114,7 +114,8 @@ Phantom make(Size size, std::uint64_t seed, const Context& context) {
   }
   Context scan_context = context;
   scan_context.progress = [&](double done) { context.report(0.7 + 0.3 * done); };
-  Scan scan = make_scan(body.skin, parts, bounds_of(patient.skin), resolution.voxel, seed, scan_context);
+  const double voxel = voxel_mm > 0 ? voxel_mm : resolution.voxel;
+  Scan scan = make_scan(body.skin, parts, bounds_of(patient.skin), voxel, seed, scan_context);
   patient.volumes = {std::move(scan.ct), std::move(scan.ct_noisy)};
   patient.labels = std::move(scan.labels);
   context.report(1);

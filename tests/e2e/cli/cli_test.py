@@ -54,6 +54,8 @@ class Cli(unittest.TestCase):
         self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.vtk"), 64, ".hdf")
         self.assert_error(run("preprocess", CASE, "-o", self.folder / "m.hdf", "--max-tets", "-5"), 64, "max-tets")
         self.assert_error(run("phantom", "-o", self.folder / "p", "--size", "huge"), 64, "huge not in {small,standard,paper}")
+        self.assert_error(run("phantom", "-o", self.folder / "p", "--voxel", "0.1"), 64, "--voxel")
+        self.assert_error(run("phantom", "-o", self.folder / "p", "--voxel", "5", "--bar"), 64, "--voxel")
         self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--skinning", "fem"), 64, "fem")
         self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--tissues", "nonsense"), 64, "nonsense")
         self.assertEqual(list(self.folder.glob("**/*.hdf")), [])
