@@ -3,8 +3,8 @@
 """Thirty stated poses: twelve of a stride, twelve of one joint about half way, six of a whole body. Written as pose files.
 
 The angles are anatomical, in degrees. A joint or an angle that the model does not have is left out; where nothing is left
-of a pose (no legs, say), the model's own limited angles take its place: one alone, or all at once and half as far, in even steps
-up to 90 degrees from rest or the limit.
+of a pose (no legs, say), the model's own limited angles take its place, in even steps up to half way from rest to the farther limit:
+one alone, or all at once and half as far.
 """
 import argparse
 import json
@@ -57,7 +57,7 @@ def own(rig, count):
         for angle in row["angles"]:
             bounds = [limit - angle["rest_deg"] for limit in (angle["min_deg"], angle["max_deg"]) if limit is not None]
             if bounds:
-                ends[row["joint"], angle["name"]] = angle["rest_deg"], max(-90.0, min(90.0, max(bounds, key=abs)))
+                ends[row["joint"], angle["name"]] = angle["rest_deg"], max(bounds, key=abs) / 2
     out, singles = {}, count - count // 2
     rounds = -(-singles // max(1, len(ends)))
     for i in range(singles if ends else 0):
