@@ -91,12 +91,17 @@ std::string to_text(const json& result) {
                 100 * limit["share"].get<double>(), limit["mean_deg"].get<double>(),
                 limit["worst_deg"].get<double>(), limit["worst_frame"].get<unsigned long long>());
   if (!result.contains("against")) return out;
-  out +=
-      "\nagainst " + text(result["against"]) + ": joint, mean, worst, mean without a constant turn (deg)\n";
+  out += "\nagainst " + text(result["against"]) + ", both aligned at " + text(result["aligned_at"]) +
+         ": joint, mean, worst, mean without a constant turn (deg)\n";
   for (const json& joint : result["differences"])
     out += line("  %-28s %8.2f %8.2f %8.2f", text(joint["joint"]).c_str(), joint["mean_deg"].get<double>(),
                 joint["worst_deg"].get<double>(), joint["varying_deg"].get<double>());
   return out;
+}
+
+void stop(const Program& program) {
+  if (program.stop.stop_requested())
+    throw Error(ErrorKind::interrupted, "motion", "interrupted", "run it again");
 }
 
 int run(const Program& program, const Settings& settings) {
@@ -104,8 +109,7 @@ int run(const Program& program, const Settings& settings) {
   const Rig& rig = model.rig;
   const auto motion = open_motion(program, settings.motion, rig);
   const auto pose = [&](std::size_t frame) {
-    if (program.stop.stop_requested())
-      throw Error(ErrorKind::interrupted, "motion", "interrupted", "run it again");
+    stop(program);
     return motion->at(frame);
   };
   json result{{"motion", settings.motion.file.string()},
@@ -117,16 +121,31 @@ int run(const Program& program, const Settings& settings) {
   result.update(report_json(kinematics::report(rig, motion->frames(), motion->frame_seconds(), pose)));
   bool apart = false;
   if (!settings.against.empty()) {
+    // Two makers' zero poses are two poses: both takes are held against the scan at one moment.
     MotionChoice choice = settings.motion;
+    std::unique_ptr<MotionSource> again;
+    MotionSource* one = motion.get();
+    const auto moment = choice.rest == "auto" ? motion->nearest_seconds() : std::nullopt;
+    if (moment) {
+      choice.rest = line("%.4fs", *moment);
+      choice.rest.pop_back();
+      again = open_motion(program, choice, rig);
+      one = again.get();
+    }
     choice.file = settings.against;
     const auto other = open_motion(program, choice, rig);
-    const auto differences =
-        kinematics::compare(rig, motion->frames(), motion->frame_seconds(), pose, other->frames(),
-                            other->frame_seconds(), [&](std::size_t frame) { return other->at(frame); });
+    const auto differences = kinematics::compare(
+        rig, one->frames(), one->frame_seconds(),
+        [&](std::size_t frame) {
+          stop(program);
+          return one->at(frame);
+        },
+        other->frames(), other->frame_seconds(), [&](std::size_t frame) { return other->at(frame); });
+    result["aligned_at"] = one->reference;
     result["against"] = settings.against.string();
     result["differences"] = json::array();
     for (const kinematics::JointDifference& d : differences) {
-      apart = apart || (settings.most_deg > 0 && d.varying * kDegrees > settings.most_deg);
+      apart = apart || (settings.most_deg > 0 && d.mean * kDegrees > settings.most_deg);
       result["differences"].push_back({{"joint", d.joint},
                                        {"mean_deg", d.mean * kDegrees},
                                        {"worst_deg", d.worst * kDegrees},
@@ -151,9 +170,8 @@ void declare_motion(CLI::App& app, Program& program, Run& chosen) {
       "--against", s->against,
       "another file of the same motion: differences joint by joint, both from their beginning");
   command
-      ->add_option(
-          "--most-deg", s->most_deg,
-          "exit with 1 when a joint differs by more than this in the mean, a constant turn taken out")
+      ->add_option("--most-deg", s->most_deg,
+                   "exit with 1 when a joint differs by more than this in the mean")
       ->check(CLI::Range(0.0, 180.0));
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
 }

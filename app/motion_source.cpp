@@ -21,7 +21,8 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kStrangeSize = 3, kWrongSize = 20;  // times the patient
 constexpr double kNoBody = 120 / kDegrees;           // a limb that points so far off is in no zero pose
-constexpr std::size_t kTried = 64;                   // frames in which a reference is looked for
+constexpr double kNoted = 5 / kDegrees;              // of an alignment, else any two bodies differ so
+constexpr std::size_t kTried = 64;                   // frames in which a reference and bends are looked for
 
 [[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
   throw Error(ErrorKind::usage, where, what, mend);
@@ -45,6 +46,18 @@ std::optional<std::size_t> whole(std::string_view text) {
   return value;
 }
 
+std::optional<double> decimal(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0) || value > 1e6)
+    return std::nullopt;
+  return value;
+}
+
+[[noreturn]] void no_reference(const std::string& word) {
+  usage("--motion-rest", "'" + word + "' is no reference", "use auto, zero, FRAME, SECONDSs or CLIP:FRAME");
+}
+
 kinematics::ClipFrame frame_of(io::ClipFile& clip, std::size_t frame) {
   kinematics::ClipFrame out;
   out.rotation.resize(clip.head().joints.size());
@@ -64,6 +77,7 @@ class ClipSource final : public MotionSource {
     match_ = kinematics::match(rig, clip_->head(), names);
     if (!match_.unused_joints.empty())
       program.note("warning: " + path_ + ": " + some(match_.unused_joints) + " moves nothing of this model");
+    find_bends();
     align(choice);
     note_alignment(program);
     check_size(program, choice);
@@ -75,19 +89,41 @@ class ClipSource final : public MotionSource {
     return kinematics::pose_at(rig_, clip_->head(), match_, frame_of(*clip_, frame));
   }
   const kinematics::Retarget* retarget() const override { return &match_; }
+  std::optional<double> nearest_seconds() override {
+    if (match_.limbs.limbs == 0) return std::nullopt;
+    return static_cast<double>(nearest()) * clip_->head().frame_seconds;
+  }
 
  private:
+  // Frames over the whole clip, few enough to be read before it plays.
+  std::size_t tried_step() const { return std::max<std::size_t>(1, clip_->frames() / kTried); }
+
+  void find_bends() {
+    std::vector<kinematics::ClipFrame> frames;
+    for (std::size_t f = 0; f < clip_->frames(); f += tried_step()) frames.push_back(frame_of(*clip_, f));
+    kinematics::find_bends(rig_, clip_->head(), frames, match_);
+  }
+
   void align(const MotionChoice& choice) {
     reference = "the zero pose";
     if (choice.rest == "zero") return;
     if (choice.rest == "auto") {
-      if (match_.limbs.worst > kNoBody) align_at_best();
+      // Then the zero pose is no pose of a body.
+      if (match_.limbs.worst > kNoBody) {
+        const std::size_t best = nearest();
+        align_at(*clip_, best, "frame " + std::to_string(best));
+      }
       return;
+    }
+    if (choice.rest.ends_with('s')) {
+      const auto seconds = decimal(std::string_view(choice.rest).substr(0, choice.rest.size() - 1));
+      if (!seconds) no_reference(choice.rest);
+      return align_at(*clip_, static_cast<std::size_t>(std::lround(*seconds / clip_->head().frame_seconds)),
+                      choice.rest);
     }
     const std::size_t colon = choice.rest.rfind(':');
     const auto frame = whole(colon == std::string::npos ? choice.rest : choice.rest.substr(colon + 1));
-    if (!frame)
-      usage("--motion-rest", "'" + choice.rest + "' is no reference", "use auto, zero, FRAME or CLIP:FRAME");
+    if (!frame) no_reference(choice.rest);
     if (colon == std::string::npos) return align_at(*clip_, *frame, "frame " + std::to_string(*frame));
     const auto other = io::open_clip(choice.rest.substr(0, colon), motion_space(choice), choice.asf);
     // The same joints in another order, or with others beside them, are found by their names.
@@ -121,19 +157,18 @@ class ClipSource final : public MotionSource {
     reference = name;
   }
 
-  // The zero pose is no pose of a body: the frame that is nearest to the scan's.
-  void align_at_best() {
+  // The frame that is nearest to the scan's pose.
+  std::size_t nearest() {
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();
-    const std::size_t step = std::max<std::size_t>(1, clip_->frames() / kTried);
-    for (std::size_t f = 0; f < clip_->frames(); f += step) {
+    for (std::size_t f = 0; f < clip_->frames(); f += tried_step()) {
       const auto places = kinematics::places(clip_->head(), frame_of(*clip_, f));
       const auto limbs = kinematics::check_limbs(rig_, places, match_.clip_joint);
       if (limbs.rms >= least) continue;
       least = limbs.rms;
       best = f;
     }
-    align_at(*clip_, best, "frame " + std::to_string(best));
+    return best;
   }
 
   // Where the reference is not the scan's pose.
@@ -143,7 +178,7 @@ class ClipSource final : public MotionSource {
       if (parent < 0) continue;
       const double angle =
           match_.rest_turn[s].angularDistance(match_.rest_turn[static_cast<std::size_t>(parent)]);
-      if (angle < 1e-6) continue;
+      if (angle < kNoted) continue;
       program.note("note: in " + (reference == "the zero pose" ? "the clip's zero pose" : reference) + " " +
                    rig_.skeleton.segments[s].name + " is turned by " + degrees(angle) +
                    " degrees from the scan's; aligned");
@@ -294,10 +329,10 @@ void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file)
   command.add_option("--motion-frame", choice.frame,
                      "axes of the clip: three letters, default LSA (y up, facing z)");
   command
-      .add_option(
-          "--motion-rest", choice.rest,
-          "the clip's pose that is held against the scan: zero, FRAME, CLIP:FRAME, or auto (the zero pose, "
-          "or the frame nearest to the scan where that is no pose of a body)")
+      .add_option("--motion-rest", choice.rest,
+                  "the clip's pose that is held against the scan: zero, FRAME, SECONDSs, CLIP:FRAME, or auto "
+                  "(the zero pose, "
+                  "or the frame nearest to the scan where that is no pose of a body)")
       ->capture_default_str();
   command.add_option("--asf", choice.asf, "skeleton of an .amc; default: the one beside it");
   command.add_option("--map", choice.map,

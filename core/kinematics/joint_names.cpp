@@ -30,7 +30,7 @@ constexpr std::string_view kLimbs[] = {
     "bip01{L}upperarm",
     "{F}forearm {F}lowerarm forearm{F} lowerarm{L} {L}radius radius{L} radius{F} {L}forearm ccbase{L}forearm "
     "bip01{L}forearm",
-    "{F}hand hand{F} hand{L} {L}wrist ccbase{L}hand bip01{L}hand {F}wrist",
+    "{F}hand hand{F} hand{L} {L}hand {L}wrist ccbase{L}hand bip01{L}hand {F}wrist",
     "{F}upleg {F}upperleg thigh{F} thigh{L} {L}femur femur{L} femur{F} {F}thigh {L}thigh ccbase{L}thigh "
     "bip01{L}thigh",
     "{F}leg {F}lowerleg shank{F} calf{L} {L}tibia tibia{L} tibia{F} {F}shin {L}calf ccbase{L}calf "

@@ -120,30 +120,32 @@ std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double 
   std::vector<JointDifference> out(joints);
   std::vector<MeanTurn> means(joints);
   std::size_t compared = 0;
-  Quaterniond first_one = Quaterniond::Identity(), first_other = first_one;
-  // Two passes: the mean turn first.
-  for (const bool second : {false, true}) {
+  const Quaterniond frame0(rig.skeleton.segments[0].joint.axes);
+  const auto in_room = [&](const Quaterniond& q) { return frame0 * q * frame0.conjugate(); };
+  Eigen::Vector2d heading = Eigen::Vector2d::Zero();  // cosine and sine of half the turn, summed
+  Quaterniond back = Quaterniond::Identity();
+  // Three passes: how the rooms are turned against each other, the mean turns, what is left of them.
+  for (const int pass : {0, 1, 2}) {
     compared = 0;
     for (std::size_t frame = 0; frame < frames; ++frame) {
       const double at = static_cast<double>(frame) * frame_seconds / other_seconds;
       const auto k = static_cast<std::size_t>(at);
       if (k + 1 >= other_frames && at > static_cast<double>(k) + 1e-9) break;
       if (k >= other_frames) break;
-      Pose a = one(frame);
-      const Pose b = between(other(k), other(std::min(k + 1, other_frames - 1)), at - static_cast<double>(k));
-      if (frame == 0) {
-        first_one = a.rotation[0];
-        first_other = b.rotation[0];
-      }
+      const Pose a = one(frame);
+      Pose b = between(other(k), other(std::min(k + 1, other_frames - 1)), at - static_cast<double>(k));
       ++compared;
+      if (pass == 0) {
+        const Quaterniond apart = in_room(b.rotation[0]) * in_room(a.rotation[0]).conjugate();
+        const Eigen::Vector2d turn(apart.w(), apart.z());
+        heading += heading.dot(turn) < 0 ? -turn : turn;
+        continue;
+      }
+      b.rotation[0] = frame0.conjugate() * back * in_room(b.rotation[0]) * frame0;
       for (std::size_t j = 0; j < joints; ++j) {
-        Quaterniond p = a.rotation[j], q = b.rotation[j];
-        if (j == 0) {
-          p = p * first_one.conjugate();
-          q = q * first_other.conjugate();
-        }
+        const Quaterniond &p = a.rotation[j], &q = b.rotation[j];
         const Quaterniond apart = p.conjugate() * q;
-        if (!second) {
+        if (pass == 1) {
           means[j].add(apart);
           out[j].mean += p.angularDistance(q);
           out[j].worst = std::max(out[j].worst, p.angularDistance(q));
@@ -151,6 +153,10 @@ std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double 
           out[j].varying += apart.angularDistance(means[j].mean());
         }
       }
+    }
+    if (pass == 0 && heading.norm() > 0) {
+      heading.normalize();
+      back = Quaterniond(heading[0], 0, 0, -heading[1]);
     }
   }
   for (std::size_t j = 0; j < joints; ++j) {

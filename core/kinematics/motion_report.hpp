@@ -48,8 +48,8 @@ struct JointDifference {
   double varying = 0;          ///< mean, when the constant turn between the two (their mean) is taken out
 };
 
-/// Joint by joint over the frames of the first motion; the root's heading counts from the first frame. Both
-/// begin together; the second is interpolated.
+/// Joint by joint over the frames of the first motion. Both begin together; the second is interpolated. What
+/// turns the whole second motion about the vertical, in the mean, is another room and left out.
 std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double frame_seconds,
                                      const std::function<Pose(std::size_t)>& one, std::size_t other_frames,
                                      double other_seconds, const std::function<Pose(std::size_t)>& other);

@@ -14,8 +14,8 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kLimb = 0.12;                           // of the skeleton's extent
-constexpr double kAnatomy = 5 * std::numbers::pi / 180;  // angles that differ between any two bodies
+constexpr double kLimb = 0.12;                          // of the skeleton's extent
+constexpr double kFacing = 5 * std::numbers::pi / 180;  // hips and shoulders differ so between any two bodies
 
 // How many children each segment has, and the last of them, or -1.
 struct Children {
@@ -58,6 +58,13 @@ Limb limb_of(const Skeleton& skeleton, const Children& children, double shortest
   return limb;
 }
 
+// The turn about a unit axis that brings one direction nearest to another.
+Quaterniond about(const Vector3d& axis, const Vector3d& from, const Vector3d& to) {
+  const Vector3d a = from - axis * axis.dot(from), b = to - axis * axis.dot(to);
+  if (a.norm() < 1e-6 || b.norm() < 1e-6) return Quaterniond::Identity();
+  return Quaterniond(Eigen::AngleAxisd(std::atan2(axis.dot(a.cross(b)), a.dot(b)), axis));
+}
+
 // The turn about the vertical that brings what stands beside the trunk onto the clip's (Procrustes in the
 // plane).
 Quaterniond facing(const Skeleton& skeleton, const Children& children, const ClipPlaces& reference,
@@ -77,7 +84,7 @@ Quaterniond facing(const Skeleton& skeleton, const Children& children, const Cli
   // A zero pose faces somewhere on purpose; what is left of a frame's is where the person looked.
   const bool zero = std::all_of(reference.turn.begin(), reference.turn.end(),
                                 [](const Quaterniond& q) { return q.vec().isZero(0); });
-  if (zero && std::abs(angle) < kAnatomy) return Quaterniond::Identity();
+  if (zero && std::abs(angle) < kFacing) return Quaterniond::Identity();
   return Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitZ()));
 }
 
@@ -112,7 +119,7 @@ ClipPlaces zero_places(const Clip& clip) {
 }
 
 std::vector<Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
-                                    const std::vector<int>& clip_joint) {
+                                    const std::vector<int>& clip_joint, const std::vector<LimbBend>& bends) {
   const auto& segments = rig.skeleton.segments;
   const double shortest = kLimb * extent(rig.skeleton);
   const Children children = children_of(rig.skeleton);
@@ -122,8 +129,18 @@ std::vector<Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
                                      : turn[static_cast<std::size_t>(segments[s].parent)];
     const Limb limb = limb_of(rig.skeleton, children, shortest, reference, clip_joint, s);
     if (!limb.is) continue;
-    const auto more = Quaterniond::FromTwoVectors(turn[s] * limb.scanned, limb.drawn);
-    if (more.angularDistance(Quaterniond::Identity()) >= kAnatomy) turn[s] = (more * turn[s]).normalized();
+    turn[s] = (Quaterniond::FromTwoVectors(turn[s] * limb.scanned, limb.drawn) * turn[s]).normalized();
+    if (bends.empty()) continue;
+    // Its own hinge and the one at its end: a shank has the knee alone, a thigh too; the knee tells both.
+    const auto end = static_cast<std::size_t>(children.last[s]);
+    const std::size_t hinge = bends[s].known ? s : end;
+    const LimbBend own = bends[hinge].known ? bend_of(rig, hinge, bends[hinge].angles) : LimbBend();
+    if (!own.known) continue;
+    const auto joint = static_cast<std::size_t>(clip_joint[s]);
+    const LimbBend& clip = bends[hinge];
+    const Vector3d from = turn[s] * (hinge == s ? own.below : own.above);
+    const Vector3d to = reference.turn[joint] * (hinge == s ? clip.below : clip.above);
+    turn[s] = (about(limb.drawn.normalized(), from, to) * turn[s]).normalized();
   }
   return turn;
 }

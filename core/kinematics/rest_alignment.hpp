@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "core/kinematics/limb_bends.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/skeleton.hpp"
 
@@ -33,10 +34,12 @@ ClipPlaces zero_places(const Clip& clip);
 /// limb, so that its direction means the same thing in both, it is then turned the shortest way onto the
 /// clip's direction. A limb has one child, which the clip moves too, at least 12 % of the skeleton's extent
 /// away: shorter segments (clavicle, hand, foot) and those with several children (pelvis, chest) have
-/// directions that are the maker's choice. Differences below 5 degrees are anatomy, and left. `clip_joint`:
-/// as in Retarget.
+/// directions that are the maker's choice. About itself a limb is then turned until it bends in the plane in
+/// which the clip's bends, where `bends` (BendFinder's) tell that: otherwise an arm that hangs and one that
+/// is held out leave its elbow anywhere. `clip_joint`: as in Retarget.
 std::vector<Eigen::Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
-                                           const std::vector<int>& clip_joint);
+                                           const std::vector<int>& clip_joint,
+                                           const std::vector<LimbBend>& bends = {});
 
 /// How the limbs of a clip stand beside the scan's, the root's turn about the vertical taken out.
 struct LimbCheck {

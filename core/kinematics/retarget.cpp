@@ -140,9 +140,17 @@ Retarget match(const Rig& rig, const Clip& clip, const NameMap& names) {
   return out;
 }
 
+void find_bends(const Rig& rig, const Clip& clip, std::span<const ClipFrame> frames, Retarget& retarget) {
+  BendFinder finder(rig, retarget.clip_joint);
+  for (const ClipFrame& frame : frames) finder.add(places(clip, frame));
+  retarget.bends = finder.bends();
+  retarget.rest_turn = retarget.alignment =
+      align_rest(rig, zero_places(clip), retarget.clip_joint, retarget.bends);
+}
+
 void align_at(const Rig& rig, const Clip& clip, const ClipFrame& reference, Retarget& retarget) {
   const ClipPlaces at = places(clip, reference);
-  retarget.rest_turn = align_rest(rig, at, retarget.clip_joint);
+  retarget.rest_turn = align_rest(rig, at, retarget.clip_joint, retarget.bends);
   retarget.limbs = check_limbs(rig, at, retarget.clip_joint);
   retarget.home = at.point[root_joint(retarget)];
   for (std::size_t s = 0; s < retarget.alignment.size(); ++s) {

@@ -24,8 +24,9 @@ struct Retarget {
   std::vector<Eigen::Quaterniond> rest_turn;  ///< #segments, from the scan to the reference (align_rest)
   /// Where the clip's joint of the root is when the patient stands where it was scanned, mm LPS.
   Eigen::Vector3d home = Eigen::Vector3d::Zero();
-  double scale = 1;  ///< of the root's way; 1 / limbs.figure fits it to the patient's size
-  LimbCheck limbs;   ///< at the reference
+  double scale = 1;             ///< of the root's way; 1 / limbs.figure fits it to the patient's size
+  LimbCheck limbs;              ///< at the reference
+  std::vector<LimbBend> bends;  ///< of the clip; empty until they are looked for (find_bends)
   std::vector<std::string> unused_joints;   ///< clip joints that move nothing (end sites excepted)
   std::vector<std::string> still_segments;  ///< segments that no clip joint moves
 };
@@ -38,6 +39,10 @@ using NameMap = std::map<std::string, std::string>;
 /// pose reaches below the floor (z = 0) until its legs, straight, stand on it. Throws Error{data} when
 /// nothing matches, naming both sides' joints, and Error{config} for names of the map that neither side has.
 Retarget match(const Rig& rig, const Clip& clip, const NameMap& names = {});
+
+/// Looks through frames of the clip (64 or so do, over its length) for the planes in which its limbs bend,
+/// and aligns at the zero pose with them; align_at uses them from then on.
+void find_bends(const Rig& rig, const Clip& clip, std::span<const ClipFrame> frames, Retarget& retarget);
 
 /// `match` at a frame of a clip with the same joints in which the person stands as the patient was scanned
 /// but for its limbs' directions: for rigs whose zero pose is no pose of a body. `home` is where the root is

@@ -19,12 +19,26 @@ void messages(Bytes bytes);
 void recording(Bytes bytes);
 /// model_file::read of a good model of which bytes were changed: u24 offset, u8 value, again and again.
 void model(Bytes bytes);
+/// Motion: a `.bvh`; an `.asf`, a zero byte and its `.amc`; a `.gltf` or `.glb`; a `.mot`; a `.trc`. Frames
+/// over their length are read too.
+void bvh(Bytes bytes);
+void acclaim(Bytes bytes);
+void gltf_clip(Bytes bytes);
+void angle_table(Bytes bytes);
+void marker_table(Bytes bytes);
 
 struct Target {
   const char* name;
   void (*run)(Bytes);
 };
-inline constexpr std::array<Target, 4> targets{
-    {{"framing", framing}, {"messages", messages}, {"recording", recording}, {"model", model}}};
+inline constexpr std::array<Target, 9> targets{{{"framing", framing},
+                                                {"messages", messages},
+                                                {"recording", recording},
+                                                {"model", model},
+                                                {"bvh", bvh},
+                                                {"acclaim", acclaim},
+                                                {"gltf_clip", gltf_clip},
+                                                {"angle_table", angle_table},
+                                                {"marker_table", marker_table}}};
 
 }  // namespace ecorche::fuzz

@@ -1,6 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Motion files of every kind through the command: the way through, and each refusal with exit code and message."""
+import contextlib
+import importlib.machinery
+import importlib.util
+import io
 import json
 import os
 import pathlib
@@ -179,6 +183,86 @@ class Motion(unittest.TestCase):
         rows[0] = "\t".join(rows[0].split("\t")[:5]) + "\t\t\t" * (len(names) - 1)
         self.refused(65, "too few markers are seen in its first frame", *self.motion(trc(names, "mm")))
         self.refused(65, "markers have a place on the body", *self.motion(trc([f"m{i}" for i in range(len(names))], "cm")))
+
+    # Clips that lie, one line each; unit_io_motion has every message of every format.
+    def test_clips_that_lie(self):
+        text = WALK.read_text()
+        frames = next(line for line in text.splitlines() if line.startswith("Frames:"))
+        root, joint = (re.search(word + r" (\S+)", text).group(1) for word in ("ROOT", "JOINT"))
+        for name, spoilt, part in (
+                ("many", text.replace(frames, "Frames: 71"), "expected the file's end after the last frame"),
+                ("few", text.replace(frames, "Frames: 73"), "expected a number, the file ends"),
+                ("huge", text.replace(frames, "Frames: 4000000000"), "more than the file can hold"),
+                ("channels", text.replace("CHANNELS 3", "CHANNELS 2", 1), "expected JOINT, End Site or '}'"),
+                ("twice", text.replace(f"JOINT {joint}", f"JOINT {root}", 1), "stands twice"),
+                ("cut", text[:len(text) // 3], "the file ends"),
+                ("hundred", re.sub(r"OFFSET (\S+) (\S+) (\S+)", lambda m: "OFFSET " + " ".join(str(100 * float(x)) for x in m.groups()), text),
+                 "its unit is another"),
+                ("time", re.sub(r"Frame Time: \S+", "Frame Time: 0", text), "frame time is not positive")):
+            with self.subTest(name):
+                self.refused(65, part, *self.motion(self.put(f"{name}.bvh", spoilt)))
+        for name, asf, amc, part in (
+                ("circle", ASF.replace("rtibia rfoot", "rtibia rfoot\n    rfoot rfemur"), AMC, "has two parents"),
+                ("orphan", ASF.replace("root rhip", "rtibia rhip"), AMC, "has children before it has a parent"),
+                ("roots", ASF.replace(":bonedata", ":root\n  order TX\n:bonedata"), AMC, "has two roots"),
+                ("dof", ASF.replace("order TX TY", "order TQ TY"), AMC, "expected a degree of freedom such as rx"),
+                ("section", ASF.replace(":bonedata", ":bones"), AMC, "expected a section such as :bonedata"),
+                ("unit", ASF.replace("angle deg", "angle gon"), AMC, "expected deg or rad, found 'gon'"),
+                ("name", ASF.replace("    name rfoot\n", ""), AMC, "a bone has no name"),
+                ("bone", ASF, AMC.replace("rfemur 0 0 0", "rfemur 0 0 0\nrfemur 0 0 0"), "stands twice in one frame"),
+                ("values", ASF, AMC.replace("rfemur 0 0 0", "rfemur 0 0"), "expected a number"),
+                ("gap", ASF, AMC.replace("\n2\n", "\n3\n"), "frame 3 stands where 2")):
+            with self.subTest(name):
+                self.put(f"{name}.asf", asf)
+                self.refused(65, part, *self.motion(self.put(f"{name}.amc", amc)))
+        self.refused(65, "says 4 rows and has 3", *self.motion(self.put("rows.mot", MOT.replace("nRows=3", "nRows=4"))))
+        gltf = {"asset": {"version": "2.0"}, "nodes": [{"name": "pelvis", "children": [1]}, {"name": "thigh_left", "children": [0]}],
+                "skins": [{"joints": [0, 1]}], "animations": [{"channels": [], "samplers": []}]}
+        self.refused(65, "circle.gltf", *self.motion(self.put("circle.gltf", json.dumps(gltf))))
+
+    # The table of docs/motion.md, on the phantom's own clip; its figure as other means read it moves as the body does.
+    def test_table_of_clips(self):
+        bench = pathlib.Path(__file__).resolve().parents[3] / "bench" / "clips" / "run"
+        loader = importlib.machinery.SourceFileLoader("clips", str(bench))
+        clips = importlib.util.module_from_spec(importlib.util.spec_from_loader("clips", loader))
+        loader.exec_module(clips)
+        clips.ECORCHE = ECORCHE
+        (self.folder / "cmu_31joint").mkdir()
+        file = self.folder / "cmu_31joint" / WALK.name
+        shutil.copy(WALK, file)
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            clips.played(file, MODEL)
+            self.assertTrue(clips.agree(file, file, MODEL))
+        self.assertRegex(said.getvalue(), r"walk.bvh +72 +\d+/\d+ .* mm/s")
+        self.assertRegex(said.getvalue(), r"aligned at [\d.]+s: \w+ 0\.0 .*in the files: \w+ 0\.0")
+        other = self.folder / "cmu_31joint" / "bend.bvh"
+        shutil.copy(CASE / "motion" / "bend.bvh", other)
+        with contextlib.redirect_stdout(said):
+            self.assertFalse(clips.agree(file, other, MODEL))
+
+    # What a clip takes in memory does not grow with it: a hundred times as long, 9 MiB on the disk.
+    def test_long_clips_stay_on_the_disk(self):
+        head, rows = re.split(r"(?<=\n)(?=Frames:)", WALK.read_text())
+        count, step, *frames = rows.strip().splitlines()
+
+        def peak(times):
+            file = self.folder / f"long_{times}.bvh"
+            with file.open("w") as out:
+                out.write(f"{head}Frames: {times * len(frames)}\n{step}\n")
+                for _ in range(times):
+                    out.write("\n".join(frames) + "\n")
+            with open(os.devnull, "w") as null:
+                child = subprocess.Popen([ECORCHE, "motion", file, "--model", MODEL, "--json"], stdout=null, stderr=null)
+                _, status, usage = os.wait4(child.pid, 0)
+            child.returncode = os.waitstatus_to_exitcode(status)
+            self.assertEqual(child.returncode, 0)
+            return file.stat().st_size / 2**20, usage.ru_maxrss / 1024
+
+        (small, low), (large, high) = peak(2), peak(200)
+        print(f"{small:.1f} MiB of clip: {low:.1f} MiB of memory; {large:.1f} MiB: {high:.1f} MiB")
+        self.assertGreater(large - small, 8)
+        self.assertLess(high - low, 3)
 
     def test_refusals(self):
         text = WALK.read_text()

@@ -251,5 +251,30 @@ TEST(MotionReport, ConstantTurnsAreToldFromOthers) {
   EXPECT_EQ(apart[2].mean, 0);
 }
 
+// The publisher of one take had the person walk another way; where he leans is no matter of that.
+TEST(MotionReport, AnotherRoomIsNoDifference) {
+  Rig rig = legs();
+  rig.skeleton.segments[0].joint.axes = test::turn(Vector3d(1, 2, 3), 0.8).toRotationMatrix();
+  const Quaterniond frame(rig.skeleton.segments[0].joint.axes);
+  const auto walk = [&](double heading, double lean, std::size_t number) {
+    Pose p = Pose::rest(7);
+    const double at = 0.02 * static_cast<double>(number);
+    const Quaterniond turn = test::turn(Vector3d::UnitZ(), heading) *
+                             test::turn(Vector3d::UnitX(), lean + at) * test::turn(Vector3d::UnitY(), at);
+    p.rotation[0] = frame.conjugate() * turn * frame;
+    return p;
+  };
+  for (const double heading : {1.1, -2.9}) {
+    const auto apart = compare(
+        rig, 50, 0.02, [&](std::size_t f) { return walk(0, 0, f); }, 50, 0.02,
+        [&](std::size_t f) { return walk(heading, 0, f); });
+    EXPECT_LT(apart[0].worst, 1e-7) << heading;
+  }
+  const auto leans = compare(
+      rig, 50, 0.02, [&](std::size_t f) { return walk(0, 0, f); }, 50, 0.02,
+      [&](std::size_t f) { return walk(1.1, 0.2, f); });
+  EXPECT_NEAR(leans[0].mean, 0.2, 0.03);
+}
+
 }  // namespace
 }  // namespace ecorche::kinematics

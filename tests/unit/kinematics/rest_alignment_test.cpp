@@ -5,8 +5,10 @@
 
 #include <numbers>
 
+#include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
 #include "core/kinematics/retarget.hpp"
+#include "core/kinematics/rig_clip.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {
@@ -69,9 +71,8 @@ TEST(RestAlignment, ShortSegmentsAndTrunkStayWithTheirParent) {
   const Rig rig = hanging_arms();
   const Clip clip = stretched_arms();
   const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
-  EXPECT_EQ(turn[0].angularDistance(Quaterniond::Identity()), 0);
-  EXPECT_EQ(turn[1].angularDistance(Quaterniond::Identity()), 0)
-      << "a collar bone's direction is the maker's";
+  EXPECT_LT((turn[0] * Vector3d(20, 0, 500).normalized() - Vector3d(0, -30, 480).normalized()).norm(), 1e-9);
+  EXPECT_EQ(turn[1].angularDistance(turn[0]), 0) << "a collar bone's direction is the maker's";
   EXPECT_EQ(turn[4].angularDistance(turn[3]), 0) << "a hand has no child";
 }
 
@@ -83,22 +84,101 @@ TEST(RestAlignment, TurnsOfTheClipComeOnTop) {
   EXPECT_LT((direction(rig, motion, 2, 3) + Vector3d::UnitZ()).norm(), 1e-9);
 }
 
-TEST(RestAlignment, AFewDegreesAreAnatomy) {
+// Two clips of one take differ by that much in their zero poses: played, they must not.
+TEST(RestAlignment, AFewDegreesAreTakenToo) {
   const Rig rig = hanging_arms();
-  Clip clip = stretched_arms();
-  const Vector3d scanned(20, 0, -280);
-  clip.joints[3].offset = test::turn(Vector3d::UnitY(), 4 * std::numbers::pi / 180) * scanned;
-  const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
-  EXPECT_EQ(turn[2].angularDistance(Quaterniond::Identity()), 0);
-  clip.joints[3].offset = test::turn(Vector3d::UnitY(), 6 * std::numbers::pi / 180) * scanned;
-  EXPECT_NEAR(align_rest(rig, zero_places(clip), match(rig, clip).clip_joint)[2].angularDistance(
-                  Quaterniond::Identity()),
-              6 * std::numbers::pi / 180, 1e-9);
+  for (const double degrees : {0.5, 4.0, 6.0}) {
+    Clip clip = stretched_arms();
+    clip.joints[1].offset = {20, 0, 500};
+    clip.joints[3].offset =
+        test::turn(Vector3d::UnitY(), degrees * std::numbers::pi / 180) * Vector3d(20, 0, -280);
+    const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
+    EXPECT_NEAR(turn[2].angularDistance(Quaterniond::Identity()), degrees * std::numbers::pi / 180, 1e-9);
+  }
+}
+
+// The rig's elbow bends about an axis of its own; the clip's is told by where its hand goes. Whatever the
+// clip's zero pose leaves open, the arm that is played bends as the rig's does, and nothing is left for
+// limits to take.
+TEST(RestAlignment, ALimbBendsInTheClipsPlane) {
+  Rig rig = hanging_arms();
+  Joint& elbow = rig.skeleton.segments[3].joint;
+  elbow.kind = JointKind::hinge;
+  elbow.axes = test::turn(Vector3d::UnitZ(), 0.4).toRotationMatrix();
+  rig.skeleton.segments[4].joint.center = rig.skeleton.segments[3].joint.center + Vector3d(18, 0, -250);
+  Clip clip = stretched_arms();  // along x, and its elbow bends about z: the hand goes to +y
+  clip.joints[1].offset = {20, 0, 500};
+  std::vector<ClipFrame> frames;
+  for (const double bend : {0.1, 0.6, 1.2, -0.05}) {
+    ClipFrame frame{Vector3d::Zero(), std::vector<Quaterniond>(5, Quaterniond::Identity())};
+    frame.rotation[2] = test::turn(Vector3d(1, 2, 3), bend);
+    frame.rotation[3] = test::turn(Vector3d::UnitZ(), bend);
+    frames.push_back(frame);
+  }
+  Retarget retarget = match(rig, clip);
+  const auto twisted = [&](const ClipFrame& frame) {
+    const Quaterniond q = pose_at(rig, clip, retarget, frame).rotation[3];
+    return q.angularDistance(clamp(elbow, q));
+  };
+  EXPECT_GT(twisted(frames[2]), 0.3) << "directions alone leave the arm turned about itself";
+  find_bends(rig, clip, frames, retarget);
+  ASSERT_TRUE(retarget.bends[3].known);
+  EXPECT_LT((retarget.bends[3].above - Vector3d::UnitZ()).norm(), 1e-9);
+  for (const ClipFrame& frame : frames)
+    EXPECT_LT(twisted(frame), 0.1);  // the rig's axis is not square to its arm
+  // The same at a frame, and the wrist goes where the clip's goes.
+  align_at(rig, clip, frames[1], retarget);
+  for (const ClipFrame& frame : frames) EXPECT_LT(twisted(frame), 0.1);
+  const auto motion = forward(rig, pose_at(rig, clip, retarget, frames[2]));
+  const ClipPlaces at = places(clip, frames[2]);
+  EXPECT_LT((direction(rig, motion, 3, 4) - (at.point[4] - at.point[3]).normalized()).norm(), 1e-6);
+  EXPECT_LT((direction(rig, motion, 2, 3) - (at.point[3] - at.point[2]).normalized()).norm(), 1e-6);
+}
+
+// A clip that was made with this rig, its elbow's axis far from square to the arm: nothing is to be turned.
+TEST(RestAlignment, ARigsOwnMotionIsLeftAsItIs) {
+  Rig rig = hanging_arms();
+  Joint& elbow = rig.skeleton.segments[3].joint;
+  elbow.kind = JointKind::hinge;
+  elbow.axes = (test::turn(Vector3d::UnitZ(), 0.4) * test::turn(Vector3d::UnitY(), 0.3)).toRotationMatrix();
+  Clip clip = rig_clip(rig, "own", 0.01);
+  std::vector<ClipFrame> frames;
+  for (const double flexion : {0.4, 0.9, 1.5, 0.6}) {
+    Pose pose = Pose::rest(5);
+    pose.rotation[2] = test::turn(Vector3d(3, 1, 2), 0.8 * flexion);
+    pose.rotation[3] = rotation_from_angles(elbow, {flexion, 0, 0});
+    add_frame(rig, pose, clip);
+    const auto begin = clip.rotation.end() - 5;
+    frames.push_back({clip.root_position.back(), {begin, clip.rotation.end()}});
+  }
+  Retarget retarget = match(rig, clip);
+  find_bends(rig, clip, frames, retarget);
+  ASSERT_TRUE(retarget.bends[3].known);
+  for (const Quaterniond& q : retarget.alignment) EXPECT_LT(q.angularDistance(Quaterniond::Identity()), 1e-7);
+}
+
+TEST(RestAlignment, ALimbThatHardlyBendsTellsNothing) {
+  Rig rig = hanging_arms();
+  rig.skeleton.segments[3].joint.kind = JointKind::hinge;
+  const Clip clip = stretched_arms();
+  ClipFrame still{Vector3d::Zero(), std::vector<Quaterniond>(5, Quaterniond::Identity())};
+  Retarget retarget = match(rig, clip);
+  const auto before = retarget.alignment;
+  find_bends(rig, clip, std::vector<ClipFrame>{still}, retarget);
+  EXPECT_FALSE(retarget.bends[3].known);
+  // Now this way, now that: no axis either.
+  ClipFrame one = still, other = still;
+  one.rotation[3] = test::turn(Vector3d::UnitZ(), 0.8);
+  other.rotation[3] = test::turn(Vector3d::UnitY(), 0.8);
+  find_bends(rig, clip, std::vector<ClipFrame>{one, other}, retarget);
+  EXPECT_FALSE(retarget.bends[3].known);
+  for (std::size_t s = 0; s < 5; ++s) EXPECT_EQ(retarget.alignment[s].coeffs(), before[s].coeffs());
 }
 
 TEST(RestAlignment, JointsThatTheClipLacksOrPlacesNowhereAreLeft) {
   const Rig rig = hanging_arms();
   Clip clip = stretched_arms();
+  clip.joints[1].offset = {20, 0, 500};
   clip.joints[3].offset.setZero();
   const auto turn = align_rest(rig, zero_places(clip), match(rig, clip).clip_joint);
   EXPECT_EQ(turn[2].angularDistance(Quaterniond::Identity()), 0);
