@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <tuple>
 
 #include "core/kinematics/angles.hpp"
 #include "core/values/error.hpp"
