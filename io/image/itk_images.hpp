@@ -11,7 +11,7 @@ namespace ecorche::io::itk_images {
 enum class Format { nrrd, meta, nifti };
 
 /// What ITK makes of the header: compared with what we made of it before any voxel is read.
-/// Throws Error{data} for what ITK refuses.
+/// No voxels where it has not three axes. Throws Error{data} for what ITK refuses.
 Image read_header(const std::filesystem::path& path, Format format);
 
 /// Throws Error{io}.

@@ -150,7 +150,7 @@ void set_type(ImageHeader& header, int datatype, const Path& path) {
 }
 
 void set_size(ImageHeader& header, const Fields& f, const Path& path) {
-  if (f.dim[0] < 1 || f.dim[0] > 7)
+  if (f.dim[0] < 3 || f.dim[0] > 7)
     refuse(path, "has " + std::to_string(f.dim[0]) + " axes", "save a 3-D image");
   for (std::size_t axis = 1; axis <= static_cast<std::size_t>(f.dim[0]); ++axis) {
     const std::int64_t size = f.dim[axis];
@@ -163,7 +163,6 @@ void set_size(ImageHeader& header, const Fields& f, const Path& path) {
              "save one 3-D image; components of a voxel are the fifth axis");
     }
   }
-  if (f.dim[0] < 3) refuse(path, "has " + std::to_string(f.dim[0]) + " axes", "save a 3-D image");
 }
 
 }  // namespace

@@ -158,7 +158,7 @@ Segmentation read_segmentation(const Path& path) {
     out.names = make_identifiers(names);
     return out;
   }
-  if (segments.size() > std::numeric_limits<std::uint16_t>::max()) refuse(path, "has too many segments");
+  // A header has a MiB at most, in which fewer than 2^16 segments find room.
   // As written where every value means one thing, else from 1.
   const bool unique = names.size() == segments.size() && names.begin()->first > 0 &&
                       names.rbegin()->first <= std::numeric_limits<std::uint16_t>::max();

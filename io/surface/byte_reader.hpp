@@ -82,6 +82,13 @@ inline std::optional<std::int64_t> whole(std::string_view word) {
   return value;
 }
 
+/// What 32-bit corners can number.
+inline constexpr std::uint64_t most_points = std::numeric_limits<std::int32_t>::max();
+
+inline void check_points(std::uint64_t points, std::uint64_t most, const std::string& where) {
+  if (points > most) refuse(where, "has more points than can be counted");
+}
+
 /// What follows `SPACE=` in a comment or title, as some tools write it.
 inline std::optional<std::string> space_tag(std::string_view text) {
   const std::size_t at = text.find("SPACE=");

@@ -2,7 +2,9 @@
 #include "io/surface/gltf_build.hpp"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstring>
+#include <fstream>
 
 #include "core/values/error.hpp"
 
@@ -97,9 +99,23 @@ tinygltf::Primitive add_surface(tinygltf::Model& gltf, const SurfaceMesh& mesh) 
   return primitive;
 }
 
+namespace {
+
+// tinygltf does not look whether its file took what it wrote; a GLB says its own length.
+bool is_whole(const std::filesystem::path& path) {
+  std::array<char, 12> head{};
+  if (!std::ifstream(path, std::ios::binary).read(head.data(), head.size())) return false;
+  std::uint32_t length = 0;
+  std::memcpy(&length, head.data() + 8, sizeof length);
+  std::error_code error;
+  return std::filesystem::file_size(path, error) == length;
+}
+
+}  // namespace
+
 void write_file(tinygltf::Model& gltf, const std::filesystem::path& path) {
   tinygltf::TinyGLTF writer;
-  if (!writer.WriteGltfSceneToFile(&gltf, path.string(), true, true, false, true)) {
+  if (!writer.WriteGltfSceneToFile(&gltf, path.string(), true, true, false, true) || !is_whole(path)) {
     throw Error(ErrorKind::io, path.string(), "glTF could not be written", "check the disk's free space");
   }
 }

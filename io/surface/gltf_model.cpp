@@ -109,10 +109,10 @@ class Placer {
 tinygltf::Model parse(std::string_view file, const std::filesystem::path& path) {
   const std::string where = path.string();
   const bool binary = bytes::lower(path.extension().string()) == ".glb";
+  if (file.size() > std::numeric_limits<std::uint32_t>::max()) refuse(where, "is larger than glTF can be");
   const std::string_view json = binary ? json_of_glb(file, where) : file;
   if (!binary && !bytes::trim(json).starts_with('{')) refuse(where, "is no glTF: it is no JSON object");
   check_depth(json, where);
-  if (file.size() > std::numeric_limits<std::uint32_t>::max()) refuse(where, "is larger than glTF can be");
   tinygltf::TinyGLTF reader;
   reader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },

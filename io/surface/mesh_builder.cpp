@@ -31,8 +31,7 @@ void MeshBuilder::add_point(const std::array<double, 3>& p) {
                   "point " + std::to_string(points_.size()) + " has the coordinate " + bytes::number(x),
                   "every coordinate must be finite and below 1e9");
   }
-  if (points_.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
-    bytes::refuse(where_, "has more points than can be counted");
+  bytes::check_points(points_.size() + 1, most_points_, where_);
   points_.push_back(p);
 }
 

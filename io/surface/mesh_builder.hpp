@@ -19,7 +19,9 @@ inline constexpr double largest_coordinate = 1e9;
 /// was added, never with what a header promises. Every member throws Error{data} naming `where`.
 class MeshBuilder {
  public:
-  explicit MeshBuilder(std::string where) : where_(std::move(where)) {}
+  /// `most_points`: what 32-bit corners can number; less in tests.
+  explicit MeshBuilder(std::string where, std::size_t most_points = std::numeric_limits<std::int32_t>::max())
+      : where_(std::move(where)), most_points_(most_points) {}
 
   /// Refuses a coordinate that is not finite or beyond `largest_coordinate`.
   void add_point(const std::array<double, 3>& p);
@@ -50,6 +52,7 @@ class MeshBuilder {
   Eigen::Vector3d point(std::int64_t index) const;
 
   std::string where_;
+  std::size_t most_points_;
   std::vector<std::array<double, 3>> points_;
   std::vector<Triangle> triangles_;
 };

@@ -106,7 +106,7 @@ class Words {
   }
   void expect(std::string_view expected) {
     const std::string_view word = next();
-    if (!is_word(word, expected)) fail("'" + std::string(expected) + "'", word);
+    if (!is_word(word, expected)) unexpected("'" + std::string(expected) + "'", word);
   }
   double expect_number() {
     std::string_view word = next();
@@ -115,7 +115,7 @@ class Words {
     double value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (word.empty() || error == std::errc::invalid_argument || end != word.data() + word.size())
-      fail("a number", met);
+      unexpected("a number", met);
     if (error == std::errc::result_out_of_range) {
       // Normals of tiny triangles are written with exponents that no double holds: those are zero.
       return word.find("e-") != word.npos || word.find("E-") != word.npos
@@ -124,7 +124,7 @@ class Words {
     }
     return value;
   }
-  [[noreturn]] void fail(const std::string& expected, std::string_view met) const {
+  [[noreturn]] void unexpected(const std::string& expected, std::string_view met) const {
     const std::string got = met.empty() ? "the file ends" : "found '" + std::string(met.substr(0, 40)) + "'";
     refuse(where_ + ":" + std::to_string(line_), "expected " + expected + ", " + got);
   }
@@ -149,11 +149,11 @@ SurfaceMesh decode_text(std::string_view text, const std::string& where) {
       words.skip_line();
       word = words.next();
       if (word.empty()) break;
-      if (!is_word(word, "solid")) words.fail("'solid' or the end of the file", word);
+      if (!is_word(word, "solid")) words.unexpected("'solid' or the end of the file", word);
       words.skip_line();
       continue;
     }
-    if (!is_word(word, "facet")) words.fail("'facet' or 'endsolid'", word);
+    if (!is_word(word, "facet")) words.unexpected("'facet' or 'endsolid'", word);
     words.expect("normal");
     for (int k = 0; k < 3; ++k) words.expect_number();
     words.expect("outer");

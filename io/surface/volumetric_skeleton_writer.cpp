@@ -61,7 +61,7 @@ void check(const std::filesystem::path& path, const VolumetricSkeletonFile& file
   if (defect.empty() && !segment.empty() && !file.segments.empty() &&
       *std::max_element(segment.begin(), segment.end()) >= std::ssize(file.segments))
     defect = "a voxel hangs on a segment without a name";
-  if (!defect.empty()) throw Error(ErrorKind::internal, path.string(), defect, "report this");
+  if (!defect.empty()) throw Error(ErrorKind::internal, path.string(), defect, "report how it was thinned");
 }
 
 std::string encode(const VolumetricSkeletonFile& file) {

@@ -27,8 +27,12 @@ class Messages final : public vtkCommand {
  public:
   static Messages* New() { return new Messages; }
   void Execute(vtkObject*, unsigned long event, void* text) override {
-    if (event == vtkCommand::ErrorEvent && text != nullptr && first.empty())
-      first = static_cast<const char*>(text);
+    if (event != vtkCommand::ErrorEvent || text == nullptr || !first.empty()) return;
+    // "ERROR: In ./IO/PLY/vtkPLYWriter.cxx, line 144\nvtkPLYWriter (0x55e1): what\n\n"
+    const std::string_view all = static_cast<const char*>(text);
+    const std::size_t told = all.find("): ");
+    first = all.substr(told == all.npos ? 0 : told + 3);
+    first.erase(first.find_last_not_of(" \n") + 1);
   }
   std::string first;
 };
@@ -41,9 +45,10 @@ void run(W& writer, const std::filesystem::path& path) {
   writer.SetFileName(path.c_str());
   const bool written = writer.Write() == 1;
   if (written && messages->first.empty() && writer.GetErrorCode() == 0) return;
-  throw Error(ErrorKind::io, path.string(),
-              messages->first.empty() ? "VTK could not write it" : messages->first,
-              "check the disk's free space");
+  throw Error(
+      ErrorKind::io, path.string(),
+      "VTK could not write it (error " + std::to_string(writer.GetErrorCode()) + ") " + messages->first,
+      "check the disk's free space");
 }
 
 template <class M>

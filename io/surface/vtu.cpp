@@ -59,8 +59,7 @@ class PieceReader {
       if (types[c] != kTet || ends[c] != 4 * static_cast<std::int64_t>(c + 1))
         refuse(where_, "cell " + std::to_string(c) + " is no tet", "save its tets alone");
     }
-    if (before + points > std::numeric_limits<std::int32_t>::max())
-      refuse(where_, "has more than 2^31 points");
+    bytes::check_points(before + points, bytes::most_points, where_);
     for (const std::int64_t corner : cells("connectivity", 4 * count)) {
       if (corner < 0 || static_cast<std::uint64_t>(corner) >= points)
         refuse(where_, "a cell uses point " + std::to_string(corner) + " of " + std::to_string(points));

@@ -48,6 +48,9 @@ std::vector<std::string_view> mesher_names();
 /// Throws Error{usage} for a name that this build does not have.
 std::unique_ptr<Mesher> make_mesher(std::string_view name);
 
+/// Throws Error{usage} where nothing like a body can be made of so few tets.
+void check_budget(double tets);
+
 /// What every mesh passes before the next stage: nodes narrowed to float32 (the run-time precision; all later
 /// stages see exactly those coordinates), merged where equal, dropped where unused and renumbered along a
 /// Morton curve; tets sorted along it, each with its lowest node first. The result depends on the geometry

@@ -50,6 +50,11 @@ void check_model(const Model& model) {
   kinematics::constrain(model.rig.skeleton, rest, clamped);
 }
 
+// Finite, and where single precision still tells one place of a body from another.
+bool within_reach(const Eigen::Vector3d& translation) {
+  return translation.allFinite() && translation.cwiseAbs().maxCoeff() <= 1e9;
+}
+
 Status bad(std::string message) {
   return {StatusCode::invalid_argument, std::move(message)};
 }
@@ -61,10 +66,11 @@ Status check_pose(const Skeleton& skeleton, const Pose& pose) {
                std::to_string(pose.translation.size()) + " translations, the rig " + std::to_string(joints) +
                " joints");
   }
-  if (!pose.root_translation.allFinite()) return bad("the root's translation is not finite");
+  if (!within_reach(pose.root_translation)) return bad("the root's translation is not within 1e9 mm");
   for (std::size_t j = 0; j < joints; ++j) {
-    if (!pose.rotation[j].coeffs().allFinite() || !pose.translation[j].allFinite()) {
-      return bad("joint '" + skeleton.segments[j].joint.name + "' has a value that is not finite");
+    if (!pose.rotation[j].coeffs().allFinite() || !within_reach(pose.translation[j])) {
+      return bad("joint '" + skeleton.segments[j].joint.name +
+                 "' has a value that is not finite, or beyond 1e9 mm");
     }
     if (std::abs(pose.rotation[j].norm() - 1) > kUnitTolerance) {
       return bad("joint '" + skeleton.segments[j].joint.name + "' has a quaternion of length " +

@@ -81,8 +81,8 @@ class BodyPoser {
 
   /// Constrains `pose` (limits, coupling), runs forward kinematics, skins the nodes, then moves the tissues
   /// whose rows of Model::tissues are in `tissues` (ascending). Allocates nothing. invalid_argument when the
-  /// pose has not one rotation and one translation per joint, or holds a value that is not finite or a
-  /// quaternion whose length is not 1 within 1 %, when a tissue is not of the model, or when `out` is no
+  /// pose has not one rotation and one translation per joint, or holds a value that is not finite, beyond
+  /// 1e9 mm or no unit quaternion within 1 %, when a tissue is not of the model, or when `out` is no
   /// frame of it. Positions keep 1e-3 mm at rest and under any rigid motion of the whole body within metres:
   /// see segment_motion.hpp.
   Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues, PosedBody& out,

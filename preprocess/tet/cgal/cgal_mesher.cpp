@@ -206,8 +206,7 @@ class CgalMesher : public Mesher {
     const std::vector<std::uint8_t> distance = surface_distance(input.labels, context);
     const double allowed = std::min(static_cast<double>(options.max_tets),
                                     static_cast<double>(options.max_nodes) / kNodesPerTet);
-    if (allowed < 100)
-      throw Error(ErrorKind::usage, "--max-tets", "fewer than 100 tets", "allow more tets and nodes");
+    check_budget(allowed);
     double near = choose_near(input.labels, distance, allowed);
     for (;;) {
       TetMesh mesh = Run(input.labels, distance, near, context).mesh();

@@ -305,8 +305,7 @@ class LatticeMesher : public Mesher {
     // the safe side.
     const double tets =
         std::min(static_cast<double>(options.max_tets), 5.0 * static_cast<double>(options.max_nodes));
-    if (tets < 100)
-      throw Error(ErrorKind::usage, "--max-tets", "fewer than 100 tets", "allow more tets and nodes");
+    check_budget(tets);
     const double finest = kFinestInVoxels * clipper.voxel();
     double side = std::max(finest, std::cbrt(12 * 1.03 * clipper.body_volume() / tets));
     for (;;) {

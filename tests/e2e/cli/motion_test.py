@@ -282,6 +282,7 @@ class Motion(unittest.TestCase):
         self.refused(64, "is no unit", *self.motion(WALK, "--motion-unit", "ell"))
         self.refused(64, "names no axes", *self.motion(WALK, "--motion-frame", "XYZ"))
         self.refused(64, "is no reference", *self.motion(WALK, "--motion-rest", "first"))
+        self.refused(64, "the clip has 72 frames (count from 0)", *self.motion(WALK, "--motion-rest", f"{WALK}:72"))
         self.refused(64, "the clip has frames 0 to 71", *self.motion(WALK, "--motion-rest", "72"))
         self.refused(78, "the clip has no joint 'Knee'",
                      *self.motion(WALK, "--map", self.put("map.yaml", "ecorche_motion_map: 1\njoints: {Knee: pelvis}\n")))

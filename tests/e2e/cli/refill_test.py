@@ -14,7 +14,9 @@ import unittest
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "scripts/renderer"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "mistakes"))
 import bodies  # noqa: E402
+import body  # noqa: E402
 import volumes  # noqa: E402
 
 ECORCHE = os.environ["ECORCHE_BIN"]
@@ -145,7 +147,7 @@ class Refill(unittest.TestCase):
         self.assertIn("do not meet", run("contact", self.few, self.few, "--other-rig", self.rig, "--other-pose", far).stdout)
         self.assertIn("meet, deepest by", run("contact", self.few, self.few, "--rig", self.rig, "--pose", self.pose).stdout)
         self.assert_error(65, ("path", self.loose, "--from", "3,8,8", "--to", "60,8,8"), "it has no tree")
-        self.assert_error(64, ("path", self.few, "--from", "3,8,8", "--to", "60,8,8", "--pose", self.pose), "--rig", "a pose needs a rig")
+        self.assert_error(64, ("path", self.few, "--from", "3,8,8", "--to", "60,8,8", "--pose", self.pose), "--rig", "a pose needs a rig (add --rig SKELETON.yaml or MODEL.hdf)")
         self.assert_error(64, ("contact", self.few, self.few, "--pose", self.pose), "--rig")
         self.assert_error(64, ("path", self.few, "--from", "3,8"), "--from")
 
@@ -218,6 +220,16 @@ class Refill(unittest.TestCase):
         self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
         self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--bridge"), "tets open no gaps")
         self.assert_error(64, ("deformers", model, "--volume", "mri", "--pose", pose), "mri")
+        small = body.write(self.folder / "small")
+        flat = self.folder / "flat.hdf"
+        self.ok("preprocess", small, "-o", flat, "--mesher", "lattice", "--max-tets", 5000, "--spheres", 0.3)
+        self.assert_error(64, ("deformers", flat, "--volume", "ct", "--pose", small / "pose.yaml"),
+                          "its voxels are not cubic, so the two do not pose it on one lattice (resample it)")
+        (small / "far.yaml").write_text("ecorche_pose: 1\nskeleton: small\nroot: {translation_mm: [1e300, 0, 0]}\n")
+        self.assert_error(65, ("deformers", flat, "--volume", "labels", "--pose", small / "far.yaml"), "(mend the motion)")
+        self.assert_error(65, ("pose", flat, "-o", self.folder / "p", "--pose", small / "far.yaml"), "(mend the motion)")
+        self.assert_error(65, ("preprocess", small, "-o", self.folder / "thin.hdf", "--mesher", "lattice", "--max-tets", 5000, "--spheres", 2),
+                          "--spheres: no voxel is left at this thinness (choose a lower one)")
         self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--deformer", "spheres", "--as-case"), "--deformer")
         plain = pathlib.Path(os.environ["ECORCHE_MODEL"])
         self.assert_error(78, ("pose", plain, "-o", self.folder / "p", "--pose", pose, "--deformer", "spheres"), "holds no spheres")
@@ -225,14 +237,29 @@ class Refill(unittest.TestCase):
 
     def test_mistakes(self):
         out = self.folder / "x.nrrd"
-        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--pose", self.pose), "--rig")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--pose", self.pose), "--rig: a pose needs a rig (add --rig SKELETON.yaml or MODEL.hdf)")
+        fitted = self.folder / "fitted.yaml"
+        fitted.write_text(ARM.replace("[30, 8, 7.5]", "{sphere_fit: {bone: a, facing: b}}"))
+        self.assert_error(78, ("refill", self.few, self.bar, "-o", out, "--rig", fitted, "--pose", self.pose),
+                          "joint 'elbow' is to be fitted to bones (name a model, whose rig is fitted)")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--region", "0,0,0,5000,5000,5000"), "it holds more than 2^31 voxels (make it smaller)")
+        arrays = re.compile(rb'<DataArray ([^>]*Name="(?:Points|ijk|distance|deficit)")[^>]*/>')
+        empty = self.folder / "empty.vtp"
+        text = re.sub(rb'NumberOfPoints="\d+"', b'NumberOfPoints="0"', self.loose.read_bytes())
+        empty.write_bytes(arrays.sub(rb'<DataArray \1 NumberOfComponents="3" format="ascii"></DataArray>', text))
+        self.assert_error(65, ("refill", empty, "-o", out), "it has no voxel (thin at a lower TP)")
+        alone = self.folder / "alone.yaml"
+        alone.write_text("ecorche_skeleton: 1\nname: arm\nsegments:\n  upper: {joint: {name: shoulder, kind: free, center: [6, 8, 7.5]}}\n")
+        whole = self.folder / "whole.vtp"
+        self.assertEqual(run("thin", self.bar, "-o", whole, "--tp", 0.3, "--tree", "--skeleton", alone).returncode, 0)
+        self.assert_error(64, ("tears", whole, "--rig", alone, "--prove", 3), "--prove: no joint lies within the body (check the rig)")
         self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--rig", self.rig), "nothing is posed")
-        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--bulge", 1), "--bulge")
-        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--back"), "--back")
-        self.assert_error(64, ("refill", self.few, self.bar, "-o", self.folder / "x.glb"), "preview")
-        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--region", "9,9,9,1,1,1"), "--region")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--bulge", 1), "--bulge: joints are needed (add --rig and --pose)")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--back"), "--back: no pose to come back from (add --rig and --pose)")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", self.folder / "x.glb"), "--output: a preview shows no values (leave out VOLUME")
+        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--region", "9,9,9,1,1,1"), "its low corner is not the low one (give X0,Y0,Z0,X1,Y1,Z1)")
         self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--region", "9.2,9.2,9.2,9.4,9.4,9.4"), "voxel centre")
-        self.assert_error(64, ("refill", self.few, "-o", out, "--morph", self.few, self.bar), "--morph")
+        self.assert_error(64, ("refill", self.few, "-o", out, "--morph", self.few, self.bar), "two objects at rest become each other (give VOLUME, and neither a pose")
         self.assert_error(64, ("refill", self.few, self.bar, "-o", out, "--time", 2), "time")
         self.assert_error(65, ("refill", self.loose, self.bar, "-o", out, "--rig", self.rig, "--pose", self.pose), "no segments")
         self.assert_error(66, ("refill", self.folder / "none.vtp", self.bar, "-o", out), "none.vtp")
@@ -242,7 +269,7 @@ class Refill(unittest.TestCase):
         fewer = write_nrrd(self.folder / "fewer.nrrd", np.zeros((4, 4, 4), np.uint8))
         self.assert_error(65, ("refill", self.few, "-o", out, "--object", fewer), "balls hold")
         self.assert_error(64, ("tears", self.few, "--rig", self.rig), "nothing is to be looked at")
-        self.assert_error(64, ("tears", self.few, "--sweep"), "--rig")
+        self.assert_error(64, ("tears", self.few, "--sweep"), "--rig: a rig must move the skeleton (add --rig SKELETON.yaml or MODEL.hdf)")
         self.assertFalse(out.exists())
 
     def test_an_animated_picture_holds_every_frame(self):

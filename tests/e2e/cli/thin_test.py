@@ -213,8 +213,9 @@ class Thin(unittest.TestCase):
         self.assertGreater(report["attached"]["reassigned"], 0)
         for text, part in (("regions: [{segment: leg, box: [[0, 0, 0], [1, 1, 1]]}]", "leg"),
                            ("regions: [{segment: hand}]", "box and ball"),
-                           ("regions: [{segment: hand, box: [[5, 0, 0], [1, 1, 1]]}]", "empty"),
-                           ("splits: [{joint: shoulder, within_mm: 5}]", "root"),
+                           ("regions: [{segment: hand, box: [[5, 0, 0], [1, 1, 1]]}]", "box: is empty (the lower corner comes first)"),
+                           ("regions: [{segment: hand, box: [[5, 0, 0]]}]", "box: has not two corners (write [[x, y, z], [x, y, z]])"),
+                           ("splits: [{joint: shoulder, within_mm: 5}]", "'shoulder' is the root's joint (split at a joint between two segments)"),
                            ("splits: [{joint: elbow, within_mm: -5}]", "positive"),
                            ("splits: [{joint: elbo, within_mm: 5}]", "elbow"),
                            ("surprise: 1", "surprise")):
@@ -230,13 +231,16 @@ class Thin(unittest.TestCase):
         out = self.folder / "t.vtp"
         for part, words in (("--tp", ["--tp", "2.5"]), ("--tp", ["--tp", "nan"]), ("--metric", ["--metric", "l1"]),
                             ("--boundary", ["--boundary", "18"]), ("--alpha", ["--alpha", "0.5"]),
-                            ("--reach", ["--reach", "0"]), ("--threshold", ["--threshold", "5"]),
-                            ("--threshold", ["--threshold", "9:5"]), ("--threshold", ["--threshold", "a:5"]),
+                            ("--reach", ["--reach", "0"]), ("'5' is not LOW:HIGH (as 300:1500, 300: or :1500)", ["--threshold", "5"]),
+                            ("--threshold", ["--threshold", "9:5"]), ("'a:5' is not LOW:HIGH (as 300:1500, 300: or :1500)", ["--threshold", "a:5"]),
                             ("--labels", ["--labels", "3", "--threshold", "5:"]), ("--snap", ["--snap"]),
-                            ("--reassign", ["--reassign", "x.yaml"]), ("--snapped", ["--snapped", "x.yaml"]),
+                            ("--reassign", ["--reassign", "x.yaml"]), ("--snapped: joints are not moved (give --snap as well)", ["--snapped", "x.yaml"]),
                             ("--model", ["--skeleton", "x.yaml", "--model", "x.hdf"])):
             self.refused(64, part, words=["thin", self.bar, "-o", out, *words])
-        self.refused(64, ".vtp", words=["thin", self.bar, "-o", self.folder / "t.vtk"])
+        self.refused(64, "t.vtk' does not end in .vtp (name it so)", words=["thin", self.bar, "-o", self.folder / "t.vtk"])
+        real = write_image(self.folder / "real.mha", np.zeros((3, 4, 5), np.float32))
+        self.refused(64, "--labels: the voxels are f32, no whole numbers (give a threshold)", words=["thin", real, "-o", out, "--labels", "3"])
+        self.refused(64, "is needed for voxels of type f32 (say which values are the object, as LOW:HIGH)", words=["thin", real, "-o", out])
         self.refused(65, "no voxel is left", words=["thin", self.bar, "-o", out, "--tp", "2"])
         self.refused(66, "none.mha", words=["thin", self.folder / "none.mha", "-o", out])
         self.refused(66, "none.yaml", words=["thin", self.bar, "-o", out, "--skeleton", self.folder / "none.yaml"])

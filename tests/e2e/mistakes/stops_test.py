@@ -63,7 +63,7 @@ class Stops(unittest.TestCase):
             if how == signal.SIGINT:
                 self.assertEqual([p for p in folder.rglob(".*")], [], "an interrupted run leaves no temporary")
                 if child.returncode == 130:
-                    self.assertIn("interrupted", err)
+                    self.assertIn("interrupted (run it again)", err)
             for name, data in whole_files(folder).items():
                 self.assertEqual(data, reference.get(name), f"{name} is not what an undisturbed run writes (stop {n})")
 
@@ -112,6 +112,15 @@ class Stops(unittest.TestCase):
                 self.assertEqual([p for p in out.rglob(".*")], [], "a temporary is left")
                 self.assertFalse((out / "p" / "case.yaml").exists() or (out / "r" / "case.yaml").exists())
                 self.assertEqual([p for p in out.rglob("*") if p.is_file() and p.stat().st_size >= 20000], [])
+
+    @unittest.skipUnless("ECORCHE_BAD_DISK" in os.environ, "this build cannot be preceded by another library")
+    def test_a_disk_that_keeps_something_else(self):
+        case = body.write(self.folder / "case")
+        result = run(["preprocess", case, "-o", self.folder / "m.hdf", "--mesher", "lattice", "--max-tets", "5000"],
+                     env=dict(os.environ, LD_PRELOAD=os.environ["ECORCHE_BAD_DISK"]))
+        self.assertEqual(result.returncode, 74, result.stderr)
+        self.assertRegex(result.stderr, r"m.hdf: \d+ datasets came back changed from the disk \(check the disk\)")
+        self.assertIn(" datasets came back changed from the disk (check the disk)", result.stderr)
 
     def rest(self):
         pose = self.folder / "pose.yaml"

@@ -198,6 +198,7 @@ TEST(Centres, RefuseASigmaOutOfRange) {
       FAIL() << sigma;
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::usage);
+      EXPECT_EQ(error.mend(), "give a number between 0 and 0.1");
     }
   }
 }

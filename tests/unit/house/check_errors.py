@@ -1,19 +1,23 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Every message of an Error is asserted by some test, or stands below with the reason why none does, or in unasserted.txt: a list
-that may only get shorter.
+"""Every message of an Error is asserted by some test, or stands below with the reason why none does.
 
 A call site is `Error(ErrorKind::...` or a call of one of the functions that throw one (FAILING); its message is what it says in
-string literals up to the semicolon, in pieces, since places and numbers come between. It counts as asserted where a literal of the
-tests holds one of its pieces of at least SHORTEST letters (the longest one, where all are shorter), or is held by one.
-usage: check_errors.py SOURCE [--list]     (--list: what unasserted.txt should hold now, where several changes meet)
+string literals up to the semicolon, in pieces, since places and numbers come between. Names of options are no message. A literal of
+the tests (no comment, no docstring) holds one of its pieces of at least SHORTEST letters (the longest one, where all are shorter), is
+held by one, or meets the end of one; and since two messages may share words, a literal asserts only one of those that it fits best,
+as often as it stands in the tests. Each message so has a line of its own.
+usage: check_errors.py SOURCE
 """
+import ast
+import collections
 import pathlib
 import re
 import sys
 
 FOLDERS = ("app", "core", "io", "preprocess", "runtime", "phantom", "proto", "clients/cpp")
 SHORTEST = 9
+START = 5
 CALL = re.compile(r"\b(?:Error\((?:ErrorKind|[a-z_:]*kind\b)|(?:throw|return) Error\(|(?:refuse|fail|usage|unfit|unexpected|refuse_size|fail_unknown|fail_count)\()")
 LITERAL = re.compile(r'"((?:[^"\\]|\\.)*)"')
 
@@ -41,8 +45,13 @@ EXCEPTIONS = {
 }
 
 
+RAW = re.compile(r'R"\((.*?)\)"', re.S)
+TOKEN = re.compile(r"""("(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)')|//[^\n]*""")
+
+
 def without_comments(text):
-    return re.sub(r"//[^\n]*", "", text)
+    """Nor without quotes that are letters: the one of '"' begins no string."""
+    return TOKEN.sub(lambda token: "" if not token.group(1) else "' '" if token.group(1) == "'\"'" else token.group(1), text)
 
 
 def statement(text, start):
@@ -66,6 +75,10 @@ def pieces_of(call):
     return [piece.encode().decode("unicode_escape") for piece in LITERAL.findall(joined)]
 
 
+# A function that throws what it is told about: what its message says around the first piece.
+FRAMES = {"fail_unknown": "unknown {} '", "unexpected": "expected {}, "}
+
+
 def call_sites(source):
     for folder in FOLDERS:
         for path in sorted((source / folder).rglob("*.[ch]pp")):
@@ -77,57 +90,102 @@ def call_sites(source):
                 call = statement(text, match.start())
                 if re.search(r"\bwhat\b", call):
                     continue  # hands on what its caller says
-                words = [piece for piece in pieces_of(call) if re.search("[A-Za-z]{2}", piece)]
+                words = [piece for piece in pieces_of(call) if re.search("[A-Za-z]{2}", piece) and not piece.startswith("--")]
+                frame = FRAMES.get(match.group().rstrip("("))
+                if words and frame:
+                    words[0] = frame.format(words[0])
                 if words:
                     yield path.relative_to(source).as_posix(), text.count("\n", 0, match.start()) + 1, words
 
 
+def python_literals(text):
+    tree = ast.parse(text)
+    documented = (ast.Module, ast.FunctionDef, ast.ClassDef)
+    docstrings = {id(node.body[0].value) for node in ast.walk(tree) if isinstance(node, documented) and node.body and isinstance(node.body[0], ast.Expr)}
+    return [node.value for node in ast.walk(tree)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings]
+
+
+def cpp_literals(text):
+    raw = RAW.findall(text)
+    text = re.sub(r"(?m)^#include.*$", "", without_comments(RAW.sub('""', text)))
+    return raw + [literal.replace('\\"', '"') for literal in LITERAL.findall(re.sub(r'"\s*\n\s*"', "", text))]
+
+
 def asserted(source):
-    out = set()
+    """How often each literal stands in the tests."""
+    out = collections.Counter()
     for path in (source / "tests").rglob("*"):
         if path.suffix in (".py", ".cpp", ".hpp") and "house" not in path.parts:
-            text = re.sub(r'"\s*\n\s*"', "", path.read_text())
-            out.update(a or b for a, b in re.findall(r'"((?:[^"\\\n]|\\.)*)"|\'((?:[^\'\\\n]|\\.)*)\'', text))
-    return [literal.replace('\\"', '"') for literal in out if len(literal) >= 5]
+            out.update(python_literals(path.read_text()) if path.suffix == ".py" else cpp_literals(path.read_text()))
+    return collections.Counter({literal: count for literal, count in out.items() if len(literal) >= 5})
 
 
-def is_asserted(words, literals):
-    long = [word.strip() for word in words if len(word.strip()) >= SHORTEST] or [max(words, key=len).strip()]
-    for word in long:
-        if any(word in literal or (len(literal) >= SHORTEST and literal in word) for literal in literals):
-            return True
-    # A literal may begin in the middle of a piece and go on over the number behind it; or end in the middle of one.
-    def overlap(word, literal):
-        most = range(SHORTEST, min(len(word), len(literal)) + 1)
-        return any(word.endswith(literal[:k]) or word.startswith(literal[-k:]) for k in most)
-    return any(overlap(word, literal) for word in long for literal in literals)
+def overlap(word, literal):
+    """Letters that both share: one within the other, or the end of one and the beginning of the other."""
+    if word in literal:
+        return len(word)
+    if literal in word:
+        return len(literal) if len(literal) >= SHORTEST else 0
+    return max((k for k in range(SHORTEST, min(len(word), len(literal)))
+                if word.endswith(literal[:k]) or word.startswith(literal[-k:])), default=0)
 
 
-def missing(source, listed="tests/unit/house/unasserted.txt"):
+def fits(words, literals):
+    """For each literal, the rows of `words` that it fits best."""
+    pieces = [[word.strip() for word in row if len(word.strip()) >= SHORTEST] or [max(row, key=len).strip()] for row in words]
+    of_start = collections.defaultdict(set)  # every stretch of the pieces, by its first letters: most literals meet none
+    for row, parts in enumerate(pieces):
+        for part in parts:
+            for at in range(max(1, len(part) - START + 1)):
+                of_start[part[at:at + START]].add(row)
+    out = {}
+    for literal in literals:
+        rows = set().union(*(of_start.get(literal[at:at + n], set()) for n in range(1, START + 1)
+                             for at in range(len(literal) - n + 1) if n == START or literal[at:at + n] in of_start))
+        shared = {row: sum(overlap(part, literal) for part in pieces[row]) for row in rows}
+        most = max(shared.values(), default=0)
+        if most > 0:
+            out[literal] = [row for row, letters in shared.items() if letters == most]
+    return out
+
+
+def assertions(words, literals):
+    """The rows of `words` that have a literal of their own: a matching of most rows, by augmenting ways."""
+    fitting = fits(words, literals)
+    owner = {}
+
+    def give(literal, seen):
+        for row in fitting[literal[0]]:
+            if row not in seen:
+                seen.add(row)
+                if row not in owner or give(owner[row], seen):
+                    owner[row] = literal
+                    return True
+        return False
+
+    for literal, rows in sorted(fitting.items(), key=lambda item: (len(item[1]), item[0])):
+        for copy in range(min(literals[literal], len(rows))):
+            give((literal, copy), set())
+    return set(owner)
+
+
+def missing(source):
     """The messages that nothing asserts, and the exceptions that nothing needs; and how many messages there are."""
-    literals = asserted(source)
     sites = list(call_sites(source))
-    known = source / listed
-    unasserted, met = known.read_text().splitlines() if known.is_file() else [], set()
-    out, unused = [], {(path, piece) for path, pieces in EXCEPTIONS.items() for piece in pieces}
-    for path, line, words in sites:
-        excuses = {(path, piece) for piece in EXCEPTIONS.get(path, ()) if any(piece in word for word in words)}
+    out, unused, needed = [], {(path, piece) for path, pieces in EXCEPTIONS.items() for piece in pieces}, []
+    for site in sites:
+        excuses = {(site[0], piece) for piece in EXCEPTIONS.get(site[0], ()) if any(piece in word for word in site[2])}
         unused -= excuses
-        if not excuses and not is_asserted(words, literals):
-            name = f"{path}: {' ... '.join(words)}"
-            if name in unasserted:
-                met.add(name)
-            else:
-                out.append(f"{path}:{line}: {' ... '.join(words)}")
-    out += [f"{name}: is asserted now, or gone: take it out of unasserted.txt" for name in unasserted if name not in met]
+        if not excuses:
+            needed.append(site)
+    met = assertions([words for _, _, words in needed], asserted(source))
+    out = [f"{path}:{line}: {' ... '.join(words)}" for row, (path, line, words) in enumerate(needed) if row not in met]
     out += [f"{path}: no message says '{piece}' any more: take the exception out" for path, piece in sorted(unused)]
     return out, len(sites)
 
 
 def main():
-    if sys.argv[2:] == ["--list"]:
-        print("\n".join(sorted({re.sub(r"^([^:]+):\d+: ", r"\1: ", line) for line in missing(pathlib.Path(sys.argv[1]), "none")[0]})))
-        return 0
     out, sites = missing(pathlib.Path(sys.argv[1]))
     print("\n".join(out))
     print(f"{sites} messages, {len(out)} of them asserted by no test or excused in vain, {sum(map(len, EXCEPTIONS.values()))} excused")

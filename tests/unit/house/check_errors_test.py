@@ -31,7 +31,26 @@ class CheckErrors(unittest.TestCase):
         self.assertEqual(self.missing(THROW, 'x = "has 3 knees too many"'), [])
         self.assertEqual(self.missing(THROW, 'x = "knees too"'), [])
         self.assertEqual(self.missing(THROW, 'x = "toes too many"'), ["io/leg.cpp:2: leg ... has  ...  knees too many ... count again"])
-        self.assertEqual(self.missing(THROW, '# "has 3 knees"'[:3]), ["io/leg.cpp:2: leg ... has  ...  knees too many ... count again"])
+        self.assertEqual(len(self.missing(THROW, '# "has 3 knees too many"')), 1)
+        self.assertEqual(len(self.missing(THROW, '"""It has 3 knees too many."""')), 1)
+
+    def test_one_literal_asserts_one_message(self):
+        twice = THROW + THROW.replace("leg", "arm").replace("knees", "elbows")
+        self.assertEqual(self.missing(twice, 'x = ["3 knees too many", "3 elbows too many"]'), [])
+        self.assertEqual(self.missing(twice, 'x = "3 knees too many"'), ["io/leg.cpp:7: arm ... has  ...  elbows too many ... count again"])
+        same = THROW + THROW  # the same words at two places
+        self.assertEqual(len(self.missing(same, 'x = "3 knees too many"')), 1)
+        self.assertEqual(self.missing(same, 'x = ["3 knees too many", "9 knees too many"]'), [])
+        self.assertEqual(len(self.missing(THROW, 'x = "too many"')), 1)  # fewer letters than tell
+
+    def test_options_are_no_message(self):
+        usage = 'void f() {\n  usage("--threads-of-mine", "none", "give one"); }'
+        self.assertEqual(len(self.missing(usage, 'x = "--threads-of-mine"')), 1)
+
+    def test_what_a_function_says_around_its_words(self):
+        unknown = 'void f() {\n  value.fail_unknown("joint", name, known); }'
+        self.assertEqual(self.missing(unknown, """x = "unknown joint 'knee'" """), [])
+        self.assertEqual(len(self.missing(unknown, 'x = "joint: knee"')), 1)
 
     def test_comments_and_callers_words_do_not_count(self):
         self.assertEqual(self.missing("// " + THROW.replace("\n", " "), ""), [])

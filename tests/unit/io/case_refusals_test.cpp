@@ -53,6 +53,7 @@ TEST_F(CaseRefusals, TheUnchangedCaseIsRead) {
 }
 
 TEST_F(CaseRefusals, KeysAndTypes) {
+  expect_error(ErrorKind::config, "case.yaml: is empty (see docs/case.md)", [&] { read(""); });
   refused("unit: mm", "units: mm", "3:units: unknown key 'units' (did you mean 'unit'?)");
   refused(
       "unit: mm", "atlas: r.yaml",
@@ -93,6 +94,10 @@ TEST_F(CaseRefusals, Names) {
           "8:bones[1].segment: unknown segment 'thigh_rigth' (did you mean 'thigh_right'?)");
   refused("segment: thigh_right", "segment: head",
           "8:bones[1].segment: unknown segment 'head' (use pelvis, thigh_right)");
+  refused("group: muscle", "group: muscel",
+          "10:tissues[0].group: unknown group 'muscel' (did you mean 'muscle'?)");
+  refused("volumes:\n  - {name: ct, file: volumes/ct.nrrd, background: -1024}\n", "volumes: none\n",
+          "11:volumes: must be a list, is 'none' (write it as");
   refused("group: muscle", "group: muscles",
           "10:tissues[0].group: unknown group 'muscles' (did you mean 'muscle'?)");
   refused("group: muscle", "group: bone",
@@ -141,7 +146,7 @@ TEST_F(CaseRefusals, NotYaml) {
   refused("unit: mm", "unit: [mm, {", "7: is no YAML: illegal block entry (mend the line)");
   refused("unit: mm", "unit: \"mm" + std::string(5000, 'x'), "3:unit: 'mmxxx");
   refused("unit: mm", "unit: &a mm", "3: an anchor (&name) (write the value out)");
-  refused("unit: mm", "unit: !!str mm", "3: a tag (");
+  refused("unit: mm", "unit: !!str mm", "3: a tag (tag:yaml.org,2002:str) (leave it out)");
   expect_error(ErrorKind::config, "case.yaml: is empty", [&] { read(""); });
   expect_error(ErrorKind::config, "case.yaml: holds more than one document",
                [&] { read(kCase + "---\na: b\n"); });

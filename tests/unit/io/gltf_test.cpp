@@ -5,6 +5,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "io/surface/gltf_build.hpp"
 #include "io/surface/surface_file.hpp"
 #include "tests/unit/io/foreign_surfaces.hpp"
 #include "tests/unit/io/scratch.hpp"
@@ -108,6 +109,12 @@ TEST(Gltf, TransformsAreComposedDownTheTree) {
     return rows;
   };
   EXPECT_EQ(corners(mesh), corners(foreign::assimp_surface(scratch / "a.glb")));
+}
+
+TEST(Gltf, AFolderThatIsNotThereIsNamed) {
+  tinygltf::Model model = gltf::new_model();
+  expect_error(ErrorKind::io, "none/a.glb: glTF could not be written (check the disk's free space)",
+               [&] { gltf::write_file(model, Scratch() / "none" / "a.glb"); });
 }
 
 TEST(Gltf, MirroredNodesKeepFacingOutward) {
@@ -234,6 +241,27 @@ TEST(Gltf, EveryMistakeIsNamed) {
       "a skin has fewer matrices than joints", [](json& g) { g["skins"][0]["inverseBindMatrices"] = 7; },
       bound);
   refused("a node's transform is damaged", [](json& g) { g["nodes"][0]["scale"] = {1, 2}; });
+  refused("an accessor is of component type 5124",
+          [](json& g) { g["accessors"][0]["componentType"] = 5124; });
+  refused("its indices are no whole numbers", [](json& g) {
+    g["accessors"][1]["componentType"] = 5126;
+    g["accessors"][1]["count"] = 3;
+  });
+  const auto sparse = [](json& accessor, int type, int count) {
+    accessor["sparse"] = {{"count", count},
+                          {"indices", {{"bufferView", 1}, {"componentType", type}}},
+                          {"values", {{"bufferView", 0}}}};
+  };
+  refused("a sparse accessor is damaged", [&](json& g) { sparse(g["accessors"][0], 5126, 1); });
+  refused("a sparse accessor is damaged (save", [&](json& g) {  // its third index is 2
+    sparse(g["accessors"][0], 5123, 3);
+    g["accessors"][0]["count"] = 2;
+  });
+  refused("a sparse accessor has 100000000 rows", [&](json& g) {
+    sparse(g["accessors"][0], 5123, 1);
+    g["accessors"][0].erase("bufferView");
+    g["accessors"][0]["count"] = 100000000;
+  });
   refused("has no triangle", [](json& g) {
     g["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}}}, {"mode", 1}}}}}};
   });

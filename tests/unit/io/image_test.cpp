@@ -168,6 +168,10 @@ TEST(Image, EveryMistakeInANrrdIsNamed) {
   refused("dimension: 3", "dimension: 4",
           "has 4 axes, and the first is not the only one with space direction 'none'");
   refused("sizes: 2 3 4", "sizes: 2 3", "its sizes are '2 3'");
+  refused("sizes: 2 3 4", "seizes: 2 3 4", "its header lacks 'sizes'");
+  refused("sizes: 2 3 4", "sizes 2 3 4", "line 6 of its header is no field: 'sizes 2 3 4'");
+  expect_error(ErrorKind::data, "ct.nrrd: its header does not end",
+               [&] { read_image(scratch.put("ct.nrrd", kNrrd.substr(0, kNrrd.find("\n\n") + 1))); });
   refused("sizes: 2 3 4", "sizes: 2 -3 4", "sizes is '-3' (it must be a whole number from 1 to 2147483647)");
   refused("sizes: 2 3 4", "sizes: 2147483647 2147483647 2147483647",
           "declares 2147483647 x 2147483647 x 2147483647 voxels of 1 u8 (images may hold 2^33 bytes");
@@ -185,7 +189,7 @@ TEST(Image, EveryMistakeInANrrdIsNamed) {
   refused("encoding: raw", "data file: LIST\nencoding: raw", "its voxels are in 'LIST'");
   refused("encoding: raw", "data file: slice%03d.raw 1 9 1\nencoding: raw",
           "its voxels are in 'slice%03d.raw 1 9 1'");
-  refused("encoding: raw", "data file: none.raw\nencoding: raw", "none.raw: cannot be opened",
+  refused("encoding: raw", "data file: none.raw\nencoding: raw", "none.raw: cannot be opened (the header ",
           ErrorKind::missing_input);
   refused("encoding: raw", "space units: \"m\" \"m\" \"m\"\nencoding: raw", "its space units are");
   refused("(1,0,0)", "(1,0.01,0)", "its axes are not orthonormal");
@@ -207,7 +211,8 @@ TEST(Image, EveryMistakeInAMetaImageIsNamed) {
   };
   refused("ObjectType = Image", "ObjectType = Tube", "ct.mha: holds a 'Tube' (it must be an image)");
   refused("ObjectType = Image", "hello", "line 1 of its header is no 'Key = value': 'hello'");
-  refused("NDims = 3", "NDims = 2", "has 2 axes");
+  refused("NDims = 3", "NDims = 2", "ct.mha: has 2 axes (save a 3-D image)");
+  refused("NDims = 3", "NDimes = 3", "its header lacks 'NDims'");
   refused("DimSize = 2 3 4", "DimSize = 2 3 2147483647",
           "declares 2 x 3 x 2147483647 voxels of 1 u8 (images may hold 2^33 bytes");
   refused("DimSize = 2 3 4", "DimSize = 2 3 99999999999", "DimSize is '99999999999'");
@@ -253,6 +258,16 @@ TEST(Image, DetachedVoxelsBesideTheHeader) {
   expect_same(read_image(scratch.put("a.nhdr", header)), whole, 0);
   const std::string meta = changed(kMeta.substr(0, kMeta.size() - 24), "LOCAL", "voxels.raw");
   expect_same(read_image(scratch.put("a.mhd", meta)), whole, 0);
+}
+
+// As if the file had become shorter since it was checked.
+TEST(Image, VoxelsThatAreGoneAreNamed) {
+  const Scratch scratch;
+  ImageHeader header;
+  header.size = {2, 3, 4};
+  header.data_file = scratch.put("a.raw", "less");
+  expect_error(ErrorKind::io, "a.raw: reading failed (check the disk)",
+               [&] { stored_voxels(header, "a.nhdr"); });
 }
 
 TEST(Image, WritingRefusesWhatItCannotDo) {

@@ -138,7 +138,7 @@ class Nifti(Described):
         two = self.save(numpy.zeros((4, 5, 3), "i2"), TURN, "two.nii", version=nibabel.Nifti2Image).read_bytes()
         for at, value, part in ((4, b"ni2\0", "its voxels are in another file"), (4, b"n+1\0", "or 'n+2' of a NIfTI-2"),
                                 (168, (352).to_bytes(8, "little"), "its voxels begin at byte 352"),
-                                (16, (2).to_bytes(8, "little"), "has 2 axes"), (500, b"\1", "unit of length is NIfTI's 1")):
+                                (16, (2).to_bytes(8, "little"), "has 2 axes (save a 3-D image)"), (500, b"\1", "unit of length is NIfTI's 1")):
             (self.folder / "two.nii").write_bytes(two[:at] + value + two[at + len(value):])
             self.refused(self.folder / "two.nii", part)
         (self.folder / "two.nii").write_bytes(two[:400])

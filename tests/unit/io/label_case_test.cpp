@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "io/case/case_file.hpp"
+#include "io/case/digest.hpp"
 #include "io/image/image_file.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "tests/unit/io/scratch.hpp"
@@ -25,6 +26,13 @@ labels:
   file: seg.nrrd
   table: {1: Pelvis, 3: Femora, 4: Liver, 5: "Muscle, leg", 6: Vessels, 7: Vessels, 8: liver, 9: absent}
 )";
+
+TEST(Digest, ADiskThatFailsIsNamed) {
+  expect_error(ErrorKind::io, "/proc/self/mem: reading failed (check the disk)",
+               [] { file_digest("/proc/self/mem", {}); });
+  expect_error(ErrorKind::missing_input, "none.raw: cannot be opened (check the path and its rights)",
+               [] { file_digest("none.raw", {}); });
+}
 
 class LabelCase : public ::testing::Test {
  protected:
@@ -163,6 +171,18 @@ TEST_F(LabelCase, RefusalsOfWithin) {
 
 TEST_F(LabelCase, RefusalsOfTheRest) {
   refused("{labels: rest", "{labels: rest, name: all", "10:tissues[1].name: unknown key 'name'");
+  refused("  - {name: liver, labels: [Liver], group: organ}\n",
+          "  - {name: vessels, labels: [Liver]}\n  - {name: vessels_6, labels: [5]}\n",
+          "11:tissues[2]: no name is left for label 6 (list it with a name of its own)");
+  ImageGrid grid;
+  grid.size = {41, 41, 41};
+  grid.spacing = {1, 1, 1};
+  Image picture(grid, ScalarType::u32);
+  std::uint32_t next = 1;
+  for (std::uint32_t& v : picture.scalars<std::uint32_t>()) v = next++;
+  write_image(scratch_ / "picture.nrrd", picture);
+  refused("seg.nrrd", "picture.nrrd",
+          "3:skin.labels: the label map has more than 65536 ids (is it a label map, or a picture?)");
   refused("group: fat", "group: fta", "10:tissues[1].group: unknown group 'fta' (did you mean 'fat'?)");
   refused("{muscle:", "{muscles:", "10:tissues[1].groups.muscles: unknown group 'muscles'");
   refused("[6, 9]", "[5]", "10:tissues[1].groups.vessel: label 5 stands in two groups (keep one)");

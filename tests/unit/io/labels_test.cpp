@@ -114,6 +114,11 @@ TEST(Segmentation, EveryMistakeIsNamed) {
   refused("labels are u8 x 2 (labels are whole numbers, one a voxel)", "", 2);
 }
 
+TEST(Segmentation, IsWrittenUnderItsOwnNameOnly) {
+  expect_error(ErrorKind::usage, "a.nrrd: segmentations are written as .seg.nrrd (name it so)",
+               [] { write_segmentation("a.nrrd", {}); });
+}
+
 TEST(LabelTable, SlicersItkSnapsAndTsv) {
   const Scratch scratch;
   EXPECT_EQ(read_label_table(scratch.put("a.ctbl",

@@ -200,6 +200,11 @@ TEST(Bvh, EveryMistakeIsNamed) {
   refused("OFFSET 4 5 6", "OFFSET 4 5 1e999", "the number 1e999 is not finite");
   expect_error(ErrorKind::missing_input, "none.bvh", [&] { read_bvh(scratch / "none.bvh"); });
   expect_error(ErrorKind::usage, "is no unit of length", [&] { read_bvh(scratch / "none.bvh", 0); });
+  refused("OFFSET 4 5 6", "OFFSET 4 5 " + std::string(5000, '6'),
+          "leg.bvh:8: a word has more than 4096 letters");
+  std::string wide = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n";
+  for (int i = 0; i < 5000; ++i) wide += "JOINT j" + std::to_string(i) + "\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\n";
+  expect_error(ErrorKind::data, "more than 4096 joints", [&] { read_bvh(scratch.put("wide.bvh", wide)); });
   std::string deep = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n";
   for (int i = 0; i < 100000; ++i) deep += "JOINT j" + std::to_string(i) + "\n{\nOFFSET 0 0 0\nCHANNELS 0\n";
   expect_error(ErrorKind::data, "joints nested deeper than 256",
@@ -210,7 +215,8 @@ TEST(Bvh, AClipThatDoesNotFitIsNotWritten) {
   const Scratch scratch;
   Clip clip = random_clip(2);
   clip.rotation.pop_back();
-  expect_error(ErrorKind::internal, "do not fit together", [&] { write_bvh(scratch / "a.bvh", clip); });
+  expect_error(ErrorKind::internal, "a.bvh: the clip's joints and frames do not fit together (report this)",
+               [&] { write_bvh(scratch / "a.bvh", clip); });
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }
 

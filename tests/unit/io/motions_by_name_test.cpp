@@ -128,7 +128,14 @@ TEST(PoseSequence, EveryMistakeIsNamed) {
   refused("pose: lib:sitting", "pose: lib:sitting, joints: {}", "also gives root or joints");
   refused("knee_left", "knee_lft", "did you mean 'knee_left'?");
   refused("bent.yaml", "none.yaml", "none.yaml", ErrorKind::missing_input);
-  refused("skeleton: bodyparts3d", "skeleton: bodyparts3d\nease: bouncy", "ease");
+  refused("skeleton: bodyparts3d", "skeleton: bodyparts3d\nease: bouncy",
+          "unknown ease 'bouncy' (use linear, smooth)");
+  refused("time_s: 1,", "time_s: 1000000,", "is 1000000 (write 0 to 100000 seconds)");
+  const std::string whole = kSequence, head = whole.substr(0, whole.find("keys:"));
+  std::string many = head + "keys:\n";
+  for (int k = 0; k < 100001; ++k) many += "  - {time_s: 0}\n";
+  refused(kSequence, head + "keys: []\n", "keys: is empty (write at least one key)");
+  refused(kSequence, many, "keys: has 100001 keys (100000 are the most)");
 }
 
 TEST(MotionMap, WhatNamesMean) {
@@ -154,10 +161,16 @@ markers: {RKNE: knee_right, SACR: {segment: pelvis, point: [0, 40, 900]}}
     expect_error(ErrorKind::config, part,
                  [&] { read_motion_map(scratch.put("map.yaml", "ecorche_motion_map: 1\n" + text), rig); });
   };
-  refused("joints: {Knee: shank_lft}", "did you mean 'shank_left'?");
+  refused("joints: {Knee: shank_lft}", "unknown segment 'shank_lft' (did you mean 'shank_left'?)");
   refused("angles: {k: [{joint: knee_left, angle: rotation}]}",
           "map.yaml:2:angles.k[0].angle: unknown angle");
-  refused("angles: {k: [{joint: nee_left, angle: flexion}]}", "did you mean 'knee_left'?");
+  refused("angles: {k: [{joint: nee_left, angle: flexion}]}",
+          "unknown joint 'nee_left' (did you mean 'knee_left'?)");
+  refused("angles: {k: [{joint: knee_left, angle: flecion}]}",
+          "unknown angle 'flecion' (did you mean 'flexion'?)");
+  refused("angles: {k: [{joint: knee_left, angle: flexion, scale: 1e6}]}",
+          "scale: is too large (write a factor such as -1)");
+  refused("markers: {A: hop_left}", "unknown joint 'hop_left' (did you mean 'hip_left'?)");
   refused("markers: {A: {segment: thorx, point: [0, 0, 0]}}", "did you mean 'thorax'?");
   refused("bones: {}", "unknown key 'bones'");
 }
@@ -212,6 +225,8 @@ TEST(IkFile, PinsAreWhereTheStartHasThem) {
   refused("pinned: [{segment: shank_right, point: [-80, -60, 100]}", many,
           "has 1001 entries (1000 are the most)");
   refused("goal:", "gaol:", "did you mean 'goal'?");
+  refused("skeleton: right_leg", "skeleton: right_leg\nmove_root: maybe",
+          "move_root: unknown value 'maybe' (use true, false)");
   refused("skeleton: right_leg", "skeleton: left_leg", "this pose is for the skeleton 'left_leg'");
   expect_error(ErrorKind::config, "asks for nothing",
                [&] { read_ik(scratch.put("none.yaml", "ecorche_ik: 1\nskeleton: right_leg\n"), rig); });

@@ -83,6 +83,8 @@ TEST_F(PoseFile, EveryMistakeIsNamed) {
   refused(head_ + "joint: {}\n", "3:joint: unknown key 'joint' (did you mean 'joints'?)");
   refused(head_ + "joints: {hip_rihgt: {flexion_deg: 3}}\n",
           "3:joints.hip_rihgt: unknown joint 'hip_rihgt' (did you mean 'hip_right'?)");
+  refused(head_ + "joints: {hip_rihgt: {flexion_deg: 3}}\n",
+          "3:joints.hip_rihgt: unknown joint 'hip_rihgt' (did you mean 'hip_right'?)");
   refused(head_ + "joints:\n  hip_right: {flexion: 3}\n",
           "4:joints.hip_right.flexion: unknown key 'flexion'");
   refused(head_ + "joints: {hip_right: {flexion_deg: x}}\n",

@@ -72,7 +72,7 @@ TEST(Rules, EveryMistakeIsNamed) {
           "center: names both 'sphere_fit' and 'centroid'");
   refused("center: {at: 0.5}", "center: names no source");
   refused("center: {sphere_fit: {region: h}, at: 0.5}", "center.at: belongs to between");
-  refused("center: {any: []}", "center.any: is empty");
+  refused("center: {any: []}", "center.any: is empty (list one source at least)");
   refused("center: {between: [[0, 0, 0]]}", "center.between: has 1 ends (write two)");
   refused("center: {centroid: {region: h, bone: f}}",
           "center.centroid: names 2 places (name one region, bone or segment)");
@@ -114,6 +114,7 @@ TEST(Rules, RegionsReadBackAndTheirMistakesAreNamed) {
   refused("{bone: f, boxes: []}", "regions.r: holds nothing (list boxes, vertices or points)");
   refused("{bone: f, boxes: [{least: [0, 3, 0], most: [1, 2, 3]}]}", "boxes[0]: its least is above its most");
   refused("{bone: f, of: skin, points: [[1, 2, 3]]}", "regions.r.of: 'skin' holds no boxes");
+  refused("{bone: f, vertices: [0.5]}", "must be a whole number, is '0.5' (write a whole number)");
   refused("{segment: a, vertices: [1]}", "regions.r.vertices: count the vertices of a bone");
   const auto file = scratch.put("bad.yaml", "ecorche_regions: 2\nregions: {}\n");
   expect_error(ErrorKind::config, "version '2' is not known", [&] { read_regions_file(file, Frame{}); });

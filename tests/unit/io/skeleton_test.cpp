@@ -142,6 +142,17 @@ TEST(Skeleton, EveryMistakeIsNamed) {
   refused("ecorche_skeleton: 2\nname: a\nsegments: {}\n",
           "s.yaml:1:ecorche_skeleton: version '2' is not known");
   refused("ecorche_skeleton: 1\nname: a\nsegments: {}\n", "s.yaml:3:segments: is empty");
+  std::string many;
+  for (int i = 0; i < 4097; ++i) many += "  s" + std::to_string(i) + ": {}\n";
+  refused(segments(many), "segments: has 4097 segments (4096 are the most)");
+  refused(
+      segments("  a: {joint: {name: b, center: [0, 0, 0], sequence: [{a: x}, {b: y}, {c: z}, {d: x}]}}\n"),
+      "sequence: has 4 turns (write one to three)");
+  refused(segments("  a: {joint: {name: b, center: [0, 0, 0], sequence: [{flexion: x}]}}\n  c: {parent: a, "
+                   "joint: {name: d, "
+                   "center: [0, 0, 0], sequence: [{flexion: x}], coupled: [{joint: b, angle: flexion, "
+                   "drives: flecion, ratio: 1}]}}\n"),
+          "drives: unknown angle 'flecion' (did you mean 'flexion'?)");
   refused("ecorche_skeleton: 1\nname: a\nsegment: {}\n",
           "s.yaml:3:segment: unknown key 'segment' (did you mean 'segments'?)");
   refused(

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "io/surface/surface_file.hpp"
+#include "io/surface/vtk_files.hpp"
 #include "tests/unit/io/foreign_surfaces.hpp"
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/io/small_case.hpp"
@@ -226,6 +227,31 @@ TEST(SurfaceFormats, TitlesOfVtkFilesNameTheirSpace) {
               "83 0</Array></FieldData>");
   EXPECT_EQ(read_tagged_surface(scratch.put("b.vtp", text)).space, "RAS");
   EXPECT_EQ(soup(foreign::vtk_surface(scratch / "b.vtp")), soup(read_surface(scratch / "b.vtp")));
+}
+
+TEST(SurfaceFormats, ATriangleOfVerticesThatAreNotThereIsNotWritten) {
+  const Scratch scratch;
+  SurfaceMesh mesh = ball();
+  mesh.F(3, 1) = 7777;
+  expect_error(ErrorKind::internal, "stl: triangle 3 uses vertex 7777 (report this)",
+               [&] { write_surface(scratch / "a.stl", mesh); });
+  expect_error(ErrorKind::internal, "mesh: triangle 3 uses vertex 7777 (report this)",
+               [&] { write_surface(scratch / "a.obj", mesh); });
+  Tets tets(1, 4);
+  tets << 0, 1, 2, 9;
+  for (const char* name : {"a.msh", "a.vtu"}) {
+    expect_error(ErrorKind::internal, "mesh: row 0 uses vertex 9 (report this)", [&] {
+      write_tets(scratch / name, PointsF::Zero(4, 3), tets, {}, {}, TetRegions{{0}, {"soft"}});
+    });
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
+}
+
+TEST(SurfaceFormats, WhatVtkCannotWriteIsSaid) {
+  const Scratch scratch;
+  expect_error(ErrorKind::io,
+               "none/a.ply: VTK could not write it: Error opening PLY file (check the disk's free space)",
+               [&] { vtk_files::write_ply(scratch / "none" / "a.ply", ball()); });
 }
 
 TEST(SurfaceFormats, UnusedVerticesGoAndEqualOnesMerge) {

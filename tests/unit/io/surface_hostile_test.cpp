@@ -3,12 +3,15 @@
 // Error{data}, and never more memory than the bytes can justify.
 #include <gtest/gtest.h>
 
+#include <sys/mman.h>
+
 #include <cstdlib>
 #include <functional>
 #include <new>
 #include <random>
 
 #include "io/surface/gltf.hpp"
+#include "io/surface/mesh_builder.hpp"
 #include "io/surface/obj.hpp"
 #include "io/surface/off.hpp"
 #include "io/surface/ply.hpp"
@@ -238,6 +241,44 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
           "its element 'face' has no list 'vertex_indices'");
   refused("a.vtk", vtk + "BANANAS 3\n", "'bananas' is no part of a surface");
   refused("a.vtk", vtk + "POINTS many float\n", "'many' is no count");
+  const std::string binary = "# vtk DataFile Version 4.2\nx\nBINARY\nDATASET POLYDATA\n";
+  const std::string fives =
+      "# vtk DataFile Version 5.1\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n";
+  refused("a.vtk", vtk + "FIELD f 1\na 1 1 variant\n7\n",
+          "its field data are of type 'variant' (save it without field data)");
+  refused("a.vtk",
+          binary +
+              "FIELD f 1\na 1 1 string\n\xc9"
+              "abc",
+          "a string of its field data is longer than the file");
+  refused("a.vtk", binary + "FIELD f 1\na 1 1 string\n\x40", "a.vtk: ends before all that it declares");
+  refused("a.vtk", binary + "POINTS 0 float\nPOLYGONS 1 4\n0123",
+          "a.vtk: ends before all that it declares (save");
+  refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n3 0 1 x\n",
+          "expected a whole number, found 'x'");
+  refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n9 0 1 2\n",
+          "cell 0 has more corners than its list");
+  refused("a.vtk", fives + "POLYGONS 2 3\nOFFSETS vtktypeint64\n0 9\nCONNECTIVITY vtktypeint64\n0 1 2\n",
+          "cell 0 has more corners than its list (save");
+  refused("a.vtk", fives + "POLYGONS 2 3\nOFFSETS vtktypeint64\n0 3\nCELLS vtktypeint64\n0 1 2\n",
+          "lacks CONNECTIVITY of its cells");
+  refused("a.vtk", "# vtk DataFile Version 4.2", "a.vtk: its header does not end");
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+  refused("a.ply",
+          ply + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 half\n",
+          "'half' is no whole number");
+  refused("a.ply", ply + "end_header\n0 zero 0\n", "'zero' is no number");
+  refused("a.ply", ply + "end_header\n0 00000\n", "a.ply: ends before all that it declares");
+  refused(
+      "a.ply",
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty list uchar int a\nproperty float x\n"
+      "property float y\nproperty float z\nend_header\n\x01"
+      "0123456789012",
+      "a.ply: ends before all that it declares (save");
+  refused("a.ply", ply + "element vertex 1\nend_header\n", "element 'vertex' is declared twice");
+  refused("a.ply", "ply\nelement vertex 1\nend_header\n", "its header lacks 'format'");
+  refused("a.off", "OFF\n1 1 0\n0 0 0\n99 0 0 0\n", "a.off:4: a face has 99 corners");
   refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 8\n3 0 1 2 0 0 0 0\n",
           "its cells are fewer than their list");
   refused("a.vtp", "<VTKFile type=\"PolyData\"><AppendedData encoding=\"raw\">",
@@ -263,6 +304,24 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
           "an array is stored as 'hex'");
   refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine + " 7", "3"),
           "an array is larger than its counts say");
+  refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"binary\">/////w==", "3"),
+          "a.vtp: an array is larger than its counts say");
+  const auto packed = [&](const std::vector<std::uint32_t>& counts, const std::string& blocks) {
+    std::string text =
+        vtp("NumberOfComponents=\"3\" format=\"binary\">" +
+                base64(std::string(reinterpret_cast<const char*>(counts.data()), 4 * counts.size())) +
+                base64(blocks),
+            "3");
+    return text.insert(text.find("type="), "compressor=\"vtkZLibDataCompressor\" ");
+  };
+  refused("a.vtp", packed({3, 12, 12, 1, 1, 0xfffffff}, "ab"),
+          "a.vtp: an array of 268435457 bytes ends early");
+  refused("a.vtp", packed({1, 36, 0, 9}, "123456789"), "its compressed arrays are damaged");
+  refused("a.vtp", packed({9, 12, 12, 1, 1, 1, 1, 1, 1, 1, 1, 1}, "123456789"),
+          "a.vtp: an array is larger than its counts say (save");
+  std::string bomb = packed({1, 36000, 0, 1}, "a");
+  refused("a.vtp", bomb.replace(bomb.find("Points=\"3\""), 10, "Points=\"3000\""),
+          "1 packed bytes cannot hold 36000");
   refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"binary\">AAAA", "3"),
           "an array of 4 bytes ends early");
   refused("a.vtp", vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine, "9"),
@@ -274,12 +333,33 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
   refused("a.vtp", odd, "an array is of type 'Float33'");
   odd.replace(odd.find("Points=\"3\""), 10, "Points=\"999999999\"");
   refused("a.vtp", odd, "NumberOfPoints is '999999999', more than the file can hold");
+  odd = vtp("NumberOfComponents=\"3\" format=\"ascii\">" + nine, "3");
+  refused("a.vtp", odd.replace(odd.find("0 1 2"), 5, "0 1 9"), "a.vtp: a cell uses point 9 of 3");
   refused("a.vtp", "<!DOCTYPE x [<!ENTITY a \"b\">]><x/>", "has a DOCTYPE");
   refused("a.vtp", "<VTKFile", "is no XML: unclosed token");
   const Scratch scratch;
   foreign::vtk_write(scratch / "a.vtp", box({0, 0, 0}, {1, 1, 1}), "lz4");
   refused("a.vtp", scratch.get("a.vtp"),
           "its arrays are packed by vtkLZ4DataCompressor (save it packed by zlib, or not packed)");
+}
+
+TEST(HostileSurfaces, PointsAreCountedIn32Bits) {
+  MeshBuilder mesh("a.obj", 2);
+  mesh.add_point({0, 0, 0});
+  mesh.add_point({1, 0, 0});
+  expect_error(ErrorKind::data, "a.obj: has more points than can be counted", [&] {
+    mesh.add_point({2, 0, 0});
+  });
+}
+
+// Nobody touches the pages of this file: its size alone is asked for.
+TEST(HostileSurfaces, NoGltfIsLargerThanItsOwnCounts) {
+  const std::size_t size = (std::size_t{1} << 32) + 1;
+  void* pages = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  ASSERT_NE(pages, MAP_FAILED);
+  const std::string_view file(static_cast<const char*>(pages), size);
+  expect_error(ErrorKind::data, "a.glb: is larger than glTF can be", [&] { gltf::decode(file, "a.glb"); });
+  ::munmap(pages, size);
 }
 
 // A polygon may have as many corners as it likes while it is convex; a hollow one is sought through.

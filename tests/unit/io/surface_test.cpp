@@ -223,7 +223,7 @@ TEST(Tets, VtkReadsThemWithTheirArrays) {
   EXPECT_EQ(grid.T, T);
   EXPECT_EQ(grid.point_data.at("weight"), weights);
   EXPECT_EQ(grid.cell_data.at("pair"), pairs);
-  expect_error(ErrorKind::internal, "weight: has 4 values for 5 rows of 1", [&] {
+  expect_error(ErrorKind::internal, "weight: has 4 values for 5 rows of 1 (report this)", [&] {
     write_tets(scratch / "b.vtu", V, T, {{"weight", 1, pairs}}, {});
   });
 }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <regex>
+
 #include <cmath>
 #include <limits>
 #include <random>
@@ -104,7 +106,8 @@ TEST(VolumetricSkeletonFile, RefusesWhatContradictsItself) {
     expect_error(ErrorKind::data, part, [&] { decode_volumetric_skeleton(bytes, "s.vtp"); });
   };
   refuses("no field 'ecorche_volumetric_skeleton'", swapped("\"ecorche_volumetric_skeleton\"", "\"other\""));
-  refuses("version 2", swapped("format=\"ascii\">1 <", "format=\"ascii\">2 <"));
+  refuses("is of version 2 (this program reads version 1)",
+          swapped("format=\"ascii\">1 <", "format=\"ascii\">2 <"));
   refuses("not where its 'ijk' says", swapped("-12.1 700.3", "-12.1 701.3"));
   refuses("isotropic", swapped("0.7 0.7 0.7", "0.7 0.7 0.8"));
   refuses("orthonormal", swapped("0 -1 0 1 0 0 0 0 1", "0 -1 0 1 0 0 0 1 1"));
@@ -117,10 +120,38 @@ TEST(VolumetricSkeletonFile, RefusesWhatContradictsItself) {
   refuses("for 6 voxels", swapped("NumberOfPoints=\"5\"", "NumberOfPoints=\"6\""));
   refuses("more than the file can hold", swapped("NumberOfPoints=\"5\"", "NumberOfPoints=\"5555555555\""));
   refuses("has a DOCTYPE", "<!DOCTYPE x>" + good);
+  const auto field = [&](const std::string& name, const std::string& text) {
+    return std::regex_replace(good, std::regex("(Name=\"" + name + "\"[^>]*>)[^<]*"), "$01" + text + " ");
+  };
+  const auto array = [&](const std::string& name, const std::string& text) {
+    return std::regex_replace(good, std::regex("(<DataArray[^>]*Name=\"" + name + "\")[^>]*/>"),
+                              "$1 format=\"ascii\">" + text + "</DataArray>");
+  };
+  refuses("its field 'size' has not 3 values", field("size", "9 8"));
+  refuses("its field 'tree' is neither 0 nor 1", field("tree", "2"));
+  refuses("its metric is 'taxicab'", field("metric", "116 97 120 105 99 97 98 0"));
+  refuses("its field 'metric' is not of 1 strings at most", field("metric", "97 0 98 0"));
+  refuses("has no point array 'deficit'", swapped("Name=\"deficit\"", "Name=\"defect\""));
+  refuses("its array 'deficit' holds nan", array("deficit", "1 2 nan 1 1"));
+  refuses("its array 'distance' has 4 values for 5 voxels", array("distance", "1 2 1 1"));
+  refuses("its array 'distance' holds 0", array("distance", "1 2 0 1 1"));
+  refuses("its lines have no array 'offsets'", swapped("Name=\"offsets\"", "Name=\"ends\""));
+  refuses("its lines' array 'offsets' has not 3 values", array("offsets", "2 4"));
+  refuses("its line 1 does not join two voxels", array("offsets", "2 5 6"));
   refuses("is no VTK PolyData", "<VTKFile type=\"ImageData\"/>");
   expect_error(ErrorKind::missing_input, "none.vtp", [&] { read_volumetric_skeleton(scratch / "none.vtp"); });
   expect_error(ErrorKind::usage, "ends in .vtp",
                [&] { write_volumetric_skeleton(scratch / "s.txt", small()); });
+}
+
+TEST(VolumetricSkeletonFile, ADamagedOneIsNotWritten) {
+  const Scratch scratch;
+  VolumetricSkeletonFile file = small();
+  file.skeleton.distance.pop_back();
+  const auto error = error_of([&] { write_volumetric_skeleton(scratch / "s.vtp", file); });
+  EXPECT_EQ(error->problem(), first_defect(file.skeleton));
+  EXPECT_EQ(error->mend(), "report how it was thinned");
+  EXPECT_FALSE(std::filesystem::exists(scratch / "s.vtp"));
 }
 
 TEST(VolumetricSkeletonCheck, FindsEveryDefect) {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/values/error.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {
@@ -97,7 +98,9 @@ TEST(Forward, TurnsThatAddUpBeyondAWholeTurnStaySmoothAlongTheChain) {
 }
 
 TEST(Forward, RefusesAPoseOfAnotherRig) {
-  EXPECT_THROW(forward(test::chain(3), Pose::rest(2)), Error);
+  expect_error(ErrorKind::internal,
+               "a pose of 2 rotations and 2 translations for 3 joints (make one of each for every joint",
+               [] { forward(test::chain(3), Pose::rest(2)); });
   std::vector<RigidTransform> out(2);
   EXPECT_THROW(forward(test::chain(3), Pose::rest(3), out), Error);
 }

@@ -5,6 +5,7 @@
 
 #include "core/kinematics/forward.hpp"
 #include "core/values/error.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {
@@ -123,6 +124,17 @@ TEST(Retarget, RefusesAFrameBeyondTheClip) {
   const Rig rig = test::chain(2);
   const Clip clip = clip_of({"s0"}, 2, random);
   EXPECT_THROW(pose_at(rig, clip, match(rig, clip), 2), Error);
+}
+
+TEST(Retarget, RefusesAMatchOfAnotherRigAndAFrameOfAnotherClip) {
+  std::mt19937 random(6);
+  const Rig rig = test::chain(2);
+  const Clip clip = clip_of({"s0"}, 2, random), other = clip_of({"s0", "s1", "s2"}, 1, random);
+  expect_error(ErrorKind::internal, "motion walk: a match of 3 segments for 2 (match the clip with this rig)",
+               [&] { pose_at(rig, clip, match(test::chain(3), clip), 0); });
+  expect_error(ErrorKind::internal,
+               "motion walk: a frame of 1 rotations for 3 joints (read the frame from this clip)",
+               [&] { places(other, {Vector3d::Zero(), {Quaterniond::Identity()}}); });
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include "preprocess/label_surfaces/label_surfaces.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/label_surfaces/bodies.hpp"
 
 namespace ecorche::label_surfaces {
@@ -42,6 +43,21 @@ TEST(Resolve, GivesEverySourceItsSurface) {
               phantom::volume(patient.bones[0].surface) + phantom::volume(patient.bones[1].surface) +
                   phantom::volume(patient.tissues[0].surface),
               0.01 * phantom::volume(patient.skin));
+}
+
+TEST(Resolve, NeedsALabelMapAndNoPicture) {
+  Case patient = labelled_case();
+  patient.labels.reset();
+  patient.skin_source->where = "case.yaml:3:skin";
+  expect_error(ErrorKind::config, "case.yaml:3:skin: the case has no labels (name them under labels)",
+               [&] { resolve(patient, {}); });
+  CaseLabels picture;
+  picture.image = Image(cube_grid(41), ScalarType::u32);
+  std::uint32_t next = 1;
+  for (std::uint32_t& v : picture.image.scalars<std::uint32_t>()) v = next++;
+  expect_error(ErrorKind::data,
+               "labels: the label map has more than 65536 ids (is it a label map, or a picture?)",
+               [&] { extract(picture, ids({1}), {}); });
 }
 
 TEST(Resolve, SpecksOffTheBodyBelongToNobody) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/mapping/bind.hpp"
+#include "tests/unit/io/scratch.hpp"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -150,7 +151,8 @@ TEST(Bind, threads_change_nothing) {
 
 TEST(Bind, refusals) {
   const FloatTets mesh = test::letter_c();
-  EXPECT_THROW(Locator(mesh.nodes, Tets(0, 4)), Error);
+  expect_error(ErrorKind::data, "mapping: the mesh has no tets (try another mesher)",
+               [&] { Locator(mesh.nodes, Tets(0, 4)); });
   const Locator locator(mesh.nodes, mesh.tets);
   EXPECT_THROW(locator.bind(Points::Constant(1, 3, std::nan("")), {}), Error);
   EXPECT_EQ(locator.bind(Points(0, 3), {}).outside, 0U);

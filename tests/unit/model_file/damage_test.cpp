@@ -94,6 +94,7 @@ TEST_F(Damage, DigestsNameTheDamagedDataset) {
   store(file("b.hdf"), bytes_);
   const Error error = error_of([&] { model_file::read(file("b.hdf"), {}); });
   EXPECT_NE(error.where().find("/ecorche/weights/weight"), std::string::npos) << error.what();
+  EXPECT_EQ(error.problem(), "is damaged: its XXH64 is not the stored one");
   int bad = 0;
   for (const auto& check : model_file::check_digests(file("b.hdf"), {})) {
     bad += check.good ? 0 : 1;

@@ -3,7 +3,11 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <fstream>
+#include <optional>
 
+#include "core/files/atomic_file.hpp"
+#include "core/model_file/hdf.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/model_file/test_files.hpp"
 
@@ -35,6 +39,7 @@ TEST_F(Write, AsksForTheExtensionThatParaViewAsksFor) {
   for (const char* name : {"a.h5", "a", "a.hdf5", "a.hdf.part"}) {
     const Error error = error_of([&] { model_file::write(toy_model(), file(name), {}); });
     EXPECT_EQ(error.kind(), ErrorKind::usage);
+    EXPECT_EQ(error.problem(), "does not end in .hdf, which ParaView asks for");
     EXPECT_NE(error.mend().find(".hdf"), std::string::npos);
   }
   EXPECT_TRUE(names().empty());
@@ -69,6 +74,57 @@ TEST_F(Write, AFullDiskKeepsTheOlderModel) {
   }
   EXPECT_EQ(load(file("a.hdf")), before);
   EXPECT_EQ(names(), std::vector<std::string>{"a.hdf"});
+}
+
+// The room was there, and is not when the bytes come.
+TEST_F(Write, ADiskThatFillsUpMeanwhileLeavesNothing) {
+  std::optional<FileSizeLimit> full;
+  Context context;
+  context.progress = [&](double) {
+    if (!full) full.emplace(4096);
+  };
+  const Error error = error_of([&] { model_file::write(toy_model(), file("a.hdf"), context); });
+  EXPECT_EQ(error.kind(), ErrorKind::io);
+  EXPECT_EQ(error.problem().find("writing failed: "), 0U) << error.what();
+  full.reset();
+  EXPECT_TRUE(names().empty());
+}
+
+TEST_F(Write, AFileThatHdf5HoldsOpenCannotBeMade) {
+  const std::string temporary = files::AtomicFile(file("a.hdf")).temporary().string();
+  const model_file::hdf::Id held(H5Fcreate(temporary.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
+                                 H5Fclose);
+  const Error error = error_of([&] { model_file::write(toy_model(), file("a.hdf"), {}); });
+  EXPECT_EQ(error.kind(), ErrorKind::cannot_create);
+  EXPECT_EQ(error.problem().find("cannot be made: "), 0U) << error.what();
+}
+
+TEST_F(Write, EveryStepOfAFileMayFail) {
+  EXPECT_EQ(error_of([&] { files::AtomicFile(file("a")).commit(); }).problem(),
+            "cannot flush: No such file or directory");
+  {
+    files::AtomicFile half(file("a"));
+    std::ofstream(half.temporary()) << std::string(500, 'a');
+    const FileSizeLimit full(1000);
+    EXPECT_EQ(error_of([&] { half.commit(); }).problem(), "cannot be written whole: File too large");
+  }
+  {
+    files::AtomicFile late(file("a"));
+    std::ofstream(late.temporary()) << "a";
+    std::filesystem::create_directory(file("a"));
+    EXPECT_EQ(error_of([&] { late.commit(); }).problem(), "cannot rename: Is a directory");
+    std::filesystem::remove(file("a"));
+  }
+  {
+    const FileSizeLimit full(1000);
+    const Error error = error_of([&] { files::write_text(file("a"), std::string(100000, 'a')); });
+    EXPECT_EQ(std::string(error.what()),
+              file("a").string() + ": writing failed (check the disk's free space)");
+  }
+  const Error error =
+      error_of([] { files::read_text("/proc/self/mem", 1 << 20); });  // which the kernel refuses to read
+  EXPECT_STREQ(error.what(), "/proc/self/mem: reading failed (check the disk)");
+  EXPECT_TRUE(names().empty());
 }
 
 TEST_F(Write, AStopHalfWayLeavesNothing) {

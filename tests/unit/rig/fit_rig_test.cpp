@@ -145,10 +145,16 @@ TEST(FitRig, mistakes_are_refused_by_name) {
   patient = hip_case();
   patient.bones.clear();
   EXPECT_EQ(refusal(patient).kind(), ErrorKind::config);
+  EXPECT_EQ(refusal(patient).problem(), "no segment owns a bone");
+  patient.generic = true;
+  EXPECT_STREQ(
+      refusal(patient).what(),
+      ("case " + patient.name + ": no segment owns a bone (list the case's bones with their segments)")
+          .c_str());
 
   patient = hip_case();
   patient.bones[0].segment = "wing";
-  EXPECT_NE(std::string(refusal(patient).what()).find("wing"), std::string::npos);
+  EXPECT_NE(refusal(patient).problem().find("its segment 'wing' is not in skeleton '"), std::string::npos);
 
   patient = hip_case();
   patient.bones[1].surface.V.col(2).setConstant(0);  // flat: no sphere anywhere

@@ -349,16 +349,16 @@ TEST(BodyPoser, RefusesAModelThatDoesNotFitTogether) {
   refused([](Model& m) { m.nodes.resize(0, 3); }, "it has no segment or no node");
   refused([](Model& m) { m.tets(3, 1) = 1 << 20; }, "a tet names an absent node");
   refused([](Model& m) { m.tissues[1].segment = 9; }, "names an absent segment");
-  refused([](Model& m) { m.weights.offsets.pop_back(); });
-  refused([](Model& m) { m.weights.segment[5] = 9; });
+  refused([](Model& m) { m.weights.offsets.pop_back(); }, "its weights do not fit its nodes");
+  refused([](Model& m) { m.weights.segment[5] = 9; }, "a weight names an absent segment");
   refused([](Model& m) { std::fill(m.weights.weight.begin(), m.weights.weight.end(), 0.0F); },
           "node 0 has no weight");
   refused([](Model& m) { m.tets(3, 2) = 100000; });
   refused([](Model& m) { m.tets(3, 2) = -1; });
-  refused([](Model& m) { m.tissues[0].tet[0] = 100000; });
+  refused([](Model& m) { m.tissues[0].tet[0] = 100000; }, "tissue 'skin' is not bound to the tets");
   refused([](Model& m) { m.tissues[0].tet.pop_back(); });
   refused([](Model& m) { m.tissues[1].segment = 3; });
-  refused([](Model& m) { m.cor.has_centre.pop_back(); });
+  refused([](Model& m) { m.cor.has_centre.pop_back(); }, "its centres of rotation do not fit its nodes");
   refused([](Model& m) { m.rig.skeleton.segments[1].joint.sequence.clear(); });
 }
 

@@ -13,6 +13,7 @@
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/resample.hpp"
 #include "tests/support/toy_model.hpp"
+#include "tests/unit/io/scratch.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -295,7 +296,9 @@ TEST(GrowTo, RefusesTooManyVoxels) {
   far[0] = 1e6F;
   far[1] = 1e6F;
   far[2] = 1e6F;
-  EXPECT_THROW(grow_to(model.volumes[0].image.grid, far), Error);
+  expect_error(ErrorKind::data,
+               "voxels, more than 2^31 (use --grid rest, or a pose nearer to the scanned place)",
+               [&] { grow_to(model.volumes[0].image.grid, far); });
   far[0] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THROW(grow_to(model.volumes[0].image.grid, far), Error);
 }

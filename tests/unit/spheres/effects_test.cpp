@@ -15,6 +15,7 @@
 #include "runtime/spheres/refill.hpp"
 #include "runtime/spheres/spatial_index.hpp"
 #include "runtime/spheres/tears.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/spheres/bent_cylinder.hpp"
 
 namespace ecorche::runtime {
@@ -212,6 +213,11 @@ TEST(Morph, EndsAreTheTwoObjects) {
     EXPECT_GT(held, covered_voxels(from, grown_box(from)) / 2);
   }
   EXPECT_THROW(morph({from, body.volume}, {to, other}, 1.5, 0, Sampling::nearest), Error);
+  BallSet none = to;
+  none.balls.clear();
+  expect_error(ErrorKind::data, "morph: a skeleton has no voxel (thin at a lower TP)", [&] {
+    morph({from, body.volume}, {none, other}, 0.5, 0, Sampling::nearest);
+  });
   EXPECT_THROW(
       morph({from, body.volume}, {to, Image(other.grid, ScalarType::i16)}, 0.5, 0, Sampling::nearest), Error);
 }
@@ -226,7 +232,15 @@ TEST(SpatialIndex, TheWayFollowsTheTree) {
   EXPECT_EQ(path_between(y, {5, 5, 0}, {0, 5, 12}), (std::vector<std::size_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(path_between(y, {5, 5, 6}, {5, 5, 6}), (std::vector<std::size_t>{2}));
   y.parent[5] = -1;
-  EXPECT_THROW(path_between(y, {0, 5, 13}, {11, 5, 12}), Error);
+  expect_error(ErrorKind::data,
+               "the two places lie in parts that hang together with nothing (choose places in one part)",
+               [&] {
+                 path_between(y, {0, 5, 13}, {11, 5, 12});
+               });
+  y.parent[2] = 3;
+  expect_error(ErrorKind::data, "its tree has a cycle (thin the volume again)", [&] {
+    path_between(y, {0, 5, 13}, {5, 5, 0});
+  });
   y.parent.clear();
   EXPECT_THROW(path_between(y, {0, 5, 13}, {11, 5, 12}), Error);
 }

@@ -8,6 +8,7 @@
 #include <queue>
 #include <random>
 
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/spheres/bent_cylinder.hpp"
 #include "tests/unit/spheres/exhaustive.hpp"
 
@@ -276,7 +277,15 @@ TEST(Refill, RefusesWhatCannotBeRefilled) {
   BallSet set = balls_at_rest(body.skeleton, body.skeleton.grid);
   set.balls[1].radius2 = 5e6;
   EXPECT_THROW(grown_box(set), Error);
+  Image small(body.skeleton.grid, ScalarType::i16);
+  expect_error(ErrorKind::internal, "refill: the result is no image of the box (this is a bug)", [&] {
+    refill_into(set, {{0, 0, 0}, {8, 8, 8}}, body.volume, 0, Sampling::nearest, small);
+  });
   EXPECT_THROW(for_tiles(set, {{0, 0, 0}, {8, 8, 8}}, {}, [](const Tile&) {}), Error);
+  set.balls[1] = set.balls[0];
+  for (std::size_t a = 0; a < 3; ++a) set.balls[1].centre[a] = 5000;
+  expect_error(ErrorKind::data, "the posed body needs more than 2^31 voxels (use a region, coarser voxels,",
+               [&] { grown_box(set); });
   set.balls[1] = set.balls[0];
   set.balls[1].centre[2] = std::nan("");
   EXPECT_THROW(grown_box(set), Error);

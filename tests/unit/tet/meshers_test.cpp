@@ -9,6 +9,7 @@
 
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/voxel/voxelize.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/tet/tet_measures.hpp"
 #include "tests/unit/voxel/shapes.hpp"
 
@@ -168,7 +169,15 @@ TEST_P(EveryMesher, RefusesAnImpossibleBudget) {
   const Prepared p(trunk(), 3);
   Options none;
   none.max_tets = 10;
-  EXPECT_THROW(p.mesh(GetParam(), none), Error);
+  expect_error(ErrorKind::usage, "--max-tets: fewer than 100 tets (allow more tets and nodes)",
+               [&] { p.mesh(GetParam(), none); });
+}
+
+TEST(LatticeMesher, RefusesABodyOfNothing) {
+  Prepared p(trunk(), 3);
+  for (std::uint16_t& v : p.labels.scalars<std::uint16_t>()) v = 0;
+  expect_error(ErrorKind::data, "tets: the label image is empty (check the skin of the case)",
+               [&] { p.mesh("lattice"); });
 }
 
 TEST(Meshers, ByName) {

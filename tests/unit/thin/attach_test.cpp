@@ -5,6 +5,7 @@
 
 #include "preprocess/thin/thinning.hpp"
 #include "preprocess/thin/tree.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/thin/brute_force.hpp"
 
 namespace ecorche::thin {
@@ -47,6 +48,12 @@ Skeleton rig() {
   add("arm", 0, {49, 30, 15});
   add("hand", 2, {49, 60, 15});
   return out;
+}
+
+TEST(Attach, RefusesWhatDoesNotFitTogether) {
+  const Body made = body();
+  expect_error(ErrorKind::internal, "attach: no tree, another mask, or no segment (report this)",
+               [&] { attach(made.skeleton, made.mask, Skeleton(), {}); });
 }
 
 TEST(Attach, TwoPasses) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/thin/mask.hpp"
+#include "tests/unit/io/scratch.hpp"
 
 #include <gtest/gtest.h>
 
@@ -210,7 +211,8 @@ TEST(Isotropic, RefusesEdgesAndComponentsThatCannotBe) {
   const Image image =
       image_of<std::uint8_t>({4, 4, 4}, 1, [](int, int, int, int) { return std::uint8_t{1}; });
   EXPECT_THROW(to_isotropic(image, 1, 0, Sampling::nearest, {}), Error);
-  EXPECT_THROW(to_isotropic(image, 0, -1, Sampling::nearest, {}), Error);
+  expect_error(ErrorKind::usage, "--isotropic: an edge must be positive (give mm, or 0 for the finest axis)",
+               [&] { to_isotropic(image, 0, -1, Sampling::nearest, {}); });
   EXPECT_THROW(to_isotropic(image, 0, std::nan(""), Sampling::nearest, {}), Error);
   EXPECT_THROW(to_isotropic(image, 0, 1e-5, Sampling::nearest, {}), Error);
   EXPECT_TRUE(is_isotropic(image.grid));

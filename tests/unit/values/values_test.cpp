@@ -16,6 +16,17 @@ TEST(Error, IsOneLineWithWhereWhatAndMend) {
   EXPECT_EQ(error.mend(), "check the path");
 }
 
+TEST(Image, OnlyWholeNumbersAreCounted) {
+  ImageGrid grid;
+  grid.size = {1, 1, 1};
+  try {
+    distinct_values(Image(grid, ScalarType::f32), 5);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "image: its voxels are no whole numbers (report this)");
+  }
+}
+
 TEST(Error, KindsHaveTheExitCodesOfDesign4) {
   const std::pair<ErrorKind, int> expected[] = {
       {ErrorKind::usage, 64},     {ErrorKind::data, 65},          {ErrorKind::missing_input, 66},

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "preprocess/weights/harmonic.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/weights/box_mesh.hpp"
 
 namespace ecorche::weights {
@@ -49,7 +50,9 @@ TEST(BoneNodes, BonesOfOneSegmentDoNotContest) {
 
 TEST(BoneNodes, RefusesALabelWithoutABone) {
   const TetMesh mesh = test::box_mesh({1, 1, 1}, 10, [](const Eigen::Vector3d&) { return 3; });
-  EXPECT_THROW(bone_nodes(mesh, Case{}, {0, 1}), Error);
+  expect_error(ErrorKind::internal, "weights: tet 0 has the label 3 of 2 bones (report it)", [&] {
+    bone_nodes(mesh, Case{}, {0, 1});
+  });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "preprocess/weights/harmonic.hpp"
+#include "tests/unit/io/scratch.hpp"
 #include "tests/unit/weights/box_mesh.hpp"
 
 namespace ecorche::weights {
@@ -127,7 +128,8 @@ TEST(Harmonic, NeedsAFixedNode) {
   const SparseMatrix L = laplacian(mesh.V, mesh.T, nullptr);
   const std::vector<std::uint8_t> none(static_cast<std::size_t>(mesh.V.rows()), 0);
   const auto solver = make_solver("eigen");
-  EXPECT_THROW(solve_harmonic(L, none, Eigen::MatrixXd::Zero(mesh.V.rows(), 1), *solver, {}), Error);
+  expect_error(ErrorKind::data, "weights: no node is fixed (the mesh must touch at least one bone)",
+               [&] { solve_harmonic(L, none, Eigen::MatrixXd::Zero(mesh.V.rows(), 1), *solver, {}); });
 }
 
 }  // namespace

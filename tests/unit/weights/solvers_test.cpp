@@ -56,6 +56,9 @@ TEST(Solvers, RefuseAMatrixThatIsNotDefinite) {
       FAIL() << name;
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::data) << error.what();
+      EXPECT_NE(error.problem().find(" unknowns is not positive definite"), std::string::npos)
+          << error.what();
+      EXPECT_EQ(error.mend(), "look for degenerate tets and for parts of the mesh without a fixed node");
     }
   }
 }

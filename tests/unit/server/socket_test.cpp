@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Servers that are not there, hang up, or stop reading.
+#include "clients/cpp/socket.hpp"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <vector>
+
+#include "core/values/error.hpp"
+
+namespace ecorche::client {
+namespace {
+
+class Listener {
+ public:
+  Listener() : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    port_ = ntohs(address.sin_port);
+  }
+  ~Listener() { close(); }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+  void listen() const { EXPECT_EQ(::listen(fd_, 1), 0); }
+  int accept() const { return ::accept(fd_, nullptr, nullptr); }
+  void close() {
+    if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+  }
+  wire::Address address() const { return {"127.0.0.1", port_}; }
+
+ private:
+  int fd_;
+  std::uint16_t port_ = 0;
+};
+
+Clock::time_point soon() {
+  return Clock::now() + std::chrono::milliseconds(300);
+}
+
+template <class F>
+std::string problem(F&& f) {
+  try {
+    f();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::temporary);
+    return error.problem();
+  }
+  return {};
+}
+
+TEST(ClientSocket, NobodyThere) {
+  const Listener silent;
+  EXPECT_EQ(problem([&] { Socket(silent.address(), soon()); }).find("cannot be reached: "), 0U);
+}
+
+TEST(ClientSocket, HangsUp) {
+  const Listener listener;
+  listener.listen();
+  Socket socket(listener.address(), soon());
+  ::close(listener.accept());
+  std::array<std::byte, 8> bytes{};
+  EXPECT_EQ(problem([&] { socket.read(bytes, soon()); }), "the server hung up");
+}
+
+TEST(ClientSocket, StopsReading) {
+  const Listener listener;
+  listener.listen();
+  Socket socket(listener.address(), soon());
+  const std::vector<std::byte> much(std::size_t{1} << 26);
+  EXPECT_EQ(problem([&] { socket.write(much, soon()); }), "the server stopped reading");
+}
+
+}  // namespace
+}  // namespace ecorche::client
