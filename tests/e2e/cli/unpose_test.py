@@ -1,7 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """`ecorche unpose`: posed files, and nothing else, come back to the scan."""
+import argparse
 import gzip
+import importlib.machinery
+import importlib.util
 import json
 import pathlib
 import re
@@ -12,10 +15,17 @@ import unittest
 
 import numpy as np
 
-from posed_files import CASE, MODEL, corners, run
+from posed_files import CASE, ECORCHE, MODEL, corners, run
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "bench"))
+BENCH = pathlib.Path(__file__).resolve().parents[3] / "bench"
+sys.path.insert(0, str(BENCH))
+import stated_poses  # noqa: E402
 import voxels  # noqa: E402
+
+LOADER = importlib.machinery.SourceFileLoader("unpose", str(BENCH / "unpose"))
+unpose = importlib.util.module_from_spec(importlib.util.spec_from_loader("unpose", LOADER))
+LOADER.exec_module(unpose)
+unpose.ECORCHE = stated_poses.ECORCHE = ECORCHE
 
 AWAY = "ecorche_pose: 1\nskeleton: phantom\nroot: {translation_mm: [40, -3, 7], rotation: [0.9, 0.1, 0.3, 0.3]}\n" \
        "joints:\n  knee_right: {flexion_deg: 50}\n  hip_right: {flexion_deg: 30}\n  elbow_left: {flexion_deg: 60}\n"
@@ -123,6 +133,30 @@ class Unpose(unittest.TestCase):
         (self.folder / "other.vtu").write_bytes(data)
         self.assert_error(run("unpose", self.folder / "other.vtu", "-o", back), 65, "have no volume at rest")
         self.assertFalse(back.exists() and list(back.iterdir()))
+
+
+class Bench(unittest.TestCase):
+    """A small piece of bench/unpose: one pose, one turn of the whole."""
+
+    def test_what_does_not_come_back_is_counted(self):
+        folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        stated_poses.write(MODEL, folder, 1)
+        (folder / "rest.yaml").write_text("".join((folder / "rigid_01.yaml").read_text().splitlines(True)[:3]))
+        volumes = [row for row in unpose.run("info", MODEL)["volumes"] if row["name"] in ("labels", "ct_noisy")]
+        by = unpose.Tets(MODEL, folder / "work", volumes)
+        options = argparse.Namespace(neighbours=26, boundary="labels", show="joint_01")
+        rows, shown = unpose.measure(by, ["joint_01", "rigid_01"], folder, options)
+        mean = unpose.means({"tets": (rows, len(by.columns))}, [row["name"] for row in volumes], ["joint_01"], ["rigid_01"])
+        for what, most in (("tets", 1), ("tets floor", 6)):
+            labels, noisy = mean[what]["labels"], mean[what]["ct_noisy"]
+            self.assertGreater(labels[0], 0)
+            self.assertLess(labels[0], most)  # of a shank and a foot that turn, and of the whole body
+            self.assertLess(labels[1], 0.1)
+            self.assertGreater(noisy[0], 2 * labels[0])
+        codes = shown["labels"][0]
+        self.assertAlmostEqual(100 * (codes > 1).sum() / (codes > 0).sum(), mean["tets"]["labels"][0])
+        self.assertAlmostEqual(100 * (codes == 3).sum() / (codes > 0).sum(), mean["tets"]["labels"][1])
 
 
 class Boundary(unittest.TestCase):
