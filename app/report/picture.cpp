@@ -61,7 +61,8 @@ std::string data_uri(const Picture& picture) {
   std::vector<unsigned char> png(PNG_IMAGE_PNG_SIZE_MAX(image));
   png_alloc_size_t size = png.size();
   if (png_image_write_to_memory(&image, png.data(), &size, 0, picture.pixels.data(), 0, nullptr) == 0)
-    throw Error(ErrorKind::internal, "report", std::string("libpng: ") + image.message, "report this");
+    throw Error(ErrorKind::internal, "report",
+                std::string("libpng cannot write the picture: ") + image.message, "report this");
   std::string base64(4 * ((size + 2) / 3) + 1, '\0');
   const int length =
       EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()), png.data(), static_cast<int>(size));

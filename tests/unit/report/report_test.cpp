@@ -88,6 +88,18 @@ TEST(View, left_is_right_and_up_is_up) {
   EXPECT_GT(View::axial().of({-1, -1, -1}, {1, 1, 1}, 9).y({0, 1, 0}), 4) << "the front is on top";
 }
 
+TEST(DataUri, what_is_no_picture_is_said) {
+  EXPECT_EQ(data_uri(Picture(1, 1, {255, 0, 0})).substr(0, 22), "data:image/png;base64,");
+  try {
+    data_uri(Picture(0, 0, {}));
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::internal);
+    EXPECT_EQ(std::string(error.what()).find("report: libpng cannot write the picture: "), 0U)
+        << error.what();
+  }
+}
+
 // Every pixel against a search of all tets.
 TEST(Slice, shows_the_mixed_weights_of_the_tet_that_holds_each_pixel) {
   const Model model = test::toy_model();
