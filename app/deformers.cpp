@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 
+#include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "core/files/atomic_file.hpp"
@@ -26,7 +27,7 @@ struct Settings {
   fs::path model, output;
   FrameChoice frames;
   std::string volume, sampling = "nearest", skinning = "cor";
-  bool bridge = false;
+  bool bridge = true;
 };
 
 double seconds_of(const std::function<void()>& work) {
@@ -128,11 +129,11 @@ std::vector<std::byte> background_bytes(const ModelVolume& volume) {
 }
 
 json compare_frame(const Settings& s, const runtime::BodyPoser& poser, const ModelVolume& volume,
-                   const runtime::Seams& seams, const Frame& frame, const Context& context) {
+                   const runtime::VolumeBalls& balls, const Frame& frame, const Context& context) {
   const Model& model = poser.model();
   runtime::PosedBody body = poser.make_frame();
-  const runtime::Sampling how =
-      volume.labels || s.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
+  const runtime::Sampling how = runtime::sampling_for(
+      volume, s.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear);
   const double skin = seconds_of([&] {
     const Status status = poser.run(frame.pose, runtime::skinning_from_name(s.skinning), {}, body);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
@@ -150,8 +151,7 @@ json compare_frame(const Settings& s, const runtime::BodyPoser& poser, const Mod
         kMib;
   });
   const double spheres = seconds_of([&] {
-    runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
-    runtime::bridge(seams, body.segments, set);
+    const runtime::BallSet set = balls.at(body.segments);
     by_spheres = runtime::refill(set, runtime::grown_box(set), volume.image, volume.background, how, context);
     spheres_mib = (set.balls.size() * (sizeof set.balls[0] + 48) + by_spheres.bytes.size()) / kMib;
   });
@@ -205,11 +205,10 @@ int run(const Program& program, const Settings& s) {
                 "its voxels are not cubic, so the two do not pose it on one lattice", "resample it");
   const std::vector<Frame> frames = read_frames(program, s.frames, model->rig);
   const runtime::BodyPoser poser(model);
-  runtime::Seams seams;
-  if (s.bridge) seams = runtime::seams_for(*model, *volume, program.context("seams"));
+  const runtime::VolumeBalls balls(*model, *volume, s.bridge, program.context("seams"));
   json rows = json::array();
   for (const Frame& frame : frames)
-    rows.push_back(compare_frame(s, poser, *volume, seams, frame, program.context("pose")));
+    rows.push_back(compare_frame(s, poser, *volume, balls, frame, program.context("pose")));
   program.result(text_of(rows), {{"ok", true},
                                  {"volume", s.volume},
                                  {"balls", spheres.size()},
@@ -230,7 +229,7 @@ void declare_deformers(CLI::App& app, Program& program, Run& chosen) {
       "-o,--output", s->output,
       "folder for tets.nrrd, spheres.nrrd and difference.nrrd (1 same, 2 differs on the boundary, 3 within)");
   add_frame_options(*command, s->frames);
-  command->add_flag("--bridge", s->bridge, "of the spheres: fill what opens between segments");
+  add_bridge_option(*command, s->bridge);
   command->add_option("--sampling", s->sampling, "nearest or trilinear; labels are always nearest")
       ->check(CLI::IsMember({"nearest", "trilinear"}))
       ->capture_default_str();

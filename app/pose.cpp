@@ -9,6 +9,7 @@
 #include <numbers>
 #include <optional>
 
+#include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/inverted_tets.hpp"
 #include "app/pose_frames.hpp"
@@ -42,7 +43,7 @@ struct Settings {
   std::string sampling = "trilinear";
   std::string grid = "posed";
   std::string deformer = "tets";
-  bool tets = false, field = false, as_case = false, bridge = false, unfold = false;
+  bool tets = false, field = false, as_case = false, bridge = true, unfold = false;
   std::vector<std::string> tet_formats{"vtu"};
 
   bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
@@ -56,7 +57,7 @@ runtime::Sampling sampling_of(const Settings& settings) {
 struct Plan {
   std::vector<std::uint32_t> tissues, volumes;
   bool tets = false, field = false;
-  std::map<std::string, runtime::Seams> seams;  // of volumes that are to be bridged, by name
+  std::map<std::string, runtime::VolumeBalls> balls;  // of volumes that are refilled, by name
 };
 
 [[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
@@ -89,8 +90,8 @@ std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::st
 
 // What is not named is not written; naming nothing writes everything.
 Plan plan_of(const Settings& settings, const Model& model) {
-  if (settings.bridge && settings.deformer != "spheres")
-    usage("--bridge", "tets open no gaps", "add --deformer spheres");
+  if (!settings.bridge && settings.deformer != "spheres")
+    usage("--no-bridge", "tets open no gaps", "add --deformer spheres");
   if (settings.as_case) {
     if (settings.chooses())
       usage("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
@@ -243,7 +244,8 @@ class FrameWriter {
   }
 
   void write_volume(const ModelVolume& volume) {
-    const Image posed = settings_.deformer == "spheres" ? refilled(volume) : drawn(volume);
+    const auto balls = plan_.balls.find(volume.name);
+    const Image posed = balls == plan_.balls.end() ? drawn(volume) : refilled(volume, balls->second);
     io::write_image(next(volume.name + "." + settings_.volume_format), posed);
   }
 
@@ -255,14 +257,12 @@ class FrameWriter {
     return posed;
   }
 
-  Image refilled(const ModelVolume& volume) const {
-    runtime::BallSet set = runtime::balls_for(model_, body_.segments, volume);
-    if (const auto seams = plan_.seams.find(volume.name); seams != plan_.seams.end())
-      runtime::bridge(seams->second, body_.segments, set);
+  Image refilled(const ModelVolume& volume, const runtime::VolumeBalls& balls) const {
+    const runtime::BallSet set = balls.at(body_.segments);
     const runtime::LatticeBox box =
         settings_.grid == "rest" ? runtime::LatticeBox{{0, 0, 0}, set.lattice.size} : runtime::grown_box(set);
-    const runtime::Sampling sampling = volume.labels ? runtime::Sampling::nearest : sampling_of(settings_);
-    return runtime::refill(set, box, volume.image, volume.background, sampling, context_);
+    return runtime::refill(set, box, volume.image, volume.background,
+                           runtime::sampling_for(volume, sampling_of(settings_)), context_);
   }
 
   void write_field() {
@@ -322,8 +322,8 @@ int run(const Program& program, const Settings& settings) {
                 "preprocess it with spheres, or deform by tets");
   for (const std::uint32_t row : plan.volumes) {
     const ModelVolume& volume = model->volumes[row];
-    if (settings.bridge)
-      plan.seams.emplace(volume.name, runtime::seams_for(*model, volume, program.context("seams")));
+    if (settings.deformer == "spheres")
+      plan.balls.try_emplace(volume.name, *model, volume, settings.bridge, program.context("seams"));
   }
   const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
   const runtime::BodyPoser poser(model);
@@ -384,8 +384,7 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       ->capture_default_str();
   command->add_flag("--unfold", s->unfold,
                     "move what lies about inverted tets until none is inverted that no bones squeeze");
-  command->add_flag("--bridge", s->bridge,
-                    "of the spheres: fill what opens between segments that turn against each other");
+  add_bridge_option(*command, s->bridge);
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');
   command->add_option("--format", s->formats, "of the tissues: stl, obj, ply, off, vtp, glb, or several")

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "app/balls_of_file.hpp"
+#include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "core/files/atomic_file.hpp"
@@ -35,7 +36,7 @@ struct Settings {
   double background = 0;
   std::string sampling = "trilinear";
   double bulge = 0, explode = 0, time = 1;
-  bool melt = false, back = false, bridge = false;
+  bool melt = false, back = false, bridge = true;
   std::vector<std::string> morph;
 
   bool poses() const { return !frames.pose.empty() || !frames.motion.file.empty(); }
@@ -60,8 +61,6 @@ void check(const Settings& s) {
   if (!s.rig.empty() && !s.poses())
     usage("--rig", "nothing is posed", "add --pose FILE or --motion CLIP --frames A:B");
   if (s.back && !s.poses()) usage("--back", "no pose to come back from", "add --rig and --pose");
-  if (s.bridge && (!s.poses() || s.back))
-    usage("--bridge", "only what is posed opens gaps", "add --rig and --pose, and leave out --back");
   if (s.bulge != 0 && !rigged) usage("--bulge", "joints are needed", "add --rig and --pose");
   if (is_surface(s.output) && (!s.region.empty() || !s.volume.empty()))
     usage("--output", "a preview shows no values", "leave out VOLUME and --region, or name an image");
@@ -208,7 +207,8 @@ int run(const Program& program, const Settings& s) {
   } else {
     const ImageGrid lattice = lattice_for(s, skeleton, volume);
     runtime::Seams seams;
-    if (s.bridge)
+    // On the way back nothing is open: at rest every voxel lies in a ball of the body.
+    if (s.bridge && s.poses() && !s.back)
       seams = runtime::seams_of(runtime::balls_at_rest(skeleton, lattice), skeleton.segment, rig.skeleton,
                                 program.context("seams"));
     const std::vector<Frame> frames =
@@ -264,8 +264,7 @@ void declare_refill(CLI::App& app, Program& program, Run& chosen) {
           "--bulge", s->bulge,
           "balls at joints grow by this share (negative: shrink); the new shell shows the ball's rim")
       ->check(CLI::Range(-0.99, 10.0));
-  command->add_flag("--bridge", s->bridge,
-                    "fill what opens between segments that turn against each other, halfway between them");
+  add_bridge_option(*command, s->bridge);
   command->add_flag("--melt", s->melt, "small balls go first; at time 1 none is left");
   command
       ->add_option("--explode", s->explode,

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "app/balls_of_file.hpp"
+#include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "core/kinematics/angles.hpp"
@@ -28,7 +29,7 @@ struct Settings {
   fs::path skeleton, rig;
   FrameChoice frames;
   double voxel_mm = 0, bulge = 0, step_deg = 10;
-  bool sweep = false, bridge = false;
+  bool sweep = false, bridge = true;
   int prove = 0;
 };
 
@@ -42,14 +43,14 @@ struct Body {
   Rig rig;
   runtime::BallSet rest;
   std::optional<runtime::TearDetector> detector;
-  runtime::Seams seams;  // none where they are not to be bridged
+  runtime::Seams seams;
 
-  runtime::BallSet posed(const Pose& pose, double gain) const {
+  runtime::BallSet posed(const Pose& pose, double gain, bool bridged) const {
     runtime::BallSet set = rest;
     const std::vector<RigidTransform> motions = kinematics::forward(rig, pose);
     runtime::move_balls(skeleton, motions, set);
     if (gain != 0) runtime::bulge(set, rig.skeleton, runtime::bulges_of(rest, rig.skeleton, gain), 1);
-    runtime::bridge(seams, motions, set);
+    if (bridged) runtime::bridge(seams, motions, set);
     return set;
   }
 };
@@ -73,7 +74,7 @@ json look_at_frames(const Program& program, const Settings& s, const Body& body)
     std::vector<ClampedJoint> clamped;
     kinematics::constrain(body.rig.skeleton, pose, clamped);
     const runtime::Tears tears =
-        body.detector->look(body.posed(pose, s.bulge), {nullptr, nullptr, context.stop});
+        body.detector->look(body.posed(pose, s.bulge, s.bridge), {nullptr, nullptr, context.stop});
     torn += tears.errs();
     frames.push_back(frame_json(body.rig.skeleton, frame.name, tears));
     context.report(static_cast<double>(frames.size()) / static_cast<double>(poses.size()));
@@ -93,13 +94,13 @@ int angles_of(const Joint& joint) {
 
 // The first multiple of the step at which the body tears, or 0 where it does not up to 180 degrees.
 double first_tear(const Body& body, std::size_t joint, const AngleAxis& angle, double sign, double step,
-                  double gain, const Context& context) {
+                  double gain, bool bridged, const Context& context) {
   for (double degrees = step; degrees <= 180; degrees += step) {
     Pose pose = Pose::rest(body.rig.skeleton.segments.size());
     Eigen::Vector3d axis = Eigen::Vector3d::Zero();
     axis[angle.axis] = sign * angle.sign;
     pose.rotation[joint] = Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis);
-    if (body.detector->look(body.posed(pose, gain), context).errs()) return degrees;
+    if (body.detector->look(body.posed(pose, gain, bridged), context).errs()) return degrees;
   }
   return 0;
 }
@@ -114,12 +115,15 @@ json sweep(const Program& program, const Settings& s, const Body& body) {
       const AngleAxis& angle = joint.sequence[static_cast<std::size_t>(a)];
       for (const double sign : {1.0, -1.0}) {
         const Context quiet{nullptr, nullptr, context.stop};
+        const auto breaks = [&](double gain, bool bridged) {
+          return first_tear(body, j, angle, sign, s.step_deg, gain, bridged, quiet);
+        };
         rows.push_back({{"joint", joint.name},
                         {"angle", angle.name},
                         {"direction", sign > 0 ? "+" : "-"},
-                        {"breaks_at_deg", first_tear(body, j, angle, sign, s.step_deg, 0, quiet)},
-                        {"bulged_breaks_at_deg",
-                         first_tear(body, j, angle, sign, s.step_deg, s.bulge != 0 ? s.bulge : 0.3, quiet)}});
+                        {"breaks_at_deg", breaks(0, false)},
+                        {"bulged_breaks_at_deg", breaks(s.bulge != 0 ? s.bulge : 0.3, false)},
+                        {"bridged_breaks_at_deg", breaks(0, true)}});
       }
     }
     context.report(static_cast<double>(j) / static_cast<double>(segments.size()));
@@ -201,10 +205,11 @@ std::string text_of(const json& result) {
     text += line;
   }
   for (const json& row : result.value("sweep", json::array())) {
-    std::snprintf(line, sizeof line, "%-22s %-14s %s  breaks at %5s deg, bulged %5s\n",
+    std::snprintf(line, sizeof line, "%-22s %-14s %s  breaks at %5s deg, bulged %5s, bridged %5s\n",
                   row["joint"].get<std::string>().c_str(), row["angle"].get<std::string>().c_str(),
                   row["direction"].get<std::string>().c_str(), degrees(row, "breaks_at_deg").c_str(),
-                  degrees(row, "bulged_breaks_at_deg").c_str());
+                  degrees(row, "bulged_breaks_at_deg").c_str(),
+                  degrees(row, "bridged_breaks_at_deg").c_str());
     text += line;
   }
   if (result.contains("torn")) {
@@ -234,7 +239,7 @@ int run(const Program& program, const Settings& s) {
   body.rest = runtime::balls_at_rest(
       body.skeleton, s.voxel_mm > 0 ? runtime::lattice_of(body.skeleton, s.voxel_mm) : body.skeleton.grid);
   body.detector.emplace(body.rest, body.skeleton.segment, program.context("rest"));
-  if (s.bridge)
+  if (s.sweep || (frames && s.bridge))
     body.seams =
         runtime::seams_of(body.rest, body.skeleton.segment, body.rig.skeleton, program.context("seams"));
   json result{{"ok", true},
@@ -262,15 +267,16 @@ void declare_tears(CLI::App& app, Program& program, Run& chosen) {
                       "the rig that the skeleton hangs on: a skeleton file (.yaml) or a model (.hdf)");
   add_frame_options(*command, s->frames);
   command->add_flag("--sweep", s->sweep,
-                    "turn every joint about every axis, both ways, until the body tears; limits aside");
+                    "turn every joint about every axis, both ways, until the body tears, limits aside: as it "
+                    "is, bulged, and bridged");
   command->add_option("--step", s->step_deg, "of the sweep, degrees")
       ->check(CLI::Range(1.0, 90.0))
       ->capture_default_str();
   command
       ->add_option("--bulge", s->bulge,
-                   "balls at joints grow by this share (the sweep tells both; there 0.3 where not given)")
+                   "balls at joints grow by this share (in the sweep 0.3 where not given)")
       ->check(CLI::Range(-0.99, 10.0));
-  command->add_flag("--bridge", s->bridge, "fill what opens between segments, as refill --bridge does");
+  add_bridge_option(*command, s->bridge);
   command->add_option("--prove", s->prove, "first seed so many tears and say how many are found")
       ->check(CLI::Range(0, 100000));
   command->add_option("--voxel", s->voxel_mm, "edge of the voxels to look at, mm (default: the skeleton's)")

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "bench/server/peers.hpp"
+#include "bench/server/region.hpp"
 #include "bench/server/served.hpp"
 #include "bench/server/walker.hpp"
 #include "core/values/error.hpp"
@@ -218,6 +219,23 @@ void soak(const Settings& settings) {
       most_descriptors, served.descriptors());
 }
 
+// Gagvani01's body lives at full resolution in a part of it.
+void region(const Settings& settings) {
+  for (const auto& [deformer, name] :
+       {std::pair{v1::DEFORMER_SPHERES, "spheres"}, {v1::DEFORMER_TETS, "tets"}}) {
+    const Served served(settings.program, settings.model);
+    const RegionRate rate = region_rate(served, deformer, 256, settings.seconds);
+    std::printf(
+        "1 client, 256^3 voxels of the CT at full resolution, by %-8s %6.1f fps, p50 %.1f, p99 %.1f ms; "
+        "posing p50 "
+        "%.1f, refilling or drawing and encoding %.1f ms; %.0f ms of processor a frame; %.2f M voxels held; "
+        "%.0f MiB%s\n",
+        name, rate.per_second, rate.p50_ms, rate.p99_ms, rate.posed_ms, rate.encoded_ms, rate.cpu_ms,
+        rate.held / 1e6, served.rss_mib(), deformer == v1::DEFORMER_SPHERES ? "  (must: 10 fps)" : "");
+    std::fflush(stdout);
+  }
+}
+
 int run(const Settings& settings) {
   rlimit files{};
   getrlimit(RLIMIT_NOFILE, &files);
@@ -251,6 +269,7 @@ int run(const Settings& settings) {
         settings, "1000 that send a byte a second",
         [](const Served& s) { return dripping_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
   }
+  if (chosen("region")) region(settings);
   if (chosen("soak")) soak(settings);
   return 0;
 }
@@ -272,7 +291,7 @@ int main(int argc, char** argv) {
   if (words.size() < 2) {
     std::fprintf(stderr,
                  "usage: bench_server ECORCHE MODEL.hdf [--seconds 30] [--soak-minutes 30] [--only ROW,...]\n"
-                 "rows: body f32 organ posers observers stalled idle dripping soak\n");
+                 "rows: body f32 organ posers observers stalled idle dripping region soak\n");
     return 64;
   }
   settings.program = words[0];

@@ -143,7 +143,7 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
   frame.set_frame(job.number);
   frame.set_pose_sequence(job.request.sequence);
   frame.set_volume(subscription.volume->want().volume);
-  auto payload = std::make_shared<wire::Payload>();
+  const std::shared_ptr<wire::Payload> payload = subscription.volume->payload();
   const Status status = guarded([&] {
     return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
                                       frame, *payload);
@@ -157,7 +157,7 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
           .number = job.number,
           .keyframe = frame.keyframe(),
           .encoded = frame.timings().encoded(),
-          .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
+          .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, payload))};
 }
 
 Status pose(const PoseJob& job, runtime::PosedBody& body, bool& fits) {

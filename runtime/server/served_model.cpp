@@ -49,7 +49,8 @@ ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& m
       volumes(model),
       meter(model),
       levels(make_levels(*model)),
-      summary(summarize(std::move(name), *model)) {
+      summary(summarize(std::move(name), *model)),
+      balls_(model->volumes.size()) {
   for (Clip& clip : moves) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
   runtime::PosedBody body = poser.make_frame({.positions = false});
   const Pose rest = Pose::rest(model->segment_count());
@@ -69,6 +70,14 @@ ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& m
   }
   for (const ModelVolume& volume : model->volumes) describe(volume, *opened.add_volumes());
   topology = std::move(payload);
+}
+
+const runtime::VolumeBalls& ServedModel::balls(std::size_t volume) const {
+  Balls& row = balls_[volume];
+  std::call_once(row.made, [&] {
+    row.balls = std::make_unique<const runtime::VolumeBalls>(model(), model().volumes[volume]);
+  });
+  return *row.balls;
 }
 
 const runtime::Probe& ServedModel::probe() const {

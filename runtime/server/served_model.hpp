@@ -2,6 +2,7 @@
 // A model made ready for clients: its poser, its digests, and its description encoded once.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -13,6 +14,7 @@
 #include "runtime/server/clip.hpp"
 #include "runtime/server/mesh_rows.hpp"
 #include "runtime/skin/body_poser.hpp"
+#include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::server {
@@ -25,6 +27,8 @@ struct ServedModel {
   const Model& model() const { return poser.model(); }
   /// Made when somebody first probes, on a worker.
   const runtime::Probe& probe() const;
+  /// Of a row of Model::volumes, bridged. Made when somebody first asks, on a worker; throws as VolumeBalls.
+  const runtime::VolumeBalls& balls(std::size_t volume) const;
 
   runtime::BodyPoser poser;
   runtime::VolumePoser volumes;
@@ -38,6 +42,12 @@ struct ServedModel {
   std::shared_ptr<const wire::Payload> topology;  ///< the triangles of every tissue
 
  private:
+  struct Balls {
+    std::once_flag made;
+    std::unique_ptr<const runtime::VolumeBalls> balls;
+  };
+
+  mutable std::deque<Balls> balls_;  // of every volume
   mutable std::once_flag probe_made_;
   mutable std::unique_ptr<const runtime::Probe> probe_;
 };

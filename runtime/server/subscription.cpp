@@ -76,20 +76,20 @@ Status read_mesh(const v1::MeshSelection& mesh, const Model& model, MeshWant& ou
 }
 
 Status read_deformer(const v1::VolumeSelection& volume, const Model& model, VolumeWant& out) {
+  if (volume.deformer() > v1::DEFORMER_SPHERES)
+    return unimplemented("deformer " + std::to_string(volume.deformer()));
   out.by_spheres = volume.deformer() == v1::DEFORMER_SPHERES;
-  if (!out.by_spheres) {
-    if (volume.deformer() > v1::DEFORMER_TETS)
-      return unimplemented("deformer " + std::to_string(volume.deformer()));
-    return volume.has_region() ? unimplemented("regions of volumes by tets") : Status{};
-  }
-  if (model.spheres.empty()) {
+  if (out.by_spheres && model.spheres.empty()) {
     return {StatusCode::failed_precondition,
             "subscribe: the model holds no spheres (deform by tets, or preprocess it with spheres)"};
   }
   if (!volume.has_region()) return {};
+  if (!out.slices.empty())
+    return {StatusCode::invalid_argument, "subscribe: slices have no region (ask for one of the two)"};
   if (Status status = read_region(volume.region(), out.region); !status.ok()) return status;
   const ModelVolume& shown = model.volumes[out.volume];
-  const ImageGrid lattice = runtime::posed_lattice(runtime::spheres_for(model, shown), shown);
+  const ImageGrid lattice =
+      out.by_spheres ? runtime::posed_lattice(runtime::spheres_for(model, shown), shown) : shown.image.grid;
   for (const std::int32_t size : runtime::box_within(lattice, out.region->low, out.region->high).size) {
     if (size < 1)
       return {StatusCode::invalid_argument,
@@ -143,8 +143,6 @@ Status read_volume(const v1::VolumeSelection& volume, const Model& model, Volume
   out.compressed = volume.compressed();
   out.changed_bricks = volume.changed_bricks();
   if (Status status = read_slices(volume, out); !status.ok()) return status;
-  if (volume.deformer() == v1::DEFORMER_SPHERES && (out.changed_bricks || !out.slices.empty()))
-    return unimplemented("slices and bricks of volumes by spheres");
   return read_deformer(volume, model, out);
 }
 

@@ -33,11 +33,11 @@ struct VolumeWant {
   std::uint32_t volume = 0;  ///< row of Model::volumes
   runtime::Sampling sampling = runtime::Sampling::trilinear;
   bool by_spheres = false;
-  std::optional<runtime::Region> region;  ///< by spheres only
-  std::vector<ImageGrid> slices;          ///< one pixel thick; by tets only
+  std::optional<runtime::Region> region;  ///< of the posed space; no slices beside it
+  std::vector<ImageGrid> slices;          ///< one pixel thick
   bool compressed = false;
-  bool changed_bricks = false;  ///< by tets only
-  double max_rate = 0;          ///< as of MeshWant
+  bool changed_bricks = false;
+  double max_rate = 0;  ///< as of MeshWant
   bool operator==(const VolumeWant&) const = default;
 };
 

@@ -4,10 +4,13 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
+#include "runtime/spheres/slice.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -39,63 +42,79 @@ void append_brick(const Image& image, const runtime::VoxelRange& range, std::vec
 Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& body,
                            std::uint64_t most_voxels, bool keyframe, v1::VolumeFrame& frame,
                            wire::Payload& payload) {
-  const Model& model = served.model();
-  if (want_.by_spheres) return write_spheres(model, body, most_voxels, frame, payload);
   if (!want_.slices.empty()) {
     write_slices(served, body, frame, payload);
     return {};
   }
-  const ModelVolume& volume = model.volumes[want_.volume];
-  const ImageGrid grid = runtime::grow_to(volume.image.grid, body.nodes);
-  if (Status status = check_size(grid, most_voxels); !status.ok()) return status;
-  served.volumes.follow(body.nodes, volume, want_.sampling, grid, kept_, scratch_);
-  wire::to_proto(grid, *frame.mutable_grid());
+  Status status =
+      want_.by_spheres ? by_spheres(served, body, most_voxels) : by_tets(served, body, most_voxels);
+  if (!status.ok()) return status;
+  wire::to_proto(posed_.image->grid, *frame.mutable_grid());
   if (want_.changed_bricks) {
     write_bricks(keyframe, frame, payload);
   } else {
-    put(kept_.image.bytes, kept_.image, frame, payload);
+    put(posed_.image->bytes, *posed_.image, frame, payload);
   }
   return {};
 }
 
-Status VolumeStream::write_spheres(const Model& model, const runtime::PosedBody& body,
-                                   std::uint64_t most_voxels, v1::VolumeFrame& frame,
-                                   wire::Payload& payload) {
-  const ModelVolume& volume = model.volumes[want_.volume];
-  const runtime::BallSet set = runtime::balls_for(model, body.segments, volume);
+Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody& body,
+                             std::uint64_t most_voxels) {
+  const ModelVolume& volume = served.model().volumes[want_.volume];
+  const ImageGrid& rest = volume.image.grid;
+  const ImageGrid grid = want_.region
+                             ? grid_of(rest, runtime::box_within(rest, want_.region->low, want_.region->high))
+                             : runtime::grow_to(rest, body.nodes);
+  if (Status status = check_size(grid, most_voxels); !status.ok()) return status;
+  served.volumes.follow(body.nodes, volume, want_.sampling, grid, kept_, scratch_);
+  posed_ = {&kept_.image, &kept_.bricks, &kept_.moved};
+  return {};
+}
+
+Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedBody& body,
+                                std::uint64_t most_voxels) {
+  runtime::BallSet set = served.balls(want_.volume).at(body.segments);
   const runtime::LatticeBox box = runtime::box_for(set, want_.region);
   if (Status status = check_size(grid_of(set.lattice, box), most_voxels); !status.ok()) return status;
-  const Image image = runtime::refill(set, box, volume.image, volume.background, want_.sampling);
-  wire::to_proto(image.grid, *frame.mutable_grid());
-  put(image.bytes, image, frame, payload);
+  runtime::follow(std::move(set), box, served.model().volumes[want_.volume], want_.sampling, refilled_);
+  posed_ = {&refilled_.image, &refilled_.bricks, &refilled_.moved};
   return {};
 }
 
 void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedBody& body,
                                 v1::VolumeFrame& frame, wire::Payload& payload) {
+  const ModelVolume& volume = served.model().volumes[want_.volume];
+  std::optional<runtime::BallSet> set;
+  if (want_.by_spheres) set = served.balls(want_.volume).at(body.segments);
   std::vector<std::byte> pixels;
-  for (const ImageGrid& slice : want_.slices) {
-    served.volumes.pose(body.nodes, served.model().volumes[want_.volume], want_.sampling, slice, kept_.image,
-                        scratch_);
-    pixels.insert(pixels.end(), kept_.image.bytes.begin(), kept_.image.bytes.end());
+  for (const ImageGrid& plane : want_.slices) {
+    if (set) {
+      slice_ = Image(plane, volume.image.type, volume.image.components);
+      runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice_);
+    } else {
+      served.volumes.pose(body.nodes, volume, want_.sampling, plane, slice_, scratch_);
+    }
+    pixels.insert(pixels.end(), slice_.bytes.begin(), slice_.bytes.end());
   }
-  put(pixels, kept_.image, frame, payload);
+  put(pixels, slice_, frame, payload);
 }
 
 void VolumeStream::write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload) {
-  if (kept_.image.grid != keyframe_grid_ || changed_.size() != kept_.moved.size()) keyframe = true;
+  const Image& image = *posed_.image;
+  const std::vector<std::uint8_t>& moved = *posed_.moved;
+  if (image.grid != keyframe_grid_ || changed_.size() != moved.size()) keyframe = true;
   if (!keyframe) {
-    for (std::size_t b = 0; b < changed_.size(); ++b) changed_[b] |= kept_.moved[b];
+    for (std::size_t b = 0; b < changed_.size(); ++b) changed_[b] |= moved[b];
   }
   // Three quarters of the bricks: another keyframe pays.
   const auto changed = static_cast<std::size_t>(std::count(changed_.begin(), changed_.end(), 1));
   if (keyframe || keyframe_ == 0 || frame.frame() - keyframe_ >= keyframe_interval ||
       4 * changed > 3 * changed_.size()) {
     keyframe_ = frame.frame();
-    keyframe_grid_ = kept_.image.grid;
-    changed_.assign(kept_.moved.size(), 0);
+    keyframe_grid_ = image.grid;
+    changed_.assign(moved.size(), 0);
     frame.set_keyframe(keyframe_);
-    put(kept_.image.bytes, kept_.image, frame, payload);
+    put(image.bytes, image, frame, payload);
     return;
   }
   frame.set_keyframe(keyframe_);
@@ -104,10 +123,10 @@ void VolumeStream::write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Pay
   for (std::uint32_t b = 0; b < changed_.size(); ++b) {
     if (changed_[b] == 0) continue;
     bricks.push_back(b);
-    append_brick(kept_.image, kept_.bricks.voxels(b, kept_.image.grid), voxels);
+    append_brick(image, posed_.bricks->voxels(b, image.grid), voxels);
   }
   *frame.mutable_bricks() = wire::append(payload, std::span<const std::uint32_t>(bricks), 1);
-  put(voxels, kept_.image, frame, payload);
+  put(voxels, image, frame, payload);
 }
 
 void VolumeStream::put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "proto/framing.hpp"
+#include "runtime/server/payload_pool.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/server/subscription.hpp"
+#include "runtime/spheres/refilled_volume.hpp"
 
 namespace ecorche::server {
 
@@ -19,9 +22,12 @@ class VolumeStream {
   /// Frames from one keyframe to the next.
   static constexpr std::uint64_t keyframe_interval = 128;
 
-  explicit VolumeStream(VolumeWant want) : want_(std::move(want)) {}
+  explicit VolumeStream(VolumeWant want)
+      : want_(std::move(want)), payloads_(std::make_shared<PayloadPool>()) {}
 
   const VolumeWant& want() const { return want_; }
+  /// To write() into.
+  std::shared_ptr<wire::Payload> payload() const { return payloads_->take(); }
 
   /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
   /// needs one. resource_exhausted beyond `most_voxels`.
@@ -29,8 +35,9 @@ class VolumeStream {
                bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
 
  private:
-  Status write_spheres(const Model& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
-                       v1::VolumeFrame& frame, wire::Payload& payload);
+  // The whole posed volume, or its region, into posed_.
+  Status by_tets(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels);
+  Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels);
   void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
                     wire::Payload& payload);
   void write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
@@ -38,7 +45,16 @@ class VolumeStream {
            wire::Payload& payload) const;
 
   VolumeWant want_;
+  std::shared_ptr<PayloadPool> payloads_;
+  // Where the last frame lies, of one deformer or the other.
+  struct Posed {
+    const Image* image = nullptr;
+    const runtime::Bricks* bricks = nullptr;
+    const std::vector<std::uint8_t>* moved = nullptr;
+  } posed_;
   runtime::PosedVolume kept_;
+  runtime::RefilledVolume refilled_;
+  Image slice_;
   runtime::VolumePoser::Scratch scratch_;
   std::vector<std::uint8_t> changed_;  // a brick each: since the keyframe
   ImageGrid keyframe_grid_;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -31,6 +32,8 @@ struct BallSet {
   ImageGrid lattice;  ///< cubic voxels; the index space of everything here
   std::vector<Ball> balls;
   std::vector<std::array<double, 9>> back;  ///< row-major rotations, posed to rest
+  /// Row of the first ball that owns only what no ball before this row holds: bridges (seams.hpp).
+  std::int32_t bridges_from = std::numeric_limits<std::int32_t>::max();
 };
 
 /// The rest lattice of a skeleton with voxels of `spacing` mm: same first voxel centre and axes, as many

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/spheres/morph.hpp"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "core/values/error.hpp"
 #include "runtime/spheres/lookup.hpp"
+#include "runtime/spheres/place_batch.hpp"
 #include "runtime/spheres/places.hpp"
 #include "runtime/volume/sampler.hpp"
 
@@ -75,13 +78,18 @@ class Side {
         sampler_{side.volume.grid, side.volume.scalars<T>(), static_cast<std::size_t>(side.volume.components),
                  background} {}
 
-  void at(std::size_t row, const Ball& shown, const Vec3& offset, bool nearest, T* out) const {
+  // Index of the volume.
+  Vec3 place(std::size_t row, const Ball& shown, const Vec3& offset) const {
     Ball ball = set_.balls[row];
     Eigen::Vector3d way(offset[0], offset[1], offset[2]);
     if (!same_) way = own_ * way;
     // As for a bulge: shown larger than it is, a ball shows its rim beyond it.
     ball.radius2 = shown.radius2 > shared_.balls[row].radius2 ? 2 * ball.rest_radius2 : ball.rest_radius2;
-    const Vec3 p = to_volume_(rest_place(set_, ball, way[0], way[1], way[2]));
+    return to_volume_(rest_place(set_, ball, way[0], way[1], way[2]));
+  }
+
+  void at(std::size_t row, const Ball& shown, const Vec3& offset, bool nearest, T* out) const {
+    const Vec3 p = place(row, shown, offset);
     nearest ? sampler_.nearest(p[0], p[1], p[2], out) : sampler_.trilinear(p[0], p[1], p[2], out);
   }
 
@@ -92,6 +100,24 @@ class Side {
   bool same_;
   Sampler<T> sampler_;
 };
+
+// One of the two alone, trilinearly, as refill() does.
+template <class T>
+void fill_end(const std::vector<Pair>& pairs, const BallSet& between, const LatticeBox& box,
+              const Side<T>& side, std::size_t Pair::*row, const SampleJob& job, const Context& context) {
+  tbb::enumerable_thread_specific<PlaceBatch> batches(sink_for(job, Sampling::trilinear));
+  for_tiles(between, box, context, [&](const Tile& tile) {
+    PlaceBatch& batch = batches.local();
+    tile.for_owned([&](std::int32_t i, std::int32_t j, std::int32_t k, std::int32_t owner) {
+      const Ball& shown = between.balls[static_cast<std::size_t>(owner)];
+      const Vec3& c = shown.centre;
+      const Vec3 offset{box.first[0] + i - c[0], box.first[1] + j - c[1], box.first[2] + k - c[2]};
+      batch.add(job.posed.grid.offset(i, j, k),
+                side.place(pairs[static_cast<std::size_t>(owner)].*row, shown, offset));
+    });
+  });
+  for (PlaceBatch& batch : batches) batch.flush();
+}
 
 template <class T>
 void fill(const std::vector<Pair>& pairs, const BallSet& between, const LatticeBox& box, const Side<T>& first,
@@ -108,13 +134,12 @@ void fill(const std::vector<Pair>& pairs, const BallSet& between, const LatticeB
       const Vec3 offset{box.first[0] + i - c[0], box.first[1] + j - c[1], box.first[2] + k - c[2]};
       std::fill(one.begin(), one.end(), empty);
       std::fill(two.begin(), two.end(), empty);
-      const bool whole = nearest || time == 0 || time == 1;
-      if (!whole || time < 0.5) first.at(pair.from, shown, offset, nearest, one.data());
-      if (!whole || time >= 0.5) second.at(pair.to, shown, offset, nearest, two.data());
+      if (!nearest || time < 0.5) first.at(pair.from, shown, offset, nearest, one.data());
+      if (!nearest || time >= 0.5) second.at(pair.to, shown, offset, nearest, two.data());
       T* voxel = &voxels[components * out.grid.offset(i, j, k)];
       for (std::size_t n = 0; n < components; ++n) {
         voxel[n] =
-            whole
+            nearest
                 ? (time < 0.5 ? one[n] : two[n])
                 : to_scalar<T>((1 - time) * static_cast<double>(one[n]) + time * static_cast<double>(two[n]));
       }
@@ -160,8 +185,14 @@ Image morph(const MorphSide& from, const MorphSide& to, double time, double back
   with_scalar_type(out.type, [&](auto zero) {
     using T = decltype(zero);
     const Side<T> first(from, from.balls, background), second(to, target, background);
-    fill<T>(pairs, between, box, first, second, time, to_scalar<T>(background), sampling == Sampling::nearest,
-            out, context);
+    const bool nearest = sampling == Sampling::nearest, start = time == 0;
+    if (nearest || (time > 0 && time < 1))
+      return fill<T>(pairs, between, box, first, second, time, to_scalar<T>(background), nearest, out,
+                     context);
+    const std::span<T> voxels = out.scalars<T>();
+    std::fill(voxels.begin(), voxels.end(), to_scalar<T>(background));
+    fill_end(pairs, between, box, start ? first : second, start ? &Pair::from : &Pair::to,
+             {start ? from.volume : to.volume, background, out}, context);
   });
   return out;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/values/error.hpp"
+#include "runtime/spheres/fixed_ball.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -20,60 +21,8 @@ constexpr double kMostVoxels = 2147483648.0;
 // Centres stay within what a 32-bit number of voxels holds with room for every sum.
 constexpr double kFarthest = 1e6;
 
-// A ball in sixteenths of a voxel from the box's first voxel.
-struct FixedBall {
-  std::array<std::int64_t, 3> centre;
-  std::int32_t limit;
-  std::array<std::int32_t, 3> low,
-      high;  // voxels of the box that it may hold, both ends included, cut to the box
-};
-
 [[noreturn]] void bad(std::size_t row, const std::string& what) {
   throw Error(ErrorKind::data, "ball " + std::to_string(row), what, "check the pose and the skeleton");
-}
-
-void check(const Ball& ball, std::size_t row) {
-  for (const double x : ball.centre) {
-    if (!(std::abs(x) < kFarthest)) bad(row, "it lies more than a million voxels away");
-  }
-  if (!(ball.radius2 <= kMostRadius * kMostRadius)) {
-    bad(row, "its radius is more than " + std::to_string(static_cast<int>(kMostRadius)) + " voxels");
-  }
-}
-
-std::int64_t floor_div(std::int64_t a, std::int64_t b) {
-  return a >= 0 ? a / b : -((-a + b - 1) / b);
-}
-
-// Rounded in the lattice, so that the box has no say.
-std::int64_t sixteenths(double x) {
-  return static_cast<std::int64_t>(std::floor(16 * x + 0.5));
-}
-
-// What rounding leaves of 256 r^2, a whole number where the lattice is the skeleton's, is not counted.
-std::int32_t limit_of(double radius2) {
-  return static_cast<std::int32_t>(std::ceil(256 * radius2 - 1e-6));
-}
-
-// Every offset from the centre of a voxel that the ball holds is at most this, sixteenths.
-std::int64_t reach_of(std::int32_t limit) {
-  return limit <= 0 ? -1 : static_cast<std::int64_t>(std::sqrt(static_cast<double>(limit - 1)));
-}
-
-// False where the ball holds nothing of the box.
-bool fix(const Ball& ball, const LatticeBox& box, FixedBall& out) {
-  out.limit = limit_of(ball.radius2);
-  const std::int64_t reach = reach_of(out.limit);
-  if (reach < 0) return false;
-  for (std::size_t a = 0; a < 3; ++a) {
-    out.centre[a] = sixteenths(ball.centre[a]) - 16 * std::int64_t{box.first[a]};
-    const std::int64_t low = -floor_div(reach - out.centre[a], 16),
-                       high = floor_div(out.centre[a] + reach, 16);
-    out.low[a] = static_cast<std::int32_t>(std::max<std::int64_t>(low, 0));
-    out.high[a] = static_cast<std::int32_t>(std::min<std::int64_t>(high, box.size[a] - 1));
-    if (out.low[a] > out.high[a]) return false;
-  }
-  return true;
 }
 
 // The first cubes.
@@ -122,12 +71,14 @@ struct CubeRows {
 class Descent {
  public:
   Descent(const std::vector<FixedBall>& balls, const LatticeBox& box, const BrickMask& mask,
-          const std::function<void(const Tile&)>& f)
+          std::int32_t bridges_from, const std::function<void(const Tile&)>& f)
       : balls_(balls),
         box_(box),
         mask_(mask),
         f_(f),
-        cubes_(static_cast<std::size_t>(cubes_along(box.size[0]))) {}
+        cubes_(static_cast<std::size_t>(cubes_along(box.size[0]))) {
+    for (CubeBalls& cube : cubes_) cube.bridges_from = bridges_from;
+  }
 
   // The cubes of a row along i.
   void row(std::span<const std::int32_t> row, std::int32_t j, std::int32_t k) {
@@ -181,6 +132,15 @@ class Descent {
 };
 
 }  // namespace
+
+void check(const Ball& ball, std::size_t row) {
+  for (const double x : ball.centre) {
+    if (!(std::abs(x) < kFarthest)) bad(row, "it lies more than a million voxels away");
+  }
+  if (!(ball.radius2 <= kMostRadius * kMostRadius)) {
+    bad(row, "its radius is more than " + std::to_string(static_cast<int>(kMostRadius)) + " voxels");
+  }
+}
 
 ImageGrid grid_of(const ImageGrid& lattice, const LatticeBox& box) {
   ImageGrid grid = lattice;
@@ -250,7 +210,8 @@ void for_tiles(const BallSet& set, const LatticeBox& box, const Context& context
     }
   });
   const CubeRows rows(balls, box);
-  tbb::enumerable_thread_specific<Descent> descents([&] { return Descent(balls, box, mask, f); });
+  tbb::enumerable_thread_specific<Descent> descents(
+      [&] { return Descent(balls, box, mask, set.bridges_from, f); });
   std::atomic<std::int64_t> done{0};
   const auto all = static_cast<std::int64_t>(rows.count());
   tbb::parallel_for(std::int64_t{0}, all, [&](std::int64_t task) {

@@ -25,17 +25,17 @@ ImageGrid posed_lattice(const VolumetricSkeleton& skeleton, const ModelVolume& v
   return cubic ? volume.image.grid : lattice_of(skeleton, finest);
 }
 
-BallSet balls_for(const Model& model, std::span<const RigidTransform> segments, const ModelVolume& volume) {
-  const VolumetricSkeleton& skeleton = spheres_for(model, volume);
-  BallSet set = balls_at_rest(skeleton, posed_lattice(skeleton, volume));
-  move_balls(skeleton, segments, set);
-  return set;
+VolumeBalls::VolumeBalls(const Model& model, const ModelVolume& volume, bool bridged, const Context& context)
+    : skeleton_(spheres_for(model, volume)),
+      rest_(balls_at_rest(skeleton_, posed_lattice(skeleton_, volume))) {
+  if (bridged) seams_ = seams_of(rest_, skeleton_.segment, model.rig.skeleton, context);
 }
 
-Seams seams_for(const Model& model, const ModelVolume& volume, const Context& context) {
-  const VolumetricSkeleton& skeleton = spheres_for(model, volume);
-  return seams_of(balls_at_rest(skeleton, posed_lattice(skeleton, volume)), skeleton.segment,
-                  model.rig.skeleton, context);
+BallSet VolumeBalls::at(std::span<const RigidTransform> segments) const {
+  BallSet set = rest_;
+  move_balls(skeleton_, segments, set);
+  bridge(seams_, segments, set);
+  return set;
 }
 
 LatticeBox box_for(const BallSet& set, const std::optional<Region>& region) {
@@ -48,9 +48,9 @@ LatticeBox box_for(const BallSet& set, const std::optional<Region>& region) {
 
 Image pose_volume(const Model& model, std::span<const RigidTransform> segments, const ModelVolume& volume,
                   const std::optional<Region>& region, Sampling sampling, const Context& context) {
-  const BallSet set = balls_for(model, segments, volume);
-  return refill(set, box_for(set, region), volume.image, volume.background,
-                volume.labels ? Sampling::nearest : sampling, context);
+  const BallSet set = VolumeBalls(model, volume, true, context).at(segments);
+  return refill(set, box_for(set, region), volume.image, volume.background, sampling_for(volume, sampling),
+                context);
 }
 
 BallSet way_back(const BallSet& set) {

@@ -25,17 +25,33 @@ const VolumetricSkeleton& spheres_for(const Model& model, const ModelVolume& vol
 /// spacing on the skeleton's.
 ImageGrid posed_lattice(const VolumetricSkeleton& skeleton, const ModelVolume& volume);
 
-/// The balls of `spheres_for` on that lattice, moved. `segments`: as PosedBody has them.
-BallSet balls_for(const Model& model, std::span<const RigidTransform> segments, const ModelVolume& volume);
+/// The balls of `spheres_for` on that lattice, to be posed again and again; where they lie at rest and where
+/// they are to be bridged is found once. Immutable; keeps a reference to the model.
+class VolumeBalls {
+ public:
+  /// `bridged`: fill what opens between segments (seams.hpp). Throws as spheres_for.
+  VolumeBalls(const Model& model, const ModelVolume& volume, bool bridged = true,
+              const Context& context = {});
 
-/// Where such balls are to be bridged (seams.hpp). Once a volume, not once a pose.
-Seams seams_for(const Model& model, const ModelVolume& volume, const Context& context = {});
+  /// `segments`: as PosedBody has them. Throws as move_balls.
+  BallSet at(std::span<const RigidTransform> segments) const;
+
+ private:
+  const VolumetricSkeleton& skeleton_;
+  BallSet rest_;
+  Seams seams_;
+};
 
 /// The voxels to fill: those of the region, or all that the lattice and the posed balls hold. Throws
 /// Error{usage} for a region without a voxel centre.
 LatticeBox box_for(const BallSet& set, const std::optional<Region>& region);
 
-/// Labels are always sampled nearest. Throws as the three above, and as refill.
+/// The sampling that is meant: labels are always sampled nearest.
+inline Sampling sampling_for(const ModelVolume& volume, Sampling wanted) {
+  return volume.labels ? Sampling::nearest : wanted;
+}
+
+/// Bridged. Throws as the three above, and as refill.
 Image pose_volume(const Model& model, std::span<const RigidTransform> segments, const ModelVolume& volume,
                   const std::optional<Region>& region, Sampling sampling, const Context& context = {});
 

@@ -59,10 +59,12 @@ std::uint64_t cell_of(const Ball& ball, double edge) {
   return key;
 }
 
-// The largest ball of every cube of `edge` voxels, rows ascending.
-std::vector<std::size_t> largest_of_cells(const BallSet& set, double edge) {
+// The largest ball of every cube of `edge` voxels, rows ascending; some only, more than `enough`, where there
+// are more cubes than that.
+std::vector<std::size_t> largest_of_cells(const BallSet& set, double edge, std::size_t enough) {
   std::unordered_map<std::uint64_t, std::size_t> best;
-  for (std::size_t b = 0; b < set.balls.size(); ++b) {
+  best.reserve(enough + 1);
+  for (std::size_t b = 0; b < set.balls.size() && best.size() <= enough; ++b) {
     if (!(set.balls[b].radius2 > 0)) continue;
     const auto [at, fresh] = best.try_emplace(cell_of(set.balls[b], edge), b);
     if (!fresh && set.balls[b].radius2 > set.balls[at->second].radius2) at->second = b;
@@ -79,7 +81,7 @@ SurfaceMesh preview(const BallSet& set, std::size_t most) {
   std::vector<std::size_t> rows;
   double edge = 1;
   do {
-    rows = largest_of_cells(set, edge);
+    rows = largest_of_cells(set, edge, 8 * most);
     edge *= rows.size() > 8 * most ? 2 : 1.25;
   } while (rows.size() > most);
   const Sphere sphere = unit_sphere();

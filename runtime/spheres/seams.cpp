@@ -203,6 +203,7 @@ std::vector<int> steps_of(const Turn& turn, const std::vector<Seam::Sheet>& shee
 
 void bridge(const Seams& seams, std::span<const RigidTransform> motions, BallSet& set) {
   const Affine index = to_index(set.lattice), space = to_space(set.lattice);
+  set.bridges_from = static_cast<std::int32_t>(set.balls.size());
   for (const Seam& seam : seams.seams) {
     for (const std::int32_t child : joints_of(seams.parent, seam.way)) {
       const auto s = static_cast<std::size_t>(child), p = static_cast<std::size_t>(seams.parent[s]);

@@ -23,6 +23,8 @@ using Voxels = hn::CappedTag<std::int32_t, 8>;
 using VoxelVector = hn::Vec<Voxels>;
 
 constexpr std::int32_t kMost = std::numeric_limits<std::int32_t>::max();
+// Added to squared distances of bridges: more than any ball's.
+constexpr std::int32_t kBehind = 1 << 30;
 
 // Squares of the distances to the nearest and the farthest voxel of the cube, along one axis.
 HWY_INLINE void add_squares(BallVector at, BallVector last, BallVector& least, BallVector& most) {
@@ -41,6 +43,11 @@ void narrow(CubeBalls& in, const std::array<std::int32_t, 3>& offset, std::int32
   const std::size_t lanes = hn::Lanes(d);
   out.reserve(in.size);
   out.clear();
+  out.bridges_from = in.bridges_from;
+  const BallVector first_bridge = hn::Set(d, in.bridges_from), behind = hn::Set(d, kBehind);
+  const auto penalty = [&](std::size_t b) HWY_ATTR {
+    return hn::IfThenElseZero(hn::Not(hn::Lt(hn::LoadU(d, &in.row[b]), first_bridge)), behind);
+  };
   const BallVector last = hn::Set(d, 16 * (edge - 1)), everything = hn::Set(d, kMost);
   const BallVector ox = hn::Set(d, 16 * offset[0]), oy = hn::Set(d, 16 * offset[1]),
                    oz = hn::Set(d, 16 * offset[2]);
@@ -52,13 +59,14 @@ void narrow(CubeBalls& in, const std::array<std::int32_t, 3>& offset, std::int32
     add_squares(hn::Sub(hn::LoadU(d, &in.z[b]), oz), last, least, most);
     hn::StoreU(least, d, &in.least[b]);
     const auto whole = hn::And(hn::Lt(most, hn::LoadU(d, &in.limit[b])), hn::FirstN(d, in.size - b));
-    bound = hn::Min(bound, hn::IfThenElse(whole, most, everything));
+    bound = hn::Min(bound, hn::IfThenElse(whole, hn::Add(most, penalty(b)), everything));
   }
   bound = hn::MinOfLanes(d, bound);
   for (std::size_t b = 0; b < in.size; b += lanes) {
     const BallVector least = hn::LoadU(d, &in.least[b]), limit = hn::LoadU(d, &in.limit[b]);
     const auto kept =
-        hn::And(hn::And(hn::Lt(least, limit), hn::Not(hn::Lt(bound, least))), hn::FirstN(d, in.size - b));
+        hn::And(hn::And(hn::Lt(least, limit), hn::Not(hn::Lt(bound, hn::Add(least, penalty(b))))),
+                hn::FirstN(d, in.size - b));
     if (hn::AllFalse(d, kept)) continue;
     const std::size_t at = out.size;
     // Not CompressStore: its masked store is slow on some processors, and there is room beyond the end.
@@ -95,13 +103,14 @@ bool draw(const CubeBalls& balls, TileOwners& out) {
   const std::size_t in_slice = 16 / lanes;
   for (std::size_t b = 0; b < balls.size; ++b) {
     const std::int32_t x = balls.x[b], y = balls.y[b], z = balls.z[b];
-    const VoxelVector row = hn::Set(d, balls.row[b]), limit = hn::Set(d, balls.limit[b]);
+    const std::int32_t penalty = balls.row[b] < balls.bridges_from ? 0 : kBehind;
+    const VoxelVector row = hn::Set(d, balls.row[b]), limit = hn::Set(d, balls.limit[b] + penalty);
     const VoxelVector dx = hn::Set(d, -32 * x), dy = hn::Set(d, -32 * y);
     for (std::size_t s = 0; s < in_slice; ++s) {
       const VoxelVector at = hn::Iota(d, static_cast<std::int32_t>(s * lanes));
       const VoxelVector i = hn::And(at, ones), j = hn::ShiftRight<2>(at);
       const VoxelVector flat =
-          hn::Add(hn::Add(hn::Mul(i, dx), hn::Mul(j, dy)), hn::Set(d, x * x + y * y + z * z));
+          hn::Add(hn::Add(hn::Mul(i, dx), hn::Mul(j, dy)), hn::Set(d, x * x + y * y + z * z + penalty));
       for (std::size_t k = 0; k < kTileEdge; ++k) {
         const std::size_t voxel = 16 * k + s * lanes;
         const VoxelVector value = hn::Sub(flat, hn::Set(d, static_cast<std::int32_t>(32 * k) * z));

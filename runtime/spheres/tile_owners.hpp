@@ -3,8 +3,9 @@
 // belong?
 //
 // Of the balls that hold a voxel's centre, the one whose centre is nearest owns it; of two as near, the one
-// of the lower row. Centres are rounded to 1/16 voxel and all distances are whole numbers of 1/256 square
-// voxels: exact, so that neither the cut into cubes nor the number of threads can change an owner.
+// of the lower row. Bridges own only what no ball of the body holds. Centres are rounded to 1/16 voxel and
+// all distances are whole numbers of 1/256 square voxels: exact, so that neither the cut into cubes nor the
+// number of threads can change an owner.
 //
 // A ball that holds a whole cube bounds the distance of its voxels to their owners, so most balls that reach
 // a cube can own nothing of it. Cubes of 16 are halved until 4, and each hands on to its eighths only the
@@ -30,6 +31,7 @@ struct CubeBalls {
   std::vector<std::int32_t> row;
   std::vector<std::int32_t> least;  ///< squared distance to the cube's nearest voxel: scratch of `narrow`
   std::size_t size = 0;             ///< the arrays are longer: vectors write beyond the end
+  std::int32_t bridges_from = 0;    ///< as BallSet has it
 
   void clear() { size = 0; }
   /// Room for `count` balls.

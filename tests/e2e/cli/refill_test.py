@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """`ecorche refill`, `tears`, `deformers` and `pose --deformer spheres`: the way through, and each mistake with its code and words."""
+import gzip
 import json
 import os
 import pathlib
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 import numpy as np
 
@@ -115,16 +117,17 @@ class Refill(unittest.TestCase):
     def test_bridges_fill_what_opens(self):
         out = self.folder / "bridge.nrrd"
         words = ("--rig", self.rig, "--pose", self.pose)
-        plain = self.ok("refill", self.few, "-o", out, *words)["frames"][0]
+        plain = self.ok("refill", self.few, "-o", out, *words, "--no-bridge")["frames"][0]
         open_ = self.read(out)[0] > 0
-        bridged = self.ok("refill", self.few, "-o", out, *words, "--bridge")["frames"][0]
+        bridged = self.ok("refill", self.few, "-o", out, *words)["frames"][0]
         self.assertGreater(bridged["balls"], plain["balls"])
         self.assertGreater(bridged["held_voxels"], plain["held_voxels"])
         self.assertLess(bridged["held_voxels"], 1.2 * plain["held_voxels"])
         self.assertEqual(int(open_.sum()), plain["held_voxels"])
-        self.assertEqual(self.ok("tears", self.few, *words, "--bridge")["frames"][0]["links"], 0)
-        self.assert_error(64, ("refill", self.few, "-o", out, "--bridge"), "--bridge", "only what is posed opens gaps")
-        self.assert_error(64, ("refill", self.few, self.bar, "-o", out, *words, "--bridge", "--back"), "--bridge")
+        self.assertEqual(self.ok("tears", self.few, *words)["frames"][0]["links"], 0)
+        # Where nothing is posed there is nothing to bridge.
+        still = self.ok("refill", self.few, "-o", out, "--bridge")["frames"][0]
+        self.assertEqual(still["held_voxels"], self.ok("refill", self.few, "-o", out, "--no-bridge")["frames"][0]["held_voxels"])
 
     def test_ways_and_meetings(self):
         table = self.folder / "way.csv"
@@ -156,6 +159,7 @@ class Refill(unittest.TestCase):
         held = [self.ok("refill", self.few, "-o", out, "--melt", "--time", t)["frames"][0]["held_voxels"] for t in (0, 0.7, 1)]
         self.assertTrue(held[0] > held[1] > held[2] == 0, held)
         words = ("--rig", self.rig, "--pose", self.pose)
+        words += ("--no-bridge",)  # which has balls of its own
         plain = self.ok("refill", self.few, "-o", out, *words)["frames"][0]["held_voxels"]
         self.assertGreater(self.ok("refill", self.few, "-o", out, *words, "--bulge", 0.4)["frames"][0]["held_voxels"], plain)
         self.assertLess(self.ok("refill", self.few, "-o", out, *words, "--bulge", -0.4)["frames"][0]["held_voxels"], plain)
@@ -190,6 +194,9 @@ class Refill(unittest.TestCase):
         self.assertEqual(len(result["sweep"]), 6)
         for row in result["sweep"]:
             self.assertTrue(row["bulged_breaks_at_deg"] == 0 or row["bulged_breaks_at_deg"] >= row["breaks_at_deg"] > 0, row)
+            self.assertTrue(row["bridged_breaks_at_deg"] == 0 or row["bridged_breaks_at_deg"] >= row["breaks_at_deg"], row)
+        said = run("tears", self.few, "--rig", self.rig, "--sweep", "--step", 90).stdout
+        self.assertRegex(said, r"elbow +flexion +\+ +breaks at +(90|180|whole) deg, bulged +\w+, bridged +\w+")
 
     def test_both_deformers_pose_a_model(self):
         model = self.folder / "m.hdf"
@@ -211,14 +218,14 @@ class Refill(unittest.TestCase):
         joined, spacing, at = self.read(self.folder / "both/spheres.nrrd")
         x, y, z = np.rint((own_at - at) / spacing).astype(int)
         self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
-        both = self.ok("deformers", model, "--volume", "labels", "--pose", pose, "--bridge", "-o", self.folder / "both")["frames"][0]
+        both = self.ok("deformers", model, "--volume", "labels", "--pose", pose, "--no-bridge", "-o", self.folder / "both")["frames"][0]
         self.assertNotEqual(both["differ"], result["differ"])
-        self.ok("pose", model, "-o", self.folder / "posed", "--pose", pose, "--volumes", "labels", "--deformer", "spheres", "--bridge")
+        self.ok("pose", model, "-o", self.folder / "posed", "--pose", pose, "--volumes", "labels", "--deformer", "spheres", "--no-bridge")
         own, _, own_at = self.read(self.folder / "posed/labels.nrrd")
         joined, spacing, at = self.read(self.folder / "both/spheres.nrrd")
         x, y, z = np.rint((own_at - at) / spacing).astype(int)
         self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
-        self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--bridge"), "tets open no gaps")
+        self.assert_error(64, ("pose", model, "-o", self.folder / "p", "--pose", pose, "--no-bridge"), "tets open no gaps")
         self.assert_error(64, ("deformers", model, "--volume", "mri", "--pose", pose), "mri")
         small = body.write(self.folder / "small")
         flat = self.folder / "flat.hdf"
@@ -271,6 +278,68 @@ class Refill(unittest.TestCase):
         self.assert_error(64, ("tears", self.few, "--rig", self.rig), "nothing is to be looked at")
         self.assert_error(64, ("tears", self.few, "--sweep"), "--rig: a rig must move the skeleton (add --rig SKELETON.yaml or MODEL.hdf)")
         self.assertFalse(out.exists())
+
+    def test_odd_masks_fill_again(self):
+        empty = np.zeros((10, 10, 10), np.uint8)
+        sheet, line, one, two = (empty.copy() for _ in range(4))
+        sheet[5, 2:8, 2:8] = line[5, 5, 2:8] = one[5, 5, 5] = two[1:4, 1:4, 1:4] = two[6:9, 6:9, 6:9] = 1
+        skeleton, out = self.folder / "odd.vtp", self.folder / "odd.nrrd"
+        for name, mask in (("all", empty + 1), ("flat", np.ones((1, 30, 30), np.uint8)), ("sheet", sheet), ("line", line), ("one", one), ("two", two)):
+            image = write_nrrd(self.folder / f"{name}.nrrd", mask)
+            made = self.ok("thin", image, "-o", skeleton, "--tp", -2, "--tree")
+            self.assertEqual((made["skeletal"], made["voxels"]["pieces"]), (int(mask.sum()), 2 if name == "two" else 1), name)
+            done = self.ok("refill", skeleton, image, "-o", out, "--object", image, "--sampling", "nearest")
+            self.assertTrue((self.read(out)[0] == mask).all(), name)
+            self.assertEqual(done["loss"]["loss_percent"], 0, name)
+        self.assert_error(65, ("thin", write_nrrd(self.folder / "empty.nrrd", empty), "-o", skeleton), "no voxel is of the object")
+        self.assert_error(65, ("thin", write_nrrd(self.folder / "long.nrrd", np.ones((1, 1, 66000), np.uint8)), "-o", skeleton), "more than 65535 voxels along an axis")
+        huge = write_nrrd(self.folder / "huge.nrrd", empty)
+        huge.write_bytes(huge.read_bytes().replace(b"sizes: 10 10 10", b"sizes: 99999 99999 99999"))
+        self.assert_error(65, ("thin", huge, "-o", skeleton), "declares 99999 x 99999 x 99999 voxels")
+
+    def test_colours_stay_with_their_voxels(self):
+        rgb = np.zeros((20, 20, 20, 3), np.uint8)
+        rgb[4:16, 4:16, 4:16] = (200, 100, 50)
+        rgb[8:12, 8:12, 8:12] = (10, 250, 30)
+        image, skeleton, out = self.folder / "rgb.nrrd", self.folder / "rgb.vtp", self.folder / "rgb_again.nrrd"
+        image.write_bytes(b"NRRD0004\ntype: uint8\ndimension: 4\nspace: left-posterior-superior\nsizes: 3 20 20 20\n"
+                          b"space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: RGB-color domain domain domain\nencoding: raw\n"
+                          b"space origin: (0,0,0)\n\n" + rgb.tobytes())
+        self.ok("thin", image, "-o", skeleton, "--component", 1, "--threshold", "50:", "--tp", -2)
+        for sampling in ("nearest", "trilinear"):
+            self.ok("refill", skeleton, image, "-o", out, "--sampling", sampling)
+            head, data = out.read_bytes().split(b"\n\n", 1)
+            self.assertIn(b"sizes: 3 20 20 20", head)
+            self.assertEqual(gzip.decompress(data) if b"gzip" in head else data, rgb.tobytes())
+        self.assert_error(64, ("thin", image, "-o", skeleton, "--component", 5, "--threshold", "50:"), "--component", "3 component(s)")
+
+    def test_a_posed_clip_is_rendered(self):
+        keys, clip, pictures = self.folder / "clip.yaml", self.folder / "clip.nrrd", self.folder / "pictures"
+        keys.write_text("ecorche_pose_sequence: 1\nskeleton: arm\nframes_per_second: 10\nkeys:\n  - {time_s: 0}\n"
+                        "  - {time_s: 1, joints: {elbow: {abduction_deg: 80}}}\n")
+        frames = self.ok("refill", self.few, self.bar, "-o", clip, "--rig", self.rig, "--motion", keys, "--frames", "0:11:5", "--sampling", "nearest")["frames"]
+        render = pathlib.Path(__file__).resolve().parents[3] / "scripts/render"
+        done = subprocess.run([render, *(frame["file"] for frame in frames), "-o", pictures, "--name", "bend", "--height", "90"],
+                              capture_output=True, text=True, timeout=200)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([pathlib.Path(line).name for line in done.stdout.split()], ["bend_0000.png", "bend_0001.png", "bend_0002.png", "bend_clip.png"])
+        data, at, drawn, size = (pictures / "bend_clip.png").read_bytes(), 8, [], None
+        while at < len(data):
+            length, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
+            body = data[at + 8:at + 8 + length]
+            if kind == b"IHDR":
+                size = (int.from_bytes(body[4:8], "big"), int.from_bytes(body[:4], "big"))
+            if kind in (b"IDAT", b"fdAT"):
+                rows = np.frombuffer(zlib.decompress(body[4 * (kind == b"fdAT"):]), np.uint8).reshape(size[0], 1 + 3 * size[1])
+                drawn.append(rows[:, 1:].reshape(*size, 3).astype(int))
+            at += 12 + length
+        self.assertEqual((len(drawn), size[0]), (3, 90))
+        shown = [np.abs(frame - frame[0, 0]).max(axis=2) > 30 for frame in drawn]
+        for mask in shown:
+            self.assertGreater(mask.mean(), 0.02)
+        # The arm swings: what is shown moves on from frame to frame.
+        for one, two in zip(shown, shown[1:]):
+            self.assertGreater((one ^ two).mean(), 0.01)
 
     def test_an_animated_picture_holds_every_frame(self):
         frames = [np.full((5, 7, 3), 40 * i, np.uint8) for i in range(3)]

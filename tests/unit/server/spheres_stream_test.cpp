@@ -7,9 +7,11 @@
 
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
+#include "proto/volume_decoder.hpp"
 #include "runtime/server/subscription.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/spheres/pose_volume.hpp"
+#include "runtime/spheres/slice.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
@@ -73,6 +75,93 @@ TEST(SpheresStream, VolumesAndRegionsEqualOfflineRefilling) {
       EXPECT_NE(rest.bytes, expected.bytes);
     }
   }
+}
+
+// Keyframes, bricks and zstd; and planes, which no pose of the whole volume is made for.
+TEST(SpheresStream, BricksAndSlicesEqualOfflineRefilling) {
+  Model model = test::toy_model();
+  // Five times as fine, so that there are bricks.
+  ModelVolume& ct = model.volumes[0];
+  const Image coarse = ct.image;
+  ImageGrid grid = coarse.grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    grid.size[a] *= 5;
+    grid.spacing[a] /= 5;
+  }
+  ct.image = Image(grid, coarse.type, coarse.components);
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i)
+        ct.image.scalars<std::int16_t>()[grid.offset(i, j, k)] =
+            coarse.scalars<std::int16_t>()[coarse.grid.offset(i / 5, j / 5, k / 5)];
+    }
+  }
+  const TestServer server({}, model);
+  TestClient client(server);
+  v1::Envelope bricks = request_for("ct"), slices = request_for("ct");
+  bricks.mutable_subscribe()->mutable_volume()->set_changed_bricks(true);
+  bricks.mutable_subscribe()->mutable_volume()->set_compressed(true);
+  std::vector<ImageGrid> planes;
+  for (const double y : {-4.0, 7.5}) {
+    v1::Slice& slice = *slices.mutable_subscribe()->mutable_volume()->add_slices();
+    slice.mutable_origin()->set_x(-20);
+    slice.mutable_origin()->set_y(y);
+    slice.mutable_u()->set_x(1.25);
+    slice.mutable_v()->set_z(3);
+    slice.set_size_u(40);
+    slice.set_size_v(90);
+    ImageGrid plane;
+    plane.size = {40, 90, 1};
+    plane.origin = {-20, y, 0};
+    plane.spacing = {1.25, 3, 1};
+    plane.direction = {1, 0, 0, 0, 0, -1, 0, 1, 0};
+    planes.push_back(plane);
+  }
+  const std::uint32_t volume = client.client().call(bricks).envelope.subscribed().subscription(),
+                      cut = client.client().call(slices).envelope.subscribed().subscription();
+  const runtime::BodyPoser poser(std::make_shared<const Model>(model));
+  runtime::PosedBody body = poser.make_frame();
+  const runtime::VolumeBalls balls(model, model.volumes[0]);
+  wire::VolumeDecoder decoder;
+  Image image;
+  std::size_t partial = 0;
+  const wire::Frame first =
+      client.next([&](const v1::Envelope& e) { return e.volume_frame().subscription() == volume; });
+  ASSERT_TRUE(decoder.decode(first.envelope.volume_frame(), first.payload, image).ok());
+  for (std::uint64_t sequence = 1; sequence < 5; ++sequence) {
+    Pose pose = client.bent(0.3);
+    // Then the tip alone turns, about the beam.
+    pose.rotation[2] = Eigen::AngleAxisd(0.02 * static_cast<double>(sequence), Eigen::Vector3d::UnitZ());
+    client.send(sequence, pose);
+    ASSERT_TRUE(poser.run(pose, runtime::Skinning::cor, {}, body).ok());
+    for (const std::uint32_t subscription : {volume, cut}) {
+      const wire::Frame frame = client.next([&](const v1::Envelope& e) {
+        return e.volume_frame().subscription() == subscription &&
+               e.volume_frame().pose_sequence() == sequence;
+      });
+      const v1::VolumeFrame& sent = frame.envelope.volume_frame();
+      ASSERT_EQ(sent.status().code(), 0U) << sent.status().message();
+      std::vector<std::byte> expected;
+      if (subscription == volume) {
+        ASSERT_TRUE(decoder.decode(sent, frame.payload, image).ok());
+        partial += sent.has_bricks() ? 1 : 0;
+        expected = runtime::pose_volume(model, body.segments, model.volumes[0], std::nullopt,
+                                        runtime::Sampling::trilinear)
+                       .bytes;
+      } else {
+        wire::VolumeDecoder plain;
+        ASSERT_TRUE(plain.decode(sent, frame.payload, image).ok());
+        for (const ImageGrid& plane : planes) {
+          Image pixels(plane, ScalarType::i16, 1);
+          runtime::refill_slice(balls.at(body.segments), model.volumes[0].image, model.volumes[0].background,
+                                runtime::Sampling::trilinear, pixels);
+          expected.insert(expected.end(), pixels.bytes.begin(), pixels.bytes.end());
+        }
+      }
+      EXPECT_EQ(image.bytes, expected) << (subscription == volume ? "bricks" : "slices") << sequence;
+    }
+  }
+  EXPECT_GT(partial, 0U);
 }
 
 TEST(SpheresStream, TetsStayWhatIsMeantWithoutAWord) {

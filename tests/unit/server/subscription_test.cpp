@@ -78,9 +78,20 @@ TEST(Subscription, WhatCannotBeDoneSaysSo) {
       {"region",
        [&](v1::Subscribe& s) {
          s.mutable_volume()->set_volume(ct);
-         s.mutable_volume()->mutable_region();
+         s.mutable_volume()->mutable_region()->mutable_min()->set_x(1);
        },
-       StatusCode::unimplemented},
+       StatusCode::invalid_argument},
+      {"slices of a region",
+       [&](v1::Subscribe& s) {
+         s.mutable_volume()->set_volume(ct);
+         s.mutable_volume()->mutable_region();
+         v1::Slice& slice = *s.mutable_volume()->add_slices();
+         slice.mutable_u()->set_x(1);
+         slice.mutable_v()->set_y(1);
+         slice.set_size_u(5);
+         slice.set_size_v(5);
+       },
+       StatusCode::invalid_argument},
       {"slices",
        [&](v1::Subscribe& s) {
          s.mutable_volume()->set_volume(ct);

@@ -143,6 +143,39 @@ TEST(Volumes, SlicesArePlanesOfThePosedVolume) {
   EXPECT_EQ(image.bytes, expected);
 }
 
+TEST(Volumes, ARegionIsThatPartOfThePosedVolume) {
+  const Model model = fine_body();
+  const TestServer server({}, model);
+  TestClient client(server);
+  v1::Envelope request;
+  v1::VolumeSelection& volume = *request.mutable_subscribe()->mutable_volume();
+  volume.set_volume(model.volumes[0].name);
+  volume.set_changed_bricks(true);
+  v1::Box& box = *volume.mutable_region();
+  box.mutable_min()->set_x(-60);
+  box.mutable_min()->set_y(-9);
+  box.mutable_min()->set_z(90);
+  box.mutable_max()->set_x(20);
+  box.mutable_max()->set_y(14);
+  box.mutable_max()->set_z(230);
+  client.client().call(request);
+  const ImageGrid& rest = model.volumes[0].image.grid;
+  const ImageGrid grid = grid_of(rest, runtime::box_within(rest, {-60, -9, 90}, {20, 14, 230}));
+  wire::VolumeDecoder decoder;
+  Image image;
+  for (std::uint64_t sequence = 0; sequence < 4; ++sequence) {
+    const Pose pose = client.bent(0.1 * static_cast<double>(sequence));
+    if (sequence > 0) client.send(sequence, pose);
+    const wire::Frame frame = next_volume(client, sequence);
+    ASSERT_TRUE(decoder.decode(frame.envelope.volume_frame(), frame.payload, image).ok());
+    const Offline offline(pose, model);
+    const Image expected = runtime::pose_volume(offline.model, offline.body.nodes, offline.model->volumes[0],
+                                                runtime::Sampling::trilinear, grid);
+    EXPECT_EQ(image.grid, grid);
+    EXPECT_EQ(image.bytes, expected.bytes);
+  }
+}
+
 // A hand-made frame of 40 x 1 x 1 voxels, two bricks, spoilt in every way.
 TEST(Volumes, WhatIsNoFrameIsRefused) {
   v1::VolumeFrame key;

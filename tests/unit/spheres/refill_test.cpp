@@ -16,6 +16,7 @@ namespace ecorche::runtime {
 namespace {
 
 using test::BentCylinder;
+using test::for_voxels;
 
 constexpr double kEverything = -1e9;  // thinness that keeps every voxel
 
@@ -23,16 +24,6 @@ BallSet posed(const VolumetricSkeleton& skeleton, std::span<const RigidTransform
   BallSet set = balls_at_rest(skeleton, skeleton.grid);
   move_balls(skeleton, motions, set);
   return set;
-}
-
-// Calls f(i, j, k) for every voxel of a box, in lattice indices.
-template <class F>
-void for_voxels(const LatticeBox& box, F&& f) {
-  for (std::int32_t k = 0; k < box.size[2]; ++k) {
-    for (std::int32_t j = 0; j < box.size[1]; ++j) {
-      for (std::int32_t i = 0; i < box.size[0]; ++i) f(box.first[0] + i, box.first[1] + j, box.first[2] + k);
-    }
-  }
 }
 
 // Owners of every voxel of the box.
