@@ -23,18 +23,6 @@ bool is_model(const fs::path& path) {
   return path.extension() == ".hdf";
 }
 
-Rig read_rig(const fs::path& path) {
-  if (is_model(path)) return model_file::read(path, {}).rig;
-  Rig rig{io::read_skeleton(path), {}};
-  for (const Segment& segment : rig.skeleton.segments) {
-    if (segment.joint.rule != CenterRule::given)
-      throw Error(ErrorKind::config, path.string(),
-                  "joint '" + segment.joint.name + "' is to be fitted to bones",
-                  "name a model, whose rig is fitted");
-  }
-  return rig;
-}
-
 // Its voxels on the rows of `rig`.
 void hang_on(const fs::path& path, const std::vector<std::string>& names, const Rig& rig,
              VolumetricSkeleton& skeleton) {
@@ -55,11 +43,23 @@ void hang_on(const fs::path& path, const std::vector<std::string>& names, const 
 
 }  // namespace
 
+Rig read_placed_rig(const fs::path& path) {
+  if (is_model(path)) return model_file::read(path, {}).rig;
+  Rig rig{io::read_skeleton(path), {}};
+  for (const Segment& segment : rig.skeleton.segments) {
+    if (segment.joint.rule != CenterRule::given)
+      throw Error(ErrorKind::config, path.string(),
+                  "joint '" + segment.joint.name + "' is to be fitted to bones",
+                  "name a model, whose rig is fitted");
+  }
+  return rig;
+}
+
 std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const fs::path& skeleton, const fs::path& rig) {
   if (!is_model(skeleton)) {
     io::VolumetricSkeletonFile file = io::read_volumetric_skeleton(skeleton);
     if (rig.empty()) return {std::move(file.skeleton), Rig()};
-    Rig moved_by = read_rig(rig);
+    Rig moved_by = read_placed_rig(rig);
     hang_on(skeleton, file.segments, moved_by, file.skeleton);
     return {std::move(file.skeleton), std::move(moved_by)};
   }
@@ -71,7 +71,7 @@ std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const fs::path& skeleto
   if (rig.empty()) return {std::move(own), std::move(model.rig)};
   std::vector<std::string> names;
   for (const Segment& segment : model.rig.skeleton.segments) names.push_back(segment.name);
-  Rig moved_by = read_rig(rig);
+  Rig moved_by = read_placed_rig(rig);
   hang_on(skeleton, names, moved_by, own);
   return {std::move(own), std::move(moved_by)};
 }

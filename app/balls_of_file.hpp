@@ -15,6 +15,10 @@
 
 namespace ecorche::app {
 
+/// The rig of a skeleton file (.yaml) whose every centre is given, or of a model (.hdf). Throws as the
+/// readers do; Error{config} for a joint without its centre.
+Rig read_placed_rig(const std::filesystem::path& path);
+
 /// A skeleton by itself (.vtp), or the first of a model (.hdf); and the rig that moves it: of `rig`, a
 /// skeleton file whose every centre is given (.yaml) or a model, else of the model that the skeleton came
 /// from, else empty. With a rig the voxels hang on its rows, matched by the names of segments. Throws as the

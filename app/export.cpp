@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "app/balls_of_file.hpp"
 #include "app/command.hpp"
 #include "app/export_rig.hpp"
 #include "app/tet_regions.hpp"
@@ -28,8 +29,22 @@ std::string to_text(const nlohmann::json& rig) {
          " frames, " + rig["frames_clamped"].dump() + " of them within limits only" + text;
 }
 
+// A model, or a skeleton file as one that has nothing but its rig.
+Model read(const Program& program, const Settings& settings) {
+  if (settings.model.extension() != ".yaml")
+    return model_file::read(settings.model, program.context("reading"));
+  for (const std::filesystem::path& output : settings.outputs) {
+    if (!is_rig_file(output))
+      throw Error(ErrorKind::usage, output.string(), "a skeleton has no tets",
+                  "name a .glb or .bvh, or give a model");
+  }
+  Model model;
+  model.rig = read_placed_rig(settings.model);
+  return model;
+}
+
 int run(const Program& program, const Settings& settings) {
-  const Model model = model_file::read(settings.model, program.context("reading"));
+  const Model model = read(program, settings);
   const io::TetRegions regions = tet_regions(model);
   const Context context = program.context("writing");
   nlohmann::json written = nlohmann::json::array(), rigs = nlohmann::json::array();
@@ -62,7 +77,9 @@ void declare_export(CLI::App& app, Program& program, Run& chosen) {
   auto* command = app.add_subcommand(
       "export", "a model for other programs: its rest tets with their regions, or its rig with a motion");
   auto s = std::make_shared<Settings>();
-  command->add_option("model", s->model, "the model, a .hdf file")->required();
+  command
+      ->add_option("model", s->model, "a model (.hdf), or a skeleton file (.yaml) whose rig alone is written")
+      ->required();
   command
       ->add_option(
           "-o,--output", s->outputs,

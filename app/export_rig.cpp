@@ -24,10 +24,15 @@ struct Played {
   std::size_t clamped = 0;
 };
 
-Played play(const Program& program, const Model& model, const RigChoice& choice, const Context& context) {
+Played play(const Program& program, const Model& model, const RigChoice& choice, bool still,
+            const Context& context) {
   Played out;
   out.clip = kinematics::rig_clip(model.rig, "rest", 1.0 / 30);
-  if (choice.motion.file.empty()) return out;
+  if (choice.motion.file.empty()) {
+    // A BVH is never without a frame: that of the scan.
+    if (still) kinematics::add_frame(model.rig, Pose::rest(model.rig.skeleton.segments.size()), out.clip);
+    return out;
+  }
   const auto motion = open_motion(program, choice.motion, model.rig);
   out.clip = kinematics::rig_clip(model.rig, choice.motion.file.stem().string(), motion->frame_seconds());
   const std::size_t step = std::max<std::size_t>(1, motion->frames() / kMeasured);
@@ -71,9 +76,7 @@ nlohmann::json export_rig(const Program& program, const Model& model, const RigC
                           const std::filesystem::path& path) {
   const Context context = program.context("writing " + path.filename().string());
   const bool bvh = path.extension() == ".bvh";
-  if (bvh && choice.motion.file.empty())
-    throw Error(ErrorKind::usage, path.string(), "a BVH needs a motion", "add --motion FILE");
-  const Played played = play(program, model, choice, context);
+  const Played played = play(program, model, choice, bvh, context);
   nlohmann::json out{{"file", path.string()},
                      {"joints", played.clip.joints.size()},
                      {"frames", played.clip.frames()},

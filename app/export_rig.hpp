@@ -23,8 +23,8 @@ bool is_rig_file(const std::filesystem::path& path);
 
 /// Writes the skeleton with the motion, within its limits: `.glb` also with the tissues, skinned by four
 /// influences, `.bvh` in cm. Returns what it did; a `.glb`'s says what cutting to four influences costs, by
-/// linear blending over the motion's frames. Throws Error{usage} for tissues that the model has not, or a
-/// `.bvh` without motion.
+/// linear blending over the motion's frames. Without a motion a `.bvh` has the scan as its only frame. Throws
+/// Error{usage} for tissues that the model has not.
 nlohmann::json export_rig(const Program& program, const Model& model, const RigChoice& choice,
                           const std::filesystem::path& path);
 

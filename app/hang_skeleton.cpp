@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/hang_skeleton.hpp"
 
+#include "app/point_table.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/case/attachment_file.hpp"
 #include "io/case/case_file.hpp"
 #include "preprocess/thin/attach.hpp"
+#include "preprocess/thin/picks.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -27,6 +29,25 @@ Skeleton read_rig(const Program& program, const HangSettings& settings) {
   return skeleton;
 }
 
+std::vector<thin::Pick> read_picks(const std::filesystem::path& path) {
+  std::vector<thin::Pick> out;
+  for (const NamedPoint& point : read_named_points(path))
+    out.push_back({point.name, point.parent, Eigen::Vector3d(point.at.data())});
+  return out;
+}
+
+// Where each joint was moved to, told and written.
+void say_snapped(const Program& program, const HangSettings& settings, const Skeleton& rig,
+                 const std::vector<thin::Snapped>& moved, nlohmann::json& report) {
+  double farthest = 0;
+  for (const thin::Snapped& joint : moved) {
+    report["snapped_mm"][joint.joint] = joint.moved_mm;
+    farthest = std::max(farthest, joint.moved_mm);
+  }
+  program.note("joints moved to skeletal voxels by at most " + std::to_string(farthest) + " mm");
+  if (!settings.snapped.empty()) files::write_text(settings.snapped, io::skeleton_to_yaml(rig));
+}
+
 void check_joints(const std::vector<std::string>& outside) {
   if (outside.empty()) return;
   std::string names;
@@ -41,17 +62,22 @@ void check_joints(const std::vector<std::string>& outside) {
 void attach(const Program& program, const HangSettings& settings, const thin::Mask& mask,
             io::VolumetricSkeletonFile& file, StepClock& clock, nlohmann::json& report) {
   VolumetricSkeleton& s = file.skeleton;
-  Skeleton rig = read_rig(program, settings);
-  if (settings.snap) {
-    double farthest = 0;
-    for (const thin::Snapped& joint : thin::snap_joints(s, rig)) {
-      report["snapped_mm"][joint.joint] = joint.moved_mm;
-      farthest = std::max(farthest, joint.moved_mm);
-    }
-    program.note("joints moved to skeletal voxels by at most " + std::to_string(farthest) + " mm");
-    if (!settings.snapped.empty()) files::write_text(settings.snapped, io::skeleton_to_yaml(rig));
+  std::vector<thin::Snapped> moved;
+  Skeleton rig;
+  if (!settings.picks.empty()) {
+    rig = thin::skeleton_of_picks(s, read_picks(settings.picks), moved);
+    for (const Segment& segment : rig.segments)
+      report["parents"][segment.name] =
+          segment.parent < 0 ? nlohmann::json()
+                             : nlohmann::json(rig.segments[static_cast<std::size_t>(segment.parent)].name);
   } else {
+    rig = read_rig(program, settings);
+    if (settings.snap) moved = thin::snap_joints(s, rig);
+  }
+  if (moved.empty()) {
     check_joints(thin::joints_outside(mask, rig));
+  } else {
+    say_snapped(program, settings, rig, moved, report);
   }
   const thin::Attachment attachment =
       clock.time("attach", [&] { return thin::attach(s, mask, rig, program.context("attaching")); });
@@ -86,6 +112,10 @@ void add_hang_options(CLI::App& command, HangSettings& settings) {
   command.add_option("--skeleton", settings.skeleton,
                      "a skeleton file (LPS mm): hang every voxel on one of its segments");
   command.add_option("--model", settings.model, "or the fitted rig of this model");
+  command.add_option(
+      "--picks", settings.picks,
+      "or points picked by hand (CSV: x,y,z and perhaps name,parent; the first is the root): each "
+      "moves to the nearest skeletal voxel, parents are found along the tree");
   command.add_flag("--snap", settings.snap, "first move every joint to the nearest skeletal voxel");
   command.add_option("--snapped", settings.snapped, "write the skeleton file with the joints so moved");
   command.add_option("--reassign", settings.reassign, "splits and regions that say otherwise, by hand");
@@ -94,11 +124,15 @@ void add_hang_options(CLI::App& command, HangSettings& settings) {
 void check_hang_options(const HangSettings& settings) {
   if (!settings.skeleton.empty() && !settings.model.empty())
     refuse("--model", "stands beside --skeleton", "give one of the two");
+  if (!settings.picks.empty() && (!settings.skeleton.empty() || !settings.model.empty()))
+    refuse("--picks", "stands beside --skeleton or --model", "give one of them");
+  if (!settings.picks.empty() && settings.snapped.empty())
+    refuse("--picks", "nothing keeps the skeleton that they make", "add --snapped SKELETON.yaml");
   if (!settings.attaches() && settings.snap)
     refuse("--snap", "there are no joints to move", "give --skeleton or --model");
   if (!settings.attaches() && !settings.reassign.empty())
-    refuse("--reassign", "nothing is attached", "give --skeleton or --model");
-  if (!settings.snap && !settings.snapped.empty())
+    refuse("--reassign", "nothing is attached", "give --skeleton, --model or --picks");
+  if (!settings.snap && settings.picks.empty() && !settings.snapped.empty())
     refuse("--snapped", "joints are not moved", "give --snap as well");
 }
 

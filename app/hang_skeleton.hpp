@@ -16,10 +16,10 @@ namespace ecorche::app {
 struct HangSettings {
   bool tree = false;
   thin::TreeOptions options;
-  std::filesystem::path skeleton, model, reassign, snapped;
+  std::filesystem::path skeleton, model, picks, reassign, snapped;
   bool snap = false;
 
-  bool attaches() const { return !skeleton.empty() || !model.empty(); }
+  bool attaches() const { return !skeleton.empty() || !model.empty() || !picks.empty(); }
 };
 
 /// `--tree` and what belongs to it. `settings` must outlive the command line's parsing.
@@ -29,8 +29,8 @@ void add_hang_options(CLI::App& command, HangSettings& settings);
 void check_hang_options(const HangSettings& settings);
 
 /// Makes the tree where it is asked for or needed, and hangs every voxel on a segment of the skeleton file or
-/// of the model's rig where one is given; `mask` is then what was thinned. Throws what the stages throw,
-/// Error{config} for joints outside the object.
+/// of the model's rig, or one made of picked points, where one is given; `mask` is then what was thinned.
+/// Throws what the stages throw, Error{config} for joints outside the object.
 void hang(const Program& program, const HangSettings& settings, const thin::Mask& mask,
           io::VolumetricSkeletonFile& file, StepClock& clock, nlohmann::json& report);
 

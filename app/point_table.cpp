@@ -5,11 +5,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string_view>
 
 #include "core/files/atomic_file.hpp"
 #include "core/values/error.hpp"
+#include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -46,6 +48,59 @@ std::string quoted(const std::string& text) {
   return out + '"';
 }
 
+// A line of a table.
+struct Row {
+  std::string where;
+  std::array<float, 3> point{};
+  std::map<std::string, std::string> cells;  // by column, where the columns have names
+
+  std::string cell(const std::string& column) const {
+    const auto found = cells.find(column);
+    return found == cells.end() ? std::string() : found->second;
+  }
+};
+
+std::vector<Row> rows_of(const std::filesystem::path& path) {
+  const std::string text = files::read_text(path);
+  std::vector<Row> rows;
+  std::vector<std::string> names;  // of the columns
+  std::array<std::size_t, 3> columns{0, 1, 2};
+  std::size_t line_number = 0;
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = trimmed(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    ++line_number;
+    if (line.empty() || line.front() == '#') continue;
+    const std::vector<std::string_view> cells = cells_of(line);
+    Row row{path.string() + ":" + std::to_string(line_number), {}, {}};
+    if (rows.empty() && names.empty() && !number(cells[0])) {
+      names.assign(cells.begin(), cells.end());
+      constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
+      for (std::size_t a = 0; a < 3; ++a) {
+        const auto found = std::find(cells.begin(), cells.end(), axes[a]);
+        if (found == cells.end())
+          throw Error(ErrorKind::data, row.where, "no column is named '" + std::string(axes[a]) + "'",
+                      "begin with a line x,y,z, or with the first point");
+        columns[a] = static_cast<std::size_t>(found - cells.begin());
+      }
+      continue;
+    }
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::optional<float> value = columns[a] < cells.size() ? number(cells[columns[a]]) : std::nullopt;
+      if (!value || (names.empty() && cells.size() != 3))
+        throw Error(ErrorKind::data, row.where, "'" + std::string(line) + "' is no point",
+                    "give x, y and z in mm with commas between");
+      row.point[a] = *value;
+    }
+    for (std::size_t c = 0; c < std::min(names.size(), cells.size()); ++c) row.cells[names[c]] = cells[c];
+    rows.push_back(std::move(row));
+  }
+  if (rows.empty())
+    throw Error(ErrorKind::data, path.string(), "it holds no points", "give a line x,y,z for each point");
+  return rows;
+}
+
 void append_line(std::string& out, const nlohmann::json& cells) {
   bool first = true;
   for (const nlohmann::json& cell : cells) {
@@ -59,42 +114,22 @@ void append_line(std::string& out, const nlohmann::json& cells) {
 }  // namespace
 
 std::vector<float> read_points(const std::filesystem::path& path) {
-  const std::string text = files::read_text(path);
   std::vector<float> points;
-  std::array<std::size_t, 3> columns{0, 1, 2};
-  bool named = false;
-  std::size_t line_number = 0;
-  for (std::string_view rest = text; !rest.empty();) {
-    const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const std::string_view line = trimmed(rest.substr(0, end));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-    ++line_number;
-    if (line.empty() || line.front() == '#') continue;
-    const std::vector<std::string_view> cells = cells_of(line);
-    const std::string where = path.string() + ":" + std::to_string(line_number);
-    if (points.empty() && !named && !number(cells[0])) {
-      constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
-      for (std::size_t a = 0; a < 3; ++a) {
-        const auto found = std::find(cells.begin(), cells.end(), axes[a]);
-        if (found == cells.end())
-          throw Error(ErrorKind::data, where, "no column is named '" + std::string(axes[a]) + "'",
-                      "begin with a line x,y,z, or with the first point");
-        columns[a] = static_cast<std::size_t>(found - cells.begin());
-      }
-      named = true;
-      continue;
-    }
-    for (const std::size_t column : columns) {
-      const std::optional<float> value = column < cells.size() ? number(cells[column]) : std::nullopt;
-      if (!value || (!named && cells.size() != 3))
-        throw Error(ErrorKind::data, where, "'" + std::string(line) + "' is no point",
-                    "give x, y and z in mm with commas between");
-      points.push_back(*value);
+  for (const Row& row : rows_of(path)) points.insert(points.end(), row.point.begin(), row.point.end());
+  return points;
+}
+
+std::vector<NamedPoint> read_named_points(const std::filesystem::path& path) {
+  std::vector<NamedPoint> out;
+  for (const Row& row : rows_of(path)) {
+    out.push_back({row.cell("name"), row.cell("parent"), {row.point[0], row.point[1], row.point[2]}});
+    for (const std::string& name : {out.back().name, out.back().parent}) {
+      if (!name.empty() && !io::yaml::is_identifier(name))
+        throw Error(ErrorKind::data, row.where, "'" + name + "' is no name",
+                    "use a to z, 0 to 9 and _, at most 64 of them");
     }
   }
-  if (points.empty())
-    throw Error(ErrorKind::data, path.string(), "it holds no points", "give a line x,y,z for each point");
-  return points;
+  return out;
 }
 
 std::string csv_of(const nlohmann::json& columns, const nlohmann::json& rows) {

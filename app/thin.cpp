@@ -229,8 +229,9 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen) {
       ->capture_default_str();
   add_hang_options(*command, s->hang);
   command->callback([&program, &chosen, s, command] {
-    for (const char* option : {"--threshold", "--labels", "--component", "--largest", "--boundary",
-                               "--isotropic", "--metric", "--distance-map", "--skeleton", "--model"}) {
+    for (const char* option :
+         {"--threshold", "--labels", "--component", "--largest", "--boundary", "--isotropic", "--metric",
+          "--distance-map", "--skeleton", "--model", "--picks"}) {
       if (command->count(option) > 0) s->for_images.emplace_back(option);
     }
     chosen = [&program, s] { return run(program, *s); };

@@ -16,12 +16,6 @@ namespace {
 using Eigen::Vector3d;
 constexpr std::int32_t none = VolumetricSkeleton::none;
 
-Vector3d place(const VolumetricSkeleton& s, std::size_t row) {
-  const auto& v = s.voxel[row];
-  const auto p = s.grid.point(v[0], v[1], v[2]);
-  return {p[0], p[1], p[2]};
-}
-
 bool is_inside(const Mask& mask, const Vector3d& index) {
   std::array<int, 3> v{};
   for (std::size_t a = 0; a < 3; ++a) {
@@ -110,7 +104,7 @@ struct Way {
 
 void spread(const VolumetricSkeleton& s, const std::vector<std::int32_t>& order, std::vector<Way>& ways) {
   const auto edge = [&](std::size_t child, std::size_t parent) {
-    return (place(s, child) - place(s, parent)).norm();
+    return (voxel_place(s, child) - voxel_place(s, parent)).norm();
   };
   const auto relax = [&](std::size_t to, std::size_t from, double mm) {
     ways[to] = std::min(ways[to], Way{ways[from].mm + mm, ways[from].seed});
@@ -177,18 +171,30 @@ bool within(const AttachmentRegion& region, const Vector3d& p) {
 
 }  // namespace
 
+Vector3d voxel_place(const VolumetricSkeleton& s, std::size_t row) {
+  const auto& v = s.voxel[row];
+  const auto p = s.grid.point(v[0], v[1], v[2]);
+  return {p[0], p[1], p[2]};
+}
+
+std::size_t nearest_voxel(const VolumetricSkeleton& skeleton, const Vector3d& to) {
+  double best = std::numeric_limits<double>::infinity();
+  std::size_t out = 0;
+  for (std::size_t r = 0; r < skeleton.size(); ++r) {
+    const double square = (voxel_place(skeleton, r) - to).squaredNorm();
+    if (square < best) best = square, out = r;
+  }
+  return out;
+}
+
 std::vector<Snapped> snap_joints(const VolumetricSkeleton& skeleton, Skeleton& rig) {
   std::vector<Snapped> moved;
+  if (skeleton.size() == 0) return moved;
   for (Segment& segment : rig.segments) {
-    double best = std::numeric_limits<double>::infinity();
-    Vector3d to = segment.joint.center;
-    for (std::size_t r = 0; r < skeleton.size(); ++r) {
-      const Vector3d p = place(skeleton, r);
-      const double square = (p - segment.joint.center).squaredNorm();
-      if (square < best) best = square, to = p;
-    }
-    if (skeleton.size() > 0) moved.push_back({segment.joint.name, std::sqrt(best)});
-    segment.joint.center = to;
+    Vector3d& center = segment.joint.center;
+    const Vector3d to = voxel_place(skeleton, nearest_voxel(skeleton, center));
+    moved.push_back({segment.joint.name, (to - center).norm()});
+    center = to;
   }
   return moved;
 }
@@ -211,7 +217,7 @@ Attachment attach(const VolumetricSkeleton& s, const Mask& mask, const Skeleton&
   out.segment.assign(s.size(), none);
   tbb::parallel_for(std::size_t{0}, s.size(), [&](std::size_t r) {
     if (context.stop.stop_requested()) return;
-    const Vector3d p = place(s, r);
+    const Vector3d p = voxel_place(s, r);
     out.segment[r] = nearest_segment(bones, p, [&](const Vector3d& to) { return line_inside(mask, p, to); });
   });
   context.check_stop();
@@ -227,7 +233,7 @@ Attachment attach(const VolumetricSkeleton& s, const Mask& mask, const Skeleton&
     if (s.parent[r] >= 0 || ways[r].seed != Way().seed) continue;
     ++out.far_components;
     ways[r] = {0, static_cast<std::int32_t>(r)};
-    out.segment[r] = nearest_segment(bones, place(s, r), [](const Vector3d&) { return true; });
+    out.segment[r] = nearest_segment(bones, voxel_place(s, r), [](const Vector3d&) { return true; });
   }
   if (out.far_components > 0) spread(s, order, ways);
   for (std::size_t r = 0; r < s.size(); ++r)
@@ -246,7 +252,7 @@ std::size_t reassign(const VolumetricSkeleton& s, const Skeleton& rig, const Rea
       refuse("joint '" + split.joint + "' is the root's", "split at a joint between two segments");
     const Plane plane = split_plane(rig, row);
     for (std::size_t r = 0; r < s.size(); ++r) {
-      const Vector3d way = place(s, r) - plane.at;
+      const Vector3d way = voxel_place(s, r) - plane.at;
       if ((segment[r] != row && segment[r] != parent) || way.norm() > split.within_mm) continue;
       segment[r] = way.dot(plane.normal) > 0 ? row : parent;
     }
@@ -255,7 +261,7 @@ std::size_t reassign(const VolumetricSkeleton& s, const Skeleton& rig, const Rea
     const std::int32_t to = segment_row(rig, region.segment);
     const std::int32_t from = region.from.empty() ? none : segment_row(rig, region.from);
     for (std::size_t r = 0; r < s.size(); ++r) {
-      if ((region.from.empty() || segment[r] == from) && within(region, place(s, r))) segment[r] = to;
+      if ((region.from.empty() || segment[r] == from) && within(region, voxel_place(s, r))) segment[r] = to;
     }
   }
   std::size_t changed = 0;

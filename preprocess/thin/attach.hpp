@@ -13,13 +13,20 @@
 
 namespace ecorche::thin {
 
+/// The centre of a skeletal voxel, LPS mm.
+Eigen::Vector3d voxel_place(const VolumetricSkeleton& skeleton, std::size_t row);
+
+/// Row of the skeletal voxel nearest to a place, LPS mm; the first in memory among equals. At least one
+/// voxel.
+std::size_t nearest_voxel(const VolumetricSkeleton& skeleton, const Eigen::Vector3d& to);
+
 /// A joint that was moved.
 struct Snapped {
   std::string joint;
   double moved_mm = 0;
 };
 
-/// Moves every joint's centre to the centre of the nearest skeletal voxel, the first in memory among equals.
+/// Moves every joint's centre to the centre of its nearest_voxel.
 std::vector<Snapped> snap_joints(const VolumetricSkeleton& skeleton, Skeleton& rig);
 
 /// The joints whose nearest voxel is background, by name.

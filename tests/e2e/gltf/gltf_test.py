@@ -86,12 +86,11 @@ class Gltf(unittest.TestCase):
             self.assertLess(farthest(vertices(self.folder / kind / "skin.obj"), source), 0.1, kind)
 
     def test_refusals(self):
-        for words, part in ((("-o", self.folder / "a.bvh"), "a BVH needs a motion"),
-                            (("-o", self.folder / "a.glb", "--tissues", "wing"), "the model has no 'wing'")):
-            result = subprocess.run([ECORCHE, "export", MODEL, *words], capture_output=True, text=True)
-            self.assertEqual(result.returncode, 64, result.stderr)
-            self.assertIn(part, result.stderr)
-            self.assertFalse(words[1].exists())
+        out = self.folder / "a.glb"
+        result = subprocess.run([ECORCHE, "export", MODEL, "-o", out, "--tissues", "wing"], capture_output=True, text=True)
+        self.assertEqual(result.returncode, 64, result.stderr)
+        self.assertIn("the model has no 'wing'", result.stderr)
+        self.assertFalse(out.exists())
 
 
 if __name__ == "__main__":
