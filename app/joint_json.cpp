@@ -36,6 +36,10 @@ Json joint_json(const Rig& rig, std::size_t row) {
                       {"min_deg", limit(angle.min)},
                       {"max_deg", limit(angle.max)}});
   }
+  Json coupled = Json::array();
+  for (const Coupling& by : joint.coupled) {
+    coupled.push_back({{"joint", by.joint}, {"angle", by.angle}, {"drives", by.drives}, {"ratio", by.ratio}});
+  }
   return {{"segment", segment.name},
           {"parent", segment.parent < 0
                          ? Json()
@@ -45,6 +49,8 @@ Json joint_json(const Rig& rig, std::size_t row) {
           {"center_mm", {joint.center[0], joint.center[1], joint.center[2]}},
           {"axes", axes},
           {"angles", angles},
+          {"limits_source", joint.limits_source},
+          {"coupled", coupled},
           {"fit",
            {{"rule", center_rule_name(fit.rule)},
             {"radius_mm", fit.radius_mm},

@@ -18,7 +18,7 @@ namespace ecorche::app {
 namespace {
 
 struct Settings {
-  std::filesystem::path case_path, output, bones;
+  std::filesystem::path case_path, output, bones, evidence;
   io::CaseOptions input;
 };
 
@@ -41,6 +41,16 @@ std::string to_text(const nlohmann::json& rig) {
     }
     out += "\n";
   }
+  for (const nlohmann::json& row : rig) {
+    for (const nlohmann::json& by : row["coupled"]) {
+      char line[256];
+      std::snprintf(line, sizeof line, "  %s %s follows %s %s x %g\n",
+                    row["joint"].get<std::string>().c_str(), by["drives"].get<std::string>().c_str(),
+                    by["joint"].get<std::string>().c_str(), by["angle"].get<std::string>().c_str(),
+                    by["ratio"].get<double>());
+      out += line;
+    }
+  }
   return out + "For training and education, not for planning surgery.";
 }
 
@@ -54,10 +64,29 @@ void write_bones(const std::filesystem::path& folder, const Case& patient, const
   }
 }
 
+// What each joint was found on: for pictures of it.
+void write_evidence(const std::filesystem::path& file, const Rig& rig,
+                    const std::vector<rig::JointEvidence>& evidence) {
+  const auto numbers = [](const Eigen::Vector3d& v) { return nlohmann::json::array({v.x(), v.y(), v.z()}); };
+  nlohmann::json joints = nlohmann::json::object();
+  for (std::size_t row = 0; row < evidence.size(); ++row) {
+    nlohmann::json vertices = nlohmann::json::array();
+    for (const Eigen::Vector3d& v : evidence[row].vertices) vertices.push_back(numbers(v));
+    joints[rig.skeleton.segments[row].joint.name] = {{"rule", center_rule_name(evidence[row].rule)},
+                                                     {"center_mm", numbers(evidence[row].at)},
+                                                     {"axis", numbers(evidence[row].axis)},
+                                                     {"radius_mm", evidence[row].radius},
+                                                     {"vertices_mm", vertices}};
+  }
+  files::write_text(file, joints.dump());
+}
+
 int run(const Program& program, const Settings& settings) {
   Case patient = io::read_case(settings.case_path, settings.input, program.context("read"));
   label_surfaces::resolve(patient, program.context("surfaces"));
-  const Rig rig = rig::fit(patient, program.context("rig"));
+  std::vector<rig::JointEvidence> evidence;
+  const Rig rig = rig::fit(patient, program.context("rig"), &evidence);
+  if (!settings.evidence.empty()) write_evidence(settings.evidence, rig, evidence);
   if (!settings.bones.empty()) write_bones(settings.bones, patient, rig.skeleton);
   if (!settings.output.empty()) {
     // The rig as it stands is its own rest: every centre, axis and angle given.
@@ -79,6 +108,8 @@ void declare_rig(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("-o,--output", settings->output,
                       "write the skeleton with every centre, axis and rest angle");
   command->add_option("--bones", settings->bones, "write each segment's bones as one STL into this folder");
+  command->add_option("--evidence", settings->evidence,
+                      "write the vertices, spheres and cylinders that joints were found on, as JSON");
   add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

@@ -20,9 +20,13 @@ struct Region {
   std::string bone;     ///< of the case
   std::string segment;  ///< all its bones together
   /// Vertices within any of these; LPS mm, or shares (0 to 1) of the bones' own box along LPS where
-  /// `of_bones`.
+  /// `of_bones`, or widths of the bone's end nearest to segment `near` in the frame of that end
+  /// (preprocess/rig/bone_end.hpp), where it is named.
   std::vector<Eigen::AlignedBox3d> boxes;
   bool of_bones = false;
+  std::string near;
+  /// Beside `near`: the axis of a cylinder is within 60 degrees of this direction of that frame; zero: any.
+  Eigen::Vector3d along = Eigen::Vector3d::Zero();
   Points points = Points(0, 3);  ///< LPS mm; each stands for the vertex nearest to it
 };
 

@@ -30,8 +30,7 @@ void need_place(const PlacedRegion& placed, const Case& patient) {
     placed.value.at("bone").fail_unknown("bone", region.bone, bones);
   std::vector<std::string> segments;
   for (const Segment& segment : patient.skeleton.segments) segments.push_back(segment.name);
-  if (!region.segment.empty() && !holds(segments, region.segment))
-    placed.value.at("segment").fail_unknown("segment", region.segment, segments);
+  need_segments(placed, segments);
 }
 
 void place_vertices(PlacedRegion& placed, const Case& patient) {

@@ -55,6 +55,9 @@ struct PlacedRegion {
 };
 std::vector<PlacedRegion> parse_regions(const yaml::Value& value, const Frame& frame);
 
+/// Refuses a region on, or near, a segment that is none of these.
+void need_segments(const PlacedRegion& placed, const std::vector<std::string>& segments);
+
 /// A regions file; LPS mm.
 std::string regions_to_yaml(const std::vector<Region>& regions);
 

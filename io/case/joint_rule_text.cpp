@@ -94,6 +94,8 @@ std::string regions_to_yaml(const std::vector<Region>& regions) {
     if (!region.boxes.empty()) {
       out += ", boxes: [" + joined(region.boxes, box_to_yaml) + "]";
       if (region.of_bones) out += ", of: bones";
+      if (!region.near.empty()) out += ", " + word("near", region.near);
+      if (!region.along.isZero()) out += ", along: " + write_vector(region.along);
     }
     if (region.points.rows() > 0) {
       out += ", points: [";

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Named regions of bones: `regions.yaml` of a case, or `regions` of a skeleton.
+#include <algorithm>
+
 #include "io/case/joint_rule_file.hpp"
 #include "io/case/skeleton_file.hpp"
 
@@ -45,9 +47,22 @@ PlacedRegion read_region(const std::string& name, const Value& value, const Fram
       of->fail("'" + of->text() + "' holds no boxes", "write of: bones, or leave it out");
     region.of_bones = true;
   }
+  if (const auto near = value.find("near")) {
+    region.near = near->identifier();
+    if (region.of_bones) near->fail("says again where boxes lie", "keep of or near");
+    if (region.near == region.segment) near->fail("is the region's own segment", "name its neighbour");
+    if (!value.find("boxes")) near->fail("is for boxes", "list boxes, or leave it out");
+  }
+  if (const auto along = value.find("along")) {
+    if (region.near.empty()) along->fail("is for boxes near a segment", "name it by near, or leave it out");
+    const auto numbers = along->numbers<3>();
+    region.along = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]);
+    if (!(region.along.norm() > 0)) along->fail("has no length", "write a direction");
+    region.along.normalize();
+  }
   if (const auto boxes = value.find("boxes")) {
     for (const Value& box : boxes->items())
-      region.boxes.push_back(read_box(box, region.of_bones ? Frame{} : frame));
+      region.boxes.push_back(read_box(box, region.of_bones || !region.near.empty() ? Frame{} : frame));
   }
   if (const auto vertices = value.find("vertices")) {
     if (!bone) vertices->fail("count the vertices of a bone", "name the region's bone");
@@ -65,6 +80,15 @@ PlacedRegion read_region(const std::string& name, const Value& value, const Fram
 }
 
 }  // namespace
+
+void need_segments(const PlacedRegion& placed, const std::vector<std::string>& segments) {
+  const auto need = [&](const char* key, const std::string& name) {
+    if (!name.empty() && std::find(segments.begin(), segments.end(), name) == segments.end())
+      placed.value.at(key).fail_unknown("segment", name, segments);
+  };
+  need("segment", placed.region.segment);
+  need("near", placed.region.near);
+}
 
 std::vector<PlacedRegion> parse_regions(const Value& value, const Frame& frame) {
   std::vector<PlacedRegion> out;

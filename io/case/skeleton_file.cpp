@@ -327,6 +327,9 @@ PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
   }
   check_names(skeleton, placed.named);
   if (const auto regions = root.find("regions")) placed.regions = parse_regions(*regions, frame);
+  std::vector<std::string> names;
+  for (const Segment& segment : skeleton.segments) names.push_back(segment.name);
+  for (const PlacedRegion& region : placed.regions) need_segments(region, names);
   return placed;
 }
 

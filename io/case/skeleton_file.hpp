@@ -25,8 +25,8 @@ inline constexpr std::array<std::string_view, 6> use{"region",  "bone",         
                                                      "segment", "facing_segment", "looks"};
 inline constexpr std::array<std::string_view, 8> direction{
     "cylinder_fit", "plane_fit", "ellipse_fit", "towards", "from", "to", "axis_of", "any"};
-inline constexpr std::array<std::string_view, 6> region{"bone", "segment",  "boxes",
-                                                        "of",   "vertices", "points"};
+inline constexpr std::array<std::string_view, 8> region{"bone", "segment", "boxes",    "of",
+                                                        "near", "along",   "vertices", "points"};
 inline constexpr std::array<std::string_view, 3> axes{"x", "y", "z"};
 inline constexpr std::array<std::string_view, 4> coupling{"joint", "angle", "drives", "ratio"};
 inline constexpr std::array<std::string_view, 5> kinds{"ball", "hinge", "universal", "fixed", "free"};

@@ -2,21 +2,15 @@
 #include "preprocess/rig/bone_points.hpp"
 
 #include <algorithm>
+#include <numeric>
+#include <optional>
 #include <set>
 
+#include "preprocess/rig/bone_end.hpp"
 #include "preprocess/rig/facing.hpp"
 
 namespace ecorche::rig {
 namespace {
-
-const Points kNone(0, 3);
-
-Points rows_of(const Points& points, const std::set<Eigen::Index>& rows) {
-  Points out(static_cast<Eigen::Index>(rows.size()), 3);
-  Eigen::Index at = 0;
-  for (const Eigen::Index row : rows) out.row(at++) = points.row(row);
-  return out;
-}
 
 // In shares of `whole`, from a corner at 0 to the other at 1.
 Eigen::AlignedBox3d within(const Eigen::AlignedBox3d& shares, const Eigen::AlignedBox3d& whole) {
@@ -56,19 +50,25 @@ const SurfaceMesh& BonePoints::segment(const std::string& name) {
   return all;
 }
 
-Points BonePoints::region(const std::string& name) {
+SurfacePoints BonePoints::region(const std::string& name) {
   const auto region = std::find_if(patient_.regions.begin(), patient_.regions.end(),
                                    [&](const Region& r) { return r.name == name; });
-  if (region == patient_.regions.end()) return kNone;
+  if (region == patient_.regions.end()) return {};
   const SurfaceMesh* surface = region->bone.empty() ? &segment(region->segment) : bone(region->bone);
-  if (surface == nullptr || surface->V.rows() == 0) return kNone;
+  if (surface == nullptr || surface->V.rows() == 0) return {};
   const Points& V = surface->V;
-  std::set<Eigen::Index> rows;
   const Eigen::AlignedBox3d whole(V.colwise().minCoeff().transpose(), V.colwise().maxCoeff().transpose());
+  std::optional<BoneEnd> end;
+  if (!region->near.empty()) {
+    end = bone_end(*surface, segment(region->near));
+    if (!end) return {};
+  }
+  std::set<Eigen::Index> rows;
   for (const Eigen::AlignedBox3d& said : region->boxes) {
     const Eigen::AlignedBox3d box = region->of_bones ? within(said, whole) : said;
     for (Eigen::Index v = 0; v < V.rows(); ++v) {
-      if (box.contains(Eigen::Vector3d(V.row(v).transpose()))) rows.insert(v);
+      const Eigen::Vector3d at = V.row(v).transpose();
+      if (box.contains(end ? end->place(at) : at)) rows.insert(v);
     }
   }
   for (Eigen::Index p = 0; p < region->points.rows(); ++p) {
@@ -76,28 +76,37 @@ Points BonePoints::region(const std::string& name) {
     (V.rowwise() - region->points.row(p)).rowwise().squaredNorm().minCoeff(&nearest);
     rows.insert(nearest);
   }
-  return rows_of(V, rows);
+  SurfacePoints out = surface_points(*surface, {rows.begin(), rows.end()});
+  out.found = end.has_value();
+  if (end) out.along = end->axes * region->along;
+  return out;
 }
 
-const Points& BonePoints::of(const RegionUse& use) {
+const SurfacePoints& BonePoints::of(const RegionUse& use) {
   const Key key{{use.region, use.bone, use.facing, use.segment, use.facing_segment},
                 {use.looks.x(), use.looks.y(), use.looks.z()}};
-  const auto [entry, fresh] = found_.try_emplace(key, 0, 3);
+  const auto [entry, fresh] = found_.try_emplace(key);
   if (fresh) entry->second = find(use);
   return entry->second;
 }
 
-Points BonePoints::find(const RegionUse& use) {
+SurfacePoints BonePoints::find(const RegionUse& use) {
+  const auto whole = [](const SurfaceMesh& surface) {
+    std::vector<Eigen::Index> all(static_cast<std::size_t>(surface.V.rows()));
+    std::iota(all.begin(), all.end(), Eigen::Index{0});
+    return surface_points(surface, all);
+  };
   if (!use.region.empty()) return region(use.region);
   if (!use.segment.empty()) {
     const SurfaceMesh& own = segment(use.segment);
-    return use.facing_segment.empty() ? own.V : facing_vertices(own, segment(use.facing_segment), use.looks);
+    return use.facing_segment.empty() ? whole(own)
+                                      : facing_points(own, segment(use.facing_segment), use.looks);
   }
   const SurfaceMesh* own = bone(use.bone);
-  if (own == nullptr) return kNone;
-  if (use.facing.empty()) return own->V;
+  if (own == nullptr) return {};
+  if (use.facing.empty()) return whole(*own);
   const SurfaceMesh* other = bone(use.facing);
-  return other == nullptr ? kNone : facing_vertices(*own, *other, use.looks);
+  return other == nullptr ? SurfacePoints{} : facing_points(*own, *other, use.looks);
 }
 
 }  // namespace ecorche::rig

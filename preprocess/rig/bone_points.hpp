@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "core/values/case.hpp"
+#include "preprocess/rig/surface_points.hpp"
 
 namespace ecorche::rig {
 
@@ -16,23 +17,23 @@ class BonePoints {
   /// `patient` must outlive this.
   explicit BonePoints(const Case& patient) : patient_(patient) {}
 
-  /// #V by 3, LPS mm; no rows where the place has no bone in this case. A region's boxes take the vertices
+  /// No rows where the place has no bone in this case. A region's boxes take the vertices
   /// within them; each of its points takes the vertex nearest to it, once: so a region that was marked on
   /// another surface of the same bone still finds its own.
-  const Points& of(const RegionUse& use);
+  const SurfacePoints& of(const RegionUse& use);
 
   /// All bones of a segment as one surface; empty where it has none.
   const SurfaceMesh& segment(const std::string& name);
 
  private:
   const SurfaceMesh* bone(const std::string& name) const;
-  Points region(const std::string& name);
-  Points find(const RegionUse& use);
+  SurfacePoints region(const std::string& name);
+  SurfacePoints find(const RegionUse& use);
 
   const Case& patient_;
   std::map<std::string, SurfaceMesh> segments_;
   using Key = std::tuple<std::array<std::string, 5>, std::array<double, 3>>;
-  std::map<Key, Points> found_;  // facing is slow, and centre and axes ask alike
+  std::map<Key, SurfacePoints> found_;  // facing is slow, and centre and axes ask alike
 };
 
 }  // namespace ecorche::rig

@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <array>
-#include <numbers>
 
 #include "preprocess/rig/robust.hpp"
 
@@ -96,13 +95,6 @@ std::optional<Cylinder> refine(const Points& points, const std::vector<Eigen::In
   return cylinder;
 }
 
-// Evenly over a half sphere, by the golden angle.
-Eigen::Vector3d direction(int k) {
-  const double z = (k + 0.5) / kDirections, turn = k * std::numbers::pi * (3 - std::sqrt(5.0));
-  const double across = std::sqrt(1 - z * z);
-  return {across * std::cos(turn), across * std::sin(turn), z};
-}
-
 Points thinned(const Points& points) {
   if (points.rows() <= kMost) return points;
   Points out(kMost, 3);
@@ -120,7 +112,7 @@ std::vector<Cylinder> hypotheses(const Points& points, double extent, double ban
     for (int d = 0; d < kDraws; ++d) {
       const std::array<Eigen::Index, 3> i{draw(), draw(), draw()};
       const auto cylinder = through(points.row(i[0]).transpose(), points.row(i[1]).transpose(),
-                                    points.row(i[2]).transpose(), direction(k));
+                                    points.row(i[2]).transpose(), robust::half_sphere(k, kDirections));
       if (!cylinder || !(cylinder->radius <= extent)) continue;
       const double cost = robust::truncated_squares(points, *cylinder, band);
       if (here && cost >= here_cost) continue;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "preprocess/geometry/face_tree.hpp"
@@ -15,18 +16,6 @@ constexpr double kNearestShare = 0.02;
 constexpr double kReach = 2;
 constexpr double kFacingCosine = 0.5;
 
-Points vertex_normals(const SurfaceMesh& mesh) {
-  Points normal = Points::Zero(mesh.V.rows(), 3);
-  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
-    const Eigen::Vector3d a = mesh.V.row(mesh.F(f, 0)), b = mesh.V.row(mesh.F(f, 1)),
-                          c = mesh.V.row(mesh.F(f, 2));
-    const Eigen::RowVector3d area = (b - a).cross(c - a).transpose();
-    for (int i = 0; i < 3; ++i) normal.row(mesh.F(f, i)) += area;
-  }
-  normal.rowwise().normalize();
-  return normal;
-}
-
 double mean_edge(const SurfaceMesh& mesh) {
   double sum = 0;
   for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
@@ -37,11 +26,13 @@ double mean_edge(const SurfaceMesh& mesh) {
 
 }  // namespace
 
-Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other, const Eigen::Vector3d& looks) {
+SurfacePoints facing_points(const SurfaceMesh& bone, const SurfaceMesh& other, const Eigen::Vector3d& looks) {
   const auto count = static_cast<std::size_t>(bone.V.rows());
-  if (count == 0 || other.F.rows() == 0) return Points(0, 3);
+  if (count == 0 || other.F.rows() == 0) return {};
   const geometry::FaceTree tree(other);
-  const Points normal = vertex_normals(bone);
+  std::vector<Eigen::Index> all(count);
+  std::iota(all.begin(), all.end(), Eigen::Index{0});
+  const Points normal = surface_points(bone, all).normal;
 
   std::vector<double> distance(count);
   std::vector<bool> faces(count);
@@ -72,8 +63,8 @@ Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other, const 
   };
   std::vector<Eigen::Index> rows = choose(true);
   if (rows.size() < kFewest) rows = choose(false);
-  Points out(static_cast<Eigen::Index>(rows.size()), 3);
-  for (std::size_t i = 0; i < rows.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = bone.V.row(rows[i]);
+  SurfacePoints out = surface_points(bone, rows);
+  out.found = true;
   return out;
 }
 

@@ -2,7 +2,7 @@
 // The part of a bone that faces another: the joint's surface when nobody marked it.
 #pragma once
 
-#include "core/values/mesh.hpp"
+#include "preprocess/rig/surface_points.hpp"
 
 namespace ecorche::rig {
 
@@ -12,7 +12,12 @@ namespace ecorche::rig {
 /// its normal is within 60 degrees of the way to the closest point there; where fewer than 16 do, as in bones
 /// that touch, reach alone counts. `looks`: a direction within 60 degrees of which the normals must be; zero
 /// for any.
-Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other,
-                       const Eigen::Vector3d& looks = Eigen::Vector3d::Zero());
+SurfacePoints facing_points(const SurfaceMesh& bone, const SurfaceMesh& other,
+                            const Eigen::Vector3d& looks = Eigen::Vector3d::Zero());
+
+inline Points facing_vertices(const SurfaceMesh& bone, const SurfaceMesh& other,
+                              const Eigen::Vector3d& looks = Eigen::Vector3d::Zero()) {
+  return facing_points(bone, other, looks).at;
+}
 
 }  // namespace ecorche::rig

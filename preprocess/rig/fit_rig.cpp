@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 
 #include "core/kinematics/angles.hpp"
@@ -17,6 +18,7 @@ namespace {
 constexpr double kBadResidual = 0.10;  // of the radius
 constexpr double kFewInliers = 0.5;
 constexpr double kRounding = 1e-9;  // radians
+constexpr double kDegrees = 180 / std::numbers::pi;
 
 std::string percent(double share) {
   return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
@@ -45,12 +47,25 @@ void warn_rule(const JointFit& fit, double of_axes, const Context& context) {
   } else if (fit.confidence < JointSources::least_confidence) {
     std::ostringstream line;
     line << "joint " << fit.joint << ": its centre by " << center_rule_name(fit.rule) << " has confidence "
-         << percent(fit.confidence) << " (rms residual " << fit.residual_mm << " mm, "
-         << percent(fit.inlier_share) << " of " << fit.points << " vertices)";
+         << percent(fit.confidence) << " (";
+    if (fit.rule == CenterRule::centroid) {
+      line << "the mean of " << fit.points << " vertices that lie " << fit.residual_mm << " mm about it)";
+    } else {
+      line << "rms residual " << fit.residual_mm << " mm, " << percent(fit.inlier_share) << " of "
+           << fit.points << " vertices)";
+    }
     context.warn(line.str());
   }
   if (of_axes < JointSources::least_confidence)
     context.warn("joint " + fit.joint + ": its axes have confidence " + percent(of_axes));
+}
+
+JointEvidence evidence_of(const FoundPoint& found) {
+  JointEvidence out{found.fit.rule, found.at, found.axis, found.fit.radius_mm, {}};
+  for (const SurfacePoints* on : found.on) {
+    for (Eigen::Index p = 0; p < on->at.rows(); ++p) out.vertices.push_back(on->at.row(p).transpose());
+  }
+  return out;
 }
 
 bool has_bone(const Case& patient, const std::string& name) {
@@ -73,27 +88,53 @@ void need_sphere(const Case& patient, const Joint& joint, const FoundPoint& foun
       "give the joint's center as [x, y, z]");
 }
 
+void warn_widened(const Joint& joint, const AngleAxis& angle, double from, double to,
+                  const Context& context) {
+  if (from == to) return;
+  std::ostringstream line;
+  line << "joint " << joint.name << ": " << angle.name << " rests at " << std::lround(to * kDegrees)
+       << " degrees, outside its limits: widened from " << std::lround(from * kDegrees)
+       << ", for the scanned pose is allowed";
+  context.warn(line.str());
+}
+
 // The rest angles that lead from the parent's axes to the joint's. Limits that leave them out are widened to
-// them: the scanned pose is allowed.
-void measure_rest(const Eigen::Matrix3d& parent, Joint& joint) {
+// them. Turns that the joint does not make (those of a hinge about its second axis) have none.
+void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, const Context& context) {
   for (AngleAxis& angle : joint.sequence) angle.rest = 0;
   const std::array<double, 3> rest = kinematics::angles_from_rotation(
       joint, Eigen::Quaterniond(Eigen::Matrix3d(parent.transpose() * joint.axes)));
   for (std::size_t a = 0; a < 3; ++a) {
     AngleAxis& angle = joint.sequence[a];
     angle.rest = std::abs(rest[a]) < kRounding ? 0 : rest[a];
-    angle.min = std::min(angle.min, angle.rest);
-    angle.max = std::max(angle.max, angle.rest);
+    const double least = std::min(angle.min, angle.rest), most = std::max(angle.max, angle.rest);
+    if (std::isfinite(angle.min)) warn_widened(joint, angle, angle.min, least, context);
+    if (std::isfinite(angle.max)) warn_widened(joint, angle, angle.max, most, context);
+    angle.min = least;
+    angle.max = most;
   }
+}
+
+// What the joint leaves open costs a mean of vertices nothing: where along its axis a hinge lies, and about
+// which point a root turns.
+FoundPoint of_kind(const Joint& joint, const FoundPoint& found, const Eigen::Matrix3d& axes) {
+  FoundPoint out = found;
+  if (found.fit.rule != CenterRule::centroid) return out;
+  if (joint.kind == JointKind::free) out.fit.confidence = 1;
+  if (joint.kind != JointKind::hinge) return out;
+  const Eigen::Vector3d axis = axes.col(joint.sequence[0].axis);
+  out.fit.residual_mm = std::sqrt(std::max(0.0, found.scatter.trace() - axis.dot(found.scatter * axis)));
+  out.fit.confidence = centroid_confidence(out.fit.residual_mm);
+  return out;
 }
 
 void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig& rig,
                const Context& context) {
   Joint& joint = rig.skeleton.segments[row].joint;
-  const FoundPoint& found = sources.center(row);
+  const auto [axes, of_axes] = sources.axes(row);
+  const FoundPoint found = of_kind(joint, sources.center(row), axes);
   const bool two_bones = joint.rule == CenterRule::sphere_fit && !joint.facing_bone.empty();
   if (two_bones) need_sphere(patient, joint, found);
-  const auto [axes, of_axes] = sources.axes(row);
   rig.fits.push_back(found.fit);
   if (two_bones) {
     warn_sphere(found.fit, context);
@@ -105,7 +146,7 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
 
 }  // namespace
 
-Rig fit(const Case& patient, const Context& context) {
+Rig fit(const Case& patient, const Context& context, std::vector<JointEvidence>* evidence) {
   Rig rig;
   const Skeleton asked = patient.generic ? generic_tree(patient, context) : present_part(patient, context);
   rig.skeleton = asked;
@@ -123,7 +164,8 @@ Rig fit(const Case& patient, const Context& context) {
     joint.rule = rig.fits[row].rule;
     joint.how.reset();
     const bool measured = from.joint.how && from.joint.how->measured_rest && from.parent >= 0;
-    if (measured) measure_rest(sources.axes(static_cast<std::size_t>(from.parent)).first, joint);
+    if (evidence != nullptr) evidence->push_back(evidence_of(sources.center(row)));
+    if (measured) measure_rest(sources.axes(static_cast<std::size_t>(from.parent)).first, joint, context);
   }
   return rig;
 }

@@ -2,8 +2,10 @@
 #include "preprocess/rig/joint_sources.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/values/error.hpp"
+#include "preprocess/rig/axle_fit.hpp"
 #include "preprocess/rig/ellipse_fit.hpp"
 #include "preprocess/rig/facing.hpp"
 #include "preprocess/rig/plane_fit.hpp"
@@ -14,11 +16,74 @@ namespace {
 
 constexpr double kLeastSine = 0.1;  // two directions closer to a line (6 degrees) say nothing of the third
 
+// An angle of 0.1 halves the confidence of a direction between points; these are off by a third of their
+// vertices' spread, or by 5 mm at half confidence.
+constexpr double kAngle = 0.1, kSpreadOff = 1.0 / 3, kOff = 5;
+
+double angle_confidence(double angle) {
+  return 1 / (1 + (angle / kAngle) * (angle / kAngle));
+}
+
 template <class Fit>
-FoundPoint of_fit(CenterRule rule, const Fit& fit, double size, Eigen::Index points) {
-  return {
-      fit.center,
-      {"", rule, size, fit.residual, fit.inlier_share, static_cast<std::int32_t>(points), fit.confidence}};
+FoundPoint of_fit(CenterRule rule, const Fit& fit, double size, const SurfacePoints& on) {
+  FoundPoint found;
+  found.at = fit.center;
+  found.fit = {"",
+               rule,
+               size,
+               fit.residual,
+               fit.inlier_share,
+               static_cast<std::int32_t>(on.at.rows()),
+               fit.confidence};
+  found.on = {&on};
+  return found;
+}
+
+FoundPoint said(const Eigen::Vector3d& at) {
+  FoundPoint found;
+  found.at = at;
+  return found;
+}
+
+FoundPoint centroid(const SurfacePoints& on) {
+  FoundPoint found;
+  found.at = on.at.colwise().mean().transpose();
+  const Points from = on.at.rowwise() - found.at.transpose();
+  found.scatter = from.transpose() * from / static_cast<double>(on.at.rows());
+  const double spread = std::sqrt(found.scatter.trace());
+  found.fit = {"",
+               CenterRule::centroid,
+               0,
+               spread,
+               1,
+               static_cast<std::int32_t>(on.at.rows()),
+               centroid_confidence(spread)};
+  found.on = {&on};
+  return found;
+}
+
+// The middle of a plate is as sure as it is small: vertices 25 mm about it halve its confidence.
+double middle_confidence(const Points& points, const std::vector<Eigen::Index>& rows) {
+  const Points plate = points(rows, Eigen::all);
+  const double squares = (plate.rowwise() - plate.colwise().mean()).rowwise().squaredNorm().mean();
+  return 1 / (1 + squares / (25.0 * 25));
+}
+
+// All of the bones that a part was found on; nothing of a region's.
+RegionUse whole(const RegionUse& part) {
+  RegionUse out;
+  out.bone = part.bone;
+  out.segment = part.segment;
+  return out;
+}
+
+// How far off a point may be across a direction, mm.
+double off_across(const FoundPoint& point, const Eigen::Vector3d& along) {
+  if (!point.scatter.isZero()) {
+    const double across = point.scatter.trace() - along.dot(point.scatter * along);
+    return kSpreadOff * std::sqrt(std::max(0.0, across));
+  }
+  return kOff * std::sqrt(1 / std::max(point.fit.confidence, 1e-6) - 1);
 }
 
 [[noreturn]] void circle(const std::string& joint) {
@@ -42,37 +107,18 @@ class Open {
   std::size_t row_;
 };
 
-bool is_fit(CenterRule rule) {
-  return rule == CenterRule::sphere_fit || rule == CenterRule::cylinder_fit ||
-         rule == CenterRule::plane_fit || rule == CenterRule::ellipse_fit;
-}
-bool is_fit(const PointSource& source) {
-  return is_fit(source.rule);
-}
-bool is_fit(const DirectionSource& source) {
-  return source.kind == DirectionSource::Kind::fit;
-}
-
-// The first fit that is good; else the first that reaches `fair`; else the first source that is no fit, since
-// nothing says how good a mean is; else the best fit.
+// The first source that is good, else the best.
 template <class Found, class Sources, class Find, class Confidence>
-std::optional<Found> first_good(const Sources& sources, double fair_enough, Find&& find,
-                                Confidence&& confidence) {
-  std::optional<Found> fair, plain, best;
+std::optional<Found> first_good(const Sources& sources, Find&& find, Confidence&& confidence) {
+  std::optional<Found> best;
   for (const auto& source : sources) {
-    if (!is_fit(source) && plain) continue;
     std::optional<Found> found = find(source);
     if (!found) continue;
-    if (!is_fit(source)) {
-      plain = std::move(found);
-      continue;
-    }
     const double known = confidence(*found);
     if (known >= JointSources::least_confidence) return found;
-    if (known >= fair_enough && !fair) fair = found;
     if (!best || known > confidence(*best)) best = std::move(found);
   }
-  return fair ? fair : plain ? plain : best;
+  return best;
 }
 
 // Never beside nothing, the zero vector.
@@ -94,51 +140,66 @@ JointSources::JointSources(const Case& patient, const Skeleton& skeleton)
       open_center_(skeleton.segments.size()),
       open_axes_(skeleton.segments.size()) {}
 
-const std::optional<CylinderFit>& JointSources::cylinder(const Points& points) {
+const std::optional<CylinderFit>& JointSources::cylinder(const SurfacePoints& points) {
   const auto [entry, fresh] = cylinders_.try_emplace(&points);
-  if (fresh) entry->second = fit_cylinder(points);
+  if (fresh) entry->second = points.found ? fit_axle(points) : fit_cylinder(points.at);
   return entry->second;
 }
 
 std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse& on) {
-  const Points& points = bones_.of(on);
+  const SurfacePoints& surface = bones_.of(on);
+  const Points& points = surface.at;
   if (points.rows() == 0) return std::nullopt;
+  std::optional<FoundPoint> found;
   switch (rule) {
     case CenterRule::sphere_fit:
-      if (const auto fit = fit_sphere(points)) return of_fit(rule, *fit, fit->radius, points.rows());
-      return std::nullopt;
+      if (auto fit = fit_sphere(points)) {
+        if (surface.found) *fit = grown_sphere(bones_.of(whole(on)), *fit);
+        found = of_fit(rule, *fit, fit->radius, surface);
+      }
+      return found;
     case CenterRule::cylinder_fit:
-      if (const auto& fit = cylinder(points)) return of_fit(rule, *fit, fit->radius, points.rows());
-      return std::nullopt;
+      if (const auto& fit = cylinder(surface)) {
+        found = of_fit(rule, *fit, fit->radius, surface);
+        found->axis = fit->axis;
+      }
+      return found;
     case CenterRule::plane_fit:
-      if (const auto fit = fit_plane(points)) return of_fit(rule, *fit, 0, points.rows());
-      return std::nullopt;
+      if (const auto fit = fit_plane(points)) {
+        found = of_fit(rule, *fit, 0, surface);
+        found->axis = fit->normal;
+        found->fit.confidence *= middle_confidence(points, fit->rows);
+      }
+      return found;
     case CenterRule::ellipse_fit:
-      if (const auto fit = fit_ellipse(points))
-        return of_fit(rule, *fit, 0.5 * (fit->long_mm + fit->short_mm), points.rows());
-      return std::nullopt;
+      if (const auto fit = fit_ellipse(points)) {
+        found = of_fit(rule, *fit, 0.5 * (fit->long_mm + fit->short_mm), surface);
+        found->axis = fit->normal;
+      }
+      return found;
     default:
-      break;
+      return centroid(surface);
   }
-  return FoundPoint{mean(points), {"", rule, 0, 0, 1, static_cast<std::int32_t>(points.rows()), 1}};
 }
 
 std::optional<FoundPoint> JointSources::between(const PointSource& source) {
   const auto a = point(source.parts[0]), b = point(source.parts[1]);
   if (!a || !b) return std::nullopt;
-  FoundPoint out{a->at + source.share * (b->at - a->at), {}};
+  FoundPoint out = said(a->at + source.share * (b->at - a->at));
   out.fit.rule = CenterRule::between;
   out.fit.residual_mm = std::max(a->fit.residual_mm, b->fit.residual_mm);
   out.fit.inlier_share = std::min(a->fit.inlier_share, b->fit.inlier_share);
   out.fit.points = a->fit.points + b->fit.points;
   out.fit.confidence = std::min(a->fit.confidence, b->fit.confidence);
+  out.on = a->on;
+  out.on.insert(out.on.end(), b->on.begin(), b->on.end());
   return out;
 }
 
 std::optional<FoundPoint> JointSources::point(const PointSource& source) {
   switch (source.rule) {
     case CenterRule::given:
-      return FoundPoint{source.point, {}};
+      return said(source.point);
     case CenterRule::between:
       return between(source);
     case CenterRule::joint: {
@@ -150,7 +211,7 @@ std::optional<FoundPoint> JointSources::point(const PointSource& source) {
     }
     case CenterRule::first_good:
       return first_good<FoundPoint>(
-          source.parts, least_confidence, [&](const PointSource& part) { return point(part); },
+          source.parts, [&](const PointSource& part) { return point(part); },
           [](const FoundPoint& found) { return found.fit.confidence; });
     default:
       return fitted(source.rule, source.on);
@@ -159,7 +220,7 @@ std::optional<FoundPoint> JointSources::point(const PointSource& source) {
 
 std::optional<FoundPoint> JointSources::by_rule(const Joint& joint) {
   if (joint.how) return point(joint.how->center);
-  if (joint.rule == CenterRule::given) return FoundPoint{joint.center, {}};
+  if (joint.rule == CenterRule::given) return said(joint.center);
   if (joint.rule != CenterRule::sphere_fit) return std::nullopt;
   RegionUse on;
   on.bone = joint.center_bone;
@@ -193,11 +254,12 @@ const FoundPoint& JointSources::center(std::size_t row) {
 }
 
 std::optional<FoundDirection> JointSources::fitted_axis(const DirectionSource& source) {
-  const Points& points = bones_.of(source.from.on);
+  const SurfacePoints& surface = bones_.of(source.from.on);
+  const Points& points = surface.at;
   if (points.rows() == 0) return std::nullopt;
   FoundDirection out;
   if (source.from.rule == CenterRule::cylinder_fit) {
-    const auto& fit = cylinder(points);
+    const auto& fit = cylinder(surface);
     if (!fit) return std::nullopt;
     out = {fit->axis, fit->confidence};
   } else if (source.from.rule == CenterRule::plane_fit) {
@@ -232,10 +294,12 @@ std::optional<FoundDirection> JointSources::direction(const DirectionSource& sou
       return axis_of(source.joint, axis);
     case Kind::first_good:
       return first_good<FoundDirection>(
-          source.choices, fair_axis,
+          source.choices,
           [&](const DirectionSource& choice) {
             auto found = direction(choice, axis, beside);
-            return found && collinear(found->along, beside) ? std::nullopt : found;
+            if (found && collinear(found->along, beside)) found.reset();
+            if (found && choice.kind == Kind::given) found->confidence = default_axis;
+            return found;
           },
           [](const FoundDirection& found) { return found.confidence; });
     case Kind::towards:
@@ -243,7 +307,10 @@ std::optional<FoundDirection> JointSources::direction(const DirectionSource& sou
   }
   const auto from = point(source.from), to = point(source.to);
   if (!from || !to || (to->at - from->at).norm() < 1e-6) return std::nullopt;
-  return FoundDirection{(to->at - from->at).normalized(), std::min(from->fit.confidence, to->fit.confidence)};
+  const double length = (to->at - from->at).norm();
+  const Eigen::Vector3d along = (to->at - from->at) / length;
+  const double off = off_across(*from, along) + off_across(*to, along);
+  return FoundDirection{along, angle_confidence(off / length)};
 }
 
 std::pair<Eigen::Matrix3d, double> JointSources::axes(std::size_t row) {

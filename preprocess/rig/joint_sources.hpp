@@ -14,8 +14,18 @@ namespace ecorche::rig {
 /// A point, and how well it was found.
 struct FoundPoint {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  JointFit fit;  ///< without its joint's name
+  JointFit fit{};  ///< without its joint's name
+  /// How the vertices of a centroid lie about it, mm^2; zero of other rules.
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< unit: a cylinder's, or a plane's normal; else zero
+  std::vector<const SurfacePoints*> on{};          ///< what it was found on
 };
+
+/// Of a mean of vertices that lie `spread` mm (rms) about it: a joint's centre may be anywhere among them, so
+/// 10 mm halve it.
+inline double centroid_confidence(double spread) {
+  return 1 / (1 + (spread / 10) * (spread / 10));
+}
 
 struct FoundDirection {
   Eigen::Vector3d along = Eigen::Vector3d::UnitX();  ///< unit
@@ -26,10 +36,8 @@ class JointSources {
  public:
   /// Below this the next of several sources is tried, and a joint is warned of.
   static constexpr double least_confidence = 0.5;
-  /// From this on an axis is taken rather than one that was not fitted. Condyles are no cylinders (0.1 to
-  /// 0.4): their axis holds, but their centre by it differs by a centimetre from left to right, where their
-  /// mean does not.
-  static constexpr double fair_axis = 0.1;
+  /// Of a direction that is said among others that are found: it stands for none.
+  static constexpr double default_axis = 0.1;
 
   /// Both must outlive this; `skeleton` is the part of the patient's that has bones.
   JointSources(const Case& patient, const Skeleton& skeleton);
@@ -47,7 +55,7 @@ class JointSources {
 
  private:
   const FoundPoint& found(std::size_t row) const { return *centers_[row]; }
-  const std::optional<CylinderFit>& cylinder(const Points& points);
+  const std::optional<CylinderFit>& cylinder(const SurfacePoints& points);
   std::optional<FoundPoint> point(const PointSource& source);
   std::optional<FoundPoint> fitted(CenterRule rule, const RegionUse& on);
   std::optional<FoundPoint> between(const PointSource& source);
@@ -65,7 +73,7 @@ class JointSources {
   std::vector<std::optional<FoundPoint>> centers_;
   std::vector<std::optional<std::pair<Eigen::Matrix3d, double>>> axes_;
   /// By the points' own place: centre and axis of a joint ask alike.
-  std::map<const Points*, std::optional<CylinderFit>> cylinders_;
+  std::map<const SurfacePoints*, std::optional<CylinderFit>> cylinders_;
   std::vector<bool> open_center_, open_axes_;  // being worked out: rules that meet one again go in a circle
 };
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <vector>
@@ -27,6 +28,13 @@ class Draw {
   std::uint64_t count_;
   std::mt19937_64 random_{20180901};
 };
+
+/// Direction `k` of `count` that lie evenly over a half sphere, by the golden angle.
+inline Eigen::Vector3d half_sphere(int k, int count) {
+  const double z = (k + 0.5) / count, turn = k * std::numbers::pi * (3 - std::sqrt(5.0));
+  const double across = std::sqrt(1 - z * z);
+  return {across * std::cos(turn), across * std::sin(turn), z};
+}
 
 /// Length of the diagonal of the points' box, mm.
 inline double extent_of(const Points& points) {

@@ -13,6 +13,12 @@ namespace {
 constexpr int kDraws = 500;        // half outliers leave 1 - (15/16)^500 of a miss: never
 constexpr double kSurface = 0.25;  // of the radius: farther points are of another part of the bone
 
+constexpr int kGrowths = 8;
+constexpr double kGrown = 0.08;    // of the radius
+constexpr double kOutward = 0.85;  // cosine
+constexpr std::size_t kFewestGrown = 12;
+constexpr double kGood = 0.1, kGoodShare = 0.5;  // a worse one would grow into another surface
+
 struct Sphere {
   Eigen::Vector3d center;
   double radius;
@@ -108,6 +114,42 @@ std::optional<SphereFit> fit_sphere(const Points& points) {
   fit.residual = found.residual(kSurface * fit.radius);
   fit.confidence =
       robust::confidence(fit.inlier_share, fit.residual / fit.radius, center_error(points, found));
+  return fit;
+}
+
+SphereFit grown_sphere(const SurfacePoints& bone, const SphereFit& first) {
+  if (first.residual > kGood * first.radius || first.inlier_share < kGoodShare) return first;
+  Sphere sphere{first.center, first.radius};
+  robust::Settled<Sphere> settled{sphere, {}, {}};
+  Points near(0, 3);
+  for (int round = 0; round < kGrowths; ++round) {
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index p = 0; p < bone.at.rows(); ++p) {
+      const Eigen::Vector3d out = bone.at.row(p).transpose() - sphere.center;
+      const double away = out.norm();
+      if (std::abs(away - sphere.radius) <= kGrown * sphere.radius &&
+          bone.normal.row(p).dot(out) > kOutward * away)
+        rows.push_back(p);
+    }
+    if (rows.size() < kFewestGrown) return first;
+    near.resize(static_cast<Eigen::Index>(rows.size()), 3);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      near.row(static_cast<Eigen::Index>(i)) = bone.at.row(rows[i]);
+    settled = robust::settle(
+        near, sphere, kGrown * sphere.radius, 4,
+        [&](const auto& chosen, const Sphere& now) { return std::optional(refine(near, chosen, now)); });
+    sphere = settled.shape;
+    if (!((sphere.center - first.center).norm() < 0.25 * first.radius &&
+          std::abs(sphere.radius - first.radius) < 0.2 * first.radius))
+      return first;
+  }
+  SphereFit fit;
+  fit.center = sphere.center;
+  fit.radius = sphere.radius;
+  fit.inlier_share = first.inlier_share;
+  fit.residual = settled.residual(kSurface * fit.radius);
+  fit.confidence =
+      robust::confidence(fit.inlier_share, fit.residual / fit.radius, center_error(near, settled));
   return fit;
 }
 

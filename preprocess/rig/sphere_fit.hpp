@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "core/values/mesh.hpp"
+#include "preprocess/rig/surface_points.hpp"
 
 namespace ecorche::rig {
 
@@ -21,5 +21,11 @@ struct SphereFit {
 /// points, the same for every hypothesis. Spheres wider than that extent are not considered: a flat patch is
 /// no joint. Nothing when there are fewer than four points or no sphere passes through any four of them.
 std::optional<SphereFit> fit_sphere(const Points& points);
+
+/// The same sphere on all of a bone: from what faces another bone, its upper half perhaps, to every vertex
+/// within 8 % of the radius whose normal points away from the centre, in turn with least squares. `first`
+/// comes back where it is no good one (residual above a tenth of the radius, fewer than half inliers),
+/// wanders off (a quarter of the radius, or by a fifth of it), or finds fewer than twelve.
+SphereFit grown_sphere(const SurfacePoints& bone, const SphereFit& first);
 
 }  // namespace ecorche::rig

@@ -36,7 +36,7 @@ TEST(Docs, TheExamplesAreRead) {
   EXPECT_EQ(patient.bones.size(), 2u);
   EXPECT_EQ(patient.bones[1].surface.V.row(0), Eigen::RowVector3d(500, 400, -1000));  // RAS, cm
   EXPECT_EQ(patient.skeleton.segments.size(), 3u);
-  ASSERT_EQ(patient.regions.size(), 4u);
+  ASSERT_EQ(patient.regions.size(), 5u);
   EXPECT_EQ(patient.regions[0].points.row(3), patient.bones[1].surface.V.row(7));
   Rig rig;
   rig.skeleton = patient.skeleton;

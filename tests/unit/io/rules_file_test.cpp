@@ -98,6 +98,7 @@ TEST(Rules, RegionsReadBackAndTheirMistakesAreNamed) {
   const std::string text =
       "ecorche_regions: 1\nregions:\n  head: {bone: f, boxes: [{least: [0, 0, 0], most: [1, 2, 3]}]}\n"
       "  heel: {segment: b, boxes: [{least: [0, 0.8, 0], most: [1, 1, 0.5]}], of: bones}\n"
+      "  end: {segment: b, boxes: [{least: [0, 0, 0], most: [1, 1, 0.5]}], near: a, along: [1, 0, 0]}\n"
       "  marks: {bone: f, points: [[1, 2, 3], [4, 5, 6]]}\n";
   const Scratch scratch;
   std::vector<Region> regions;
@@ -115,6 +116,12 @@ TEST(Rules, RegionsReadBackAndTheirMistakesAreNamed) {
   refused("{bone: f, boxes: [{least: [0, 3, 0], most: [1, 2, 3]}]}", "boxes[0]: its least is above its most");
   refused("{bone: f, of: skin, points: [[1, 2, 3]]}", "regions.r.of: 'skin' holds no boxes");
   refused("{bone: f, vertices: [0.5]}", "must be a whole number, is '0.5' (write a whole number)");
+  const std::string box = "boxes: [{least: [0, 0, 0], most: [1, 1, 1]}]";
+  refused("{segment: a, of: bones, near: b, " + box + "}", "regions.r.near: says again where boxes lie");
+  refused("{segment: a, near: a, " + box + "}", "regions.r.near: is the region's own segment");
+  refused("{bone: f, near: a, points: [[1, 2, 3]]}", "regions.r.near: is for boxes");
+  refused("{segment: a, along: [1, 0, 0], " + box + "}", "regions.r.along: is for boxes near a segment");
+  refused("{segment: a, near: b, along: [0, 0, 0], " + box + "}", "regions.r.along: has no length");
   refused("{segment: a, vertices: [1]}", "regions.r.vertices: count the vertices of a bone");
   const auto file = scratch.put("bad.yaml", "ecorche_regions: 2\nregions: {}\n");
   expect_error(ErrorKind::config, "version '2' is not known", [&] { read_regions_file(file, Frame{}); });

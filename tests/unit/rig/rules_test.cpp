@@ -140,7 +140,9 @@ TEST(Rules, the_first_source_that_is_found_well_is_taken) {
   rule.axes = {{1, any}, {2, given(Vector3d(0, 0, 1))}};
   const Rig rig = fit(two_segments(rule), {});
   EXPECT_EQ(rig.fits[1].rule, CenterRule::centroid);
-  EXPECT_EQ(rig.fits[1].confidence, 1);
+  // A ball of 15 mm has its vertices 15 mm about their mean; and a direction among others stands for none.
+  EXPECT_NEAR(rig.fits[1].residual_mm, 15, 1e-6);
+  EXPECT_NEAR(rig.fits[1].confidence, 0.1, 1e-9);
   EXPECT_EQ(rig.skeleton.segments[1].joint.axes, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
   EXPECT_EQ(rig.skeleton.segments[1].joint.how, nullptr);  // all is said
 }
@@ -213,6 +215,70 @@ TEST(Rules, circles_and_collinear_axes_are_refused) {
   rule.axes = {{0, given(Vector3d(1, 0, 0))}, {2, given(Vector3d(1, 0, 0.05))}};
   EXPECT_NE(refusal(two_segments(rule), ErrorKind::data).find("its two axes come out collinear"),
             std::string::npos);
+}
+
+TEST(Rules, a_mean_of_vertices_is_as_sure_as_they_lie_close_together) {
+  JointRule rule;
+  rule.center = at(CenterRule::centroid, "low");
+  std::string heard;
+  Context context;
+  context.log = [&](LogLevel, std::string_view line) { heard += line; };
+  Case patient = two_segments(rule);
+  EXPECT_NEAR(fit(patient, context).fits[1].confidence, 1 / (1 + 1.5 * 1.5), 1e-9);
+  EXPECT_NE(
+      heard.find("joint tip_joint: its centre by centroid has confidence 31 % (the mean of 482 vertices "
+                 "that lie 15 mm about it)"),
+      std::string::npos)
+      << heard;
+  // A hinge may lie anywhere along its axis: two thirds of the squares remain.
+  patient.skeleton.segments[1].joint.kind = JointKind::hinge;
+  EXPECT_NEAR(fit(patient, {}).fits[1].confidence, 1 / (1 + 1.5), 0.03);
+}
+
+TEST(Rules, boxes_near_a_segment_lie_in_widths_of_the_bones_end) {
+  JointRule rule;
+  rule.center = at(CenterRule::sphere_fit, "end");
+  Case patient = two_segments(rule);
+  Region end;
+  end.name = "end";
+  end.segment = "tip";
+  end.near = "base";
+  end.boxes = {{Vector3d(-2, -2, -0.1), Vector3d(2, 2, 0.9)}};  // the upper ball of 48 mm
+  patient.regions.push_back(end);
+  std::vector<JointEvidence> evidence;
+  const Rig rig = fit(patient, {}, &evidence);
+  EXPECT_LT((rig.skeleton.segments[1].joint.center - Vector3d(0, 0, 100)).norm(), 1e-6);
+  ASSERT_EQ(evidence.size(), 2U);
+  EXPECT_EQ(evidence[1].rule, CenterRule::sphere_fit);
+  EXPECT_NEAR(evidence[1].radius, 24, 1e-6);
+  EXPECT_EQ(static_cast<int>(evidence[1].vertices.size()), rig.fits[1].points);
+  EXPECT_GT(evidence[1].vertices[0].z(), 70);
+  patient.regions.back().near = "nobody";
+  EXPECT_EQ(fit(patient, {}).fits[1].rule, CenterRule::facing);
+}
+
+TEST(Rules, a_measured_rest_outside_its_limits_widens_them_and_says_so) {
+  JointRule rule;
+  rule.center = at(CenterRule::sphere_fit, "high");
+  rule.axes = {{2, from_to(at(CenterRule::centroid, "low"), at(CenterRule::sphere_fit, "high"))},
+               {0, given(Vector3d(1, 0, 0))}};
+  rule.measured_rest = true;
+  Case patient = two_segments(rule);
+  for (AngleAxis& angle : patient.skeleton.segments[1].joint.sequence) {
+    angle.min = -0.05;
+    angle.max = 0.05;
+  }
+  std::string heard;
+  Context context;
+  context.log = [&](LogLevel, std::string_view line) { heard += line; };
+  const Joint joint = fit(patient, context).skeleton.segments[1].joint;
+  EXPECT_NEAR(joint.sequence[1].min, -std::atan2(10, 100), 1e-6);
+  EXPECT_EQ(joint.sequence[1].max, 0.05);
+  EXPECT_EQ(joint.sequence[0].min, -0.05);
+  EXPECT_NE(heard.find("joint tip_joint: adduction rests at -6 degrees, outside its limits: widened from -3, "
+                       "for the scanned pose is allowed"),
+            std::string::npos)
+      << heard;
 }
 
 // A row of five balls that nobody joined, and one far to the side of the middle one.
