@@ -172,10 +172,10 @@ class Guard {
     total_bytes_ += stored.bytes;
     if (stored.bytes > 0) {
       const haddr_t offset = H5Dget_offset(dataset);
-      if (offset == HADDR_UNDEF || H5Dget_storage_size(dataset) != stored.bytes) {
+      if (offset == HADDR_UNDEF || H5Dget_storage_size(dataset) != stored.bytes ||
+          offset > found_.file.size() - stored.bytes) {
         refuse(path, "is not wholly stored");
       }
-      if (offset > found_.file.size() - stored.bytes) refuse(path, "reaches beyond the end of its file");
       stored.offset = offset;
     }
     return found_.datasets.emplace(path, std::move(stored)).first->second;

@@ -133,8 +133,9 @@ TEST(Retarget, RefusesAMatchOfAnotherRigAndAFrameOfAnotherClip) {
   expect_error(ErrorKind::internal, "motion walk: a match of 3 segments for 2 (match the clip with this rig)",
                [&] { pose_at(rig, clip, match(test::chain(3), clip), 0); });
   expect_error(ErrorKind::internal,
-               "motion walk: a frame of 1 rotations for 3 joints (read the frame from this clip)",
-               [&] { places(other, {Vector3d::Zero(), {Quaterniond::Identity()}}); });
+               "motion walk: a frame of 1 rotations for 3 joints (read the frame from this clip)", [&] {
+                 places(other, {Vector3d::Zero(), {Quaterniond::Identity()}});
+               });
 }
 
 }  // namespace

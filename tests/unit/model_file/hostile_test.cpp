@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <array>
-#include <cstring>
 
 #include "core/model_file/guard.hpp"
 #include "tests/unit/model_file/forge.hpp"
@@ -189,39 +188,6 @@ TEST_F(Hostile, AContentsPageOfNumbers) {
   const auto early = [](hid_t creation) { H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY); };
   expect_refused([&](Forge& f) { f.dataset("/ecorche/digests/dataset", H5T_STD_U64LE, {4}, early); },
                  {"/ecorche/digests/dataset", "is not a list of text"});
-}
-
-// Old object headers have no checksum: such a one may say that its bytes lie anywhere.
-TEST_F(Hostile, BytesBeyondTheEnd) {
-  haddr_t place = 0;
-  {
-    const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V110);
-    const Id opened(H5Fopen(file("a.hdf").c_str(), H5F_ACC_RDWR, access), H5Fclose);
-    ASSERT_GE(H5Ldelete(opened, kWeight.c_str(), H5P_DEFAULT), 0);
-    const hsize_t extent = 64;
-    const Id space(H5Screate_simple(1, &extent, nullptr), H5Sclose),
-        creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-    H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY);
-    const Id made(
-        H5Dcreate2(opened, kWeight.c_str(), H5T_IEEE_F32LE, space, H5P_DEFAULT, creation, H5P_DEFAULT),
-        H5Dclose);
-    place = H5Dget_offset(made);
-  }
-  Bytes bytes = load(file("a.hdf"));
-  std::array<char, 8> was{}, is{};
-  const std::uint64_t beyond = bytes.size() - 8;
-  std::memcpy(was.data(), &place, 8);
-  std::memcpy(is.data(), &beyond, 8);
-  int met = 0;
-  for (auto at = bytes.begin(); (at = std::search(at, bytes.end(), was.begin(), was.end())) != bytes.end();
-       ++met)
-    at = std::copy(is.begin(), is.end(), at);
-  ASSERT_GT(met, 0);
-  store(file("a.hdf"), bytes);
-  const Error error = error_of([&] { model_file::read(file("a.hdf"), {}); });
-  EXPECT_NE(std::string(error.what()).find("reaches beyond the end of its file"), std::string::npos)
-      << error.what();
 }
 
 TEST_F(Hostile, AFileThatBecomesShorter) {
