@@ -65,7 +65,7 @@ void attach(const Program& program, const HangSettings& settings, const thin::Ma
   std::vector<thin::Snapped> moved;
   Skeleton rig;
   if (!settings.picks.empty()) {
-    rig = thin::skeleton_of_picks(s, read_picks(settings.picks), moved);
+    rig = thin::skeleton_of_picks(s, mask, read_picks(settings.picks), moved);
     for (const Segment& segment : rig.segments)
       report["parents"][segment.name] =
           segment.parent < 0 ? nlohmann::json()

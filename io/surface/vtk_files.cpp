@@ -45,10 +45,11 @@ void run(W& writer, const std::filesystem::path& path) {
   writer.SetFileName(path.c_str());
   const bool written = writer.Write() == 1;
   if (written && messages->first.empty() && writer.GetErrorCode() == 0) return;
-  throw Error(
-      ErrorKind::io, path.string(),
-      "VTK could not write it (error " + std::to_string(writer.GetErrorCode()) + ") " + messages->first,
-      "check the disk's free space");
+  const unsigned long code = writer.GetErrorCode();
+  throw Error(ErrorKind::io, path.string(),
+              "VTK could not write it" + (code != 0 ? " (error " + std::to_string(code) + ")" : "") +
+                  (messages->first.empty() ? "" : ": " + messages->first),
+              "check the disk's free space");
 }
 
 template <class M>

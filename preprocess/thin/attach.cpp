@@ -31,15 +31,6 @@ Vector3d index_of(const ImageGrid& grid, const Vector3d& point) {
   return {i[0], i[1], i[2]};
 }
 
-bool line_inside(const Mask& mask, const Vector3d& from, const Vector3d& to) {
-  const Vector3d a = index_of(mask.grid, from), way = index_of(mask.grid, to) - a;
-  const int steps = std::max(1, static_cast<int>(std::ceil(2 * way.norm())));
-  for (int s = 1; s <= steps; ++s) {
-    if (!is_inside(mask, a + static_cast<double>(s) / steps * way)) return false;
-  }
-  return true;
-}
-
 struct Bone {
   Vector3d from, to;
   std::int32_t segment;
@@ -170,6 +161,15 @@ bool within(const AttachmentRegion& region, const Vector3d& p) {
 }
 
 }  // namespace
+
+bool line_inside(const Mask& mask, const Vector3d& from, const Vector3d& to) {
+  const Vector3d a = index_of(mask.grid, from), way = index_of(mask.grid, to) - a;
+  const int steps = std::max(1, static_cast<int>(std::ceil(2 * way.norm())));
+  for (int s = 1; s <= steps; ++s) {
+    if (!is_inside(mask, a + static_cast<double>(s) / steps * way)) return false;
+  }
+  return true;
+}
 
 Vector3d voxel_place(const VolumetricSkeleton& s, std::size_t row) {
   const auto& v = s.voxel[row];

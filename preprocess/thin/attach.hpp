@@ -20,6 +20,10 @@ Eigen::Vector3d voxel_place(const VolumetricSkeleton& skeleton, std::size_t row)
 /// voxel.
 std::size_t nearest_voxel(const VolumetricSkeleton& skeleton, const Eigen::Vector3d& to);
 
+/// Whether the straight line between two places, LPS mm, stays in the object from behind `from` to `to`:
+/// looked at every half voxel, nearest voxel centres.
+bool line_inside(const Mask& mask, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 /// A joint that was moved.
 struct Snapped {
   std::string joint;

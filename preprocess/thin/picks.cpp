@@ -79,61 +79,71 @@ Ways ways_to(const VolumetricSkeleton& skeleton, std::size_t root) {
   return out;
 }
 
-// The body's radius at every pick, mm: of the largest ball that holds its voxel.
-std::vector<double> radii_at(const VolumetricSkeleton& skeleton, const std::vector<std::size_t>& voxel) {
-  std::vector<double> out(voxel.size(), 0);
-  for (std::size_t v = 0; v < skeleton.size(); ++v) {
-    const double radius = length(skeleton.metric, skeleton.distance[v]) * skeleton.grid.spacing[0];
-    const Vector3d at = voxel_place(skeleton, v);
-    for (std::size_t p = 0; p < voxel.size(); ++p) {
-      if (radius > out[p] && (voxel_place(skeleton, voxel[p]) - at).norm() < radius) out[p] = radius;
-    }
-  }
-  return out;
+// How near two picks are: a straight line within the body, or else the way along the tree, which is behind
+// every line.
+struct Link {
+  bool seen = false;
+  double far = std::numeric_limits<double>::infinity();
+
+  bool operator<(const Link& other) const { return seen != other.seen ? seen : far < other.far; }
+};
+
+// Row of the pick that p names as its parent, or none.
+std::size_t named_parent(const std::vector<Pick>& picks, std::size_t p) {
+  if (picks[p].parent.empty()) return kNone;
+  const auto found = std::find_if(picks.begin(), picks.end(),
+                                  [&](const Pick& other) { return other.name == picks[p].parent; });
+  if (found == picks.end())
+    bad(picks[p], "its parent '" + picks[p].parent + "' is no pick", "correct the name");
+  return static_cast<std::size_t>(found - picks.begin());
 }
 
-// Near which pick does the way from p to the first one lead first, of those that are nearer to the first?
-// Near is within the body's radius there; near several at once, the one that is nearer to p along the tree.
-std::size_t next_on_the_way(const VolumetricSkeleton& skeleton, const Ways& ways,
-                            const std::vector<std::size_t>& voxel, const std::vector<double>& radius,
-                            std::size_t p) {
-  for (std::size_t at = voxel[p]; at != kNone; at = ways.next[at]) {
-    std::size_t met = kNone;
-    for (std::size_t q = 0; q < voxel.size(); ++q) {
-      if (q == p || !(ways.far[voxel[q]] < ways.far[voxel[p]])) continue;
-      if (q > 0 && ways.next[voxel[q]] == kNone) continue;  // of another component
-      const double far = (voxel_place(skeleton, at) - voxel_place(skeleton, voxel[q])).norm();
-      if (far >= radius[q]) continue;
-      if (met == kNone || ways.far[voxel[q]] > ways.far[voxel[met]]) met = q;
-    }
-    if (met != kNone) return met;
-  }
-  return kNone;
-}
-
-// Row of every pick's parent; the first has none.
-std::vector<std::size_t> parents_of(const VolumetricSkeleton& skeleton, const std::vector<Pick>& picks,
-                                    const std::vector<std::size_t>& voxel) {
+// Row of every pick's parent; the first has none. The tree grows from the first by the shortest link to any
+// that is in it (Prim); who names a parent waits for it. Picks in a ring of names keep the names.
+std::vector<std::size_t> parents_of(const VolumetricSkeleton& skeleton, const Mask& mask,
+                                    const std::vector<Pick>& picks, const std::vector<std::size_t>& voxel) {
   if (!picks[0].parent.empty())
     bad(picks[0], "the first is the root, and has a parent", "leave its parent out");
-  const Ways ways = ways_to(skeleton, voxel[0]);
-  const std::vector<double> radius = radii_at(skeleton, voxel);
-  std::vector<std::size_t> out{kNone};
-  for (std::size_t p = 1; p < picks.size(); ++p) {
-    if (!picks[p].parent.empty()) {
-      const auto found = std::find_if(picks.begin(), picks.end(),
-                                      [&](const Pick& other) { return other.name == picks[p].parent; });
-      if (found == picks.end())
-        bad(picks[p], "its parent '" + picks[p].parent + "' is no pick", "correct the name");
-      out.push_back(static_cast<std::size_t>(found - picks.begin()));
-      continue;
-    }
-    if (ways.next[voxel[p]] == kNone)
+  const std::size_t count = picks.size();
+  std::vector<Ways> ways;
+  std::vector<std::size_t> named, parent(count, kNone);
+  for (std::size_t p = 0; p < count; ++p) {
+    ways.push_back(ways_to(skeleton, voxel[p]));
+    named.push_back(named_parent(picks, p));
+    if (p > 0 && named[p] == kNone && ways[0].next[voxel[p]] == kNone)
       bad(picks[p], "the skeleton tree does not join it to '" + picks[0].name + "'",
           "join the tree's components by --connect, or name its parent");
-    out.push_back(next_on_the_way(skeleton, ways, voxel, radius, p));
   }
-  return out;
+  const auto link = [&](std::size_t p, std::size_t q) -> Link {
+    const Vector3d from = voxel_place(skeleton, voxel[p]), to = voxel_place(skeleton, voxel[q]);
+    if (line_inside(mask, from, to)) return {true, (to - from).norm()};
+    if (ways[q].next[voxel[p]] != kNone) return {false, ways[q].far[voxel[p]]};
+    return {};
+  };
+  std::vector<std::uint8_t> joined(count, 0);
+  joined[0] = 1;
+  for (;;) {
+    Link shortest;
+    std::size_t next = kNone, to = kNone;
+    for (std::size_t p = 1; p < count; ++p) {
+      if (joined[p] != 0) continue;
+      for (std::size_t q = 0; q < count; ++q) {
+        if (joined[q] == 0 || (named[p] != kNone && named[p] != q)) continue;
+        const Link found = named[p] == q ? Link{true, 0} : link(p, q);
+        if (next != kNone && !(found < shortest)) continue;
+        shortest = found;
+        next = p;
+        to = q;
+      }
+    }
+    if (next == kNone) break;
+    joined[next] = 1;
+    parent[next] = to;
+  }
+  for (std::size_t p = 1; p < count; ++p) {
+    if (joined[p] == 0) parent[p] = named[p];
+  }
+  return parent;
 }
 
 // Rows of the picks, parents first, else in their order.
@@ -170,13 +180,13 @@ Joint joint_of(const Pick& pick, bool root) {
 
 }  // namespace
 
-Skeleton skeleton_of_picks(const VolumetricSkeleton& skeleton, const std::vector<Pick>& by_hand,
-                           std::vector<Snapped>& moved) {
+Skeleton skeleton_of_picks(const VolumetricSkeleton& skeleton, const Mask& mask,
+                           const std::vector<Pick>& by_hand, std::vector<Snapped>& moved) {
   if (skeleton.parent.size() != skeleton.size())
     throw Error(ErrorKind::internal, "picks", "the volumetric skeleton has no tree", "report this");
   std::vector<Pick> picks = named(by_hand);
   const std::vector<std::size_t> voxel = voxels_of(skeleton, picks);
-  const std::vector<std::size_t> parent = parents_of(skeleton, picks, voxel);
+  const std::vector<std::size_t> parent = parents_of(skeleton, mask, picks, voxel);
   const std::vector<std::size_t> order = parents_first(picks, parent);
   Skeleton out;
   out.name = "picked";

@@ -9,6 +9,7 @@
 #include "core/values/skeleton.hpp"
 #include "core/values/volumetric_skeleton.hpp"
 #include "preprocess/thin/attach.hpp"
+#include "preprocess/thin/mask.hpp"
 
 namespace ecorche::thin {
 
@@ -19,13 +20,15 @@ struct Pick {
 };
 
 /// Moves every pick to the centre of the nearest skeletal voxel and makes a joint of it: balls about LPS
-/// axes, without limits; the first is the root, and free. The parent of a pick that names none is the one
-/// near which its way along the tree to the first leads first, of those nearer to the first along the tree;
-/// near is within the radius of the largest ball that holds the pick. Segments come parents first, else in
-/// the order of the picks. `moved` tells how far, in the order of the segments. `skeleton` must have its tree
-/// (Error{internal}). Throws Error{config} for no picks, two of one name or on one voxel, a parent that is no
-/// pick, parents in a ring, a first pick with a parent, and a pick that the tree does not join to the first.
-Skeleton skeleton_of_picks(const VolumetricSkeleton& skeleton, const std::vector<Pick>& picks,
-                           std::vector<Snapped>& moved);
+/// axes, without limits; the first is the root, and free. Picks that name no parent are
+/// joined to the first one by one, always that one next whose link to a joined one is the shortest (a minimum
+/// spanning tree): a straight line that stays in the object; where no line does, the way along the skeleton
+/// tree. Segments come parents
+/// first, else in the order of the picks. `moved` tells how far, in the order of the segments. `skeleton`
+/// must have its tree (Error{internal}). Throws Error{config} for no picks, two of one name or on one voxel,
+/// a parent that is no pick, parents in a ring, a first pick with a parent, and a pick that the tree does not
+/// join to the first.
+Skeleton skeleton_of_picks(const VolumetricSkeleton& skeleton, const Mask& mask,
+                           const std::vector<Pick>& picks, std::vector<Snapped>& moved);
 
 }  // namespace ecorche::thin

@@ -232,8 +232,10 @@ class Refill(unittest.TestCase):
         self.ok("preprocess", small, "-o", flat, "--mesher", "lattice", "--max-tets", 5000, "--spheres", 0.3)
         self.assert_error(64, ("deformers", flat, "--volume", "ct", "--pose", small / "pose.yaml"),
                           "its voxels are not cubic, so the two do not pose it on one lattice (resample it)")
+        far = self.folder / "far.yaml"
+        far.write_text(f"ecorche_pose: 1\nskeleton: {info['skeleton']}\nroot: {{translation_mm: [1e300, 0, 0]}}\n")
+        self.assert_error(65, ("deformers", model, "--volume", "labels", "--pose", far), "(mend the motion)")
         (small / "far.yaml").write_text("ecorche_pose: 1\nskeleton: small\nroot: {translation_mm: [1e300, 0, 0]}\n")
-        self.assert_error(65, ("deformers", flat, "--volume", "labels", "--pose", small / "far.yaml"), "(mend the motion)")
         self.assert_error(65, ("pose", flat, "-o", self.folder / "p", "--pose", small / "far.yaml"), "(mend the motion)")
         self.assert_error(65, ("preprocess", small, "-o", self.folder / "thin.hdf", "--mesher", "lattice", "--max-tets", 5000, "--spheres", 2),
                           "--spheres: no voxel is left at this thinness (choose a lower one)")
@@ -311,7 +313,7 @@ class Refill(unittest.TestCase):
         rest = self.ok("refill", few, self.bar, "-o", out[0], "--sampling", "nearest")["frames"][0]
         self.assertTrue((self.read(out[0])[0] == self.read(out[1])[0]).all(), rest)
         self.assert_error(64, ("export", rig, "-o", self.folder / "x.vtu"), "a skeleton has no tets")
-        self.assert_error(78, ("export", self.folder / "picks.csv", "-o", self.folder / "x.glb"), "picks.csv")
+        self.assert_error(65, ("export", picks, "-o", self.folder / "x.glb"), "picks.csv: is not an HDF5 file")
 
     def test_picks_that_are_none(self):
         picks, rig, out = self.folder / "bad.csv", self.folder / "bad.yaml", self.folder / "bad.vtp"

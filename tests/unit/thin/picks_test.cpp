@@ -15,6 +15,7 @@ namespace {
 // root of the tree where nobody picks.
 struct Body {
   VolumetricSkeleton skeleton;
+  Mask mask;  // flesh about it, one voxel thick
 
   Body() {
     skeleton.grid.size = {30, 5, 30};
@@ -27,6 +28,13 @@ struct Body {
     limb(15, 17, 1, 0, 7);
     limb(15, 17, -1, 0, 7);
     // As every tree, rooted somewhere else: at the right hand, 37.
+    mask.grid = skeleton.grid;
+    mask.inside.assign(mask.grid.voxels(), 0);
+    for (const auto& [i, j, k] : skeleton.voxel) {
+      for (int di = -1; di <= 1; ++di) {
+        for (int dk = -1; dk <= 1; ++dk) mask.inside[mask.grid.offset(i + di, j, k + dk)] = 1;
+      }
+    }
     std::int32_t at = 37, before = -1;
     while (at >= 0)
       before = std::exchange(at, std::exchange(skeleton.parent[static_cast<std::size_t>(at)], before));
@@ -55,16 +63,16 @@ std::string parent_of(const Skeleton& rig, const std::string& name) {
   return up < 0 ? "" : rig.segments.at(static_cast<std::size_t>(up)).name;
 }
 
-TEST(Picks, ParentsAreTheNextOnTheWayToTheFirst) {
+TEST(Picks, ParentsAreTheNearestOnTheWayToTheFirst) {
   const Body body;
   // Knees before hips, hands before the chest.
-  const std::vector<Pick> picks{{"pelvis", "", body.at(15, 11)},           {"knee_left", "", body.at(20, 5)},
+  const std::vector<Pick> picks{{"pelvis", "", body.at(15, 10)},           {"knee_left", "", body.at(20, 5)},
                                 {"hand_right", "", body.at(8, 17)},        {"hip_left", "", body.at(16, 9)},
                                 {"hip_right", "", body.at(14, 9)},         {"chest", "", body.at(15, 16)},
                                 {"elbow_right", "", body.at(11, 17)},      {"", "", body.at(22, 17)},
                                 {"foot_right", "hip_right", body.at(9, 4)}};
   std::vector<Snapped> moved;
-  const Skeleton rig = skeleton_of_picks(body.skeleton, picks, moved);
+  const Skeleton rig = skeleton_of_picks(body.skeleton, body.mask, picks, moved);
   ASSERT_EQ(rig.segments.size(), picks.size());
   EXPECT_EQ(rig.segments[0].name, "pelvis");
   EXPECT_EQ(rig.segments[0].joint.kind, JointKind::free);
@@ -93,12 +101,39 @@ TEST(Picks, ParentsAreTheNextOnTheWayToTheFirst) {
   }
 }
 
+TEST(Picks, ALineWithinTheBodyCountsMoreThanTheTree) {
+  // Flesh between the left elbow and the left hip: they are in one lump, as in a body that was scanned
+  // sitting.
+  Body body;
+  const std::vector<Pick> picks{{"pelvis", "", body.at(15, 11)},
+                                {"hip", "", body.at(19, 6)},
+                                {"hand", "", body.at(20, 17)},
+                                {"knee", "", body.at(21, 4)}};
+  std::vector<Snapped> moved;
+  EXPECT_EQ(parent_of(skeleton_of_picks(body.skeleton, body.mask, picks, moved), "hand"), "pelvis");
+  for (int k = 6; k <= 17; ++k) {
+    for (int i = 18; i <= 21; ++i) body.mask.inside[body.mask.grid.offset(i, 2, k)] = 1;
+  }
+  const Skeleton lump = skeleton_of_picks(body.skeleton, body.mask, picks, moved);
+  EXPECT_EQ(parent_of(lump, "hand"), "hip");
+  EXPECT_EQ(parent_of(lump, "knee"), "hip");
+  // What a name says counts more.
+  std::vector<Pick> told = picks;
+  told[2].parent = "pelvis";
+  EXPECT_EQ(parent_of(skeleton_of_picks(body.skeleton, body.mask, told, moved), "hand"), "pelvis");
+  told[1].parent = "knee";
+  told[3].parent = "hand";
+  const Skeleton chain = skeleton_of_picks(body.skeleton, body.mask, told, moved);
+  EXPECT_EQ(parent_of(chain, "hip"), "knee");
+  EXPECT_EQ(parent_of(chain, "knee"), "hand");
+}
+
 TEST(Picks, WhatNoTreeCanMeanIsRefused) {
   Body body;
   std::vector<Snapped> moved;
   const auto refused = [&](const std::vector<Pick>& picks, const std::string& why) {
     try {
-      skeleton_of_picks(body.skeleton, picks, moved);
+      skeleton_of_picks(body.skeleton, body.mask, picks, moved);
       ADD_FAILURE() << why;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
@@ -116,7 +151,8 @@ TEST(Picks, WhatNoTreeCanMeanIsRefused) {
     if (parent == 3) parent = -1;
   }
   refused({pelvis, chest}, "does not join it");
-  EXPECT_NO_THROW(skeleton_of_picks(body.skeleton, {pelvis, {"chest", "pelvis", chest.at}}, moved));
+  EXPECT_NO_THROW(
+      skeleton_of_picks(body.skeleton, body.mask, {pelvis, {"chest", "pelvis", chest.at}}, moved));
   body.skeleton.parent.clear();
   refused({pelvis}, "the volumetric skeleton has no tree");
 }
