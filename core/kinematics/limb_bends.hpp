@@ -51,7 +51,7 @@ class BendFinder {
 /// sequence, or has no child that tells its direction.
 LimbBend bend_of(const Rig& rig, std::size_t segment, const std::vector<double>& angles);
 
-/// Rows of the limbs' ends: the only child of a segment, or -1.
+/// Row of the only child of every segment; -1 where it has none or several.
 std::vector<int> only_child(const Skeleton& skeleton);
 
 }  // namespace ecorche::kinematics

@@ -17,22 +17,6 @@ using Eigen::Vector3d;
 constexpr double kLimb = 0.12;                          // of the skeleton's extent
 constexpr double kFacing = 5 * std::numbers::pi / 180;  // hips and shoulders differ so between any two bodies
 
-// How many children each segment has, and the last of them, or -1.
-struct Children {
-  std::vector<int> last, count;
-};
-
-Children children_of(const Skeleton& skeleton) {
-  Children out{std::vector<int>(skeleton.segments.size(), -1), std::vector<int>(skeleton.segments.size(), 0)};
-  for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
-    const int parent = skeleton.segments[s].parent;
-    if (parent < 0) continue;
-    ++out.count[static_cast<std::size_t>(parent)];
-    out.last[static_cast<std::size_t>(parent)] = static_cast<int>(s);
-  }
-  return out;
-}
-
 double extent(const Skeleton& skeleton) {
   Eigen::AlignedBox3d box;
   for (const Segment& segment : skeleton.segments) box.extend(segment.joint.center);
@@ -45,10 +29,10 @@ struct Limb {
   Vector3d scanned, drawn;
 };
 
-Limb limb_of(const Skeleton& skeleton, const Children& children, double shortest, const ClipPlaces& reference,
-             const std::vector<int>& clip_joint, std::size_t s) {
-  if (children.count[s] != 1) return {};
-  const auto c = static_cast<std::size_t>(children.last[s]);
+Limb limb_of(const Skeleton& skeleton, const std::vector<int>& child, double shortest,
+             const ClipPlaces& reference, const std::vector<int>& clip_joint, std::size_t s) {
+  if (child[s] < 0) return {};
+  const auto c = static_cast<std::size_t>(child[s]);
   if (clip_joint[s] < 0 || clip_joint[c] < 0) return {};
   Limb limb;
   limb.scanned = skeleton.segments[c].joint.center - skeleton.segments[s].joint.center;
@@ -67,13 +51,13 @@ Quaterniond about(const Vector3d& axis, const Vector3d& from, const Vector3d& to
 
 // The turn about the vertical that brings what stands beside the trunk onto the clip's (Procrustes in the
 // plane).
-Quaterniond facing(const Skeleton& skeleton, const Children& children, const ClipPlaces& reference,
+Quaterniond facing(const Skeleton& skeleton, const std::vector<int>& child, const ClipPlaces& reference,
                    const std::vector<int>& clip_joint) {
   double cosine = 0, sine = 0;
   for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
     if (skeleton.segments[s].parent < 0) continue;
     const auto parent = static_cast<std::size_t>(skeleton.segments[s].parent);
-    if (children.count[parent] < 2 || clip_joint[s] < 0 || clip_joint[parent] < 0) continue;
+    if (child[parent] >= 0 || clip_joint[s] < 0 || clip_joint[parent] < 0) continue;
     const Vector3d a = skeleton.segments[s].joint.center - skeleton.segments[parent].joint.center;
     const Vector3d b = reference.point[static_cast<std::size_t>(clip_joint[s])] -
                        reference.point[static_cast<std::size_t>(clip_joint[parent])];
@@ -122,17 +106,17 @@ std::vector<Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
                                     const std::vector<int>& clip_joint, const std::vector<LimbBend>& bends) {
   const auto& segments = rig.skeleton.segments;
   const double shortest = kLimb * extent(rig.skeleton);
-  const Children children = children_of(rig.skeleton);
+  const std::vector<int> child = only_child(rig.skeleton);
   std::vector<Quaterniond> turn(segments.size(), Quaterniond::Identity());
   for (std::size_t s = 0; s < segments.size(); ++s) {
-    turn[s] = segments[s].parent < 0 ? facing(rig.skeleton, children, reference, clip_joint)
+    turn[s] = segments[s].parent < 0 ? facing(rig.skeleton, child, reference, clip_joint)
                                      : turn[static_cast<std::size_t>(segments[s].parent)];
-    const Limb limb = limb_of(rig.skeleton, children, shortest, reference, clip_joint, s);
+    const Limb limb = limb_of(rig.skeleton, child, shortest, reference, clip_joint, s);
     if (!limb.is) continue;
     turn[s] = (Quaterniond::FromTwoVectors(turn[s] * limb.scanned, limb.drawn) * turn[s]).normalized();
     if (bends.empty()) continue;
     // Its own hinge and the one at its end: a shank has the knee alone, a thigh too; the knee tells both.
-    const auto end = static_cast<std::size_t>(children.last[s]);
+    const auto end = static_cast<std::size_t>(child[s]);
     const std::size_t hinge = bends[s].known ? s : end;
     const LimbBend own = bends[hinge].known ? bend_of(rig, hinge, bends[hinge].angles) : LimbBend();
     if (!own.known) continue;
@@ -147,12 +131,12 @@ std::vector<Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
 
 LimbCheck check_limbs(const Rig& rig, const ClipPlaces& reference, const std::vector<int>& clip_joint) {
   const double shortest = kLimb * extent(rig.skeleton);
-  const Children children = children_of(rig.skeleton);
-  const Quaterniond turn = facing(rig.skeleton, children, reference, clip_joint);
+  const std::vector<int> child = only_child(rig.skeleton);
+  const Quaterniond turn = facing(rig.skeleton, child, reference, clip_joint);
   LimbCheck out;
   double scanned = 0, drawn = 0;
   for (std::size_t s = 0; s < rig.skeleton.segments.size(); ++s) {
-    const Limb limb = limb_of(rig.skeleton, children, shortest, reference, clip_joint, s);
+    const Limb limb = limb_of(rig.skeleton, child, shortest, reference, clip_joint, s);
     if (!limb.is) continue;
     const Vector3d a = turn * limb.scanned;
     const double angle = std::atan2(a.cross(limb.drawn).norm(), a.dot(limb.drawn));
