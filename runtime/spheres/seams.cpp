@@ -183,19 +183,39 @@ struct Turn {
   }
 };
 
-// So many steps that a swept ball leaves no scallop deeper than half a voxel: balls of radius r that lie 2 w
-// apart leave r - sqrt(r^2 - w^2) <= 1/2 where w^2 <= r - 1/4.
-int steps_of(const Turn& turn, const Seam::Sheet& at, const Vec3& joint, double voxel_mm) {
-  const double way = turn.angle() * std::sqrt(distance2(at.voxel, joint)) + turn.shift() / voxel_mm;
-  const double apart = 2 * std::sqrt(std::max(std::sqrt(at.radius2) - 0.25, 0.5));
-  return static_cast<int>(std::clamp(std::ceil(way / apart), 1.0, kMostSteps));
+// Balls of radius r that lie 2 w apart leave scallops of r - sqrt(r^2 - w^2): at most half a voxel where
+// w^2 <= r - 1/4.
+double apart(const Seam::Sheet& at) {
+  return 2 * std::sqrt(std::max(std::sqrt(at.radius2) - 0.25, 0.5));
 }
 
-// Large balls near the joint go in longer strides than small ones far out.
-std::vector<int> steps_of(const Turn& turn, const std::vector<Seam::Sheet>& sheet, const ImageGrid& lattice) {
+// How one ball of a sheet is swept: large ones near the joint in longer strides than small ones far out.
+struct Sweep {
+  Vector3d from, to;  // where the way begins and ends, voxels
+  int steps = 1;      // along it
+  int chords = 0;     // further ways, from inside the arc to the chord
+};
+
+std::vector<Sweep> sweeps_of(const Turn& turn, const std::vector<Seam::Sheet>& sheet,
+                             const ImageGrid& lattice) {
+  const Affine space = to_space(lattice), index = to_index(lattice);
+  const auto forth = [&](double share) {
+    const RigidTransform at = turn.at(share);
+    return index * Affine{at.q.toRotationMatrix(), at.t} * space;
+  };
+  const Affine from = forth(0), middle = forth(0.5), to = forth(1);
   const Vec3 joint = lattice.index({turn.joint.x(), turn.joint.y(), turn.joint.z()});
-  std::vector<int> out;
-  for (const Seam::Sheet& at : sheet) out.push_back(steps_of(turn, at, joint, lattice.spacing[0]));
+  std::vector<Sweep> out;
+  for (const Seam::Sheet& at : sheet) {
+    const Vector3d voxel(at.voxel.data());
+    Sweep sweep{from * voxel, to * voxel};
+    const double way =
+        turn.angle() * std::sqrt(distance2(at.voxel, joint)) + turn.shift() / lattice.spacing[0];
+    const double bow = (middle * voxel - 0.5 * (sweep.from + sweep.to)).norm();
+    sweep.steps = static_cast<int>(std::clamp(std::ceil(way / apart(at)), 1.0, kMostSteps));
+    sweep.chords = static_cast<int>(std::min(bow / apart(at), kMostSteps));
+    out.push_back(sweep);
+  }
   return out;
 }
 
@@ -209,20 +229,28 @@ void bridge(const Seams& seams, std::span<const RigidTransform> motions, BallSet
       const auto s = static_cast<std::size_t>(child), p = static_cast<std::size_t>(seams.parent[s]);
       const Turn turn{motions[p], motions[s], Vector3d(seams.joint[s].data())};
       if (turn.angle() < kSame && turn.shift() < kSame) continue;
-      const std::vector<int> steps = steps_of(turn, seam.sheet, set.lattice);
-      const int shares = kShares * *std::max_element(steps.begin(), steps.end());
+      const std::vector<Sweep> sweeps = sweeps_of(turn, seam.sheet, set.lattice);
+      int most = 1;
+      for (const Sweep& sweep : sweeps) most = std::max(most, sweep.steps);
+      const int shares = kShares * most;
       for (int i = 0; i <= shares; ++i) {
-        const RigidTransform share = turn.at(static_cast<double>(i) / shares);
+        const double along = static_cast<double>(i) / shares;
+        const RigidTransform share = turn.at(along);
         const Affine motion{share.q.toRotationMatrix(), share.t};
         const Affine forth = index * motion * space;
         const auto row = static_cast<std::int32_t>(set.back.size());
         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(set.back.emplace_back().data()) =
             forth.linear.transpose();
-        for (std::size_t b = 0; b < steps.size(); ++b) {
-          if (i < shares && i % (shares / steps[b]) != 0) continue;
+        for (std::size_t b = 0; b < sweeps.size(); ++b) {
+          const Sweep& sweep = sweeps[b];
+          if (i < shares && i % (shares / sweep.steps) != 0) continue;
           const Seam::Sheet& at = seam.sheet[b];
-          const Vector3d to = forth * Vector3d(at.voxel.data());
-          set.balls.push_back({at.voxel, {to.x(), to.y(), to.z()}, at.radius2, at.radius2, row});
+          const Vector3d arc = forth * Vector3d(at.voxel.data());
+          const Vector3d chord = (1 - along) * sweep.from + along * sweep.to;
+          for (int c = 0; c <= sweep.chords; ++c) {
+            const Vector3d to = sweep.chords == 0 ? arc : arc + (chord - arc) * c / sweep.chords;
+            set.balls.push_back({at.voxel, {to.x(), to.y(), to.z()}, at.radius2, at.radius2, row});
+          }
         }
       }
     }

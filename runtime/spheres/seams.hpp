@@ -41,7 +41,9 @@ Seams seams_of(const BallSet& rest, const std::vector<std::int32_t>& segment, co
 
 /// Adds the balls of every seam, swept from the motion of one of its segments to that of the other along the
 /// joints between them: turned about each joint's centre by shares of its rotation, so many that the bodies
-/// of neighbouring balls leave no scallop deeper than half a voxel. What they show moves likewise, halfway
+/// of neighbouring balls leave no scallop deeper than half a voxel, and, where that arc bows out so far that
+/// the straight way lies outside the balls on it, along ways between the arc and its chord too: a sheet that
+/// does not reach to the axis sweeps a shell, with nothing inside it. What they show turns likewise, halfway
 /// between the segments. They own only what no ball before them holds: what the body shows of itself, it
 /// shows as without them. Nothing is added where nothing turns. Once a pose. `motions`: as move_balls has
 /// them.
