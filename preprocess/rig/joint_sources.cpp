@@ -45,11 +45,17 @@ FoundPoint said(const Eigen::Vector3d& at) {
   return found;
 }
 
+// Of marked vertices each counts the same; of a part of the surface each as its area does, or a mesh that is
+// finer on one side would draw the mean there.
 FoundPoint centroid(const SurfacePoints& on) {
+  Eigen::VectorXd share = Eigen::VectorXd::Ones(on.at.rows());
+  if (on.found) share = Eigen::Map<const Eigen::VectorXd>(on.area.data(), on.at.rows());
+  if (!(share.sum() > 0)) share.setOnes();
+  share /= share.sum();
   FoundPoint found;
-  found.at = on.at.colwise().mean().transpose();
+  found.at = on.at.transpose() * share;
   const Points from = on.at.rowwise() - found.at.transpose();
-  found.scatter = from.transpose() * from / static_cast<double>(on.at.rows());
+  found.scatter = from.transpose() * share.asDiagonal() * from;
   const double spread = std::sqrt(found.scatter.trace());
   found.fit = {"",
                CenterRule::centroid,

@@ -257,6 +257,29 @@ TEST(Rules, boxes_near_a_segment_lie_in_widths_of_the_bones_end) {
   EXPECT_EQ(fit(patient, {}).fits[1].rule, CenterRule::facing);
 }
 
+// A ball whose one side has three times as many vertices: those found count by area, marked ones one by one.
+TEST(Rules, a_found_part_has_its_middle_by_area) {
+  JointRule rule;
+  rule.center = at(CenterRule::centroid, "end");
+  Case patient = two_segments(rule);
+  const auto side = [](int rings, double sign) {
+    return test::part_of(test::ball({0, 0, 100}, 24, rings),
+                         [&](const Vector3d& p) { return sign * p.x() > -1e-9; });
+  };
+  patient.bones[1].surface =
+      test::joined(test::joined(side(16, 1), side(48, -1)), test::ball({10, 0, 0}, 15, 16));
+  Region end;
+  end.name = "end";
+  end.segment = "tip";
+  end.near = "base";
+  end.boxes = {{Vector3d(-2, -2, -0.1), Vector3d(2, 2, 1.2)}};
+  patient.regions.push_back(end);
+  EXPECT_LT(std::abs(fitted(patient).center.x()), 0.5);
+  patient.regions.back() = patient.regions.front();
+  patient.regions.back().name = "end";
+  EXPECT_LT(fitted(patient).center.x(), -5);
+}
+
 TEST(Rules, a_measured_rest_outside_its_limits_widens_them_and_says_so) {
   JointRule rule;
   rule.center = at(CenterRule::sphere_fit, "high");
