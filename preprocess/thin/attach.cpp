@@ -133,13 +133,10 @@ Plane split_plane(const Skeleton& rig, int row) {
   const Vector3d at = segment.joint.center;
   const Vector3d in = at - rig.segments[static_cast<std::size_t>(segment.parent)].joint.center;
   Vector3d out = Vector3d::Zero();
-  double children = 0;
   for (const Segment& child : rig.segments) {
     if (child.parent != row) continue;
     out += child.joint.center - at;
-    ++children;
   }
-  if (children > 0) out /= children;
   const auto unit = [](const Vector3d& v) { return v.norm() > 0 ? Vector3d(v.normalized()) : v; };
   const Vector3d normal = unit(in) + unit(out);
   if (!(normal.norm() > 1e-6))

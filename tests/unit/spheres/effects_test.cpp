@@ -17,6 +17,7 @@
 #include "runtime/spheres/tears.hpp"
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/spheres/bent_cylinder.hpp"
+#include "tests/unit/spheres/exhaustive.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -169,6 +170,25 @@ TEST(Effects, ExplosionKeepsTheMeanAndScalesEveryWay) {
   EXPECT_EQ(parts_of(mask, 1), 3U);
 }
 
+// 1 + T G (1 - (d / r)^2)^2 within r, 1 beyond, of the joint's two segments.
+TEST(Effects, ABulgeFallsOffWithTheFourthPower) {
+  BallSet set = balls({{{10, 10, 10}, 2}, {{13, 10, 10}, 2}, {{10, 14, 10}, 2}, {{18.5, 10, 10}, 2}}, 30);
+  set.back.resize(3, set.back[0]);
+  set.balls[2].motion = 2;
+  Skeleton rig;
+  rig.segments.resize(3);
+  for (std::size_t s = 1; s < 3; ++s) {
+    rig.segments[s].parent = static_cast<int>(s) - 1;
+    rig.segments[s].joint.center = {10, 10, 10};
+  }
+  bulge(set, rig, std::vector<JointBulge>{{1, 8, 0.5}}, 0.6);
+  const auto grown = [](double d) { return 1 + 0.6 * 0.5 * std::pow(1 - d * d / 64, 2); };
+  EXPECT_NEAR(std::sqrt(set.balls[0].radius2), 2 * grown(0), 1e-12);
+  EXPECT_NEAR(std::sqrt(set.balls[1].radius2), 2 * grown(3), 1e-12);
+  EXPECT_EQ(set.balls[2].radius2, 4);  // another segment's
+  EXPECT_EQ(set.balls[3].radius2, 4);  // beyond
+}
+
 TEST(Effects, ABulgeAddsAShellOfTheBallsOwnRim) {
   const BentCylinder body(0.3);
   const Skeleton rig = two_segments(body);
@@ -220,6 +240,29 @@ TEST(Morph, EndsAreTheTwoObjects) {
   });
   EXPECT_THROW(
       morph({from, body.volume}, {to, Image(other.grid, ScalarType::i16)}, 0.5, 0, Sampling::nearest), Error);
+}
+
+// Of one body into itself with other values: everywhere their mean by time, or, nearest, the nearer one's.
+TEST(Morph, ValuesGoFromTheOneToTheOther) {
+  const BentCylinder body(0.3);
+  const BallSet set = posed(body, 0);
+  const LatticeBox box = grown_box(set);
+  Image one(body.volume.grid, ScalarType::f32), two = one;
+  for (float& v : one.scalars<float>()) v = 10;
+  for (float& v : two.scalars<float>()) v = 50;
+  for (const auto& [time, sampling, expected] : {std::tuple{0.25, Sampling::trilinear, 20.0F},
+                                                 {0.75, Sampling::trilinear, 40.0F},
+                                                 {0.25, Sampling::nearest, 10.0F},
+                                                 {0.75, Sampling::nearest, 50.0F}}) {
+    const Image image = morph({set, one}, {set, two}, time, -1, sampling);
+    std::size_t held = 0;
+    for (const float v : image.scalars<float>()) {
+      if (v < 0) continue;
+      ++held;
+      ASSERT_FLOAT_EQ(v, expected);
+    }
+    EXPECT_EQ(held, covered_voxels(set, box));
+  }
 }
 
 TEST(SpatialIndex, TheWayFollowsTheTree) {
@@ -294,7 +337,21 @@ TEST(Tears, ASoundBodyHasNoneAndSeededOnesAreFound) {
   const BentCylinder body(0.3);
   const BallSet rest = posed(body, 0);
   const TearDetector detector(rest, body.skeleton.segment);
-  EXPECT_GT(detector.deep_voxels(), 500U);
+  // Two deep, by trying every voxel.
+  const Image held = covered(rest, grown_box(rest));
+  const ImageGrid& grid = held.grid;
+  const auto at = [&](int i, int j, int k) {
+    return i >= 0 && j >= 0 && k >= 0 && i < grid.size[0] && j < grid.size[1] && k < grid.size[2] &&
+           held.scalars<std::uint8_t>()[grid.offset(i, j, k)] != 0;
+  };
+  std::size_t deep = 0;
+  test::for_voxels({{0, 0, 0}, grid.size}, [&](int i, int j, int k) {
+    bool all = at(i, j, k);
+    for (int d = -2; d <= 2; ++d) all = all && at(i + d, j, k) && at(i, j + d, k) && at(i, j, k + d);
+    deep += all;
+  });
+  EXPECT_EQ(detector.deep_voxels(), deep);
+  EXPECT_GT(deep, 500U);
   EXPECT_GT(detector.deep_links(), 20U);
   EXPECT_FALSE(detector.look(rest).errs());
   for (const double degrees : {10.0, 30.0}) EXPECT_FALSE(detector.look(posed(body, degrees)).errs());

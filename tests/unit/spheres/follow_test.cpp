@@ -12,6 +12,7 @@
 #include "core/values/error.hpp"
 #include "runtime/spheres/refilled_volume.hpp"
 #include "runtime/spheres/slice.hpp"
+#include "tests/unit/spheres/exhaustive.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -112,6 +113,20 @@ TEST(Follow, BallsThatComeAndGoShowWhereTheyWere) {
     EXPECT_EQ(kept.image.bytes, body.whole(kBox, Sampling::nearest).bytes) << gone;
     EXPECT_LE(std::count(kept.moved.begin(), kept.moved.end(), 1), gone == 0 ? 12 : 8) << gone;
   }
+  // One alone, where nothing else is, goes and leaves nothing.
+  body.set.balls.resize(own);
+  follow(body.set, kBox, body.volume, Sampling::nearest, kept);
+  Vec3 corner{1, 1, 10};
+  while (test::owner_of(body.set, static_cast<int>(corner[0]), 1, 10) >= 0) ++corner[0];
+  ASSERT_LT(corner[0], kEdge);
+  for (const bool there : {true, false}) {
+    body.set.balls.resize(own);
+    if (there) body.set.balls.push_back({corner, corner, 2, 2, 0});
+    const Image before = kept.image;
+    follow(body.set, kBox, body.volume, Sampling::nearest, kept);
+    EXPECT_EQ(kept.image.bytes, body.whole(kBox, Sampling::nearest).bytes) << there;
+    EXPECT_NE(kept.image.bytes, before.bytes);
+  }
   // A ball that turns in its place.
   body.set.back[0] = {0, 1, 0, -1, 0, 0, 0, 0, 1};
   follow(body.set, kBox, body.volume, Sampling::nearest, kept);
@@ -138,6 +153,13 @@ TEST(Follow, AfterAStopAllIsMadeAgain) {
   stop.request_stop();
   EXPECT_THROW(
       follow(body.set, kBox, body.volume, Sampling::nearest, kept, {nullptr, nullptr, stop.get_token()}),
+      Error);
+  follow(body.set, kBox, body.volume, Sampling::nearest, kept);
+  EXPECT_EQ(kept.image.bytes, body.whole(kBox, Sampling::nearest).bytes);
+  // Stopped in another box, where the image had been made anew.
+  const LatticeBox other{{1, -3, 2}, {90, 86, 75}};
+  EXPECT_THROW(
+      follow(body.set, other, body.volume, Sampling::nearest, kept, {nullptr, nullptr, stop.get_token()}),
       Error);
   follow(body.set, kBox, body.volume, Sampling::nearest, kept);
   EXPECT_EQ(kept.image.bytes, body.whole(kBox, Sampling::nearest).bytes);

@@ -172,6 +172,39 @@ TEST(Refill, EveryVoxelShowsTheRestPlaceOfItsOwner) {
   EXPECT_EQ(wrong, 0U);
 }
 
+// Between voxels, too: a volume that is linear in space comes back exactly so.
+TEST(Refill, TrilinearValuesAreThoseOfTheRestPlace) {
+  const BentCylinder body(0.4);
+  Image volume(body.volume.grid, ScalarType::f32);
+  const auto ramp = [](double i, double j, double k) { return 3 * i - 5 * j + 2 * k; };
+  for_voxels({{0, 0, 0}, volume.grid.size}, [&](int i, int j, int k) {
+    volume.scalars<float>()[volume.grid.offset(i, j, k)] = static_cast<float>(ramp(i, j, k));
+  });
+  const BallSet set = posed(body.skeleton, body.bent(50));
+  const LatticeBox box = grown_box(set);
+  const Image image = refill(set, box, volume, -1000, Sampling::trilinear);
+  std::size_t at = 0, held = 0;
+  double worst = 0;
+  for_voxels(box, [&](int i, int j, int k) {
+    const float shown = image.scalars<float>()[at++];
+    const std::int32_t owner = test::owner_of(set, i, j, k);
+    if (owner < 0) return;
+    const Ball& ball = set.balls[static_cast<std::size_t>(owner)];
+    const auto& r = set.back[static_cast<std::size_t>(ball.motion)];
+    const Vec3 q{i - ball.centre[0], j - ball.centre[1], k - ball.centre[2]};
+    Vec3 place;
+    for (std::size_t a = 0; a < 3; ++a)
+      place[a] = ball.rest[a] + r[3 * a] * q[0] + r[3 * a + 1] * q[1] + r[3 * a + 2] * q[2];
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (place[a] < 0 || place[a] > volume.grid.size[a] - 1) return;
+    }
+    ++held;
+    worst = std::max(worst, std::abs(shown - ramp(place[0], place[1], place[2])));
+  });
+  EXPECT_GT(held, 3000U);
+  EXPECT_LT(worst, 1e-3);
+}
+
 // Size of the largest 6-connected part of `value`, and of all of it.
 std::pair<std::size_t, std::size_t> largest_part(const Image& image, std::uint8_t value) {
   const ImageGrid& grid = image.grid;
