@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times of posing beside the memory's floor and the plain version, all in one run: bench_runtime MODEL.hdf.
+// Times of posing beside the memory's floor, the plain version and other libraries, all in one run:
+// bench_runtime MODEL.hdf [--clip CLIP] [--only PART]..., with parts skin, walk, quality, probe, volume,
+// peers.
 //
 // Every joint moves in every frame. Working sets of whole frames of at least four last caches: as many copies
 // of the body as that takes, but no more than twelve, are posed in turn; the number is printed. The floor is
@@ -14,20 +16,22 @@
 #include <chrono>
 #include <cstdio>
 #include <functional>
+#include <numeric>
+#include <set>
 
 #include "bench/runtime/bandwidth.hpp"
+#include "bench/runtime/clip_poses.hpp"
 #include "bench/runtime/figure.hpp"
+#include "bench/runtime/peer_rows.hpp"
 #include "bench/runtime/plain_eigen.hpp"
 #include "bench/runtime/probing.hpp"
-#include "bench/runtime/sampling_floor.hpp"
+#include "bench/runtime/volume_rows.hpp"
 #include "core/kinematics/forward.hpp"
 #include "core/model_file/model_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/quality/quality_meter.hpp"
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
-#include "runtime/volume/resample.hpp"
-#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -85,10 +89,21 @@ Bytes bytes_of(const Model& model, const runtime::BodyParts& parts) {
   return out;
 }
 
+struct Wishes {
+  std::string model, clip;
+  std::set<std::string> only;
+
+  bool has(const char* part) const { return only.empty() || only.contains(part); }
+};
+
 class Bench {
  public:
-  explicit Bench(std::shared_ptr<const Model> model)
-      : model_(std::move(model)), parts_(*model_), bytes_(bytes_of(*model_, parts_)), plain_(*model_) {
+  Bench(std::shared_ptr<const Model> model, const Wishes& wishes)
+      : model_(std::move(model)),
+        parts_(*model_),
+        bytes_(bytes_of(*model_, parts_)),
+        plain_(*model_),
+        wishes_(wishes) {
     const double frame = bytes_.nodes[2] + bytes_.tissues + bytes_.quantised;
     copies_ = std::clamp<std::size_t>(static_cast<std::size_t>(4 * last_cache() / frame) + 1, 2, 12);
     for (std::size_t c = 0; c < copies_; ++c) {
@@ -103,11 +118,30 @@ class Bench {
       poses_.push_back(swing(model_->segment_count(), f));
       segments_.push_back(kinematics::forward(model_->rig, poses_.back()));
     }
+    if (!wishes.clip.empty()) walk_ = clip_poses(wishes.clip, model_->rig);
   }
 
   void run(int threads) {
     tbb::task_arena arena(threads);
     arena.execute([&] { run_here(threads); });
+  }
+
+  // Other libraries on the same points and volume.
+  void run_peers() {
+    if (!wishes_.has("peers")) return;
+    const std::vector<std::uint32_t> needed = needed_clusters();
+    skinning_peers({*model_, parts_.clusters(), segments_, copies_,
+                    [&](Skinning skinning, int threads) {
+                      tbb::task_arena arena(threads);
+                      return arena.execute(
+                          [&] { return time(kFrames, [&](int f) { skin(skinning, needed, f); }); });
+                    },
+                    [&](Skinning skinning, int f) -> std::span<const float> {
+                      skin(skinning, needed, f);
+                      return plain_frames_[static_cast<std::size_t>(f) % copies_].scratch.lanes;
+                    }});
+    tbb::task_arena arena(2);
+    arena.execute([&] { time_volume_peers(model_, posed(7).nodes); });
   }
 
   void describe() const {
@@ -129,10 +163,18 @@ class Bench {
  private:
   void run_here(int threads) {
     const double gbs = bandwidth(4 * 3 * last_cache() / kMib);
-    const auto floor_of = [&](double bytes) { return bytes / gbs / 1e6; };
     std::printf("%d thread%s: memory %.1f GB/s\n", threads, threads == 1 ? "" : "s", gbs);
-    std::vector<std::uint32_t> needed((parts_.clusters().needed + 63) / 64);
-    for (std::size_t c = 0; c < needed.size(); ++c) needed[c] = static_cast<std::uint32_t>(c);
+    if (wishes_.has("skin")) time_skin(threads, gbs);
+    if (wishes_.has("walk")) time_walk(threads);
+    runtime::PosedBody& frame = posed(7);
+    if (wishes_.has("quality")) time_quality(frame, threads);
+    if (wishes_.has("probe")) time_probe(model_, frame.nodes, threads);
+    if (wishes_.has("volume")) time_volumes(model_, frame.nodes, threads);
+  }
+
+  void time_skin(int threads, double gbs) {
+    const auto floor_of = [&](double bytes) { return bytes / gbs / 1e6; };
+    const std::vector<std::uint32_t> needed = needed_clusters();
     for (const Skinning skinning : kAll) {
       const Figure figure = time(kFrames, [&](int f) { skin(skinning, needed, f); });
       line((std::string("nodes, ") + std::string(runtime::skinning_name(skinning))).c_str(), threads, figure,
@@ -160,75 +202,50 @@ class Bench {
     line("frame, CoR, u16 and normals", threads, frames(full_frames_),
          floor_of(body + bytes_.quantised + bytes_.normals));
     line("plain Eigen, CoR, float32", threads, {plain, plain, plain}, 0);
+  }
 
+  // As Sujar18 table 2: all tissues as float32, frames a second over a walk and in its worst frame.
+  void time_walk(int threads) {
+    const std::vector<Pose>& walk = walk_.empty() ? poses_ : walk_;
+    for (const Skinning skinning : kAll) {
+      double sum = 0, worst = 0;
+      for (std::size_t f = 0; f < walk.size() + 3; ++f) {
+        const auto start = std::chrono::steady_clock::now();
+        run_frame(walk[f % walk.size()], skinning, f % copies_, plain_frames_);
+        const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+        if (f < 3) continue;
+        sum += took.count();
+        worst = std::max(worst, took.count());
+      }
+      const double mean = sum / static_cast<double>(walk.size());
+      std::printf(
+          "  %s, %zu frames, %-18s %d thread%s mean %.3f ms, %.0f a second; worst %.3f ms, %.0f a second\n",
+          walk_.empty() ? "own swing" : "walk", walk.size(),
+          std::string(runtime::skinning_name(skinning)).c_str(), threads, threads == 1 ? " " : "s", mean,
+          1000 / mean, worst, 1000 / worst);
+    }
+  }
+
+  // The whole body, nodes and all.
+  runtime::PosedBody& posed(std::size_t f) {
     runtime::PosedBody& frame = plain_frames_[0];
-    const Status status = posers_[0]->run(poses_[7], Skinning::cor, posers_[0]->all_tissues(), frame);
+    const Status status = posers_[0]->run(poses_[f], Skinning::cor, posers_[0]->all_tissues(), frame);
     if (!status.ok()) throw Error(ErrorKind::internal, "bench", status.message, "mend it");
+    return frame;
+  }
+
+  void time_quality(const runtime::PosedBody& frame, int threads) {
     const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model_);
     line("quality, all tets and tissues", threads,
-         time(9, [&](int) { runtime::measure(*model_, frame, posers_[0]->all_tissues(), {}, closed); }), 0);
+         time(9, [&](int) { runtime::measure(*model_, frame, posers_[0]->all_tissues(), {}, closed); }));
     const runtime::QualityMeter meter(model_);
     line("quality, subset of tets", threads,
-         time(kFrames, [&](int) { meter.measure(frame, posers_[0]->all_tissues()); }), 0);
-    time_probe(model_, frame.nodes, threads);
-    if (model_->volumes.empty()) return;
-    const ModelVolume& volume = model_->volumes.front();
-    runtime::InverseMap map;
-    const ImageGrid grid = volume.image.grid;
-    std::printf("  volume %s on its rest grid, %d x %d x %d\n", volume.name.c_str(),
-                static_cast<int>(grid.size[0]), static_cast<int>(grid.size[1]),
-                static_cast<int>(grid.size[2]));
-    line("  inverse map", threads, time(3, [&](int) { runtime::locate(*model_, frame.nodes, grid, map); }),
-         0);
-    line("  trilinear samples", threads,
-         time(3,
-              [&](int) {
-                runtime::resample(*model_, frame.nodes, map, volume, runtime::Sampling::trilinear);
-              }),
-         0);
-    time_volume_poser(frame, volume, threads);
+         time(kFrames, [&](int) { meter.measure(frame, posers_[0]->all_tissues()); }));
   }
 
-  // `volume` as 8 and 16 bits on 290 x 169 x 940 voxels about its own box, one slice and one region of it.
-  void time_volume_poser(const runtime::PosedBody& frame, const ModelVolume& volume, int threads) {
-    const runtime::VolumePoser poser(model_);
-    runtime::VolumePoser::Scratch scratch;
-    const ImageGrid fine = resized(volume.image.grid, {290, 169, 940});
-    ImageGrid slice = resized(fine, {512, 512, 1}), region = fine;
-    slice.origin = fine.point(0, 0, 700);
-    region.origin = fine.point(20, 0, 500);
-    region.size = {256, std::min(256, fine.size[1]), 256};
-    for (const bool wide : {false, true}) {
-      ModelVolume sampled{volume.name, Image(fine, wide ? ScalarType::i16 : ScalarType::u8), 0, false, {}};
-      for (std::size_t v = 0; v < sampled.image.bytes.size(); ++v) {
-        sampled.image.bytes[v] = static_cast<std::byte>(v * 2654435761U >> 13 & (wide && v % 2 ? 3 : 255));
-      }
-      for (const auto sampling : {runtime::Sampling::nearest, runtime::Sampling::trilinear}) {
-        const std::string how =
-            std::string(wide ? "16" : "8") +
-            (sampling == runtime::Sampling::nearest ? " bit, nearest" : " bit, trilinear");
-        const auto row = [&](const std::string& name, const ImageGrid& grid, int runs) {
-          Image out;
-          line(std::string("  ").append(name).append(", ").append(how), threads,
-               time(runs, [&](int) { poser.pose(frame.nodes, sampled, sampling, grid, out, scratch); }), 0);
-        };
-        row("290 x 169 x 940", fine, 5);
-        row("slice of 512 x 512", slice, 15);
-        row("region of 256^3", region, 5);
-        line("    its samples alone", threads, samples_alone(sampled, sampling, region));
-        if (sampling == runtime::Sampling::nearest)
-          line("    its bytes copied", threads, copy_alone(sampled, region));
-      }
-    }
-  }
-
-  // The same box in other voxels.
-  static ImageGrid resized(const ImageGrid& grid, std::array<std::int32_t, 3> size) {
-    ImageGrid out = grid;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      out.spacing[axis] = grid.spacing[axis] * grid.size[axis] / size[axis];
-    }
-    out.size = size;
+  std::vector<std::uint32_t> needed_clusters() const {
+    std::vector<std::uint32_t> out((parts_.clusters().needed + 63) / 64);
+    std::iota(out.begin(), out.end(), 0U);
     return out;
   }
 
@@ -251,23 +268,28 @@ class Bench {
 
   Figure frames(std::vector<runtime::PosedBody>& bodies) {
     return time(kFrames, [&](int f) {
-      const std::size_t copy = static_cast<std::size_t>(f) % copies_;
-      const Status status =
-          posers_[copy]->run(poses_[static_cast<std::size_t>(f % kFrames)], Skinning::cor,
-                             posers_[copy]->all_tissues(), bodies[copy], runtime::NodesOf::tissues);
-      if (!status.ok()) throw Error(ErrorKind::internal, "bench", status.message, "mend it");
+      run_frame(poses_[static_cast<std::size_t>(f % kFrames)], Skinning::cor,
+                static_cast<std::size_t>(f) % copies_, bodies);
     });
+  }
+
+  void run_frame(const Pose& pose, Skinning skinning, std::size_t copy,
+                 std::vector<runtime::PosedBody>& bodies) {
+    const Status status = posers_[copy]->run(pose, skinning, posers_[copy]->all_tissues(), bodies[copy],
+                                             runtime::NodesOf::tissues);
+    if (!status.ok()) throw Error(ErrorKind::internal, "bench", status.message, "mend it");
   }
 
   std::shared_ptr<const Model> model_;
   runtime::BodyParts parts_;
   Bytes bytes_;
   PlainEigen plain_;
+  Wishes wishes_;
   std::size_t copies_ = 1;
   std::vector<std::unique_ptr<runtime::BodyPoser>> posers_;
   std::vector<runtime::NodeClusters> clusters_;
   std::vector<runtime::PosedBody> plain_frames_, wire_frames_, full_frames_;
-  std::vector<Pose> poses_;
+  std::vector<Pose> poses_, walk_;
   std::vector<std::vector<RigidTransform>> segments_;
 };
 
@@ -276,15 +298,32 @@ class Bench {
 
 int main(int argc, char** argv) {
   using namespace ecorche;
-  if (argc != 2) {
-    std::fprintf(stderr, "error: bench_runtime: one model is needed (bench_runtime MODEL.hdf)\n");
+  bench::Wishes wishes;
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  bool good = true;
+  for (std::size_t w = 0; w < words.size(); ++w) {
+    if (words[w] == "--clip" && w + 1 < words.size()) {
+      wishes.clip = words[++w];
+    } else if (words[w] == "--only" && w + 1 < words.size()) {
+      wishes.only.insert(words[++w]);
+    } else if (wishes.model.empty() && !words[w].starts_with("-")) {
+      wishes.model = words[w];
+    } else {
+      good = false;
+    }
+  }
+  if (!good || wishes.model.empty()) {
+    std::fprintf(stderr,
+                 "error: bench_runtime: one model is needed (bench_runtime MODEL.hdf [--clip CLIP] [--only "
+                 "skin|walk|quality|probe|volume|peers]...)\n");
     return 64;
   }
   try {
-    bench::Bench bench(std::make_shared<const Model>(model_file::read(argv[1], Context{})));
+    bench::Bench bench(std::make_shared<const Model>(model_file::read(wishes.model, Context{})), wishes);
     bench.describe();
     bench.run(1);
     bench.run(2);
+    bench.run_peers();
   } catch (const Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return exit_code(error.kind());

@@ -23,7 +23,8 @@ struct TissueChange {
   std::string name;
   bool closed = true;  ///< an open surface encloses nothing: then the figures below mean nothing and are 0
   double rest_mm3 = 0, posed_mm3 = 0;
-  double share = 0;  ///< (posed - rest) / rest; enclosed volumes of the surfaces
+  double share = 0;        ///< (posed - rest) / rest; enclosed volumes of the surfaces
+  double share_error = 0;  ///< of an estimate; 0 where the whole surface was measured
 };
 
 struct PoseQuality {

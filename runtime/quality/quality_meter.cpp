@@ -12,7 +12,6 @@ namespace {
 using Vec = std::array<float, 3>;
 
 constexpr std::size_t kTetsPerBlock = 1024;
-constexpr Eigen::Index kTrianglesPerBlock = 4096;
 constexpr std::size_t kBoneVertices = 64;
 
 Vec edge(std::span<const float> points, std::size_t from, std::size_t to) {
@@ -37,22 +36,6 @@ std::span<const float> floats(const PointsF& points) {
 std::size_t drawn(std::size_t number, std::size_t run) {
   return static_cast<std::size_t>((number * 0x9e3779b97f4a7c15U >> 32) % run);
 }
-
-// Six times the signed volume of the triangles [begin, end) about the first vertex.
-double volume_6(std::span<const float> vertices, const Triangles& F, Eigen::Index begin, Eigen::Index end) {
-  double sum = 0;
-  for (Eigen::Index f = begin; f < end; ++f) {
-    const auto corner = [&](int c) { return edge(vertices, 0, static_cast<std::size_t>(F(f, c))); };
-    sum += static_cast<double>(det(corner(0), corner(1), corner(2)));
-  }
-  return sum;
-}
-
-struct TriangleBlock {
-  std::size_t tissue;
-  Eigen::Index begin;
-  double volume;
-};
 
 }  // namespace
 
@@ -87,20 +70,47 @@ QualityMeter::QualityMeter(std::shared_ptr<const Model> model, std::size_t most_
     }
     rest_.push_back(det_of(floats(model_->nodes), corners_.back()));
   }
-  for (std::size_t t = 0; t < parts_.size(); ++t) {
-    const Tissue& tissue = model_->tissues[t];
-    parts_[t].closed = is_closed(tissue.F);
-    if (parts_[t].closed) parts_[t].rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
-    if (tissue.segment == Tissue::by_tets) continue;
-    const auto vertices = static_cast<std::size_t>(tissue.V.rows());
-    for (std::size_t i = 0; i < std::min(vertices, kBoneVertices); ++i) {
-      const std::size_t v = vertices * i / std::min(vertices, kBoneVertices);
-      parts_[t].sample.push_back(static_cast<std::uint32_t>(v));
-      for (int c = 0; c < 3; ++c) {
-        parts_[t].sample_rest.push_back(tissue.V(static_cast<Eigen::Index>(v), c));
-      }
-    }
+  tbb::parallel_for(std::size_t{0}, parts_.size(),
+                    [&](std::size_t t) { parts_[t] = look_at(model_->tissues[t]); });
+}
+
+QualityMeter::Part QualityMeter::look_at(const Tissue& tissue) {
+  Part part;
+  part.closed = is_closed(tissue.F);
+  if (part.closed) part.rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
+  if (tissue.segment == Tissue::by_tets) {
+    if (part.closed) part.coarse = coarsen(tissue.V, tissue.F, coarse_triangles);
+    return part;
   }
+  const auto vertices = static_cast<std::size_t>(tissue.V.rows());
+  for (std::size_t i = 0; i < std::min(vertices, kBoneVertices); ++i) {
+    const std::size_t v = vertices * i / std::min(vertices, kBoneVertices);
+    part.sample.push_back(static_cast<std::uint32_t>(v));
+    for (int c = 0; c < 3; ++c) part.sample_rest.push_back(tissue.V(static_cast<Eigen::Index>(v), c));
+  }
+  return part;
+}
+
+// What a pose did to one tissue.
+struct QualityMeter::Change {
+  double share = 0, error = 0, residual = 0;
+};
+
+QualityMeter::Change QualityMeter::change(const Part& part, std::span<const float> posed) {
+  Change out;
+  if (!part.sample.empty()) {
+    std::array<float, 3 * kBoneVertices> at;
+    for (std::size_t i = 0; i < part.sample.size(); ++i)
+      std::copy_n(&posed[3 * std::size_t{part.sample[i]}], 3, &at[3 * i]);
+    out.residual = rigid_residual(part.sample_rest, std::span(at).first(part.sample_rest.size()));
+  }
+  if (part.coarse.empty() || part.coarse[0].rest_6 == 0) return out;
+  const auto share = [&](const CoarseSurface& surface) {
+    return volume_6(surface, posed) / surface.rest_6 - 1;
+  };
+  out.share = share(part.coarse[0]);
+  if (part.coarse.size() > 1) out.error = std::abs(out.share - share(part.coarse[1]));
+  return out;
 }
 
 QualityMeter::Sums QualityMeter::sum(std::span<const float> nodes, std::size_t begin, std::size_t end) const {
@@ -125,22 +135,14 @@ QualityMeter::Sums QualityMeter::sum(std::span<const float> nodes, std::size_t b
 PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                                   const QualityThresholds& thresholds) const {
   std::vector<Sums> blocks((rest_.size() + kTetsPerBlock - 1) / kTetsPerBlock);
-  std::vector<TriangleBlock> triangles;
-  for (std::size_t i = 0; i < tissues.size(); ++i) {
-    const Tissue& tissue = model_->tissues[tissues[i]];
-    if (tissue.segment != Tissue::by_tets || !parts_[tissues[i]].closed) continue;
-    for (Eigen::Index f = 0; f < tissue.F.rows(); f += kTrianglesPerBlock) triangles.push_back({i, f, 0});
-  }
-  tbb::parallel_for(std::size_t{0}, blocks.size() + triangles.size(), [&](std::size_t b) {
+  std::vector<Change> changes(tissues.size());
+  tbb::parallel_for(std::size_t{0}, blocks.size() + tissues.size(), [&](std::size_t b) {
     if (b < blocks.size()) {
       blocks[b] = sum(body.nodes, b * kTetsPerBlock, std::min(rest_.size(), (b + 1) * kTetsPerBlock));
-      return;
+    } else {
+      const std::uint32_t row = tissues[b - blocks.size()];
+      changes[b - blocks.size()] = change(parts_[row], body.tissues[row]);
     }
-    TriangleBlock& block = triangles[b - blocks.size()];
-    const std::uint32_t row = tissues[block.tissue];
-    const Triangles& F = model_->tissues[row].F;
-    block.volume =
-        volume_6(body.tissues[row], F, block.begin, std::min(F.rows(), block.begin + kTrianglesPerBlock));
   });
 
   Sums all;
@@ -168,28 +170,11 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
   }
 
   out.tissues.resize(tissues.size());
-  std::vector<float> posed;
   for (std::size_t i = 0; i < tissues.size(); ++i) {
-    const Tissue& tissue = model_->tissues[tissues[i]];
     const Part& part = parts_[tissues[i]];
-    TissueChange& change = out.tissues[i];
-    change.name = tissue.name;
-    change.closed = part.closed;
-    change.rest_mm3 = change.posed_mm3 = part.rest_mm3;
-    if (tissue.segment == Tissue::by_tets) {
-      change.posed_mm3 = 0;
-      continue;
-    }
-    posed.clear();
-    for (const std::uint32_t v : part.sample) {
-      const float* x = &body.tissues[tissues[i]][3 * std::size_t{v}];
-      posed.insert(posed.end(), x, x + 3);
-    }
-    out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, rigid_residual(part.sample_rest, posed));
-  }
-  for (const TriangleBlock& block : triangles) out.tissues[block.tissue].posed_mm3 += block.volume / 6;
-  for (TissueChange& change : out.tissues) {
-    if (change.rest_mm3 != 0) change.share = (change.posed_mm3 - change.rest_mm3) / change.rest_mm3;
+    out.tissues[i] = {model_->tissues[tissues[i]].name,       part.closed,      part.rest_mm3,
+                      part.rest_mm3 * (1 + changes[i].share), changes[i].share, changes[i].error};
+    out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, changes[i].residual);
   }
   out.clamped = body.clamped;
   judge(thresholds, out);

@@ -71,8 +71,9 @@ HWY_INLINE V3 turn_less_identity(V w, const V3& r, const V3& y) {
   return times(cross(r, inner), all(2));
 }
 
-/// The last line of segment_motion.hpp, x' = x + e + (R_root - I)(y + e) + t_root, with the sum of x and
-/// t_root made in two floats (Knuth's), so that a body metres away keeps 1e-3 mm and a rest pose every bit.
+/// The last line of segment_motion.hpp, x' = x + e + (R_root - I)(y + e) + t_root. What it moves within the
+/// body is summed first and t_root last, its own narrowing with the former: so a body metres away rounds
+/// once, and a rest pose keeps every bit.
 class Root {
  public:
   explicit Root(const RootMotion& root) : turn_(root.turn) {
@@ -84,15 +85,14 @@ class Root {
   }
   HWY_INLINE V3 origin() const { return {all(origin_[0]), all(origin_[1]), all(origin_[2])}; }
   HWY_INLINE V3 carry(const V3& x, const V3& e) const {
-    const V3 d = plus(e, matrix_times(turn_.data(), plus(minus(x, origin()), e)));
-    return {sum(x.x, d.x, 0), sum(x.y, d.y, 1), sum(x.z, d.z, 2)};
+    const V3 z = plus(minus(x, origin()), e);
+    return {sum(x.x, e.x, z, 0), sum(x.y, e.y, z, 1), sum(x.z, e.z, z, 2)};
   }
 
  private:
-  HWY_INLINE V sum(V x, V d, std::size_t c) const {
-    const V high = all(high_[c]), s = hn::Add(x, high), taken = hn::Sub(s, x);
-    const V lost = hn::Add(hn::Sub(x, hn::Sub(s, taken)), hn::Sub(high, taken));
-    return hn::Add(s, hn::Add(hn::Add(lost, all(low_[c])), d));
+  HWY_INLINE V sum(V x, V e, const V3& z, std::size_t c) const {
+    const V within = hn::Add(x, row(&turn_[3 * c], z, hn::Add(e, all(low_[c]))));
+    return hn::Add(within, all(high_[c]));
   }
   std::array<float, 9> turn_;
   float origin_[3], high_[3], low_[3];

@@ -34,6 +34,12 @@ BatchSink sink_for(const SampleJob& job, Sampling sampling) {
     if (type == ScalarType::u16) return {kernels::trilinear_u16, &job};
     if (type == ScalarType::i16) return {kernels::trilinear_i16, &job};
   }
+  constexpr std::size_t most = std::size_t{1} << 31U;
+  if (sampling == Sampling::nearest && job.volume.components == 1 && job.volume.grid.voxels() < most) {
+    if (scalar_bytes(type) == 1) return {kernels::nearest_1, &job};
+    if (scalar_bytes(type) == 2) return {kernels::nearest_2, &job};
+    if (scalar_bytes(type) == 4) return {kernels::nearest_4, &job};
+  }
   return with_scalar_type(type, [&](auto zero) -> BatchSink {
     using T = decltype(zero);
     if (sampling == Sampling::nearest) return {sample<T, Sampling::nearest>, &job};

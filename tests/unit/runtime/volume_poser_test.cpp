@@ -13,6 +13,8 @@
 
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/fixed_points.hpp"
+#include "runtime/volume/sample_batch.hpp"
+#include "runtime/volume/sampler.hpp"
 #include "runtime/volume/volume_poser.hpp"
 #include "tests/support/toy_model.hpp"
 
@@ -258,6 +260,49 @@ TEST_F(PosedInOnePass, RefusesAGridOfNothingOrTooMuch) {
   EXPECT_THROW(poser.pose(rest_nodes(*model), volume, Sampling::nearest, grid, out, scratch), Error);
   grid.size = {0, 4, 4};
   EXPECT_THROW(poser.pose(rest_nodes(*model), volume, Sampling::nearest, grid, out, scratch), Error);
+}
+
+// Places all over an image and beyond it, many of them just beside a tie.
+template <class T>
+void expect_samplers_nearest(std::size_t count) {
+  ModelVolume volume = smooth_volume<T>(ImageGrid{{9, 7, 5}});
+  volume.background = 9;
+  Image posed(ImageGrid{{static_cast<std::int32_t>(count), 1, 1}}, scalar_type_of<T>);
+  std::mt19937 random(static_cast<unsigned>(count));
+  VoxelBatch batch;
+  batch.count = count;
+  const float ties[] = {0,      0.5F, std::nextafter(0.5F, 0.0F), std::nextafter(0.5F, 1.0F), -0.5F,
+                        -1e-9F, 0.25F};
+  for (std::size_t i = 0; i < count; ++i) {
+    batch.offset[i] = static_cast<std::uint32_t>(count - 1 - i);
+    for (std::size_t a = 0; a < 3; ++a) {
+      batch.base[a][i] = static_cast<std::int32_t>(random() % 11) - 2;
+      batch.part[a][i] = static_cast<float>(random() % 3) + ties[random() % std::size(ties)];
+    }
+  }
+  const SampleJob job{volume.image, volume.background, posed};
+  const BatchSink sink = sink_for(job, Sampling::nearest);
+  sink.sample(sink.to, batch);
+  const Sampler<T> slow{volume.image.grid, volume.image.scalars<T>(), 1, volume.background};
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto at = [&](std::size_t a) { return batch.base[a][i] + static_cast<double>(batch.part[a][i]); };
+    T expected = 9;
+    slow.nearest(at(0), at(1), at(2), &expected);
+    ASSERT_EQ(posed.scalars<T>()[count - 1 - i], expected) << i << " of " << count;
+  }
+}
+
+TEST(NearestSamples, AreTheSamplersToTheByteOnEveryInstructionSet) {
+  on_every_target([] {
+    for (const std::size_t count : {1, 3, 16, 17, 100, 1024}) {
+      expect_samplers_nearest<std::uint8_t>(count);
+      expect_samplers_nearest<std::int8_t>(count);
+      expect_samplers_nearest<std::uint16_t>(count);
+      expect_samplers_nearest<std::int32_t>(count);
+      expect_samplers_nearest<float>(count);
+      expect_samplers_nearest<double>(count);
+    }
+  });
 }
 
 TEST(FixedPoints, DifferencesOfTwoAlwaysFit) {

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/quality/coarse_surface.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+namespace ecorche::runtime {
+namespace {
+
+constexpr double kVolumeKept = 0.03;
+constexpr float kFiner = 0.7F;  // grids that are tried one after the other
+
+std::span<const float> floats(const PointsF& points) {
+  return {points.data(), static_cast<std::size_t>(points.size())};
+}
+
+CoarseSurface whole_surface(const PointsF& V, const Triangles& F) {
+  CoarseSurface out;
+  out.vertex.resize(static_cast<std::size_t>(V.rows()));
+  std::iota(out.vertex.begin(), out.vertex.end(), 0U);
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    out.triangle.push_back({static_cast<std::uint32_t>(F(f, 0)), static_cast<std::uint32_t>(F(f, 1)),
+                            static_cast<std::uint32_t>(F(f, 2))});
+  }
+  out.rest_6 = volume_6(out, floats(V));
+  return out;
+}
+
+double area(const PointsF& V, const Triangles& F) {
+  double sum = 0;
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    const Eigen::RowVector3f a = V.row(F(f, 0));
+    sum += static_cast<double>((V.row(F(f, 1)) - a).cross(V.row(F(f, 2)) - a).norm()) / 2;
+  }
+  return sum;
+}
+
+// The cell of every vertex as one number.
+std::vector<std::uint64_t> cells(const PointsF& V, float edge) {
+  const Eigen::RowVector3f low = V.colwise().minCoeff();
+  std::vector<std::uint64_t> out(static_cast<std::size_t>(V.rows()));
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    const Eigen::RowVector3f at = (V.row(static_cast<Eigen::Index>(v)) - low) / edge;
+    for (int c = 0; c < 3; ++c) {
+      const auto cell = static_cast<std::uint64_t>(std::clamp(at[c], 0.0F, 2e6F));
+      out[v] = out[v] << 21U | cell;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+CoarseSurface cluster_vertices(const PointsF& V, const Triangles& F, float edge) {
+  const std::vector<std::uint64_t> cell = cells(V, edge);
+  std::vector<std::uint32_t> order(cell.size()), drawn(cell.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return cell[a] != cell[b] ? cell[a] < cell[b] : a < b; });
+  CoarseSurface out;
+  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+    Eigen::RowVector3f mean = Eigen::RowVector3f::Zero();
+    for (end = begin; end < order.size() && cell[order[end]] == cell[order[begin]]; ++end) {
+      mean += V.row(order[end]);
+    }
+    mean /= static_cast<float>(end - begin);
+    std::uint32_t nearest = order[begin];
+    float least = std::numeric_limits<float>::infinity();
+    for (std::size_t i = begin; i < end; ++i) {
+      drawn[order[i]] = static_cast<std::uint32_t>(out.vertex.size());
+      const float distance = (V.row(order[i]) - mean).squaredNorm();
+      if (distance >= least) continue;
+      least = distance;
+      nearest = order[i];
+    }
+    out.vertex.push_back(nearest);
+  }
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    const std::array<std::uint32_t, 3> t{drawn[static_cast<std::size_t>(F(f, 0))],
+                                         drawn[static_cast<std::size_t>(F(f, 1))],
+                                         drawn[static_cast<std::size_t>(F(f, 2))]};
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) out.triangle.push_back(t);
+  }
+  out.rest_6 = volume_6(out, floats(V));
+  return out;
+}
+
+std::vector<CoarseSurface> coarsen(const PointsF& V, const Triangles& F, std::size_t triangles) {
+  const auto all = static_cast<std::size_t>(F.rows());
+  if (all <= 2 * triangles) return {whole_surface(V, F)};
+  const double volume = whole_surface(V, F).rest_6;
+  // A surface meets about one and a half times area / edge^2 cells, and has two triangles a vertex.
+  auto edge = static_cast<float>(std::sqrt(3 * area(V, F) / static_cast<double>(triangles)));
+  for (; edge > 0; edge *= kFiner) {
+    CoarseSurface coarse = cluster_vertices(V, F, edge);
+    if (coarse.triangle.size() > all / 2) break;
+    if (std::abs(coarse.rest_6 - volume) > kVolumeKept * std::abs(volume)) continue;
+    CoarseSurface coarser = cluster_vertices(V, F, edge * std::numbers::sqrt2_v<float>);
+    if (coarser.rest_6 != 0) return {std::move(coarse), std::move(coarser)};
+  }
+  return {whole_surface(V, F)};
+}
+
+double volume_6(const CoarseSurface& surface, std::span<const float> vertices) {
+  if (surface.triangle.empty()) return 0;
+  const float* origin = &vertices[3 * std::size_t{surface.vertex[0]}];
+  const auto corner = [&](std::uint32_t local) {
+    const float* x = &vertices[3 * std::size_t{surface.vertex[local]}];
+    return std::array<float, 3>{x[0] - origin[0], x[1] - origin[1], x[2] - origin[2]};
+  };
+  double sum = 0;
+  for (const std::array<std::uint32_t, 3>& t : surface.triangle) {
+    const auto a = corner(t[0]), b = corner(t[1]), c = corner(t[2]);
+    sum += static_cast<double>((a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] +
+                               (a[0] * b[1] - a[1] * b[0]) * c[2]);
+  }
+  return sum;
+}
+
+}  // namespace ecorche::runtime
