@@ -15,6 +15,9 @@ class Ozz final : public SkinningPeer {
  public:
   Ozz(const HungPoints& points, std::size_t copies) : matrices_(points.segments), bodies_(copies) {
     name = "ozz " ECORCHE_OZZ_VERSION " SkinningJob, 4 weights";
+#ifdef __AVX2__
+    name += ", for this CPU";
+#endif
     Body body;
     body.rest = points.at;
     body.posed.resize(points.at.size());
@@ -80,7 +83,7 @@ class Ozz final : public SkinningPeer {
 
 }  // namespace
 
-void add_ozz(const HungPoints& points, std::size_t copies, Peers& out) {
+void ECORCHE_ADD_OZZ(const HungPoints& points, std::size_t copies, Peers& out) {
   out.push_back(std::make_unique<Ozz>(points, copies));
 }
 

@@ -83,6 +83,7 @@ void skinning_peers(const OurSkinning& ours) {
   Peers peers;
 #ifdef ECORCHE_PEER_OZZ
   add_ozz(points, ours.copies, peers);
+  add_ozz_native(points, ours.copies, peers);
 #else
   absent.emplace_back("ozz-animation (ECORCHE_OZZ_DIR)");
 #endif

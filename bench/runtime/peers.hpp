@@ -48,7 +48,9 @@ class ECORCHE_PEER_API SkinningPeer {
 using Peers = std::vector<std::unique_ptr<SkinningPeer>>;
 
 /// SkinningJob of ozz-animation: float, the four heaviest weights. `copies` of the data, posed in turn.
+/// Compiled as its own build does, and for this processor.
 ECORCHE_PEER_API void add_ozz(const HungPoints& points, std::size_t copies, Peers& out);
+ECORCHE_PEER_API void add_ozz_native(const HungPoints& points, std::size_t copies, Peers& out);
 /// igl::lbs_matrix and igl::dqs: double, dense weights; dqs on one thread and on all.
 ECORCHE_PEER_API void add_igl(const HungPoints& points, Peers& out);
 /// vtkWeightedTransformFilter: float, all weights.

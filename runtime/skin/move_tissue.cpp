@@ -126,14 +126,20 @@ HWY_INLINE void move_group(const TissueVertices& job, std::size_t g, const Table
 }
 
 void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
-  Table table;
-  for (std::size_t g = begin; g < end; ++g) {
+  // The next group's palette is fetched before a group is moved: wide loads of what was just stored narrowly
+  // would wait for the stores.
+  Table tables[2];
+  const auto fetch_group = [&](std::size_t g) HWY_ATTR {
     const VertexGroups::Group& group = job.groups.groups[g];
-    fetch(job.posed.data(), &job.groups.lanes[group.lanes], group.count, table);
-    if (group.count <= 32) {
-      move_group<false>(job, g, table);
+    fetch(job.posed.data(), &job.groups.lanes[group.lanes], group.count, tables[g % 2]);
+  };
+  if (begin < end) fetch_group(begin);
+  for (std::size_t g = begin; g < end; ++g) {
+    if (g + 1 < end) fetch_group(g + 1);
+    if (job.groups.groups[g].count <= 32) {
+      move_group<false>(job, g, tables[g % 2]);
     } else {
-      move_group<true>(job, g, table);
+      move_group<true>(job, g, tables[g % 2]);
     }
   }
 }

@@ -13,8 +13,8 @@ namespace ecorche::runtime {
 
 /// Clusters of 64 nodes with one palette of segments each and a dense planar weight for every pair of them:
 /// no index per node, no gather. First the nodes that some tissue hangs on, then the others, each in the
-/// model's own order (Morton). A *lane* is a place in this order: node `node[lane]`. The last cluster repeats
-/// its last node.
+/// model's own order (Morton), sorted within runs of 2048 by the segments that they hang on. A *lane* is a
+/// place in this order: node `node[lane]`. The last cluster repeats its last node.
 struct NodeClusters {
   static constexpr std::size_t size = 64;
 

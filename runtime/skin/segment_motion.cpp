@@ -43,18 +43,17 @@ RootMotion make_motions(std::span<const RigidTransform> segments, const Vec3f& o
                         std::span<SegmentMotion> out) {
   const Eigen::Vector3d o(static_cast<double>(origin[0]), static_cast<double>(origin[1]),
                           static_cast<double>(origin[2]));
-  const RigidTransform to_root = segments[0].inverse();
+  const Eigen::Vector3d way = shift_of(segments[0], o);
   for (std::size_t s = 0; s < out.size(); ++s) {
-    const RigidTransform relative = to_root * segments[s];
-    const Eigen::Vector3d u = shift_of(relative, o);
-    const Eigen::Quaterniond dual = Eigen::Quaterniond(0, u.x() / 2, u.y() / 2, u.z() / 2) * relative.q;
-    out[s] = {turn_less_identity(relative.q),
+    const Eigen::Quaterniond& q = segments[s].q;
+    const Eigen::Vector3d u = shift_of(segments[s], o) - way;
+    const Eigen::Quaterniond dual = Eigen::Quaterniond(0, u.x() / 2, u.y() / 2, u.z() / 2) * q;
+    out[s] = {turn_less_identity(q),
               {static_cast<float>(u.x()), static_cast<float>(u.y()), static_cast<float>(u.z())},
-              narrowed(relative.q),
+              narrowed(q),
               narrowed(dual)};
   }
-  const Eigen::Vector3d t = shift_of(segments[0], o);
-  return {origin, turn_less_identity(segments[0].q), {t.x(), t.y(), t.z()}};
+  return {origin, turn_less_identity(segments[0].q), {way.x(), way.y(), way.z()}};
 }
 
 }  // namespace ecorche::runtime

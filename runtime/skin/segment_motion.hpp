@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motion of the segments, narrowed to float32 without losing the rest pose or a rigid motion.
 //
-// The body is skinned in the frame of its root segment and then carried along with it, both as displacements
-// from rest:
+// The body is skinned about its middle, as displacements from rest, and then carried along with its root:
 //   y  = x - origin                                 (origin: the middle of the rest body)
-//   e  = blend of ((R_i - I) y + u_i)               (segment i relative to the root)
-//   x' = x + e + (R_root - I)(y + e) + t_root
-// At rest every term but x is exactly zero. Under a rigid motion of the whole body e is zero to 1e-12 mm and
-// only the last line rounds; its sum is made in double, so that a body metres away keeps 1e-3 mm. Blending by
-// weights, by dual quaternions and about centres of rotation all commute with the root's motion, so nothing
-// is changed by taking it out.
+//   e  = blend of ((R_i - I) y + u_i)               (segment i, less the way that the root takes the origin)
+//   x' = x + e + t_root
+// At rest every term but x is exactly zero. Taken apart from the way of the root, all numbers of a blend are
+// within the body's own size, so that a body metres away keeps 1e-3 mm. Blending by weights, by dual
+// quaternions and about centres of rotation all commute with a translation, so nothing is changed by it.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -22,7 +20,7 @@ namespace ecorche::runtime {
 
 using Vec3f = std::array<float, 3>;
 
-/// Segment relative to the root, about the origin: y -> y + turn y + shift, in the three forms that blending
+/// Segment about the origin, less the root's way: y -> y + turn y + shift, in the three forms that blending
 /// needs.
 struct SegmentMotion {
   std::array<float, 9> turn;  ///< R - I, row-major
@@ -31,7 +29,7 @@ struct SegmentMotion {
   std::array<float, 4> dual;  ///< of the unit dual quaternion (Kavan08): half of (0, shift) times real, mm
 };
 
-/// What carries the body along with its root.
+/// The root about the origin: y -> y + turn y + shift.
 struct RootMotion {
   Vec3f origin;                 ///< mm
   std::array<float, 9> turn;    ///< R - I, row-major
@@ -45,22 +43,5 @@ Vec3f middle_of(std::span<const float> nodes);
 /// `out`.
 RootMotion make_motions(std::span<const RigidTransform> segments, const Vec3f& origin,
                         std::span<SegmentMotion> out);
-
-/// turn y + shift.
-inline Vec3f apply(const std::array<float, 9>& turn, const Vec3f& y) {
-  return {turn[0] * y[0] + turn[1] * y[1] + turn[2] * y[2], turn[3] * y[0] + turn[4] * y[1] + turn[5] * y[2],
-          turn[6] * y[0] + turn[7] * y[1] + turn[8] * y[2]};
-}
-
-/// The last line above: rest position x, displacement e in the root's frame.
-inline void carry_with_root(const RootMotion& root, const float* x, const Vec3f& e, float* out) {
-  const Vec3f z{(x[0] - root.origin[0]) + e[0], (x[1] - root.origin[1]) + e[1],
-                (x[2] - root.origin[2]) + e[2]};
-  const Vec3f turned = apply(root.turn, z);
-  for (std::size_t c = 0; c < 3; ++c) {
-    out[c] =
-        static_cast<float>(static_cast<double>(x[c]) + static_cast<double>(e[c] + turned[c]) + root.shift[c]);
-  }
-}
 
 }  // namespace ecorche::runtime

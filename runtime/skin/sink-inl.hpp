@@ -55,10 +55,18 @@ HWY_INLINE void put_position(const VertexSink& out, const Places& places, const 
   }
 }
 
+/// 1 / sqrt(x) to 2e-5 of itself, half a step of i16; x within [1e-30, 1e30]. One step of Newton's costs less
+/// than a root and a division.
+HWY_INLINE V inverse_root(V x) {
+  const V guess = hn::ApproximateReciprocalSqrt(x);
+  const V less = hn::NegMulAdd(hn::Mul(hn::Mul(x, guess), all(0.5F)), guess, all(0.5F));
+  return hn::MulAdd(guess, less, guess);
+}
+
 /// n needs no length; a zero stays zero.
 HWY_INLINE void put_normal(const VertexSink& out, const Places& places, const V3& n) {
   const V squared = hn::MulAdd(n.x, n.x, hn::MulAdd(n.y, n.y, hn::Mul(n.z, n.z)));
-  const V3 unit = times(n, hn::Div(all(1), hn::Sqrt(hn::Max(squared, all(1e-30F)))));
+  const V3 unit = times(n, inverse_root(hn::Min(hn::Max(squared, all(1e-30F)), all(1e30F))));
   places.store(I16(), narrow_unit(unit.x), narrow_unit(unit.y), narrow_unit(unit.z), out.normals);
 }
 

@@ -10,7 +10,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
 void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
-  const V3 origin = Root(job.root).origin();
+  const V3 origin = all3(job.root.origin);
   const SegmentMotion* motions = job.motions.data();
   const float* centres = job.layout.centre.data();
   for_clusters(job, begin, end, [&](const Cluster& cluster, std::size_t at, const V3& x) HWY_ATTR {

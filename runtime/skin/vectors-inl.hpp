@@ -71,31 +71,27 @@ HWY_INLINE V3 turn_less_identity(V w, const V3& r, const V3& y) {
   return times(cross(r, inner), all(2));
 }
 
-/// The last line of segment_motion.hpp, x' = x + e + (R_root - I)(y + e) + t_root. What it moves within the
-/// body is summed first and t_root last, its own narrowing with the former: so a body metres away rounds
-/// once, and a rest pose keeps every bit.
-class Root {
+HWY_INLINE V3 all3(const Vec3f& v) {
+  return {all(v[0]), all(v[1]), all(v[2])};
+}
+
+/// The last line of segment_motion.hpp, x' = x + e + t_root. What moves within the body is summed first and
+/// the root's way last, its own narrowing with the former: so a body metres away rounds once, and a rest pose
+/// keeps every bit.
+class Way {
  public:
-  explicit Root(const RootMotion& root) : turn_(root.turn) {
+  explicit Way(const RootMotion& root) {
     for (std::size_t c = 0; c < 3; ++c) {
-      origin_[c] = root.origin[c];
       high_[c] = static_cast<float>(root.shift[c]);
       low_[c] = static_cast<float>(root.shift[c] - static_cast<double>(high_[c]));
     }
   }
-  HWY_INLINE V3 origin() const { return {all(origin_[0]), all(origin_[1]), all(origin_[2])}; }
   HWY_INLINE V3 carry(const V3& x, const V3& e) const {
-    const V3 z = plus(minus(x, origin()), e);
-    return {sum(x.x, e.x, z, 0), sum(x.y, e.y, z, 1), sum(x.z, e.z, z, 2)};
+    return plus(plus(x, plus(e, all3(low_))), all3(high_));
   }
 
  private:
-  HWY_INLINE V sum(V x, V e, const V3& z, std::size_t c) const {
-    const V within = hn::Add(x, row(&turn_[3 * c], z, hn::Add(e, all(low_[c]))));
-    return hn::Add(within, all(high_[c]));
-  }
-  std::array<float, 9> turn_;
-  float origin_[3], high_[3], low_[3];
+  Vec3f high_, low_;
 };
 
 /// Calls `skin(cluster view, rest x of a vector of lanes, e)` on every vector of every cluster.
@@ -105,18 +101,18 @@ struct Cluster {
   const std::uint16_t* weights;  // of the first lane of the vector; the next segment's 64 further
 };
 
-/// `displace(cluster, first lane, x)` -> displacement in the root's frame.
+/// `displace(cluster, first lane, x)` -> displacement, less the root's way.
 template <class Displace>
 HWY_INLINE void for_clusters(const SkinClusters& job, std::size_t begin, std::size_t end, Displace displace) {
   constexpr std::size_t size = NodeClusters::size;
-  const Root root(job.root);
+  const Way way(job.root);
   const NodeClusters& layout = job.layout;
   for (std::size_t i = begin; i < end; ++i) {
     const std::size_t c = job.clusters[i], first = layout.begin[c];
     Cluster cluster{&layout.palette[first], layout.begin[c + 1] - first, &layout.weight[size * first]};
     for (std::size_t lane = 0; lane < size; lane += hn::Lanes(F())) {
       const V3 x = load_planar(&layout.rest[3 * size * c + lane], size);
-      const V3 posed = root.carry(x, displace(cluster, 3 * size * c + lane, x));
+      const V3 posed = way.carry(x, displace(cluster, 3 * size * c + lane, x));
       hn::StoreInterleaved3(posed.x, posed.y, posed.z, F(), &job.posed[3 * (size * c + lane)]);
       cluster.weights += hn::Lanes(F());
     }
