@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/tet/relax_slivers.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -18,6 +20,7 @@ using Eigen::Vector3d;
 using Corners = std::array<Vector3d, 4>;
 
 constexpr int kPasses = 12;
+constexpr std::size_t kChunk = 1 << 14;               // tets that one thread looks at
 constexpr double kSurfaceShare = 0.25;                // of the shortest edge, in all
 constexpr std::array kSteps{0.25, 0.1, 0.04, 0.015};  // of the shortest edge, per try
 constexpr std::array<std::array<int, 3>, 4> kFaces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
@@ -57,18 +60,17 @@ class Relaxation {
   Relaxation(TetMesh& mesh, const SliverBounds& bounds)
       : mesh_(mesh),
         cos_min_(std::cos(bounds.min_deg * std::numbers::pi / 180)),
-        cos_max_(std::cos(bounds.max_deg * std::numbers::pi / 180)),
-        start_(mesh.V),
-        on_surface_(static_cast<std::size_t>(mesh.V.rows()), 0) {
-    link_nodes();
-    mark_surfaces();
-    make_directions();
-  }
+        cos_max_(std::cos(bounds.max_deg * std::numbers::pi / 180)) {}
 
   SliverReport run(const Context& context) {
     SliverReport report;
     std::vector<std::int32_t> bad = all_beyond();
     report.before = static_cast<std::int64_t>(bad.size());
+    if (bad.empty()) return report;  // as of every uncut lattice
+    start_ = mesh_.V;
+    link_nodes();
+    mark_surfaces();
+    make_directions();
     for (int pass = 0; pass < kPasses && !bad.empty(); ++pass) {
       sort_worst_first(bad);
       bool moved = false;
@@ -108,6 +110,7 @@ class Relaxation {
 
   /// A node lies on a surface when a face at it has one tet only, or two of different labels.
   void mark_surfaces() {
+    on_surface_.assign(static_cast<std::size_t>(mesh_.V.rows()), 0);
     struct Face {
       std::array<std::int32_t, 3> nodes;
       std::uint16_t label;
@@ -151,11 +154,15 @@ class Relaxation {
   }
 
   std::vector<std::int32_t> all_beyond() const {
+    const auto count = static_cast<std::size_t>(mesh_.T.rows());
+    std::vector<std::vector<std::int32_t>> found(count / kChunk + 1);
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
+      for (std::size_t t = chunk * kChunk; t < std::min(count, (chunk + 1) * kChunk); ++t)
+        if (beyond(corners(static_cast<std::int32_t>(t)), cos_min_, cos_max_))
+          found[chunk].push_back(static_cast<std::int32_t>(t));
+    });
     std::vector<std::int32_t> bad;
-    for (Eigen::Index t = 0; t < mesh_.T.rows(); ++t) {
-      if (beyond(corners(static_cast<std::int32_t>(t)), cos_min_, cos_max_))
-        bad.push_back(static_cast<std::int32_t>(t));
-    }
+    for (const std::vector<std::int32_t>& some : found) bad.insert(bad.end(), some.begin(), some.end());
     return bad;
   }
 

@@ -7,10 +7,6 @@
 namespace ecorche::tet {
 namespace {
 
-/// Corners of the low face along `axis`, counter-clockwise seen from the high side, as steps along the next
-/// two axes.
-constexpr int kLoop[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-
 std::size_t next(std::size_t axis, std::size_t steps) {
   return (axis + steps) % 3;
 }
@@ -49,13 +45,13 @@ std::array<std::int64_t, 4> BccLattice::nodes(std::int64_t slot) const {
              edge = static_cast<std::size_t>(slot % 4);
   Cell low = high;
   --low[axis];
-  const auto loop = [&](std::size_t n) {
+  const auto at_loop = [&](std::size_t n) {
     Cell c = high;
-    c[next(axis, 1)] += kLoop[n % 4][0];
-    c[next(axis, 2)] += kLoop[n % 4][1];
+    c[next(axis, 1)] += loop[n % 4][0];
+    c[next(axis, 2)] += loop[n % 4][1];
     return corner(c);
   };
-  return {loop(edge), loop(edge + 1), corner_count_ + cube(low), corner_count_ + cube(high)};
+  return {at_loop(edge), at_loop(edge + 1), corner_count_ + cube(low), corner_count_ + cube(high)};
 }
 
 std::int64_t BccLattice::slot_at(const Eigen::Vector3d& p) const {
@@ -95,8 +91,8 @@ std::array<std::int64_t, BccLattice::star> BccLattice::around(std::int64_t node)
     } else {
       for (std::int64_t place = 0; place < 4; ++place) {  // the node is this corner of the face's loop
         Cell face = c;
-        face[next(axis, 1)] -= kLoop[place][0];
-        face[next(axis, 2)] -= kLoop[place][1];
+        face[next(axis, 1)] -= loop[place][0];
+        face[next(axis, 2)] -= loop[place][1];
         const std::int64_t first = slots_per_cube * cube(face) + 4 * static_cast<std::int64_t>(axis);
         slots[n++] = first + place;
         slots[n++] = first + (place + 3) % 4;

@@ -19,6 +19,9 @@ class BccLattice {
   using Cell = std::array<std::int32_t, 3>;
   static constexpr int slots_per_cube = 12;
   static constexpr int star = 24;  ///< tets around every node
+  /// Corners of the low face along an axis, counter-clockwise seen from the high side, as steps along the
+  /// next two axes.
+  static constexpr int loop[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
 
   BccLattice() = default;
   BccLattice(const Eigen::Vector3d& low, double side, const Cell& cubes);
@@ -43,13 +46,13 @@ class BccLattice {
   /// The tets around a node that has its whole star, in an order that the node's kind alone decides.
   std::array<std::int64_t, star> around(std::int64_t node) const;
   bool is_centre(std::int64_t node) const { return node >= corner_count_; }
+  /// The cube of a centre; of a corner the cube that it is the lowest corner of, which need not be there.
+  Cell node_cell(std::int64_t node) const;
 
  private:
   std::int64_t corner(const Cell& c) const {
     return (std::int64_t{c[2]} * (cubes_[1] + 1) + c[1]) * (cubes_[0] + 1) + c[0];
   }
-  Cell node_cell(std::int64_t node) const;
-
   Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
   double side_ = 1;
   Cell cubes_{0, 0, 0};

@@ -5,7 +5,9 @@
 #include <set>
 
 #include "preprocess/tet/lattice/bcc_lattice.hpp"
+#include "preprocess/tet/lattice/clipper.hpp"
 #include "preprocess/tet/lattice/manifold_fill.hpp"
+#include "preprocess/tet/lattice/star_sets.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 #include "tests/unit/tet/tet_measures.hpp"
@@ -88,6 +90,80 @@ TEST(BccLattice, StarsHoldTheTetsAtANode) {
       const auto nodes = lattice.nodes(slot);
       EXPECT_TRUE(std::find(nodes.begin(), nodes.end(), node) != nodes.end());
     }
+  }
+}
+
+TEST(StarSets, HoldTheKeptTetsAroundEveryNode) {
+  const BccLattice lattice({0, 0, 0}, 1, {5, 4, 6});
+  std::mt19937 random(4);
+  std::vector<std::uint16_t> kept = all_slots(lattice);
+  for (std::uint16_t& label : kept) label = static_cast<std::uint16_t>(random() % 2 * label);
+  const StarSets sets(lattice, kept);
+  for (std::int64_t node = 0; node < lattice.node_count(); ++node) {
+    StarSet expected = 0;
+    if (lattice.has_whole_star(node)) {
+      const auto slots = lattice.around(node);
+      for (std::size_t s = 0; s < slots.size(); ++s)
+        if (kept[static_cast<std::size_t>(slots[s])] != 0) expected |= StarSet{1} << s;
+    }
+    EXPECT_EQ(sets.star(node), expected) << node;
+  }
+}
+
+/// Most of eleven looks into the image, one at a time.
+std::uint16_t slow_vote(const BccLattice& lattice, std::int64_t slot, const Image& labels) {
+  const auto nodes = lattice.nodes(slot);
+  int body = 0, looks = 0;
+  const auto look = [&](const Eigen::Vector4d& share) {
+    Eigen::Vector3d p = Eigen::Vector3d::Zero();
+    for (int c = 0; c < 4; ++c) p += share[c] * lattice.position(nodes[static_cast<std::size_t>(c)]);
+    const auto index = labels.grid.index({p[0], p[1], p[2]});
+    int voxel[3];
+    bool within = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      voxel[axis] = static_cast<int>(std::floor(index[axis] + 0.5));
+      within = within && voxel[axis] >= 0 && voxel[axis] < labels.grid.size[axis];
+    }
+    ++looks;
+    if (within && labels.scalars<std::uint16_t>()[labels.grid.offset(voxel[0], voxel[1], voxel[2])] != 0)
+      ++body;
+  };
+  look(Eigen::Vector4d::Constant(0.25));
+  for (int a = 0; a < 4; ++a) look(0.1 * Eigen::Vector4d::Ones() + 0.6 * Eigen::Vector4d::Unit(a));
+  for (int a = 0; a < 4; ++a)
+    for (int b = a + 1; b < 4; ++b)
+      look(0.1 * Eigen::Vector4d::Ones() + 0.3 * (Eigen::Vector4d::Unit(a) + Eigen::Vector4d::Unit(b)));
+  return 2 * body > looks ? voxel::soft : voxel::outside;
+}
+
+TEST(Clipper, AgreesWithElevenLooksATet) {
+  std::mt19937 random(11);
+  for (const double side : {1.6, 3.7, 9.3}) {  // mm; blocks of voxels are 6 mm
+    ImageGrid grid;
+    grid.size = {23, 18, 30};
+    grid.spacing = {1.5013, 1.5013, 1.5013};  // no look lies between two voxels
+    grid.origin = {-3.0171, 2.0233, 7.0317};
+    Image labels(grid, ScalarType::u16);
+    const std::span<std::uint16_t> voxels = labels.scalars<std::uint16_t>();
+    for (int k = 0; k < 30; ++k)  // a ball, rough, and a solid end at the image's border
+      for (int j = 0; j < 18; ++j)
+        for (int i = 0; i < 23; ++i) {
+          const double r = std::hypot(i - 11, j - 9, k - 12);
+          const bool in = r < 6 || (r < 8 && random() % 3 != 0) || k > 25;
+          voxels[grid.offset(i, j, k)] = in ? voxel::soft : voxel::outside;
+        }
+    const Clipped clipped = Clipper(labels, {}).clip(side);
+    std::vector<std::uint16_t> slow(static_cast<std::size_t>(clipped.lattice.slot_count()), 0);
+    const std::vector<std::uint16_t> there = all_slots(clipped.lattice);
+    for (std::size_t slot = 0; slot < slow.size(); ++slot)
+      if (there[slot] != 0) slow[slot] = slow_vote(clipped.lattice, static_cast<std::int64_t>(slot), labels);
+    fill_to_manifold(clipped.lattice, slow, voxel::soft, {});
+    EXPECT_EQ(clipped.kept, slow) << side;
+    const TetMesh fast = gather(clipped), plain = tets_of(clipped.lattice, clipped.kept);
+    EXPECT_EQ(fast.T.rows(), plain.T.rows());
+    EXPECT_EQ(fast.V.rows(), plain.V.rows());
+    for (Eigen::Index t = 0; t < fast.T.rows(); ++t)
+      for (int c = 0; c < 4; ++c) ASSERT_EQ(fast.V.row(fast.T(t, c)), plain.V.row(plain.T(t, c)));
   }
 }
 
