@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "app/big_heap.hpp"
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/model_report.hpp"
@@ -137,6 +138,7 @@ std::string write_refused(const fs::path& output, const preprocess::WorstTets& w
 
 int run(const Program& program, const Settings& settings) {
   check_outputs(settings);
+  use_big_heap();
   std::optional<StageFolder> kept;
   if (!settings.cache.empty()) kept.emplace(settings.cache, settings.cache_gib);
   std::vector<StageTime> stages;

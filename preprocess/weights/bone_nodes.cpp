@@ -19,9 +19,10 @@ struct Touch {
   auto operator<=>(const Touch&) const = default;
 };
 
-/// Every pair of a node and a bone of whose tets it is a corner, by node, then bone.
-std::vector<Touch> touches(const TetMesh& mesh, std::size_t bones) {
-  std::vector<Touch> all;
+/// The bone whose tets alone have each node for a corner; kNone and kSeveral.
+constexpr std::int32_t kNone = -1, kSeveral = -2;
+std::vector<std::int32_t> only_bones(const TetMesh& mesh, std::size_t bones) {
+  std::vector<std::int32_t> only(static_cast<std::size_t>(mesh.V.rows()), kNone);
   for (Eigen::Index t = 0; t < mesh.T.rows(); ++t) {
     const std::uint16_t label = mesh.label[static_cast<std::size_t>(t)];
     if (label == TetMesh::soft) continue;
@@ -31,7 +32,23 @@ std::vector<Touch> touches(const TetMesh& mesh, std::size_t bones) {
                       std::to_string(bones) + " bones",
                   "report it");
     }
-    for (Eigen::Index k = 0; k < 4; ++k) all.push_back({mesh.T(t, k), label - 1});
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      std::int32_t& bone = only[static_cast<std::size_t>(mesh.T(t, k))];
+      bone = bone == kNone || bone == label - 1 ? label - 1 : kSeveral;
+    }
+  }
+  return only;
+}
+
+/// Every pair of a node of several bones and one of them, by node, then bone.
+std::vector<Touch> touches(const TetMesh& mesh, const std::vector<std::int32_t>& only) {
+  std::vector<Touch> all;
+  for (Eigen::Index t = 0; t < mesh.T.rows(); ++t) {
+    const std::uint16_t label = mesh.label[static_cast<std::size_t>(t)];
+    if (label == TetMesh::soft) continue;
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      if (only[static_cast<std::size_t>(mesh.T(t, k))] == kSeveral) all.push_back({mesh.T(t, k), label - 1});
+    }
   }
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
@@ -42,10 +59,14 @@ std::vector<Touch> touches(const TetMesh& mesh, std::size_t bones) {
 
 std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
                                      const std::vector<std::int32_t>& bone_segment) {
-  const std::vector<Touch> all = touches(mesh, bone_segment.size());
+  const std::vector<std::int32_t> only = only_bones(mesh, bone_segment.size());
+  const std::vector<Touch> all = touches(mesh, only);
   const auto segment = [&](const Touch& touch) { return bone_segment[static_cast<std::size_t>(touch.bone)]; };
 
   std::vector<std::int32_t> owner(static_cast<std::size_t>(mesh.V.rows()), -1);
+  for (std::size_t n = 0; n < owner.size(); ++n) {
+    if (only[n] >= 0) owner[n] = bone_segment[static_cast<std::size_t>(only[n])];
+  }
   std::vector<std::pair<std::size_t, std::size_t>> contested;  // ranges of `all`
   std::map<std::int32_t, geometry::FaceTree> surfaces;
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {

@@ -13,8 +13,13 @@ struct FreeSystem {
   solve::Block rhs;
 };
 
+/// Right angles tie nothing: six of the fourteen neighbours of a node of the lattice.
+bool vanishes(const solve::SparseMatrix::InnerIterator& entry) {
+  return entry.value() == 0 && entry.row() != entry.col();
+}
+
 FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_t>& free_row,
-                     std::int32_t free_count, const Eigen::MatrixXd& boundary) {
+                     std::int32_t free_count, const solve::Block& boundary) {
   FreeSystem system;
   system.A.resize(free_count, free_count);
   system.rhs.setZero(free_count, boundary.cols());
@@ -26,7 +31,9 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
   for (Eigen::Index c = 0; c < L.outerSize(); ++c) {
     if (row_of(c) < 0) continue;
     std::int32_t count = 0;
-    for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) count += row_of(entry.row()) >= 0;
+    for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
+      count += row_of(entry.row()) >= 0 && !vanishes(entry);
+    }
     offsets[row_of(c) + 1] = offsets[row_of(c)] + count;
   }
   system.A.resizeNonZeros(offsets[free_count]);
@@ -34,6 +41,7 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
     const std::int32_t column = row_of(c);
     std::int32_t at = column < 0 ? 0 : offsets[column];
     for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
+      if (vanishes(entry)) continue;
       const std::int32_t row = row_of(entry.row());
       if (row >= 0 && column >= 0) {
         system.A.innerIndexPtr()[at] = row;
@@ -51,7 +59,7 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
 }  // namespace
 
 HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
-                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver,
+                              const solve::Block& boundary, solve::SpdSolver& solver,
                               const Context& context) {
   std::vector<std::int32_t> free_row(fixed.size(), -1);
   std::int32_t free_count = 0;

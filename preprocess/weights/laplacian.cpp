@@ -2,7 +2,9 @@
 // The stiffness matrix of linear elements, straight into compressed columns: every node gathers its own tets,
 // so nothing is sorted and the sums have one order whatever the number of threads.
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -59,57 +61,71 @@ struct Neighbour {
   double value;
 };
 
-/// The neighbours of `node`, ascending, with the sums over its tets. `row` is scratch.
-void gather(const Tets& T, const Incidence& incidence, const std::vector<EdgeTerms>& terms, std::int32_t node,
-            std::vector<Neighbour>& row) {
-  row.clear();
-  const auto n = static_cast<std::size_t>(node);
-  for (std::int64_t i = incidence.offsets[n]; i < incidence.offsets[n + 1]; ++i) {
-    const std::int64_t packed = incidence.corners[static_cast<std::size_t>(i)];
-    const std::int64_t t = packed / 4;
-    const auto corner = static_cast<std::size_t>(packed % 4);
-    for (std::size_t other = 0; other < 4; ++other) {
-      if (other == corner) continue;
-      const std::int32_t b = T(t, static_cast<Eigen::Index>(other));
-      const double value = terms[static_cast<std::size_t>(t)][static_cast<std::size_t>(kEdge[corner][other])];
-      const auto found =
-          std::find_if(row.begin(), row.end(), [b](const Neighbour& x) { return x.node == b; });
-      if (found == row.end()) {
-        row.push_back({b, value});
-      } else {
-        found->value += value;
+/// What one thread gathers rows with: where in the row a node has its place, -1 for none.
+struct Gatherer {
+  std::vector<std::int32_t> place;
+  std::vector<Neighbour> row;
+
+  explicit Gatherer(std::int32_t nodes) : place(static_cast<std::size_t>(nodes), -1) {}
+
+  /// The neighbours of `node`, ascending, with the sums over its tets.
+  void gather(const Tets& T, const Incidence& incidence, const std::vector<EdgeTerms>& terms,
+              std::int32_t node) {
+    row.clear();
+    const auto n = static_cast<std::size_t>(node);
+    for (std::int64_t i = incidence.offsets[n]; i < incidence.offsets[n + 1]; ++i) {
+      const std::int64_t packed = incidence.corners[static_cast<std::size_t>(i)];
+      const std::int64_t t = packed / 4;
+      const auto corner = static_cast<std::size_t>(packed % 4);
+      for (std::size_t other = 0; other < 4; ++other) {
+        if (other == corner) continue;
+        const std::int32_t b = T(t, static_cast<Eigen::Index>(other));
+        const double value =
+            terms[static_cast<std::size_t>(t)][static_cast<std::size_t>(kEdge[corner][other])];
+        std::int32_t& at = place[static_cast<std::size_t>(b)];
+        if (at < 0) {
+          at = static_cast<std::int32_t>(row.size());
+          row.push_back({b, value});
+        } else {
+          row[static_cast<std::size_t>(at)].value += value;
+        }
       }
     }
+    for (const Neighbour& x : row) place[static_cast<std::size_t>(x.node)] = -1;
+    std::sort(row.begin(), row.end(), [](const Neighbour& x, const Neighbour& y) { return x.node < y.node; });
   }
-  std::sort(row.begin(), row.end(), [](const Neighbour& x, const Neighbour& y) { return x.node < y.node; });
-}
+};
 
-/// Calls `f(node, row)` for every node in parallel.
-template <class F>
-void for_each_row(const Tets& T, const Incidence& incidence, const std::vector<EdgeTerms>& terms,
-                  std::int32_t nodes, const F& f) {
-  tbb::parallel_for(tbb::blocked_range<std::int32_t>(0, nodes, 1024), [&](const auto& range) {
-    std::vector<Neighbour> row;
-    for (std::int32_t n = range.begin(); n < range.end(); ++n) {
-      gather(T, incidence, terms, n, row);
-      f(n, row);
-    }
-  });
-}
+/// Columns of L that one piece of work made.
+struct Piece {
+  std::vector<std::int32_t> row;
+  std::vector<double> value;
+};
 
 }  // namespace
 
 double positive_offdiagonal_share(const solve::SparseMatrix& L) {
-  const Eigen::VectorXd diagonal = L.diagonal();
-  std::int64_t positive = 0, all = 0;
-  for (Eigen::Index c = 0; c < L.outerSize(); ++c) {
-    for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
-      if (entry.row() == c) continue;
-      ++all;
-      // Right angles give an exact zero on paper and either sign in floating point.
-      if (entry.value() > 1e-12 * (diagonal(c) + diagonal(entry.row()))) ++positive;
-    }
-  }
+  // A column of the lower triangle starts with its diagonal.
+  const auto own = [&](Eigen::Index n) { return L.valuePtr()[L.outerIndexPtr()[n]]; };
+  struct Count {
+    std::int64_t positive = 0, all = 0;
+  };
+  const auto [positive, all] = tbb::parallel_reduce(
+      tbb::blocked_range<Eigen::Index>(0, L.outerSize(), 16384), Count{},
+      [&](const auto& range, Count count) {
+        for (Eigen::Index c = range.begin(); c < range.end(); ++c) {
+          for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
+            if (entry.row() == c) continue;
+            ++count.all;
+            // Right angles give an exact zero on paper and either sign in floating point.
+            if (entry.value() > 1e-12 * (own(c) + own(entry.row()))) ++count.positive;
+          }
+        }
+        return count;
+      },
+      [](const Count& a, const Count& b) {
+        return Count{a.positive + b.positive, a.all + b.all};
+      });
   return all == 0 ? 0.0 : static_cast<double>(positive) / static_cast<double>(all);
 }
 
@@ -126,25 +142,37 @@ solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_s
   solve::SparseMatrix L(nodes, nodes);
   std::int32_t* offsets = L.outerIndexPtr();
   offsets[0] = 0;
-  for_each_row(T, incidence, terms, nodes, [&](std::int32_t n, const std::vector<Neighbour>& row) {
-    std::int32_t below = 1;
-    for (const Neighbour& x : row) below += x.node > n;
-    offsets[n + 1] = below;
+  constexpr std::int32_t kNodes = 4096;
+  std::vector<Piece> pieces(static_cast<std::size_t>((nodes + kNodes - 1) / kNodes));
+  tbb::enumerable_thread_specific<Gatherer> gatherers([&] { return Gatherer(nodes); });
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
+    Gatherer& gatherer = gatherers.local();
+    Piece& piece = pieces[p];
+    const std::int32_t first = static_cast<std::int32_t>(p) * kNodes;
+    for (std::int32_t n = first; n < std::min(first + kNodes, nodes); ++n) {
+      gatherer.gather(T, incidence, terms, n);
+      const std::size_t diagonal = piece.row.size();
+      piece.row.push_back(n);
+      piece.value.push_back(0);
+      double sum = 0;
+      for (const Neighbour& x : gatherer.row) {
+        sum += x.value;
+        if (x.node < n) continue;
+        piece.row.push_back(x.node);
+        piece.value.push_back(x.value);
+      }
+      piece.value[diagonal] = -sum;  // constants are harmonic
+      offsets[n + 1] = static_cast<std::int32_t>(piece.row.size() - diagonal);
+    }
   });
   for (std::int32_t n = 0; n < nodes; ++n) offsets[n + 1] += offsets[n];
   L.resizeNonZeros(offsets[nodes]);
-  for_each_row(T, incidence, terms, nodes, [&](std::int32_t n, const std::vector<Neighbour>& row) {
-    std::int32_t at = offsets[n];
-    const std::int32_t diagonal = at++;
-    double sum = 0;
-    for (const Neighbour& x : row) {
-      sum += x.value;
-      if (x.node < n) continue;
-      L.innerIndexPtr()[at] = x.node;
-      L.valuePtr()[at++] = x.value;
-    }
-    L.innerIndexPtr()[diagonal] = n;
-    L.valuePtr()[diagonal] = -sum;  // constants are harmonic
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
+    Piece& piece = pieces[p];
+    const std::int32_t at = offsets[static_cast<std::int32_t>(p) * kNodes];
+    std::copy(piece.row.begin(), piece.row.end(), L.innerIndexPtr() + at);
+    std::copy(piece.value.begin(), piece.value.end(), L.valuePtr() + at);
+    piece = {};
   });
   if (positive_share != nullptr) *positive_share = positive_offdiagonal_share(L);
   return L;

@@ -42,7 +42,7 @@ void drop_positive_ties(solve::SparseMatrix& L, const std::vector<std::uint8_t>&
 }  // namespace
 
 MonotoneResult solve_monotone(solve::SparseMatrix L, const std::vector<std::uint8_t>& fixed,
-                              const Eigen::MatrixXd& boundary, solve::SpdSolver& solver,
+                              const solve::Block& boundary, solve::SpdSolver& solver,
                               const Context& context) {
   MonotoneResult result;
   result.harmonic = solve_harmonic(L, fixed, boundary, solver, context);

@@ -6,7 +6,7 @@
 
 namespace ecorche::weights {
 
-Repair repair(const std::vector<std::uint8_t>& fixed, Eigen::MatrixXd& values) {
+Repair repair(const std::vector<std::uint8_t>& fixed, solve::Block& values) {
   Repair report;
   for (std::size_t n = 0; n < fixed.size(); ++n) {
     if (fixed[n]) continue;

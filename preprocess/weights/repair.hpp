@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/solve/spd_solver.hpp"
 #include "core/values/context.hpp"
 #include "core/values/mesh.hpp"
 
@@ -22,6 +23,6 @@ struct Repair {
 inline constexpr double kRounding = 1e-9;  ///< below it a violation is the solver's rounding, not the mesh's
 
 /// `values` is #nodes by #columns, as solved; mended in place. Rows of nodes with fixed[n] are not looked at.
-Repair repair(const std::vector<std::uint8_t>& fixed, Eigen::MatrixXd& values);
+Repair repair(const std::vector<std::uint8_t>& fixed, solve::Block& values);
 
 }  // namespace ecorche::weights

@@ -77,7 +77,7 @@ void warn_of_mended_nodes(const MonotoneResult& solved, const Context& context) 
 }
 
 /// Largest, smallest and row sums over the rows that were solved.
-void measure_solved(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& source,
+void measure_solved(const solve::Block& values, const std::vector<std::int32_t>& source,
                     Certificate& certificate) {
   certificate.solved_min_weight = 1;
   certificate.solved_max_weight = 0;
@@ -91,7 +91,7 @@ void measure_solved(const Eigen::MatrixXd& values, const std::vector<std::int32_
 }
 
 /// Rows cut at kStored, divided by their sum and narrowed to float32; `source` as in attachments().
-Weights store(const Eigen::MatrixXd& values, const std::vector<std::int32_t>& columns,
+Weights store(const solve::Block& values, const std::vector<std::int32_t>& columns,
               const std::vector<std::int32_t>& source, Certificate& certificate) {
   Weights w;
   w.offsets.reserve(source.size() + 1);
@@ -154,7 +154,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   std::vector<Eigen::Index> column_of(segments, -1);
   for (std::size_t c = 0; c < columns.size(); ++c)
     column_of[static_cast<std::size_t>(columns[c])] = static_cast<Eigen::Index>(c);
-  Eigen::MatrixXd boundary = Eigen::MatrixXd::Zero(mesh.V.rows(), static_cast<Eigen::Index>(columns.size()));
+  solve::Block boundary = solve::Block::Zero(mesh.V.rows(), static_cast<Eigen::Index>(columns.size()));
   for (std::size_t n = 0; n < nodes; ++n) {
     fixed[n] = owner[n] >= 0 || source[n] >= 0;
     if (owner[n] >= 0)
@@ -182,7 +182,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   }
   context.report(0.9);
 
-  Eigen::MatrixXd& values = solved.values;
+  solve::Block& values = solved.values;
   const Repair repaired = repair(fixed, values);
   certificate.repaired_rows = repaired.rows;
   certificate.repaired_largest_change = repaired.largest_change;

@@ -113,8 +113,8 @@ class CholmodSolver final : public solve::SpdSolver {
   Block solve(const Block& B, const Context& context) const override {
     if (!state_) fail(ErrorKind::internal, "solve before factor", "report it");
     if (B.size() == 0) return B;
-    auto rhs = std::make_shared<Block>(B);
-    auto X = std::make_shared<Block>(B.rows(), B.cols());
+    auto rhs = std::make_shared<Eigen::MatrixXd>(B);  // CHOLMOD's are column by column
+    auto X = std::make_shared<Eigen::MatrixXd>(B.rows(), B.cols());
     solve::run_abandonable(
         [state = state_, rhs, X] {
           openblas_set_num_threads(1);
@@ -132,7 +132,7 @@ class CholmodSolver final : public solve::SpdSolver {
         },
         context);
     state_->check(B.rows());
-    return std::move(*X);
+    return *X;
   }
 
  private:

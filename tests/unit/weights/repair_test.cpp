@@ -7,7 +7,7 @@ namespace ecorche::weights {
 namespace {
 
 TEST(Repair, ClampsAndCountsOnlyWhatLeftTheBounds) {
-  Eigen::MatrixXd values(5, 3);
+  solve::Block values(5, 3);
   values << 0.2, 0.3, 0.5,       //
       1.004, -0.003, -0.001,     // clamped to (1, 0, 0)
       0.6, 0.402, -0.002,        // divided by 1.002

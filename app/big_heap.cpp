@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/big_heap.hpp"
+
+#include <malloc.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <climits>
+#include <cstdint>
+#include <cstdlib>
+
+namespace ecorche::app {
+
+void use_big_heap() {
+#ifdef __GLIBC__
+  constexpr int kAhead = 3 << 29;  // addresses that the heap takes at once; memory only where it is touched
+  mallopt(M_MMAP_MAX, 0);
+  mallopt(M_TRIM_THRESHOLD, INT_MAX);
+  mallopt(M_TOP_PAD, kAhead);
+  // Larger than what the heap has left: makes it take those addresses. Volatile, or it would not be called.
+  void* const volatile some = std::malloc(std::size_t{1} << 26);
+  std::free(some);
+  mallopt(M_TOP_PAD, 1 << 26);
+  constexpr std::uintptr_t kPage = std::uintptr_t{1} << 21;
+  const auto end = reinterpret_cast<std::uintptr_t>(sbrk(0));
+  const std::uintptr_t begin = (end - std::uintptr_t{kAhead} + kPage) / kPage * kPage;
+  if (some != nullptr) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+#endif
+}
+
+}  // namespace ecorche::app
