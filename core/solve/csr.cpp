@@ -57,26 +57,40 @@ Csr<double> transpose(const Csr<double>& A) {
   return out;
 }
 
+Csr<double> join(std::int32_t rows, std::int32_t columns, std::vector<RowsPart>& parts) {
+  Csr<double> out;
+  out.rows = rows;
+  out.columns = columns;
+  out.first.reserve(static_cast<std::size_t>(rows) + 1);
+  for (const RowsPart& part : parts) {
+    for (const std::int32_t length : part.length) out.first.push_back(out.first.back() + length);
+  }
+  out.column.resize(static_cast<std::size_t>(out.first.back()));
+  out.value.resize(static_cast<std::size_t>(out.first.back()));
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+    const auto at = out.first[p * static_cast<std::size_t>(RowsPart::rows)];
+    std::copy(parts[p].column.begin(), parts[p].column.end(), out.column.begin() + at);
+    std::copy(parts[p].value.begin(), parts[p].value.end(), out.value.begin() + at);
+    parts[p] = {};
+  });
+  return out;
+}
+
 Csr<double> multiply(const Csr<double>& A, const Csr<double>& B) {
-  constexpr std::int32_t kRows = 4096;
-  struct Part {
-    std::vector<std::int64_t> length;
-    std::vector<std::int32_t> column;
-    std::vector<double> value;
-  };
+  constexpr std::int32_t kRows = RowsPart::rows;
   struct Sums {
     std::vector<double> sum;
     std::vector<std::uint8_t> live;
     std::vector<std::int32_t> columns;
   };
-  std::vector<Part> parts(static_cast<std::size_t>((A.rows + kRows - 1) / kRows));
+  std::vector<RowsPart> parts(static_cast<std::size_t>((A.rows + kRows - 1) / kRows));
   tbb::enumerable_thread_specific<Sums> scratch([&] {
     const auto columns = static_cast<std::size_t>(B.columns);
     return Sums{std::vector<double>(columns, 0), std::vector<std::uint8_t>(columns, 0), {}};
   });
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
     Sums& s = scratch.local();
-    Part& part = parts[p];
+    RowsPart& part = parts[p];
     const auto begin = static_cast<std::int32_t>(p) * kRows, end = std::min(begin + kRows, A.rows);
     for (std::int32_t row = begin; row < end; ++row) {
       s.columns.clear();
@@ -96,18 +110,10 @@ Csr<double> multiply(const Csr<double>& A, const Csr<double>& B) {
         s.sum[c] = 0;
         s.live[c] = 0;
       }
-      part.length.push_back(static_cast<std::int64_t>(s.columns.size()));
+      part.length.push_back(static_cast<std::int32_t>(s.columns.size()));
     }
   });
-  Csr<double> out;
-  out.rows = A.rows;
-  out.columns = B.columns;
-  for (const Part& part : parts) {
-    for (const std::int64_t length : part.length) out.first.push_back(out.first.back() + length);
-    out.column.insert(out.column.end(), part.column.begin(), part.column.end());
-    out.value.insert(out.value.end(), part.value.begin(), part.value.end());
-  }
-  return out;
+  return join(A.rows, B.columns, parts);
 }
 
 Csr<float> narrow(const Csr<double>& A) {

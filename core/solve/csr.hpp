@@ -37,6 +37,16 @@ Csr<double> multiply(const Csr<double>& A, const Csr<double>& B);
 
 Csr<float> narrow(const Csr<double>& A);
 
+/// The entries of so many rows of a matrix under construction: parts are made in parallel and joined.
+struct RowsPart {
+  static constexpr std::int32_t rows = 4096;
+  std::vector<std::int32_t> length;  ///< entries by row
+  std::vector<std::int32_t> column;
+  std::vector<double> value;
+};
+/// Parts hold RowsPart::rows rows each, the last one what is left. Takes them apart.
+Csr<double> join(std::int32_t rows, std::int32_t columns, std::vector<RowsPart>& parts);
+
 /// The diagonal; 0 where a row has none.
 std::vector<double> diagonal(const Csr<double>& A);
 

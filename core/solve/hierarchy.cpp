@@ -72,16 +72,12 @@ std::vector<std::int32_t> aggregate(const Csr<double>& A, double strength) {
 Csr<double> smoothed_prolongator(const Csr<double>& A, const std::vector<std::int32_t>& group,
                                  double strength, double largest) {
   const Ties ties(A, strength);
-  Csr<double> out;
-  out.rows = A.rows;
-  for (const std::int32_t g : group) out.columns = std::max(out.columns, g + 1);
-  std::vector<std::pair<std::int32_t, double>> row;
-  for (std::int32_t i = 0; i < A.rows; ++i) {
-    double own = 0;
-    A.for_row(i, [&](std::int32_t j, double a) { own += ties.strong(i, j, a) ? 0 : a; });
-    // A row whose filtered diagonal vanishes cannot be smoothed by itself.
-    const double scale = own > 0 ? 4.0 / (3 * largest * own) : 0;
-    row.clear();
+  std::int32_t groups = 0;
+  for (const std::int32_t g : group) groups = std::max(groups, g + 1);
+  std::vector<RowsPart> parts(static_cast<std::size_t>((A.rows + RowsPart::rows - 1) / RowsPart::rows));
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+    RowsPart& part = parts[p];
+    std::vector<std::pair<std::int32_t, double>> row;
     const auto add = [&](std::int32_t g, double value) {
       if (g < 0) return;
       const auto at =
@@ -92,18 +88,26 @@ Csr<double> smoothed_prolongator(const Csr<double>& A, const std::vector<std::in
         at->second += value;
       }
     };
-    add(group[static_cast<std::size_t>(i)], 1 - scale * own);
-    A.for_row(i, [&](std::int32_t j, double a) {
-      if (ties.strong(i, j, a)) add(group[static_cast<std::size_t>(j)], -scale * a);
-    });
-    std::sort(row.begin(), row.end());
-    for (const auto& [g, value] : row) {
-      out.column.push_back(g);
-      out.value.push_back(value);
+    const auto begin = static_cast<std::int32_t>(p) * RowsPart::rows;
+    for (std::int32_t i = begin; i < std::min(begin + RowsPart::rows, A.rows); ++i) {
+      double own = 0;
+      A.for_row(i, [&](std::int32_t j, double a) { own += ties.strong(i, j, a) ? 0 : a; });
+      // A row whose filtered diagonal vanishes cannot be smoothed by itself.
+      const double scale = own > 0 ? 4.0 / (3 * largest * own) : 0;
+      row.clear();
+      add(group[static_cast<std::size_t>(i)], 1 - scale * own);
+      A.for_row(i, [&](std::int32_t j, double a) {
+        if (ties.strong(i, j, a)) add(group[static_cast<std::size_t>(j)], -scale * a);
+      });
+      std::sort(row.begin(), row.end());
+      for (const auto& [g, value] : row) {
+        part.column.push_back(g);
+        part.value.push_back(value);
+      }
+      part.length.push_back(static_cast<std::int32_t>(row.size()));
     }
-    out.first.push_back(static_cast<std::int64_t>(out.column.size()));
-  }
-  return out;
+  });
+  return join(A.rows, groups, parts);
 }
 
 double largest_eigenvalue(const Csr<double>& A) {
@@ -115,22 +119,34 @@ double largest_eigenvalue(const Csr<double>& A) {
     state = state * 1664525U + 1013904223U;
     value = 0.5 + static_cast<double>(state >> 8) / (1U << 24);
   }
-  double estimate = 1;
-  for (int step = 0; step < kSteps; ++step) {
-    tbb::parallel_for(std::int32_t{0}, A.rows, [&](std::int32_t i) {
-      double sum = 0;
-      A.for_row(i, [&](std::int32_t j, double a) { sum += a * x[static_cast<std::size_t>(j)]; });
-      y[static_cast<std::size_t>(i)] = sum / own[static_cast<std::size_t>(i)];
-    });
+  double estimate = 1, scale = 1;
+  constexpr std::size_t kRows = 4096;
+  struct Squares {
     double before = 0, after = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      before += x[i] * x[i];
-      after += y[i] * y[i];
+  };
+  std::vector<Squares> parts((x.size() + kRows - 1) / kRows);
+  for (int step = 0; step < kSteps; ++step) {
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+      Squares sums;
+      for (std::size_t i = p * kRows; i < std::min((p + 1) * kRows, x.size()); ++i) {
+        double sum = 0;
+        A.for_row(static_cast<std::int32_t>(i),
+                  [&](std::int32_t j, double a) { sum += a * x[static_cast<std::size_t>(j)]; });
+        y[i] = scale * sum / own[i];
+        sums.before += x[i] * x[i];
+        sums.after += y[i] * y[i];
+      }
+      parts[p] = sums;
+    });
+    Squares all;  // in one order
+    for (const Squares& sums : parts) {
+      all.before += scale * scale * sums.before;
+      all.after += sums.after;
     }
-    if (!(before > 0) || !(after > 0)) break;
-    estimate = std::sqrt(after / before);
-    const double scale = 1 / std::sqrt(after);
-    for (std::size_t i = 0; i < x.size(); ++i) x[i] = y[i] * scale;
+    if (!(all.before > 0) || !(all.after > 0)) break;
+    estimate = std::sqrt(all.after / all.before);
+    scale = 1 / std::sqrt(all.after);
+    std::swap(x, y);
   }
   return 1.1 * estimate;
 }

@@ -2,7 +2,11 @@
 // Laplace's equation with the fixed nodes eliminated: L_ff X_f = -L_fb B, only the free block is factored.
 #include "preprocess/weights/harmonic.hpp"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <string>
+#include <vector>
 
 namespace ecorche::weights {
 namespace {
@@ -27,31 +31,46 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
   const auto row_of = [&](Eigen::Index n) { return free_row[static_cast<std::size_t>(n)]; };
 
   // Free rows keep the order of the nodes, so the lower triangle stays lower.
+  constexpr Eigen::Index kNodes = 8192;
+  struct Tie {  // of a free row and a fixed node
+    std::int32_t row;
+    Eigen::Index node;
+    double value;
+  };
+  std::vector<std::vector<Tie>> ties(static_cast<std::size_t>((L.outerSize() + kNodes - 1) / kNodes));
+  const auto for_columns = [&](std::size_t part, auto&& f) {
+    const auto first = static_cast<Eigen::Index>(part) * kNodes;
+    for (Eigen::Index c = first; c < std::min(first + kNodes, L.outerSize()); ++c) f(c);
+  };
   offsets[0] = 0;
-  for (Eigen::Index c = 0; c < L.outerSize(); ++c) {
-    if (row_of(c) < 0) continue;
-    std::int32_t count = 0;
-    for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
-      count += row_of(entry.row()) >= 0 && !vanishes(entry);
-    }
-    offsets[row_of(c) + 1] = offsets[row_of(c)] + count;
-  }
-  system.A.resizeNonZeros(offsets[free_count]);
-  for (Eigen::Index c = 0; c < L.outerSize(); ++c) {
-    const std::int32_t column = row_of(c);
-    std::int32_t at = column < 0 ? 0 : offsets[column];
-    for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
-      if (vanishes(entry)) continue;
-      const std::int32_t row = row_of(entry.row());
-      if (row >= 0 && column >= 0) {
-        system.A.innerIndexPtr()[at] = row;
-        system.A.valuePtr()[at++] = entry.value();
-      } else if (row >= 0) {
-        system.rhs.row(row) -= entry.value() * boundary.row(c);
-      } else if (column >= 0) {
-        system.rhs.row(column) -= entry.value() * boundary.row(entry.row());
+  tbb::parallel_for(std::size_t{0}, ties.size(), [&](std::size_t part) {
+    for_columns(part, [&](Eigen::Index c) {
+      std::int32_t count = 0;
+      for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
+        if (vanishes(entry)) continue;
+        const std::int32_t row = row_of(entry.row()), column = row_of(c);
+        if (row >= 0 && column >= 0) ++count;
+        if (row >= 0 && column < 0) ties[part].push_back({row, c, entry.value()});
+        if (row < 0 && column >= 0) ties[part].push_back({column, entry.row(), entry.value()});
       }
-    }
+      if (row_of(c) >= 0) offsets[row_of(c) + 1] = count;
+    });
+  });
+  for (std::int32_t n = 0; n < free_count; ++n) offsets[n + 1] += offsets[n];
+  system.A.resizeNonZeros(offsets[free_count]);
+  tbb::parallel_for(std::size_t{0}, ties.size(), [&](std::size_t part) {
+    for_columns(part, [&](Eigen::Index c) {
+      if (row_of(c) < 0) return;
+      std::int32_t at = offsets[row_of(c)];
+      for (solve::SparseMatrix::InnerIterator entry(L, c); entry; ++entry) {
+        if (vanishes(entry) || row_of(entry.row()) < 0) continue;
+        system.A.innerIndexPtr()[at] = row_of(entry.row());
+        system.A.valuePtr()[at++] = entry.value();
+      }
+    });
+  });
+  for (const std::vector<Tie>& some : ties) {
+    for (const Tie& tie : some) system.rhs.row(tie.row) -= tie.value * boundary.row(tie.node);
   }
   return system;
 }

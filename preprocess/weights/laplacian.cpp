@@ -17,19 +17,37 @@ namespace {
 
 /// Tet and corner, packed: 4 * tet + corner.
 struct Incidence {
-  std::vector<std::int64_t> offsets;  ///< #nodes + 1
-  std::vector<std::int64_t> corners;  ///< ascending within a node
+  std::vector<std::uint32_t> offsets;  ///< #nodes + 1
+  std::vector<std::uint32_t> corners;  ///< ascending within a node
 
+  /// Every part of the tets counts for itself, so that it knows where its own begin.
   Incidence(Eigen::Index nodes, const Tets& T)
       : offsets(static_cast<std::size_t>(nodes) + 1, 0), corners(static_cast<std::size_t>(T.size())) {
+    constexpr std::size_t kParts = 4;
     const std::int32_t* node = T.data();
-    for (std::size_t i = 0; i < corners.size(); ++i) ++offsets[static_cast<std::size_t>(node[i]) + 1];
-    for (std::size_t n = 1; n < offsets.size(); ++n) offsets[n] += offsets[n - 1];
-    std::vector<std::int64_t> next(offsets.begin(), offsets.end() - 1);
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      corners[static_cast<std::size_t>(next[static_cast<std::size_t>(node[i])]++)] =
-          static_cast<std::int64_t>(i);
+    std::array<std::vector<std::uint32_t>, kParts> next;
+    const auto for_corners = [&](std::size_t part, auto&& f) {
+      for (std::size_t i = corners.size() * part / kParts; i < corners.size() * (part + 1) / kParts; ++i)
+        f(i, next[part][static_cast<std::size_t>(node[i])]);
+    };
+    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
+      next[part].assign(static_cast<std::size_t>(nodes), 0);
+      for_corners(part, [](std::size_t, std::uint32_t& count) { ++count; });
+    });
+    std::uint32_t at = 0;
+    for (std::size_t n = 0; n + 1 < offsets.size(); ++n) {
+      for (auto& counts : next) {
+        const std::uint32_t count = counts[n];
+        counts[n] = at;
+        at += count;
+      }
+      offsets[n + 1] = at;
     }
+    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
+      for_corners(part, [&](std::size_t i, std::uint32_t& place) {
+        corners[place++] = static_cast<std::uint32_t>(i);
+      });
+    });
   }
 };
 
@@ -73,9 +91,9 @@ struct Gatherer {
               std::int32_t node) {
     row.clear();
     const auto n = static_cast<std::size_t>(node);
-    for (std::int64_t i = incidence.offsets[n]; i < incidence.offsets[n + 1]; ++i) {
-      const std::int64_t packed = incidence.corners[static_cast<std::size_t>(i)];
-      const std::int64_t t = packed / 4;
+    for (std::uint32_t i = incidence.offsets[n]; i < incidence.offsets[n + 1]; ++i) {
+      const std::uint32_t packed = incidence.corners[i];
+      const auto t = static_cast<Eigen::Index>(packed / 4);
       const auto corner = static_cast<std::size_t>(packed % 4);
       for (std::size_t other = 0; other < 4; ++other) {
         if (other == corner) continue;
