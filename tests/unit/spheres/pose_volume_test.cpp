@@ -175,9 +175,12 @@ TEST(PoseVolume, TheSkeletonOfItsNameElseTheFirst) {
 
 // At rest every voxel asks the ball whose rest centre is nearest, and looks where its segment took it.
 TEST(WayBack, EveryVoxelShowsItsPlaceInThePose) {
-  const BentCylinder body(kEverything);
+  // Few balls, so that most voxels lie beside a ball's centre, and a turn about no axis of the lattice.
+  const BentCylinder body(0.3);
   const Model model = model_of(body);
-  const auto motions = body.bent(35);
+  auto motions = body.bent(35);
+  const Eigen::Quaterniond askew(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()));
+  for (RigidTransform& motion : motions) motion = RigidTransform{askew, {4, -9, 2}} * motion;
   const BallSet there = VolumeBalls(model, model.volumes[0], false).at(motions);
   const Image posed = noise_on(grid_of(there.lattice, grown_box(there)));
   const BallSet back = way_back(there);
