@@ -57,8 +57,8 @@ BodyParts::BodyParts(const Model& model)
     }
     part.groups = group_vertices(model, tissue, clusters_.lane);
     part.mask.assign((clusters_.clusters() + 63) / 64, 0);
-    for (const std::uint32_t lane : part.groups.lanes) {
-      const std::size_t cluster = lane / NodeClusters::size;
+    for (const std::uint32_t row : part.groups.rows) {
+      const std::size_t cluster = row / (3 * NodeClusters::size);
       part.mask[cluster / 64] |= std::uint64_t{1} << cluster % 64;
     }
   };

@@ -24,14 +24,15 @@ HWY_INLINE V3 load_rows(const float* rows, std::size_t first, std::size_t count)
 
 void move_bone(const BoneVertices& job, std::size_t begin, std::size_t end) {
   const Way way(job.motion);
+  const Sink sink(job.out);
   const V3 origin = all3(job.motion.origin);
   for (std::size_t v = begin; v < end; v += hn::Lanes(F())) {
     const Places places{v, std::min(end - v, hn::Lanes(F())), nullptr};
     const V3 x = load_rows(job.rest.data(), v, places.count);
-    put_position(job.out, places, way.carry(x, matrix_times(job.motion.turn.data(), minus(x, origin))));
-    if (job.out.normals == nullptr) continue;
+    sink.put_position(places, way.carry(x, matrix_times(job.motion.turn.data(), minus(x, origin))));
+    if (!sink.wants_normals()) continue;
     const V3 n = load_rows(job.normals.data(), v, places.count);
-    put_normal(job.out, places, plus(n, matrix_times(job.motion.turn.data(), n)));
+    sink.put_normal(places, plus(n, matrix_times(job.motion.turn.data(), n)));
   }
 }
 

@@ -17,6 +17,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
 using I16 = hn::Rebind<std::int16_t, F>;
+using U32 = hn::Rebind<std::uint32_t, F>;
 
 /// The places of a vector's vertices: `count` of them from `first` on, or those that `scattered` names.
 struct Places {
@@ -37,38 +38,44 @@ struct Places {
   }
 };
 
-HWY_INLINE hn::Vec<U16> quantise(V x, float low, float per_step) {
-  const V number = hn::Mul(hn::Sub(x, all(low)), all(per_step));
-  return hn::DemoteTo(U16(), hn::NearestInt(hn::Min(hn::Max(number, all(0)), all(65535))));
-}
-
 HWY_INLINE hn::Vec<I16> narrow_unit(V x) {
   return hn::DemoteTo(I16(), hn::NearestInt(hn::Mul(x, all(32767))));
 }
 
-HWY_INLINE void put_position(const VertexSink& out, const Places& places, const V3& p) {
-  if (out.positions != nullptr) places.store(F(), p.x, p.y, p.z, out.positions);
-  if (out.quantised != nullptr) {
-    const float per_step = 1 / out.box.step;
-    places.store(U16(), quantise(p.x, out.box.low[0], per_step), quantise(p.y, out.box.low[1], per_step),
-                 quantise(p.z, out.box.low[2], per_step), out.quantised);
+/// A VertexSink of the kernels' own, which no store can be thought to change.
+class Sink {
+ public:
+  explicit Sink(const VertexSink& out)
+      : out_(out), per_step_(out.box.step > 0 ? 1 / out.box.step : 0), widest_(65535 * out.box.step) {}
+
+  bool wants_normals() const { return out_.normals != nullptr; }
+
+  HWY_INLINE void put_position(const Places& places, const V3& p) const {
+    if (out_.positions != nullptr) places.store(F(), p.x, p.y, p.z, out_.positions);
+    if (out_.quantised != nullptr)
+      places.store(U16(), quantise(p.x, 0), quantise(p.y, 1), quantise(p.z, 2), out_.quantised);
   }
-}
 
-/// 1 / sqrt(x) to 2e-5 of itself, half a step of i16; x within [1e-30, 1e30]. One step of Newton's costs less
-/// than a root and a division.
-HWY_INLINE V inverse_root(V x) {
-  const V guess = hn::ApproximateReciprocalSqrt(x);
-  const V less = hn::NegMulAdd(hn::Mul(hn::Mul(x, guess), all(0.5F)), guess, all(0.5F));
-  return hn::MulAdd(guess, less, guess);
-}
+  /// n needs no length; a zero stays zero.
+  HWY_INLINE void put_normal(const Places& places, const V3& n) const {
+    const V squared = hn::MulAdd(n.x, n.x, hn::MulAdd(n.y, n.y, hn::Mul(n.z, n.z)));
+    const V3 unit = times(n, inverse_root(squared));
+    places.store(I16(), narrow_unit(unit.x), narrow_unit(unit.y), narrow_unit(unit.z), out_.normals);
+  }
 
-/// n needs no length; a zero stays zero.
-HWY_INLINE void put_normal(const VertexSink& out, const Places& places, const V3& n) {
-  const V squared = hn::MulAdd(n.x, n.x, hn::MulAdd(n.y, n.y, hn::Mul(n.z, n.z)));
-  const V3 unit = times(n, inverse_root(hn::Min(hn::Max(squared, all(1e-30F)), all(1e30F))));
-  places.store(I16(), narrow_unit(unit.x), narrow_unit(unit.y), narrow_unit(unit.z), out.normals);
-}
+ private:
+  // Between 2^23 and 2^24 floats are whole numbers: what is added to the middle of that is rounded to
+  // nearest, and its low 16 bits are the number.
+  HWY_INLINE hn::Vec<U16> quantise(V x, std::size_t c) const {
+    const V beyond = hn::Sub(x, all(out_.box.low[c]));
+    const V within = hn::Min(hn::Max(beyond, hn::Zero(F())), all(widest_));
+    const V number = hn::MulAdd(within, all(per_step_), all(12582912.0F));
+    return hn::TruncateTo(U16(), hn::BitCast(U32(), number));
+  }
+
+  VertexSink out_;
+  float per_step_, widest_;
+};
 
 }  // namespace ecorche::runtime::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -27,7 +27,7 @@ void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
       add(motion.real, w, q);
     }
     const V squared = squared_length(q);
-    q = scaled(q, hn::Div(all(1), hn::Sqrt(squared)));
+    q = scaled(q, inverse_root(squared));
     if (HWY_UNLIKELY(any_vanished(squared))) {
       replace_vanished(motions, cluster, squared, &SegmentMotion::real, q);
     }

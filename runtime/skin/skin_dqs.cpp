@@ -27,7 +27,7 @@ void skin_dqs(const SkinClusters& job, std::size_t begin, std::size_t end) {
       add(motion.dual, w, dual);
     }
     const V squared = squared_length(real);
-    const V scale = hn::Div(all(1), hn::Sqrt(squared));
+    const V scale = inverse_root(squared);
     real = scaled(real, scale);
     dual = scaled(dual, scale);
     if (HWY_UNLIKELY(any_vanished(squared))) {

@@ -65,6 +65,19 @@ HWY_INLINE V3 matrix_times(const float* m, const V3& v) {
   return {row(m, v, zero), row(m + 3, v, zero), row(m + 6, v, zero)};
 }
 
+/// 1 / sqrt(x) to 2e-7 of itself; of what lies beyond, that of 1e-30 or 1e30. Steps of Newton's cost less
+/// than a root and a division.
+HWY_INLINE V inverse_root(V x) {
+  const V within = hn::Min(hn::Max(x, all(1e-30F)), all(1e30F));
+  V guess = hn::ApproximateReciprocalSqrt(within);
+  // From 12 bits or more, but 8 bits on ARM.
+  for (int step = 0; step < (HWY_ARCH_ARM ? 2 : 1); ++step) {
+    const V less = hn::NegMulAdd(hn::Mul(hn::Mul(within, guess), all(0.5F)), guess, all(0.5F));
+    guess = hn::MulAdd(guess, less, guess);
+  }
+  return guess;
+}
+
 /// (R - I) y for the unit quaternion (w, r): 2 r x (r x y + w y). Exactly zero for the identity.
 HWY_INLINE V3 turn_less_identity(V w, const V3& r, const V3& y) {
   const V3 inner = plus(cross(r, y), times(y, w));

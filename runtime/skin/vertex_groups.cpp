@@ -71,10 +71,10 @@ void add_group(const Model& model, const Tissue& tissue, std::span<const std::ui
                std::span<const std::uint32_t> vertices, const PointsF& normals, VertexGroups& out) {
   VertexGroups::Group group{};
   const std::vector<std::uint32_t> palette = palette_of(model, tissue, vertices);
-  group.lanes = static_cast<std::uint32_t>(out.lanes.size());
-  group.count = static_cast<std::uint32_t>((palette.size() + 3) / 4 * 4);
+  group.palette = static_cast<std::uint32_t>(out.rows.size());
+  group.count = static_cast<std::uint32_t>((palette.size() + 7) / 8 * 8);
   for (std::size_t i = 0; i < group.count; ++i)
-    out.lanes.push_back(lane[palette[std::min(i, palette.size() - 1)]]);
+    out.rows.push_back(3 * lane[palette[std::min(i, palette.size() - 1)]]);
 
   const auto at = [&](std::size_t i) {
     return static_cast<Eigen::Index>(vertices[std::min(i, vertices.size() - 1)]);

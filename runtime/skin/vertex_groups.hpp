@@ -19,17 +19,17 @@ struct VertexGroups {
   static constexpr std::size_t most_lanes = 4 * size;
 
   struct Group {
-    std::uint32_t lanes;  ///< first of its palette in `lanes`
-    std::uint32_t count;  ///< of its palette: 4, 8 .. 64
-    std::uint32_t data;   ///< first of its 3 * 16 numbers, in `narrow` or in `wide`
-    float low, step;      ///< narrow: b = low + step * number; step 0: the numbers are in `wide`
+    std::uint32_t palette;  ///< first of its palette in `rows`
+    std::uint32_t count;    ///< of its palette: 8, 16 .. 64
+    std::uint32_t data;     ///< first of its 3 * 16 numbers, in `narrow` or in `wide`
+    float low, step;        ///< narrow: b = low + step * number; step 0: the numbers are in `wide`
   };
 
   std::size_t vertices = 0;
   bool in_order = true;  ///< group g holds the vertices from 16 g
   std::vector<Group> groups;
   std::vector<std::uint32_t> vertex;  ///< 16 * #groups, place of each; empty when in order
-  Aligned<std::uint32_t> lanes;       ///< palettes, filled up with their last entry: lanes of NodeClusters
+  Aligned<std::uint32_t> rows;        ///< palettes, filled up with their last entry: 3 * lane of NodeClusters
   Aligned<std::uint8_t> corner;       ///< 4 x 16 a group: the corners of the vertices' tets in the palette
   Aligned<std::uint16_t> narrow;      ///< 3 x 16 a group: barycentric coordinates of corners 1, 2, 3
   Aligned<float> wide;                ///< the same, where 16 bits would move a vertex by more than 2e-4 mm
