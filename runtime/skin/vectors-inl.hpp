@@ -66,9 +66,12 @@ HWY_INLINE V3 matrix_times(const float* m, const V3& v) {
 }
 
 /// 1 / sqrt(x) to 2e-7 of itself; of what lies beyond, that of 1e-30 or 1e30. Steps of Newton's cost less
-/// than a root and a division.
+/// than a root and a division, where there is a good guess.
 HWY_INLINE V inverse_root(V x) {
   const V within = hn::Min(hn::Max(x, all(1e-30F)), all(1e30F));
+#if HWY_TARGET == HWY_SCALAR
+  return hn::Div(all(1), hn::Sqrt(within));
+#else
   V guess = hn::ApproximateReciprocalSqrt(within);
   // From 12 bits or more, but 8 bits on ARM.
   for (int step = 0; step < (HWY_ARCH_ARM ? 2 : 1); ++step) {
@@ -76,6 +79,7 @@ HWY_INLINE V inverse_root(V x) {
     guess = hn::MulAdd(guess, less, guess);
   }
   return guess;
+#endif
 }
 
 /// (R - I) y for the unit quaternion (w, r): 2 r x (r x y + w y). Exactly zero for the identity.
