@@ -5,9 +5,9 @@ namespace ecorche::tet {
 
 std::vector<std::string_view> mesher_names() {
 #ifdef ECORCHE_GPL
-  return {"lattice", "cgal", "tetgen"};
+  return {"lattice", "lattice_cut", "cgal", "tetgen"};
 #else
-  return {"lattice"};
+  return {"lattice", "lattice_cut"};
 #endif
 }
 
@@ -22,6 +22,7 @@ std::unique_ptr<Mesher> make_mesher(std::string_view name) {
   if (name == "tetgen") return make_tetgen_mesher();
 #endif
   if (name == "lattice") return make_lattice_mesher();
+  if (name == "lattice_cut") return make_lattice_cut_mesher();
   std::string known;
   for (const std::string_view each : mesher_names()) known.append(known.empty() ? "" : ", ").append(each);
   throw Error(ErrorKind::usage, "--mesher", "there is no mesher \"" + std::string(name) + "\" in this build",

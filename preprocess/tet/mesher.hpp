@@ -36,11 +36,12 @@ class Mesher {
   virtual TetMesh mesh(const Input& input, const Options& options, const Context& context) const = 0;
 };
 
-std::unique_ptr<Mesher> make_lattice_mesher();  ///< tet/lattice, Apache-2.0
-std::unique_ptr<Mesher> make_cgal_mesher();     ///< tet/cgal, GPL
-std::unique_ptr<Mesher> make_tetgen_mesher();   ///< tet/tetgen, AGPL
+std::unique_ptr<Mesher> make_lattice_mesher();      ///< tet/lattice, Apache-2.0; uncut
+std::unique_ptr<Mesher> make_lattice_cut_mesher();  ///< tet/lattice, Apache-2.0; cut at the surfaces
+std::unique_ptr<Mesher> make_cgal_mesher();         ///< tet/cgal, GPL
+std::unique_ptr<Mesher> make_tetgen_mesher();       ///< tet/tetgen, AGPL
 
-/// Names of the meshers in this build; the first is the default. It is `lattice`: of the three it alone keeps
+/// Names of the meshers in this build; the first is the default. It is `lattice`: of all it alone keeps
 /// every weight within its bounds without repair, folds no more than cgal when posed, and takes a hundredth
 /// of its time.
 std::vector<std::string_view> mesher_names();

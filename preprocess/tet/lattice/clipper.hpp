@@ -27,7 +27,9 @@ class Clipper {
   double body_volume() const { return body_; }  ///< mm^3
   double voxel() const { return grid_.spacing[0]; }
 
-  /// Cubes of `side` mm, or a little more. The boundary is a manifold, and no bone is lost. Throws
+  /// The lattice alone, over the whole image with three cubes to spare: cubes of `side` mm, or a little more.
+  BccLattice lay(double side) const;
+  /// The tets of that lattice. The boundary is a manifold, and no bone is lost. Throws
   /// Error{data} where two bones want the same only tet.
   Clipped clip(double side) const;
 
@@ -40,7 +42,6 @@ class Clipper {
     std::vector<std::uint16_t> label;
   };
 
-  BccLattice lay(double side) const;
   Blocks summarize() const;
   /// What all voxels near a cube's tets have in common, or `mixed`.
   std::uint16_t common_label(const Blocks& blocks, const Eigen::Vector3d& corner, double side) const;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The mesher without a library: a uniform body-centred cubic lattice clipped to the body, uncut.
+// The meshers without a library: a uniform body-centred cubic lattice, clipped to the body or cut.
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "preprocess/tet/lattice/clipper.hpp"
+#include "preprocess/tet/lattice/cut_lattice.hpp"
 #include "preprocess/tet/mesher.hpp"
 
 namespace ecorche::tet {
@@ -15,7 +16,9 @@ constexpr double kFinestInVoxels = 1.5;
 
 class LatticeMesher : public Mesher {
  public:
-  std::string_view name() const override { return "lattice"; }
+  explicit LatticeMesher(bool cut) : cut_(cut) {}
+
+  std::string_view name() const override { return cut_ ? "lattice_cut" : "lattice"; }
 
   TetMesh mesh(const Input& input, const Options& options, const Context& context) const override {
     const Clipper clipper(input.labels, context);
@@ -29,7 +32,7 @@ class LatticeMesher : public Mesher {
     const double finest = kFinestInVoxels * clipper.voxel();
     double side = std::max(finest, std::cbrt(12 * 1.03 * clipper.body_volume() / tets));
     for (;;) {
-      TetMesh mesh = gather(clipper.clip(side));
+      TetMesh mesh = cut_ ? cut(clipper.lay(side), input, context) : gather(clipper.clip(side));
       const double excess =
           std::max(static_cast<double>(mesh.T.rows()) / static_cast<double>(options.max_tets),
                    static_cast<double>(mesh.V.rows()) / static_cast<double>(options.max_nodes));
@@ -43,12 +46,29 @@ class LatticeMesher : public Mesher {
                    std::to_string(side) + " mm are tried");
     }
   }
+
+ private:
+  static TetMesh cut(const BccLattice& lattice, const Input& input, const Context& context) {
+    CutMesh made = cut_lattice(lattice, input, context);
+    const CutReport& r = made.report;
+    context.info("lattice of " + std::to_string(lattice.side()) + " mm: " + std::to_string(r.warped) +
+                 " nodes moved to surfaces, " + std::to_string(r.cut) + " edges cut, " +
+                 std::to_string(r.stars) + " tets where three materials meet, " + std::to_string(r.lent) +
+                 " nodes lent to parts thinner than the lattice, " + std::to_string(r.relabelled) +
+                 " tets relabelled for the sake of manifold boundaries");
+    return std::move(made.mesh);
+  }
+
+  bool cut_;
 };
 
 }  // namespace
 
 std::unique_ptr<Mesher> make_lattice_mesher() {
-  return std::make_unique<LatticeMesher>();
+  return std::make_unique<LatticeMesher>(false);
+}
+std::unique_ptr<Mesher> make_lattice_cut_mesher() {
+  return std::make_unique<LatticeMesher>(true);
 }
 
 }  // namespace ecorche::tet
