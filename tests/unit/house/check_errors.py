@@ -38,7 +38,7 @@ EXCEPTIONS = {
     "phantom/body.cpp": {"no part ": CALLER},
     "phantom/volume.cpp": {"too many parts for 8-bit labels": CALLER},
     "preprocess/tet/cgal/cgal_mesher.cpp": {"CGAL found no tet": "no body is known that does it: empty ones are refused before"},
-    "preprocess/tet/lattice/lattice_mesher.cpp": {"it shares its only tet": "no body is known that does it"},
+    "preprocess/tet/lattice/clipper.cpp": {"it shares its only tet": "no body is known that does it"},
     "preprocess/voxel/voxelize.cpp": {"more bones than 16-bit labels": SIZE},
     "preprocess/weights/cholmod/cholmod_solver.cpp": {"status ": CALLER, "solve before factor": CALLER},
     "proto/framing.cpp": {"do not make a frame": CALLER},
