@@ -31,10 +31,10 @@ std::vector<FaceTree::Corners> corners_of(const PointsF& nodes, const std::vecto
 // Neighbours in space share cells, tets and boxes: along a curve they meet them in the cache.
 std::vector<std::uint32_t> along_curve(const Points& points, const Eigen::AlignedBox3d& box) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> code(static_cast<std::size_t>(points.rows()));
-  for (std::size_t i = 0; i < code.size(); ++i) {
+  tbb::parallel_for(std::size_t{0}, code.size(), [&](std::size_t i) {
     code[i] = {geometry::morton(points.row(static_cast<Eigen::Index>(i)).transpose(), box),
                static_cast<std::uint32_t>(i)};
-  }
+  });
   tbb::parallel_sort(code.begin(), code.end());  // no two are equal: one order
   std::vector<std::uint32_t> order(code.size());
   for (std::size_t i = 0; i < code.size(); ++i) order[i] = code[i].second;

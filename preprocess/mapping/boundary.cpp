@@ -25,18 +25,35 @@ struct TetsOfNodes {
 
   TetsOfNodes(std::int64_t nodes, const Tets& tets)
       : begin(static_cast<std::size_t>(nodes) + 1), tet(static_cast<std::size_t>(2 * tets.rows())) {
-    for (std::int64_t t = 0; t < tets.rows(); ++t) {
-      const auto n = sorted(tets, t);
-      ++begin[static_cast<std::size_t>(n[0]) + 1];
-      ++begin[static_cast<std::size_t>(n[1]) + 1];
+    // Every part of the tets counts for itself, so that it knows where its own begin.
+    constexpr std::int64_t kParts = 4;
+    std::array<std::vector<std::int32_t>, kParts> next;
+    const auto for_tets = [&](std::int64_t part, auto&& f) {
+      std::vector<std::int32_t>& own = next[static_cast<std::size_t>(part)];
+      for (std::int64_t t = tets.rows() * part / kParts; t < tets.rows() * (part + 1) / kParts; ++t) {
+        const auto n = sorted(tets, t);
+        f(t, own[static_cast<std::size_t>(n[0])]);
+        f(t, own[static_cast<std::size_t>(n[1])]);
+      }
+    };
+    tbb::parallel_for(std::int64_t{0}, kParts, [&](std::int64_t part) {
+      next[static_cast<std::size_t>(part)].assign(static_cast<std::size_t>(nodes), 0);
+      for_tets(part, [](std::int64_t, std::int32_t& count) { ++count; });
+    });
+    std::int32_t at = 0;
+    for (std::size_t n = 0; n + 1 < begin.size(); ++n) {
+      for (auto& counts : next) {
+        const std::int32_t count = counts[n];
+        counts[n] = at;
+        at += count;
+      }
+      begin[n + 1] = at;
     }
-    for (std::size_t n = 1; n < begin.size(); ++n) begin[n] += begin[n - 1];
-    std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
-    for (std::int64_t t = 0; t < tets.rows(); ++t) {
-      const auto n = sorted(tets, t);
-      tet[static_cast<std::size_t>(next[static_cast<std::size_t>(n[0])]++)] = static_cast<std::int32_t>(t);
-      tet[static_cast<std::size_t>(next[static_cast<std::size_t>(n[1])]++)] = static_cast<std::int32_t>(t);
-    }
+    tbb::parallel_for(std::int64_t{0}, kParts, [&](std::int64_t part) {
+      for_tets(part, [&](std::int64_t t, std::int32_t& place) {
+        tet[static_cast<std::size_t>(place++)] = static_cast<std::int32_t>(t);
+      });
+    });
   }
 };
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numeric>
 
 namespace ecorche::mapping {
 namespace {
@@ -30,12 +31,16 @@ TetGrid::TetGrid(const PointsF& nodes, const Tets& tets, const Context& context)
     return;
   }
   for (Eigen::Index n = 0; n < nodes.rows(); ++n) box_.extend(nodes.row(n).transpose().cast<double>());
-  double extent = 0;
-  for (Eigen::Index t = 0; t < tets.rows(); ++t) {
-    Eigen::AlignedBox3f one;
-    for (int c = 0; c < 4; ++c) one.extend(nodes.row(tets(t, c)).transpose());
-    extent += one.sizes().maxCoeff();
-  }
+  std::vector<double> extents(static_cast<std::size_t>((tets.rows() + kGrain - 1) / kGrain), 0);
+  tbb::parallel_for(std::size_t{0}, extents.size(), [&](std::size_t part) {
+    const auto first = static_cast<std::int64_t>(part) * kGrain;
+    for (std::int64_t t = first; t < std::min(first + kGrain, std::int64_t{tets.rows()}); ++t) {
+      Eigen::AlignedBox3f one;
+      for (int c = 0; c < 4; ++c) one.extend(nodes.row(tets(t, c)).transpose());
+      extents[part] += static_cast<double>(one.sizes().maxCoeff());
+    }
+  });
+  const double extent = std::accumulate(extents.begin(), extents.end(), 0.0);
   edge_ = kEdge * extent / static_cast<double>(tets.rows());
   // A graded mesh has most of its tets in little of its box: never more than four cells a tet.
   edge_ = std::max(edge_, std::cbrt(box_.volume() / (4.0 * static_cast<double>(tets.rows()) + 64)));

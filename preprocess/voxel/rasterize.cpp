@@ -37,11 +37,21 @@ Slabs sort_into_slabs(const SnappedSurface& surface, int low_k, int count) {
   Slabs slabs;
   slabs.start.assign(static_cast<std::size_t>(count) + 1, 0);
   const auto faces = static_cast<std::int32_t>(surface.F->rows());
+  struct Span {
+    std::uint16_t first, last;  // a grid has at most most_voxels_along_axis layers
+  };
+  std::vector<Span> spans(static_cast<std::size_t>(faces));
+  tbb::parallel_for(tbb::blocked_range<std::int32_t>(0, faces, 4096), [&](const auto& range) {
+    for (std::int32_t f = range.begin(); f < range.end(); ++f) {
+      const Corners t = corners(surface, f);
+      spans[static_cast<std::size_t>(f)] = {static_cast<std::uint16_t>((t.low(2) / units - low_k) / kSlab),
+                                            static_cast<std::uint16_t>((t.high(2) / units - low_k) / kSlab)};
+    }
+  });
   const auto each = [&](auto&& visit) {
     for (std::int32_t f = 0; f < faces; ++f) {
-      const Corners t = corners(surface, f);
-      const int first = (t.low(2) / units - low_k) / kSlab, last = (t.high(2) / units - low_k) / kSlab;
-      for (int s = first; s <= last; ++s) visit(static_cast<std::size_t>(s), f);
+      const Span span = spans[static_cast<std::size_t>(f)];
+      for (std::size_t s = span.first; s <= span.last; ++s) visit(s, f);
     }
   };
   each([&](std::size_t s, std::int32_t) { ++slabs.start[s + 1]; });

@@ -47,17 +47,32 @@ SnappedSurface snap(const SurfaceMesh& surface, const ImageGrid& grid) {
         snapped.V[v][axis] = 2 * static_cast<std::int32_t>(std::floor(voxels * (units / 2))) + 1;
       }
   });
-  Vec3i low{INT32_MAX, INT32_MAX, INT32_MAX}, high{0, 0, 0};
-  for (Eigen::Index f = 0; f < surface.F.rows(); ++f)  // not over V: a vertex may be unused
-    for (Eigen::Index c = 0; c < 3; ++c)
+  struct Bounds {
+    Vec3i low{INT32_MAX, INT32_MAX, INT32_MAX}, high{0, 0, 0};
+    void add(const Vec3i& a, const Vec3i& b) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::int32_t x = snapped.V[static_cast<std::size_t>(surface.F(f, c))][axis];
-        low[axis] = std::min(low[axis], x);
-        high[axis] = std::max(high[axis], x);
+        low[axis] = std::min(low[axis], a[axis]);
+        high[axis] = std::max(high[axis], b[axis]);
       }
+    }
+  };
+  const Bounds bounds = tbb::parallel_reduce(
+      tbb::blocked_range<Eigen::Index>(0, surface.F.rows(), 4096), Bounds{},
+      [&](const auto& range, Bounds out) {
+        for (Eigen::Index f = range.begin(); f < range.end(); ++f)  // not over V: a vertex may be unused
+          for (Eigen::Index c = 0; c < 3; ++c) {
+            const Vec3i& p = snapped.V[static_cast<std::size_t>(surface.F(f, c))];
+            out.add(p, p);
+          }
+        return out;
+      },
+      [](Bounds a, const Bounds& b) {
+        a.add(b.low, b.high);
+        return a;
+      });
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    snapped.low[axis] = low[axis] / units;
-    snapped.high[axis] = high[axis] / units;
+    snapped.low[axis] = bounds.low[axis] / units;
+    snapped.high[axis] = bounds.high[axis] / units;
   }
   return snapped;
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/voxel/voxelize.hpp"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,13 +26,24 @@ struct Bounds {
 void grow(Bounds& bounds, const SurfaceMesh& surface, const std::string& name) {
   if (surface.V.size() > 0 && !surface.V.allFinite())
     throw Error(ErrorKind::data, name, "a vertex is not finite", "run ecorche check on the case");
-  for (Eigen::Index f = 0; f < surface.F.rows(); ++f)
-    for (Eigen::Index c = 0; c < 3; ++c)
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double x = surface.V(surface.F(f, c), static_cast<Eigen::Index>(axis));
-        bounds.low[axis] = std::min(bounds.low[axis], x);
-        bounds.high[axis] = std::max(bounds.high[axis], x);
-      }
+  const auto join = [](Bounds a, const Bounds& b) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      a.low[axis] = std::min(a.low[axis], b.low[axis]);
+      a.high[axis] = std::max(a.high[axis], b.high[axis]);
+    }
+    return a;
+  };
+  bounds = tbb::parallel_reduce(
+      tbb::blocked_range<Eigen::Index>(0, surface.F.rows(), 4096), bounds,
+      [&](const auto& range, Bounds out) {
+        for (Eigen::Index f = range.begin(); f < range.end(); ++f)
+          for (Eigen::Index c = 0; c < 3; ++c) {
+            const auto p = surface.V.row(surface.F(f, c));
+            out = join(out, {{p[0], p[1], p[2]}, {p[0], p[1], p[2]}});
+          }
+        return out;
+      },
+      join);
 }
 
 /// Voxels along one axis: the extent, a little room on both sides and one empty voxel beyond.
@@ -100,16 +113,20 @@ VoxelMask solid(const SurfaceMesh& surface, const std::string& name, const Image
   return mask;
 }
 
-/// Calls `visit(voxel of the image, byte of the mask)` for every voxel of the mask that is not empty.
+/// Calls `visit(voxel of the image)` for every voxel of the mask, or of its layer k, that is not empty.
+template <class Visit>
+void for_layer(int k, const VoxelMask& mask, const ImageGrid& grid, Visit&& visit) {
+  std::size_t n = mask.offset(mask.low[0], mask.low[1], mask.low[2] + k);
+  for (int j = 0; j < mask.size[1]; ++j) {
+    const std::size_t row = grid.offset(mask.low[0], mask.low[1] + j, mask.low[2] + k);
+    for (int i = 0; i < mask.size[0]; ++i, ++n)
+      if (mask.bytes[n] != 0) visit(row + static_cast<std::size_t>(i));
+  }
+}
+
 template <class Visit>
 void for_each_voxel(const VoxelMask& mask, const ImageGrid& grid, Visit&& visit) {
-  std::size_t n = 0;
-  for (int k = 0; k < mask.size[2]; ++k)
-    for (int j = 0; j < mask.size[1]; ++j) {
-      const std::size_t row = grid.offset(mask.low[0], mask.low[1] + j, mask.low[2] + k);
-      for (int i = 0; i < mask.size[0]; ++i, ++n)
-        if (mask.bytes[n] != 0) visit(row + static_cast<std::size_t>(i));
-    }
+  for (int k = 0; k < mask.size[2]; ++k) for_layer(k, mask, grid, visit);
 }
 
 /// Voxels that more than one bone claims, and all that do, lower index first.
@@ -164,8 +181,10 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
   const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
   const auto share = [&] { return static_cast<double>(done) / static_cast<double>(triangles); };
 
-  for_each_voxel(solid(patient.skin, patient.skin_name, labels.grid, context), labels.grid,
-                 [&](std::size_t voxel) { out[voxel] = soft; });
+  const VoxelMask body = solid(patient.skin, patient.skin_name, labels.grid, context);
+  tbb::parallel_for(0, body.size[2], [&](int k) {
+    for_layer(k, body, labels.grid, [&](std::size_t voxel) { out[voxel] = soft; });
+  });
   context.report(share());
   Contested contested;
   for (std::size_t b = 0; b < patient.bones.size(); ++b) {
