@@ -254,6 +254,11 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
                        listed(weights::solver_names()))
       ->check(CLI::IsMember(solvers))
       ->capture_default_str();
+  command
+      ->add_option("--weights", o.weights,
+                   "harmonic, or quasi-harmonic: they leave bones smoothly, in twice the time")
+      ->check(CLI::IsMember(strings(weights::kind_names())))
+      ->capture_default_str();
   command->add_option("--cor-sigma", o.cor_sigma, "width of the similarity of weights (LeHodgins16 eq. 1)")
       ->check(CLI::Range(Options::sigma_range.low, Options::sigma_range.high))
       ->capture_default_str();

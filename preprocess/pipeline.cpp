@@ -227,6 +227,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   check_options(options);
   const std::string_view mesher_name = options.mesher.empty() ? tet::mesher_names().front() : options.mesher;
   const std::unique_ptr<tet::Mesher> mesher = tet::make_mesher(mesher_name);
+  const weights::Kind kind = weights::kind_from_name(options.weights);
   weights::make_solver(options.solver);  // refuses an unknown name now, not after the mesher
 
   Result result;
@@ -276,6 +277,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   {
     weights::Options o;
     o.solver = options.solver;
+    o.kind = kind;
     weights::WeightsResult solved = showing_worst_tets(
         hooks,
         [&] {
@@ -284,7 +286,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
                 return weights::solve_weights(*mesh, patient, model.bone_segment, model.segment_count(), o,
                                               inner);
               },
-              patient, *mesh, model.bone_segment, model.segment_count(), options.solver);
+              patient, *mesh, model.bone_segment, model.segment_count(), options.solver, options.weights);
         },
         [&]() -> const TetMesh& { return *mesh; });
     model.weights = std::move(solved.weights);

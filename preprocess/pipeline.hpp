@@ -34,7 +34,8 @@ struct Options {
   std::int64_t max_tets = 3'500'000;  ///< half as many again as Sujar18's largest mesh
   std::int64_t max_nodes = 800'000;
   std::string solver = "auto";
-  double cor_sigma = 0.05;  ///< half of LeHodgins16's 0.1
+  std::string weights = "harmonic";  ///< or `quasi-harmonic`: smoother at bones (weights/conductivity.hpp)
+  double cor_sigma = 0.05;           ///< half of LeHodgins16's 0.1
   /// Thinness of the body's volumetric skeleton. None is made without it: only the deformer of spheres reads
   /// one, and a model is posed by tets unless told otherwise.
   std::optional<double> spheres_tp;

@@ -33,6 +33,7 @@ std::map<std::string, std::string> provenance(const Case& patient, const Options
   out["ecorche"] = ECORCHE_VERSION;
   out["option/mesher"] = mesher;
   out["option/solver"] = solver;
+  out["option/weights"] = options.weights;
   out["option/voxel_mm"] = decimal(voxel_mm);
   out["option/max_tets"] = std::to_string(options.max_tets);
   out["option/max_nodes"] = std::to_string(options.max_nodes);

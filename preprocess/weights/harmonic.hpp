@@ -19,6 +19,10 @@ namespace ecorche::weights {
 /// Throws Error{data} for a tet without a positive volume.
 solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_share);
 
+/// The same of div(a grad): every tet's part times its a > 0, #T (1 where none are given).
+solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<double>& conductivity,
+                              double* positive_share);
+
 /// Share of the off-diagonals of a lower triangle that are positive (beyond rounding: 1e-12 of their
 /// diagonals). With none the matrix is an M-matrix, and weights stay in [0, 1] by construction.
 double positive_offdiagonal_share(const solve::SparseMatrix& L);
@@ -44,9 +48,18 @@ struct WeightsResult {
   Certificate certificate;  ///< the solver's, weights' and off-diagonal members are filled
 };
 
+/// Which equation the weights solve.
+enum class Kind {
+  harmonic,        ///< Laplace's (Sujar18 3.3)
+  quasi_harmonic,  ///< smoother at bones, in twice the time: conductivity.hpp
+};
+std::vector<std::string_view> kind_names();
+Kind kind_from_name(std::string_view name);  ///< Error{usage} for an unknown name
+
 struct Options {
   std::string_view solver = "auto";  ///< auto, cholmod, eigen, amg
   bool keep_solved = false;
+  Kind kind = Kind::harmonic;
 };
 
 /// One Laplacian, one factor, all segments as one block; segments without a bone get no weights. A connected

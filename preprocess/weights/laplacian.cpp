@@ -148,11 +148,19 @@ double positive_offdiagonal_share(const solve::SparseMatrix& L) {
 }
 
 solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_share) {
+  return laplacian(V, T, {}, positive_share);
+}
+
+solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<double>& conductivity,
+                              double* positive_share) {
   const auto nodes = static_cast<std::int32_t>(V.rows());
   std::vector<EdgeTerms> terms(static_cast<std::size_t>(T.rows()));
   tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, T.rows(), 4096), [&](const auto& range) {
     for (Eigen::Index t = range.begin(); t < range.end(); ++t) {
-      terms[static_cast<std::size_t>(t)] = edge_terms(V, T, t);
+      EdgeTerms& own = terms[static_cast<std::size_t>(t)];
+      own = edge_terms(V, T, t);
+      if (conductivity.empty()) continue;
+      for (double& term : own) term *= conductivity[static_cast<std::size_t>(t)];
     }
   });
   const Incidence incidence(V.rows(), T);

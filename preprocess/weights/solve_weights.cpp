@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "preprocess/weights/conductivity.hpp"
 #include "preprocess/weights/harmonic.hpp"
 #include "preprocess/weights/monotone.hpp"
 #include "preprocess/weights/parts.hpp"
@@ -121,6 +122,17 @@ Weights store(const solve::Block& values, const std::vector<std::int32_t>& colum
 
 }  // namespace
 
+std::vector<std::string_view> kind_names() {
+  return {"harmonic", "quasi-harmonic"};
+}
+
+Kind kind_from_name(std::string_view name) {
+  if (name == "harmonic") return Kind::harmonic;
+  if (name == "quasi-harmonic") return Kind::quasi_harmonic;
+  throw Error(ErrorKind::usage, "--weights", "there are no weights '" + std::string(name) + "'",
+              "use harmonic or quasi-harmonic");
+}
+
 WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
                             const std::vector<std::int32_t>& bone_segment, std::size_t segments,
                             const Options& options, const Context& context) {
@@ -166,6 +178,11 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
   MonotoneResult monotone = solve_monotone(std::move(L), fixed, boundary, *solver, scaled);
+  if (options.kind == Kind::quasi_harmonic && monotone.violation <= kSmallViolation) {
+    context.check_stop();
+    L = laplacian(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
+    monotone = solve_monotone(std::move(L), fixed, boundary, *solver, stop_only(context));
+  }
   if (monotone.violation > kSmallViolation) {
     refuse(mesh, monotone.worst_node, monotone.violation, monotone.mended_nodes);
   }

@@ -190,6 +190,7 @@ PREPARE_ROWS = [
     ("prepare_voxel_too_fine", lambda f: put("skin.stl", body.stl(body.box((-5e4, -4e4, -1e5), (5e4, 4e4, 1e5))))(f),
      PREPARE + ("--voxel", "0.05"), 78, "use coarser voxels"),
     ("prepare_too_few_tets", none, PREPARE + ("--max-tets", "10"), 64, "--max-tets"),
+    ("prepare_weights_unknown", none, PREPARE + ("--weights", "magic"), 64, "--weights"),
     ("prepare_sigma", none, PREPARE + ("--cor-sigma", "0.5"), 64, "--cor-sigma"),
     ("prepare_threads", none, PREPARE + ("--threads", "-3"), 64, "--threads"),
     ("repair_over_its_input", none, ("repair", "CASE", "-o", "CASE"), 64, "holds the input"),

@@ -72,6 +72,11 @@ TEST(KeptStages, only_what_reads_the_change_is_made_again) {
   const std::string eigen = after(test::two_bones(), solver);
   EXPECT_EQ(eigen.substr(0, 14), "voxelize mesh ") << "skinning does not mesh again";
   EXPECT_EQ(eigen.find("weights"), std::string::npos);
+  Options smooth = coarse();
+  smooth.weights = "quasi-harmonic";
+  const std::string other = after(test::two_bones(), smooth);
+  EXPECT_EQ(other.substr(0, 14), "voxelize mesh ");
+  EXPECT_EQ(other.find("weights"), std::string::npos);
   Options voxel = coarse();
   voxel.voxel_mm = 6;
   EXPECT_EQ(after(test::two_bones(), voxel), "");

@@ -127,6 +127,7 @@ TEST_P(EveryMesher, makes_a_model_within_its_bounds) {
 
   EXPECT_EQ(model.provenance.at("option/mesher"), GetParam());
   EXPECT_NE(model.provenance.at("option/solver"), "auto");
+  EXPECT_EQ(model.provenance.at("option/weights"), "harmonic");
   EXPECT_EQ(model.provenance.at("option/voxel_mm"), "5");
   EXPECT_EQ(model.provenance.at("input/skin.stl"), "0123456789abcdef");
   EXPECT_TRUE(model.provenance.contains("ecorche"));
@@ -202,6 +203,7 @@ TEST(Pipeline, options_out_of_range_are_refused_before_any_work) {
       {"--cor-sigma", [](Options& o) { o.cor_sigma = 0.1; }},
       {"", [](Options& o) { o.mesher = "magic"; }},
       {"", [](Options& o) { o.solver = "magic"; }},
+      {"--weights", [](Options& o) { o.weights = "magic"; }},
   };
   for (const auto& [where, spoil] : cases) {
     Options options = coarse("lattice");
