@@ -17,9 +17,11 @@ using delta::lanes;
 
 namespace {
 
-constexpr std::size_t kFittedRows = 4;  // 128 vertices are plenty for 12 numbers
+constexpr std::size_t kFittedRows =
+    2;  // 64 vertices for 12 numbers: of 128 the deltas are 3 % smaller, and take a fifth longer
 constexpr std::size_t kFewestFitted =
     16;  // fewer are moved as they stand: the map would cost more than it saves
+constexpr std::size_t kBlocksAhead = 2;
 constexpr float kMatrixOne = 1 << delta::matrix_digits;
 
 std::size_t rows_of(std::size_t vertices) {
@@ -49,6 +51,14 @@ class Rows {
   const std::uint16_t* data_;
   std::array<std::uint16_t, 3 * block_vertices> copy_;  // written only where needed
 };
+
+// Into the caches, ahead of its use: the rows of the fit lie too far apart for the processor to see what
+// comes next, and its loads would wait for memory most of the time.
+void fetch(const void* data, std::size_t bytes) {
+  constexpr std::size_t line = 64;
+  const auto* at = static_cast<const char*>(data);
+  for (std::size_t i = 0; i < bytes; i += line) __builtin_prefetch(at + i);
+}
 
 std::int16_t wrap(std::int64_t value) {
   return static_cast<std::int16_t>(static_cast<std::uint16_t>(value));
@@ -175,6 +185,11 @@ void DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t first_
     const Rows padded(numbers.data() + 3 * first, count);
     const Block& block = blocks_[b];
     const std::int16_t* key = &scaled_[3 * block_vertices * b];
+    if (const std::size_t ahead = b + kBlocksAhead; ahead < blocks_.size()) {
+      const std::size_t next = ahead * block_vertices;
+      fetch(&numbers[3 * next], 3 * sizeof(std::uint16_t) * std::min(block_vertices, vertices_ - next));
+      fetch(&scaled_[3 * next], 3 * sizeof(std::int16_t) * block_vertices);
+    }
     Header header{.digits = block.digits, .width = {}, .matrix = {}, .centre = block.centre, .base = {}};
     if (header.digits != delta::moved_only) {
       std::array<float, 12> sums{};

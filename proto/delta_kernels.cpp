@@ -43,6 +43,24 @@ struct Map {
   }
 };
 
+// Down to eight lanes as vectors: one by one, 32 lanes would cost as much as a quarter of a block's map.
+HWY_INLINE void extremes(V low, V high, std::int16_t& least, std::int16_t& largest) {
+  using Few = hn::CappedTag<std::int16_t, 8>;
+  const Few few;
+  HWY_ALIGN std::int16_t lows[delta::lanes], highs[delta::lanes];
+  hn::Store(low, I16(), lows);
+  hn::Store(high, I16(), highs);
+  auto l = hn::Load(few, lows), h = hn::Load(few, highs);
+  for (std::size_t i = hn::Lanes(few); i < hn::Lanes(I16()); i += hn::Lanes(few)) {
+    l = hn::Min(l, hn::Load(few, lows + i));
+    h = hn::Max(h, hn::Load(few, highs + i));
+  }
+  hn::Store(l, few, lows);
+  hn::Store(h, few, highs);
+  least = *std::min_element(lows, lows + hn::Lanes(few));
+  largest = *std::max_element(highs, highs + hn::Lanes(few));
+}
+
 // What is left of a block's coordinates after its map, in three planes, and the least and the largest of
 // each.
 void residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
@@ -77,20 +95,9 @@ void residuals(const delta::Header& header, const std::int16_t* key, const std::
     high_y = hn::Max(high_y, ey);
     high_z = hn::Max(high_z, ez);
   }
-  const auto extremes = [&](V low, V high, std::size_t c) {
-    HWY_ALIGN std::int16_t lows[delta::lanes], highs[delta::lanes];
-    hn::Store(low, d, lows);
-    hn::Store(high, d, highs);
-    least[c] = lows[0];
-    largest[c] = highs[0];
-    for (std::size_t l = 1; l < n; ++l) {
-      least[c] = std::min(least[c], lows[l]);
-      largest[c] = std::max(largest[c], highs[l]);
-    }
-  };
-  extremes(low_x, high_x, 0);
-  extremes(low_y, high_y, 1);
-  extremes(low_z, high_z, 2);
+  extremes(low_x, high_x, least[0], largest[0]);
+  extremes(low_y, high_y, least[1], largest[1]);
+  extremes(low_z, high_z, least[2], largest[2]);
 }
 
 // One plane: lane l's words are the bits of its rows, first row lowest; word j of all lanes stands together.
