@@ -14,6 +14,9 @@ namespace ecorche::wire {
 namespace {
 
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 33;
+// A block of zstd that repeats one byte: 128 KiB out of 4 bytes. More than that nothing holds, whatever it
+// says.
+constexpr std::uint64_t kMostRatio = std::uint64_t{1} << 15;
 constexpr std::int32_t kBrick = 32;
 
 Status bad(const std::string& what) {
@@ -30,7 +33,8 @@ Status find_voxels(const v1::VolumeFrame& frame, const Payload& payload, std::ve
   if (!find(frame.voxels(), payload, out)) return bad("its voxels reach beyond the payload");
   if (!frame.has_content()) return {};
   const std::uint64_t row = scalar_bytes(like.type) * std::uint64_t{array.components()};
-  if (array.count() > kMostBytes / row) return bad("it says that it holds too much");
+  if (array.count() > std::min(kMostBytes, kMostRatio * out.size()) / row)
+    return bad("it says that it holds too much");
   const std::uint64_t size = array.count() * row;
   if (frame.voxels().type() != v1::SCALAR_TYPE_U8 || ZSTD_getFrameContentSize(out.data(), out.size()) != size)
     return bad("its voxels are no zstd frame of the size it says");

@@ -15,6 +15,9 @@ using Bytes = std::span<const std::byte>;
 void framing(Bytes bytes);
 /// An Envelope, its arrays against a payload, and everything that is converted to a value of ours.
 void messages(Bytes bytes);
+/// Frames one after another, as a client's decoders see them: MeshDecoder, VolumeDecoder.
+void meshes(Bytes bytes);
+void volumes(Bytes bytes);
 /// wire::read_recording.
 void recording(Bytes bytes);
 /// model_file::read of a good model of which bytes were changed: u24 offset, u8 value, again and again.
@@ -31,14 +34,16 @@ struct Target {
   const char* name;
   void (*run)(Bytes);
 };
-inline constexpr std::array<Target, 9> targets{{{"framing", framing},
-                                                {"messages", messages},
-                                                {"recording", recording},
-                                                {"model", model},
-                                                {"bvh", bvh},
-                                                {"acclaim", acclaim},
-                                                {"gltf_clip", gltf_clip},
-                                                {"angle_table", angle_table},
-                                                {"marker_table", marker_table}}};
+inline constexpr std::array<Target, 11> targets{{{"framing", framing},
+                                                 {"messages", messages},
+                                                 {"meshes", meshes},
+                                                 {"volumes", volumes},
+                                                 {"recording", recording},
+                                                 {"model", model},
+                                                 {"bvh", bvh},
+                                                 {"acclaim", acclaim},
+                                                 {"gltf_clip", gltf_clip},
+                                                 {"angle_table", angle_table},
+                                                 {"marker_table", marker_table}}};
 
 }  // namespace ecorche::fuzz

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
 #include "proto/framing.hpp"
+#include "proto/mesh_decoder.hpp"
 #include "proto/recording.hpp"
+#include "proto/volume_decoder.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace ecorche::fuzz {
@@ -92,6 +95,53 @@ void messages(Bytes bytes) {
   if (!frame.envelope.ParseFromArray(envelope.data(), static_cast<int>(envelope.size()))) return;
   frame.payload.assign(bytes.end() - static_cast<std::ptrdiff_t>(size), bytes.end());
   look_at(frame);
+}
+
+namespace {
+
+// Every frame of the bytes, up to the first that is none.
+template <class Look>
+void each_frame(Bytes bytes, Look&& look) {
+  wire::FrameReader reader(kLimits);
+  while (!bytes.empty()) {
+    const auto into = reader.want();
+    const std::size_t n = std::min(into.size(), bytes.size());
+    std::memcpy(into.data(), bytes.data(), n);
+    bytes = bytes.subspan(n);
+    if (!reader.advance(n).ok()) return;
+    if (reader.complete()) look(reader.take());
+  }
+}
+
+}  // namespace
+
+void meshes(Bytes bytes) {
+  wire::MeshDecoder decoder;
+  std::vector<wire::DecodedTissue> tissues;
+  each_frame(bytes, [&](const wire::Frame& frame) {
+    const v1::MeshFrame& mesh = frame.envelope.mesh_frame();
+    if (!decoder.decode(mesh, frame.payload, tissues).ok()) return;
+    must(tissues.size() <= static_cast<std::size_t>(mesh.arrays_size()));
+    for (std::size_t t = 0; t < tissues.size(); ++t) {
+      const wire::DecodedTissue& tissue = tissues[t];
+      must(t == 0 || tissues[t - 1].tissue < tissue.tissue);
+      must(tissue.positions.size() % 3 == 0);
+      must(tissue.normals.empty() || tissue.normals.size() == tissue.positions.size());
+      must(tissue.numbers.size() == (mesh.encoding() == v1::ENCODING_F32 ? 0 : tissue.positions.size()));
+      for (const float x : tissue.normals) must(std::abs(x) <= 1.001F);
+    }
+  });
+}
+
+void volumes(Bytes bytes) {
+  wire::VolumeDecoder decoder;
+  Image image;
+  each_frame(bytes, [&](const wire::Frame& frame) {
+    const v1::VolumeFrame& volume = frame.envelope.volume_frame();
+    if (!decoder.decode(volume, frame.payload, image).ok()) return;
+    const std::size_t voxel = scalar_bytes(image.type) * static_cast<std::size_t>(image.components);
+    must(image.bytes.size() == image.grid.voxels() * voxel);
+  });
 }
 
 void recording(Bytes bytes) {
