@@ -141,13 +141,17 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
   limit("--max-payload-bytes", limits.payload_bytes, "of a client's payload", 0U, 1U << 30);
   limit("--max-connections", limits.connections, "at once", 1U, 65536U);
   limit("--max-models", limits.models, "in memory", 1U, 1024U);
-  limit("--max-sessions", limits.sessions, "at once; each holds a posed body", 1U, 65536U);
+  limit("--max-sessions", limits.sessions, "at once", 1U, 65536U);
   limit("--max-subscriptions", limits.subscriptions, "per connection", 1U, 1024U);
   limit("--pose-rate", limits.poses_per_second, "poses per second and session; faster ones are skipped", 0.1,
         1e6);
   limit("--message-rate", limits.messages_per_second, "messages per second and connection; faster ones wait",
         1.0, 1e6);
+  limit("--request-rate", limits.requests_per_second,
+        "HTTP requests per second, all together; others are turned away", 1.0, 1e6);
   limit("--frames-in-flight", limits.frames_in_flight, "unacknowledged, per subscription", 1U, 64U);
+  limit("--max-queued-bytes", limits.queued_bytes, "of frames that wait for clients, all together",
+        std::uint64_t{1} << 20, std::uint64_t{1} << 40);
   limit("--stall-seconds", limits.stall_seconds, "until a client that stopped reading is dropped", 0.01,
         3600.0);
   limit("--idle-seconds", limits.idle_seconds, "until a client that says nothing is dropped", 0.01, 1e6);

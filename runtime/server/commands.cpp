@@ -34,6 +34,8 @@ void describe(const Limits& limits, v1::Limits& out) {
   out.set_idle_seconds(limits.idle_seconds);
   out.set_linger_seconds(limits.linger_seconds);
   out.set_volume_voxels(limits.volume_voxels);
+  out.set_queued_bytes(limits.queued_bytes);
+  out.set_requests_per_second(limits.requests_per_second);
 }
 
 // Why this hello cannot be answered; ok when it can.

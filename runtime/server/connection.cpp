@@ -4,9 +4,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
 #include <new>
 #include <utility>
+#include <vector>
 
 #include "proto/convert.hpp"
 
@@ -15,6 +17,10 @@ namespace {
 
 // Answers that may wait before the client has to read some.
 constexpr std::size_t kMostAnswers = 64;
+// Frames of one write.
+constexpr std::size_t kMostTogether = 16;
+// Of the time until a client is dropped that acknowledges nothing, where frames fill the memory for them.
+constexpr double kLessPatience = 0.25;
 // How long an ending connection may take to read its last words.
 constexpr double kLastWordsSeconds = 1;
 
@@ -120,8 +126,8 @@ void Connection::check(Clock::time_point now) {
   } else if (!greeted_ && longer(born_, limits.hello_seconds)) {
     hit("hello", {StatusCode::deadline_exceeded,
                   "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
-  } else if (longer(writing_since_, limits.stall_seconds) ||
-             longer(outbox_.oldest_in_flight(), limits.stall_seconds)) {
+  } else if (const double stall = limits.stall_seconds * (house_.memory().full() ? kLessPatience : 1);
+             longer(writing_since_, stall) || longer(outbox_.oldest_in_flight(), stall)) {
     spdlog::info("{}: dropped: stopped reading", peer_);
     house_.metrics().hit("stall");
     close("stalled");
@@ -156,26 +162,44 @@ net::awaitable<void> Connection::read_frames() {
   spawn(write_frames());
   boost::system::error_code ec;
   while (!closed_ && !ending_) {
-    const std::size_t n = co_await transport_->read_some(reader_.want(), ec);
+    // What is long goes where it stays.
+    const std::span<std::byte> want = reader_.want();
+    const bool direct = want.size() >= inbox_.size();
+    const std::size_t n = co_await transport_->read_some(direct ? want : std::span<std::byte>(inbox_), ec);
     if (ec) {
       close("client left");
       co_return;
     }
-    take_in(n);
+    heard_ = Clock::now();
+    house_.metrics().read(n);
+    if (!direct && n > 0) {
+      co_await take_apart(std::span<const std::byte>(inbox_).first(n));
+      continue;
+    }
+    take_in(n, true);
     if (reader_.between_frames()) co_await hold_back();
   }
   co_await discard();
 }
 
-void Connection::take_in(std::size_t n) {
+net::awaitable<void> Connection::take_apart(std::span<const std::byte> bytes) {
+  while (!bytes.empty() && !closed_ && !ending_) {
+    const std::span<std::byte> want = reader_.want();
+    const std::size_t n = std::min(want.size(), bytes.size());
+    std::copy_n(bytes.begin(), n, want.begin());
+    bytes = bytes.subspan(n);
+    take_in(n, bytes.empty());
+    if (reader_.between_frames()) co_await hold_back();
+  }
+}
+
+void Connection::take_in(std::size_t n, bool last) {
   if (ending_) return;  // said goodbye meanwhile
-  heard_ = Clock::now();
-  house_.metrics().read(n);
   if (reader_.between_frames()) reading_since_ = heard_;
   const Handling handling(house_.seams());
   try {
     if (const Status status = reader_.advance(n); !status.ok()) return hit("frame", status);
-    if (const auto ended = transport_->message_ended(); ended && *ended != reader_.complete()) {
+    if (const auto ended = transport_->message_ended(); ended && (last && *ended) != reader_.complete()) {
       return end({StatusCode::invalid_argument,
                   "message: it holds more or less than one frame (send one frame a message)"});
     }
@@ -218,29 +242,40 @@ net::awaitable<void> Connection::discard() {
 net::awaitable<void> Connection::write_frames() {
   const auto self = shared_from_this();
   boost::system::error_code ec;
+  std::vector<SharedFrame> frames;  // of one write: answers, and then at most one of a subscription
+  std::vector<net::const_buffer> buffers;
   while (!closed_) {
-    const SharedFrame frame = outbox_.next(Clock::now());
-    if (!frame && ending_) {
+    frames.clear();
+    buffers.clear();
+    const auto start = Clock::now();
+    bool posed = false;
+    while (frames.size() < kMostTogether && !posed) {
+      SharedFrame frame = outbox_.next(start);
+      if (!frame) break;
+      posed = outbox_.last_was_posed();
+      buffers.push_back(net::buffer(frame->head));
+      if (frame->payload) buffers.push_back(net::buffer(*frame->payload));
+      frames.push_back(std::move(frame));
+      if (!transport_->joins_frames()) break;
+    }
+    if (frames.empty() && ending_) {
       co_await transport_->finish(ec);
       co_return;
     }
-    if (!frame) {
+    if (frames.empty()) {
       wake_.expires_at(Clock::time_point::max());
       co_await house_.wait(wake_, ec);
       continue;
     }
-    const bool posed = outbox_.last_was_posed();
-    std::array<net::const_buffer, 2> buffers{net::buffer(frame->head), net::const_buffer()};
-    if (frame->payload) buffers[1] = net::buffer(*frame->payload);
-    const auto start = Clock::now();
     writing_since_ = start;
-    co_await transport_->write(std::span(buffers).first(frame->payload ? 2 : 1), ec);
+    co_await transport_->write(buffers, ec);
     writing_since_.reset();
     if (ec) {
       close("client left");
       co_return;
     }
-    house_.metrics().wrote(frame->bytes(), posed);
+    for (const SharedFrame& frame : frames)
+      house_.metrics().wrote(frame->bytes(), posed && frame == frames.back());
     if (posed) house_.metrics().took(Metrics::Stage::written, seconds(Clock::now() - start));
   }
 }

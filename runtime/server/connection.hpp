@@ -2,10 +2,13 @@
 // One client.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
 #include "runtime/server/house.hpp"
@@ -48,8 +51,11 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
  private:
   net::awaitable<void> read_frames();
   net::awaitable<void> write_frames();
-  /// `n` bytes were read; a whole message is handled. Whatever goes wrong ends this connection alone.
-  void take_in(std::size_t n);
+  /// Takes the bytes apart that were read.
+  net::awaitable<void> take_apart(std::span<const std::byte> bytes);
+  /// `n` bytes are where the reader wants them, the last ones that were read or not; a whole message is
+  /// handled. Whatever goes wrong ends this connection alone.
+  void take_in(std::size_t n, bool last);
   /// Waits while the client asks faster than it may or reads.
   net::awaitable<void> hold_back();
   net::awaitable<void> discard();
@@ -106,6 +112,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   std::unique_ptr<Transport> transport_;
   House& house_;
   wire::FrameReader reader_;
+  std::array<std::byte, 4096> inbox_;  ///< several small messages come in one read
   Outbox outbox_;
   net::steady_timer wake_;   ///< the writer sleeps on it
   net::steady_timer pause_;  ///< the reader sleeps on it

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/house.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -23,7 +25,12 @@ bool identifier(const std::string& name) {
 
 House::House(net::io_context& io, Workers& workers, Options options, std::vector<NamedModel> models,
              Seams seams)
-    : io_(io), workers_(workers), options_(std::move(options)), seams_(std::move(seams)) {
+    : io_(io),
+      workers_(workers),
+      options_(std::move(options)),
+      memory_(options_.limits.queued_bytes),
+      judging_(io),
+      seams_(std::move(seams)) {
   if (models.empty() || models.size() > options_.limits.models) {
     throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
                 "serve 1 to " + std::to_string(options_.limits.models) + ", or raise --max-models");
@@ -72,7 +79,8 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {StatusCode::resource_exhausted,
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
-  out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits, metrics_);
+  out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits, memory_, judging_,
+                                  metrics_);
   sessions_.emplace(name, out);
   return {};
 }
@@ -85,17 +93,24 @@ bool House::make_room() {
     if (since && (oldest == sessions_.end() || *since < *oldest->second->waiting())) oldest = it;
   }
   if (oldest == sessions_.end()) return false;
+  keep_recording(*oldest->second);
   sessions_.erase(oldest);
   return true;
 }
 
 void House::sweep(Clock::time_point now) {
-  std::erase_if(sessions_, [&](const auto& entry) { return entry.second->over(now); });
-  std::erase_if(retired_, [&](const auto& session) { return session->over(now); });
+  const auto ends = [&](const std::shared_ptr<Session>& session) {
+    if (!session->over(now)) return false;
+    keep_recording(*session);
+    return true;
+  };
+  std::erase_if(sessions_, [&](const auto& entry) { return ends(entry.second); });
+  std::erase_if(retired_, ends);
   const auto linger = duration(options_.limits.linger_seconds);
   std::erase_if(lost_, [&](const auto& entry) {
     return now - entry.second.since >= linger || entry.second.session.expired();
   });
+  for (const auto& [name, session] : sessions_) session->catch_up();
 }
 
 void House::arrived(const std::string& token, std::function<void()> give_up) {
@@ -146,6 +161,38 @@ Status House::recording_path(const std::string& name, std::filesystem::path& out
   if (std::filesystem::exists(out, ec))
     return {StatusCode::already_exists, "record: there is a recording '" + name + "' (choose another name)"};
   return {};
+}
+
+void House::finish_recording(Session& session, std::function<void(const Status&)> done) {
+  const std::shared_ptr<Recording> recording = session.recording();
+  std::filesystem::path path;
+  if (const Status status = recording_path(recording->name(), path); !status.ok()) return done(status);
+  session.record(nullptr);
+  const auto clip = std::make_shared<Clip>(recording->finish());
+  const auto written = std::make_shared<Status>();
+  offload(
+      [recording, path, written] { *written = recording->write(path); },
+      [this, recording, clip, written, rig = session.model()->opened.rig_digest(), done = std::move(done)] {
+        if (written->ok()) add_clip(rig, std::move(*clip));
+        if (written->ok() && recording->full()) {
+          *written = {StatusCode::resource_exhausted,
+                      "record: it grew to the server's limit, and is whole up to there (record less)"};
+        }
+        done(*written);
+      });
+}
+
+// Nobody ended it: it ends with its session.
+void House::keep_recording(Session& session) {
+  if (!session.recording()) return;
+  finish_recording(session, [name = session.recording()->name()](const Status& status) {
+    if (!status.ok()) spdlog::warn("recording {}: {}", name, status.message);
+  });
+}
+
+void House::end_recordings() {
+  for (const auto& [name, session] : sessions_) keep_recording(*session);
+  for (const auto& session : retired_) keep_recording(*session);
 }
 
 Status House::room_for_recording() const {

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/server/frame_memory.hpp"
+#include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"
 #include "runtime/server/named_model.hpp"
 #include "runtime/server/seams.hpp"
@@ -51,6 +53,10 @@ class House {
   void add_clip(std::uint64_t rig_digest, Clip clip);
   /// Where a recording of this name goes: invalid_argument, failed_precondition, already_exists.
   Status recording_path(const std::string& name, std::filesystem::path& out) const;
+  /// Ends the session's recording, which it has, and writes it; then `done`.
+  void finish_recording(Session& session, std::function<void(const Status&)> done);
+  /// As finish_recording, for all sessions, whose end is the server's.
+  void end_recordings();
   /// resource_exhausted where four run, or the folder holds 256 files.
   Status room_for_recording() const;
 
@@ -61,21 +67,28 @@ class House {
   void offload(std::function<void()> work, std::function<void()> then);
 
   Metrics& metrics() { return metrics_; }
+  const FrameMemory& memory() const { return memory_; }
   const Seams& seams() const { return seams_; }
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
 
+  /// No pose is judged beside the stream any more.
+  void stop() { judging_.stop(); }
+
   std::size_t sessions() const { return sessions_.size() + retired_.size(); }
-  /// Ends the sessions that are over.
+  /// Ends the sessions that are over, and lets those go on that waited for memory.
   void sweep(Clock::time_point now);
 
  private:
   net::io_context& io_;
   Workers& workers_;
-  Options options_;
   void replace(std::shared_ptr<const ServedModel> model);
   bool make_room();
+  void keep_recording(Session& session);
 
+  Options options_;
+  FrameMemory memory_;
+  Judging judging_;
   std::vector<std::shared_ptr<const ServedModel>> models_;
   std::map<std::string, std::function<ModelParts()>> sources_;
   bool reloading_ = false;

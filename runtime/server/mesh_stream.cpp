@@ -9,6 +9,7 @@
 
 #include "proto/arrays.hpp"
 #include "proto/oct16.hpp"
+#include "runtime/server/payload_layout.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -73,35 +74,46 @@ void MeshStream::gather(const runtime::PosedBody& body) {
   });
 }
 
-std::size_t MeshStream::vertices(const runtime::PosedBody& body, std::size_t t) const {
-  if (parts_) return (*parts_)[t].vertices.size();
-  const std::uint32_t tissue = want_.tissues[t];
-  return std::max(body.tissues[tissue].size(), body.quantised[tissue].size()) / 3;
-}
-
 std::span<const std::uint16_t> MeshStream::numbers(const runtime::PosedBody& body, std::size_t t) const {
   if (parts_) return gathered_[t];
   return body.quantised[want_.tissues[t]];
 }
 
-void MeshStream::append_normals(const runtime::PosedBody& body, std::size_t t, v1::MeshFrame& frame,
-                                wire::Payload& payload) {
+// oct16, into `packed`.
+void MeshStream::pack_normals(const runtime::PosedBody& body, std::size_t t,
+                              std::vector<std::int8_t>& packed) const {
   const std::uint32_t tissue = want_.tissues[t];
-  const auto append = [&](std::span<const std::int16_t> unit) {
-    std::vector<std::int8_t> packed(unit.size() / 3 * 2);
+  const auto pack = [&](std::span<const std::int16_t> unit) {
+    packed.resize(unit.size() / 3 * 2);
     wire::to_oct16(unit, packed);
-    *add_array(frame, tissue, v1::MeshArray::KIND_NORMALS).mutable_array() =
-        wire::append(payload, std::span<const std::int8_t>(packed), 2);
   };
   if (parts_) {
-    append(picked(body.normals[tissue], (*parts_)[t]));
+    pack(picked(body.normals[tissue], (*parts_)[t]));
   } else {
-    append(body.normals[tissue]);
+    pack(body.normals[tissue]);
   }
+}
+
+// The arrays of every tissue, positions by `add`, then its normals.
+template <class Add>
+void MeshStream::lay_out(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload,
+                         Add&& add) {
+  std::vector<std::vector<std::int8_t>> normals(want_.normals ? want_.tissues.size() : 0);
+  tbb::parallel_for(std::size_t{0}, normals.size(),
+                    [&](std::size_t t) { pack_normals(body, t, normals[t]); });
+  PayloadLayout layout;
+  for (std::size_t t = 0; t < want_.tissues.size(); ++t) {
+    add(layout, t, *add_array(frame, want_.tissues[t], v1::MeshArray::KIND_POSITIONS).mutable_array());
+    if (!want_.normals) continue;
+    layout.append(*add_array(frame, want_.tissues[t], v1::MeshArray::KIND_NORMALS).mutable_array(),
+                  v1::SCALAR_TYPE_I8, 2, std::span<const std::int8_t>(normals[t]));
+  }
+  layout.fill(payload);
 }
 
 void MeshStream::write_nodes(const runtime::PosedBody& body, v1::MeshFrame& frame,
                              wire::Payload& payload) const {
+  payload.clear();
   std::vector<float> nodes(3 * nodes_.size());
   for (std::size_t i = 0; i < nodes_.size(); ++i)
     std::copy_n(&body.nodes[3 * std::size_t{nodes_[i]}], 3, &nodes[3 * i]);
@@ -143,24 +155,18 @@ void MeshStream::write(const runtime::PosedBody& body, bool fits, bool keyframe,
   if (encoding == v1::ENCODING_U16_DELTA && !keyframe && !keyframe_due(frame.frame()))
     return write_deltas(body, frame, payload);
 
-  std::size_t bytes = 0;
-  const std::size_t row = encoding == v1::ENCODING_F32 ? 3 * sizeof(float) : 3 * sizeof(std::uint16_t);
-  for (std::size_t t = 0; t < want_.tissues.size(); ++t)
-    bytes +=
-        wire::aligned(vertices(body, t) * row) + wire::aligned(want_.normals ? 2 * vertices(body, t) : 0);
-  payload.reserve(bytes);
-  for (std::size_t t = 0; t < want_.tissues.size(); ++t) {
-    const std::uint32_t tissue = want_.tissues[t];
-    v1::Array& array = *add_array(frame, tissue, v1::MeshArray::KIND_POSITIONS).mutable_array();
+  std::vector<std::vector<float>> some(parts_ && encoding == v1::ENCODING_F32 ? want_.tissues.size() : 0);
+  lay_out(body, frame, payload, [&](PayloadLayout& layout, std::size_t t, v1::Array& array) {
+    const std::vector<float>& positions = body.tissues[want_.tissues[t]];
     if (encoding != v1::ENCODING_F32) {
-      array = wire::append(payload, numbers(body, t), 3);
+      layout.append(array, v1::SCALAR_TYPE_U16, 3, numbers(body, t));
     } else if (parts_) {
-      array = wire::append(payload, std::span<const float>(picked(body.tissues[tissue], (*parts_)[t])), 3);
+      some[t] = picked(positions, (*parts_)[t]);
+      layout.append(array, v1::SCALAR_TYPE_F32, 3, std::span<const float>(some[t]));
     } else {
-      array = wire::append(payload, std::span<const float>(body.tissues[tissue]), 3);
+      layout.append(array, v1::SCALAR_TYPE_F32, 3, std::span<const float>(positions));
     }
-    if (want_.normals) append_normals(body, t, frame, payload);
-  }
+  });
   if (encoding != v1::ENCODING_U16_DELTA) return;
   frame.set_keyframe(frame.frame());
   keyframe_ = frame.frame();
@@ -193,22 +199,12 @@ void MeshStream::write_deltas(const runtime::PosedBody& body, v1::MeshFrame& fra
     pieces_[r].clear();
     keys_[run.tissue].encode(numbers(body, run.tissue), run.first, run.end, pieces_[r]);
   });
-  std::size_t bytes = 0;
-  for (const auto& piece : pieces_) bytes += wire::aligned(piece.size());
-  if (want_.normals) bytes += keyframe_bytes_ / 3;
-  payload.reserve(bytes);
   std::size_t r = 0;
-  for (std::uint32_t t = 0; t < want_.tissues.size(); ++t) {
-    v1::Array& array = *add_array(frame, want_.tissues[t], v1::MeshArray::KIND_POSITIONS).mutable_array();
-    array.set_type(v1::SCALAR_TYPE_U8);
-    array.set_components(1);
-    array.set_offset(payload.size());
-    for (; r < runs_.size() && runs_[r].tissue == t; ++r)
-      payload.insert(payload.end(), pieces_[r].begin(), pieces_[r].end());
-    array.set_count(payload.size() - array.offset());
-    payload.resize(wire::aligned(payload.size()));
-    if (want_.normals) append_normals(body, t, frame, payload);
-  }
+  lay_out(body, frame, payload, [&](PayloadLayout& layout, std::size_t t, v1::Array& array) {
+    layout.begin(array, v1::SCALAR_TYPE_U8, 1);
+    for (; r < runs_.size() && runs_[r].tissue == t; ++r) layout.add(pieces_[r]);
+    layout.end(1);
+  });
   frame.set_keyframe(keyframe_);
   last_bytes_ = payload.size();
   if (first_bytes_ == 0) first_bytes_ = last_bytes_;

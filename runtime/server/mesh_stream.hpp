@@ -20,9 +20,9 @@ namespace ecorche::server {
 /// a time uses it, on a worker.
 class MeshStream {
  public:
-  /// Frames from one keyframe to the next: fewer than 1 % are keyframes, so that the tail of latencies is not
-  /// theirs.
-  static constexpr std::uint64_t keyframe_interval = 128;
+  /// Frames from one keyframe to the next: fewer than 1 % are keyframes, or come after one that is being made
+  /// ready, so that the tail of latencies is not theirs.
+  static constexpr std::uint64_t keyframe_interval = 256;
 
   /// `parts`: of the tissues of `want`, one for each, null where they are whole. `nodes`: of
   /// MeshWant::control_nodes.
@@ -36,13 +36,11 @@ class MeshStream {
 
   /// What the frame needs of the posed body.
   bool needs_numbers() const { return want_.encoding != v1::ENCODING_F32; }
-  bool needs_positions() const {
-    return (want_.encoding == v1::ENCODING_F32 && !want_.control_nodes) || want_.quality;
-  }
+  bool needs_positions() const { return want_.encoding == v1::ENCODING_F32 && !want_.control_nodes; }
 
   /// Fills encoding, arrays, box and keyframe of `frame`, whose number is set. `keyframe`: somebody needs
-  /// one. A body with a vertex outside its box goes out as float32 (`fits` is false; `body` then has
-  /// positions).
+  /// one. `payload` is replaced. A body with a vertex outside its box goes out as float32 (`fits` is false;
+  /// `body` then has positions).
   void write(const runtime::PosedBody& body, bool fits, bool keyframe, v1::MeshFrame& frame,
              wire::Payload& payload);
   /// After a keyframe has left: readies it for the deltas to come. Cheap where nothing is to be done.
@@ -51,11 +49,11 @@ class MeshStream {
  private:
   void write_nodes(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) const;
   void write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload);
-  void append_normals(const runtime::PosedBody& body, std::size_t t, v1::MeshFrame& frame,
-                      wire::Payload& payload);
+  void pack_normals(const runtime::PosedBody& body, std::size_t t, std::vector<std::int8_t>& packed) const;
+  template <class Add>
+  void lay_out(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload, Add&& add);
   /// The numbers of tissue `t` of the want, gathered where it is a part.
   void gather(const runtime::PosedBody& body);
-  std::size_t vertices(const runtime::PosedBody& body, std::size_t t) const;
   std::span<const std::uint16_t> numbers(const runtime::PosedBody& body, std::size_t t) const;
   bool keyframe_due(std::uint64_t frame) const;
 

@@ -173,30 +173,13 @@ void Connection::handle_record(const v1::Envelope& request) {
 }
 
 void Connection::finish_recording(std::uint64_t id) {
-  const std::shared_ptr<Recording> recording = session_->recording();
-  std::filesystem::path path;
-  Status status;
-  if (!recording)
-    status = {StatusCode::failed_precondition, "record: no recording runs in this session (begin one)"};
-  else
-    status = house_.recording_path(recording->name(), path);
-  if (!status.ok()) return answer_status(id, status);
-  session_->record(nullptr);
-  const auto clip = std::make_shared<Clip>(recording->finish());
-  const auto written = std::make_shared<Status>();
-  const std::uint64_t rig = session_->model()->opened.rig_digest();
-  house_.offload([recording, path, written] { *written = recording->write(path); },
-                 [weak = weak_from_this(), &house = house_, recording, clip, written, rig, id] {
-                   if (written->ok()) house.add_clip(rig, std::move(*clip));
-                   const auto self = weak.lock();
-                   if (!self) return;
-                   if (written->ok() && recording->full()) {
-                     *written = {
-                         StatusCode::resource_exhausted,
-                         "record: it grew to the server's limit, and is whole up to there (record less)"};
-                   }
-                   self->answer_status(id, *written);
-                 });
+  if (!session_->recording()) {
+    return answer_status(
+        id, {StatusCode::failed_precondition, "record: no recording runs in this session (begin one)"});
+  }
+  house_.finish_recording(*session_, [weak = weak_from_this(), id](const Status& status) {
+    if (const auto self = weak.lock()) self->answer_status(id, status);
+  });
 }
 
 }  // namespace ecorche::server

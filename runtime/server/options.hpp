@@ -18,11 +18,13 @@ struct Limits {
   std::uint32_t payload_bytes = 1 << 20;
   std::uint32_t connections = 256;
   std::uint32_t models = 8;
-  std::uint32_t sessions = 64;        ///< each holds one posed body
+  std::uint32_t sessions = 64;        ///< each holds a pose, and keyframes
   std::uint32_t subscriptions = 16;   ///< per connection
   double poses_per_second = 240;      ///< per session
   double messages_per_second = 2000;  ///< per connection; 90 Hz of poses and acknowledgements are 180
   std::uint32_t frames_in_flight = 2;
+  std::uint64_t queued_bytes = std::uint64_t{512} << 20;  ///< of frames that wait for clients, all together
+  double requests_per_second = 100;                       ///< over HTTP, all clients together
   double stall_seconds = 10;
   double idle_seconds = 300;
   double linger_seconds = 60;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Payloads of posed volumes, used again: fresh ones of tens of megabytes cost more than filling them.
+// Payloads of frames, used again: fresh ones cost more than filling them.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -14,7 +15,10 @@ namespace ecorche::server {
 /// Any number of threads may take and let go.
 class PayloadPool : public std::enable_shared_from_this<PayloadPool> {
  public:
-  /// Empty, perhaps with room; comes back when the last one lets go.
+  /// Keeps up to `most` that nobody holds.
+  explicit PayloadPool(std::size_t most = 2) : most_(most) { spare_.reserve(most); }
+
+  /// Holds whatever it held last; comes back when the last one lets go.
   std::shared_ptr<wire::Payload> take() {
     std::unique_ptr<wire::Payload> payload;
     {
@@ -32,14 +36,12 @@ class PayloadPool : public std::enable_shared_from_this<PayloadPool> {
   }
 
  private:
-  static constexpr std::size_t kMost = 2;
-
   void put_back(std::unique_ptr<wire::Payload> payload) {
-    payload->clear();
     const std::lock_guard lock(mutex_);
-    if (spare_.size() < kMost) spare_.push_back(std::move(payload));
+    if (spare_.size() < most_) spare_.push_back(std::move(payload));
   }
 
+  std::size_t most_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<wire::Payload>> spare_;
 };

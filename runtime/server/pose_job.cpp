@@ -5,9 +5,10 @@
 #include <utility>
 
 #include "proto/convert.hpp"
-#include "runtime/quality/pose_quality.hpp"
+#include "runtime/server/judging.hpp"
 #include "runtime/server/mesh_stream.hpp"
 #include "runtime/server/recording.hpp"
+#include "runtime/server/serially.hpp"
 #include "runtime/server/volume_stream.hpp"
 
 namespace ecorche::server {
@@ -38,12 +39,13 @@ struct Wanted {
 
   std::vector<bool> shown, positions, numbers, normals;  // by row of Model::tissues
 
-  void add(const MeshStream& stream) {
+  // `measured`: its quality is.
+  void add(const MeshStream& stream, bool measured) {
     // Who moves the vertices itself needs the nodes alone.
-    if (stream.want().control_nodes && !stream.want().quality) return;
+    if (stream.want().control_nodes && !measured) return;
     for (const std::uint32_t tissue : stream.want().tissues) {
       shown[tissue] = true;
-      if (stream.needs_positions()) positions[tissue] = true;
+      if (stream.needs_positions() || measured) positions[tissue] = true;
       if (stream.needs_numbers()) numbers[tissue] = true;
       if (stream.want().normals) normals[tissue] = true;
     }
@@ -66,6 +68,14 @@ struct Wanted {
   }
 };
 
+// Whether the quality of this pose is measured with the subscription's frame, which then waits for it.
+bool measured(const PoseJob& job, const Subscription& subscription) {
+  const auto* mesh = std::get_if<MeshWant>(&subscription.want);
+  if (!mesh) return false;
+  const bool known = subscription.quality && subscription.quality->pose_sequence() == job.request.sequence;
+  return mesh->quality || !subscription.quality || (job.judge && !known);
+}
+
 // Quality, probes and volumes by tets look at every tet; meshes only at those that their vertices hang on,
 // spheres at none.
 runtime::NodesOf nodes_wanted(const PoseJob& job) {
@@ -73,28 +83,10 @@ runtime::NodesOf nodes_wanted(const PoseJob& job) {
   for (const Subscription& subscription : job.subscriptions) {
     const auto* mesh = std::get_if<MeshWant>(&subscription.want);
     const auto* volume = std::get_if<VolumeWant>(&subscription.want);
-    if ((mesh && (mesh->quality || mesh->control_nodes)) || (volume && !volume->by_spheres))
+    if ((mesh && (measured(job, subscription) || mesh->control_nodes)) || (volume && !volume->by_spheres))
       return runtime::NodesOf::body;
   }
   return runtime::NodesOf::tissues;
-}
-
-void describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,
-              v1::PoseQuality& out) {
-  out.set_verdict(quality.pass ? v1::PoseQuality::VERDICT_PASS : v1::PoseQuality::VERDICT_WARN);
-  out.set_inverted_tets(quality.inverted_tets);
-  out.set_inverted_share(quality.inverted_share);
-  out.set_min_det_f(quality.min_det_f);
-  out.set_volume_change(quality.volume_change);
-  for (std::size_t i = 0; i < quality.tissues.size(); ++i) {
-    v1::TissueChange& change = *out.add_tissues();
-    change.set_tissue(tissues[i]);
-    if (quality.tissues[i].closed) change.set_share(quality.tissues[i].share);
-  }
-  out.set_bone_rigidity(quality.bone_rigidity_mm);
-  out.set_max_inverted_share(quality.thresholds.max_inverted_share);
-  out.set_max_volume_change(quality.thresholds.max_volume_change);
-  out.set_max_bone_rigidity(quality.thresholds.max_bone_rigidity_mm);
 }
 
 void describe(const ClampedJoint& clamped, const Skeleton& skeleton, v1::ClampedJoint& out) {
@@ -103,8 +95,25 @@ void describe(const ClampedJoint& clamped, const Skeleton& skeleton, v1::Clamped
   out.set_removed(clamped.removed);
 }
 
+// The quality that the subscription's frames tell, and whether it is this pose's, just measured.
+struct Judged {
+  std::shared_ptr<const v1::PoseQuality> quality;
+  bool now = false;
+  std::uint64_t took = 0;  // microseconds
+};
+
+Judged judge(const PoseJob& job, const Subscription& subscription, const runtime::PosedBody& body) {
+  if (!measured(job, subscription)) return {subscription.quality};
+  const auto start = Clock::now();
+  const std::vector<std::uint32_t>& tissues = std::get<MeshWant>(subscription.want).tissues;
+  auto quality = std::make_shared<const v1::PoseQuality>(server::describe(
+      job.model->meter.measure(body, tissues, job.thresholds), tissues, job.request.sequence));
+  return {std::move(quality), true, microseconds(Clock::now() - start)};
+}
+
 PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std::size_t at,
-                      const runtime::PosedBody& body, bool fits, const v1::ServerTimings& timings) {
+                      const runtime::PosedBody& body, bool fits, const v1::ServerTimings& timings,
+                      const Judged& judged) {
   MeshStream& stream = *subscription.streams[at];
   v1::Envelope envelope;
   v1::MeshFrame& frame = *envelope.mutable_mesh_frame();
@@ -113,17 +122,13 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
   frame.set_pose_sequence(job.request.sequence);
   frame.set_topology_digest(job.model->opened.topology_digest());
   *frame.mutable_timings() = timings;
-  if (stream.want().quality) {
-    const auto start = Clock::now();
-    const std::vector<std::uint32_t>& tissues = stream.want().tissues;
-    describe(job.model->meter.measure(body, tissues, job.thresholds), tissues, *frame.mutable_quality());
-    frame.mutable_timings()->set_measured(microseconds(Clock::now() - start));
-  }
+  *frame.mutable_quality() = *judged.quality;
+  frame.mutable_timings()->set_measured(judged.took);
   for (const ClampedJoint& clamped : body.clamped) {
     describe(clamped, job.model->model().rig.skeleton, *frame.add_clamped());
   }
   const auto start = Clock::now();
-  auto payload = std::make_shared<wire::Payload>();
+  const std::shared_ptr<wire::Payload> payload = job.model->payloads->take();
   stream.write(body, fits, (subscription.keyframes >> at & 1) != 0, frame, *payload);
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
   return {.subscription = subscription.id,
@@ -131,7 +136,8 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
           .number = job.number,
           .keyframe = frame.keyframe(),
           .encoded = frame.timings().encoded(),
-          .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, std::move(payload)))};
+          .bytes = job.memory->hold(wire::encode(envelope, payload)),
+          .judged = judged.now ? judged.quality : nullptr};
 }
 
 PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, const runtime::PosedBody& body,
@@ -157,16 +163,14 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
           .number = job.number,
           .keyframe = frame.keyframe(),
           .encoded = frame.timings().encoded(),
-          .bytes = std::make_shared<wire::EncodedFrame>(wire::encode(envelope, payload))};
+          .bytes = job.memory->hold(wire::encode(envelope, payload))};
 }
 
 Status pose(const PoseJob& job, runtime::PosedBody& body, bool& fits) {
   const runtime::BodyPoser& poser = job.model->poser;
-  // A session's body is made at its first pose: sessions that only wait cost nothing.
-  if (body.segments.empty()) body = poser.make_frame({.positions = false});
   Wanted wanted(poser.model().tissues.size());
   for (const Subscription& subscription : job.subscriptions) {
-    if (!subscription.streams.empty()) wanted.add(*subscription.streams[0]);
+    if (!subscription.streams.empty()) wanted.add(*subscription.streams[0], measured(job, subscription));
   }
   const std::vector<std::uint32_t> tissues = Wanted::rows(wanted.shown),
                                    numbers = Wanted::rows(wanted.numbers);
@@ -187,47 +191,81 @@ void hand_over(const PoseJob& job, PosedFrame frame) {
   job.on_frame(std::move(frame));
 }
 
+// Every frame of the posed body.
+Status show(const PoseJob& job, const runtime::PosedBody& body, bool fits, const v1::ServerTimings& timings) {
+  if (job.probe) {
+    job.model->probe().follow(body.nodes, job.probe->tree);
+    job.probe->sequence = job.request.sequence;
+    job.on_probe();
+  }
+  // The streams that somebody wants a frame of.
+  const auto wanted = [](const Subscription& subscription, std::size_t i) {
+    return (subscription.levels >> i & 1) != 0;
+  };
+  for (const Subscription& subscription : job.subscriptions) {
+    if (subscription.streams.empty()) continue;
+    const Judged judged = judge(job, subscription, body);
+    for (std::size_t i = 0; i < subscription.streams.size(); ++i) {
+      if (wanted(subscription, i))
+        hand_over(job, mesh_frame(job, subscription, i, body, fits, timings, judged));
+    }
+  }
+  for (const Subscription& subscription : job.subscriptions) {
+    if (subscription.volume) hand_over(job, volume_frame(job, subscription, body, timings));
+  }
+  // Once everything is on its way.
+  for (const Subscription& subscription : job.subscriptions) {
+    for (std::size_t i = 0; i < subscription.streams.size(); ++i) {
+      if (wanted(subscription, i)) subscription.streams[i]->settle(body);
+    }
+  }
+  return {};
+}
+
+// Whether other threads could help: most of the time of a small job would go into waking them.
+bool small(const PoseJob& job) {
+  constexpr std::size_t most = 60'000;  // vertices, and nodes
+  if (job.probe) return false;
+  std::size_t work = nodes_wanted(job) == runtime::NodesOf::body ? job.model->model().node_count() : 0;
+  for (const Subscription& subscription : job.subscriptions) {
+    if (subscription.volume) return false;
+    for (const std::uint32_t t : std::get<MeshWant>(subscription.want).tissues)
+      work += static_cast<std::size_t>(job.model->model().tissues[t].V.rows());
+  }
+  return work <= most;
+}
+
 }  // namespace
 
-Status run(const PoseJob& job, runtime::PosedBody& body) {
+Status run(const PoseJob& job) {
   const auto start = Clock::now();
   PoseOutcome outcome;
   outcome.sequence = job.request.sequence;
   outcome.timings.set_waited(microseconds(start - job.request.arrived));
+  BodyPool::Lease body;
   bool fits = true;  // the box of the u16 encodings
-  outcome.status = guarded([&] { return pose(job, body, fits); });
-  outcome.timings.set_posed(microseconds(Clock::now() - start));
-  const v1::ServerTimings timings = outcome.timings;
-  const bool posed = outcome.status.ok();
-  if (posed) outcome.clamped = body.clamped;
-  job.on_outcome(std::move(outcome));
-  if (!posed) return {};
-
-  // The streams that somebody wants a frame of.
-  const auto each_stream = [&](auto&& work) {
-    for (const Subscription& subscription : job.subscriptions) {
-      for (std::size_t i = 0; i < subscription.streams.size(); ++i) {
-        if ((subscription.levels >> i & 1) != 0) work(subscription, i);
-      }
-    }
-  };
-  return guarded([&] {
-    if (job.probe) {
-      job.model->probe().follow(body.nodes, job.probe->tree);
-      job.probe->sequence = job.request.sequence;
-      job.on_probe();
-    }
-    each_stream([&](const Subscription& subscription, std::size_t i) {
-      hand_over(job, mesh_frame(job, subscription, i, body, fits, timings));
+  const auto pose_all = [&] {
+    outcome.status = guarded([&] {
+      body = job.model->bodies.take();
+      return pose(job, *body, fits);
     });
-    for (const Subscription& subscription : job.subscriptions) {
-      if (subscription.volume) hand_over(job, volume_frame(job, subscription, body, timings));
-    }
-    // Once everything is on its way.
-    each_stream(
-        [&](const Subscription& subscription, std::size_t i) { subscription.streams[i]->settle(body); });
-    return Status{};
-  });
+    outcome.timings.set_posed(microseconds(Clock::now() - start));
+  };
+  Status status;
+  const auto all = [&] {
+    pose_all();
+    const v1::ServerTimings timings = outcome.timings;
+    const bool posed = outcome.status.ok();
+    if (posed) outcome.clamped = body->clamped;
+    job.on_outcome(std::move(outcome));
+    if (posed) status = guarded([&] { return show(job, *body, fits, timings); });
+  };
+  if (small(job)) {
+    serially(all);
+  } else {
+    all();
+  }
+  return status;
 }
 
 }  // namespace ecorche::server

@@ -12,6 +12,7 @@
 #include "runtime/probe/probe.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/asio.hpp"
+#include "runtime/server/frame_memory.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/server/subscription.hpp"
 
@@ -42,6 +43,7 @@ struct PosedFrame {
   std::uint64_t encoded = 0;  ///< time that it took, microseconds
   std::shared_ptr<const wire::EncodedFrame> bytes;
   std::optional<std::uint64_t> digest = {};  ///< XXH64 of the payload, where PoseJob::digests asks for it
+  std::shared_ptr<const v1::PoseQuality> judged = {};  ///< where it was measured with this frame
 };
 
 /// A posed body as probes ask it. Not written once it is shown to them.
@@ -57,8 +59,11 @@ struct PoseJob {
   std::vector<Subscription> subscriptions;
   std::uint64_t volume_voxels = 0;  ///< Limits
   runtime::QualityThresholds thresholds;
+  bool judge = false;  ///< every frame with its own pose's quality; else Subscription::quality may be told
   bool digests = false;
-  std::shared_ptr<ProbeFrame> probe;  ///< to be filled; null where nobody probes
+  const FrameMemory* memory = nullptr;  ///< counts the frames
+  FrameMemory::Room room;               ///< about what they will take
+  std::shared_ptr<ProbeFrame> probe;    ///< to be filled; null where nobody probes
   /// Called on the worker, in this order: the outcome once, `probe` once it is filled, then every frame,
   /// meshes before volumes (which take longer).
   std::function<void(PoseOutcome)> on_outcome;
@@ -66,8 +71,8 @@ struct PoseJob {
   std::function<void(PosedFrame)> on_frame;
 };
 
-/// Poses into `body`, which is made at the first call. Throws nothing. The status is that of the frames: the
-/// first that could not be made (out of memory) while the pose itself was good.
-Status run(const PoseJob& job, runtime::PosedBody& body);
+/// Throws nothing. The status is that of the frames: the first that could not be made (out of memory) while
+/// the pose itself was good. A small job keeps to the calling thread.
+Status run(const PoseJob& job);
 
 }  // namespace ecorche::server

@@ -11,8 +11,10 @@
 #include "proto/framing.hpp"
 #include "runtime/probe/probe.hpp"
 #include "runtime/quality/quality_meter.hpp"
+#include "runtime/server/body_pool.hpp"
 #include "runtime/server/clip.hpp"
 #include "runtime/server/mesh_rows.hpp"
+#include "runtime/server/payload_pool.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/volume_poser.hpp"
@@ -31,6 +33,9 @@ struct ServedModel {
   const runtime::VolumeBalls& balls(std::size_t volume) const;
 
   runtime::BodyPoser poser;
+  /// For the frames of meshes.
+  std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);
+  mutable BodyPool bodies{poser};  ///< for jobs to pose into
   runtime::VolumePoser volumes;
   runtime::QualityMeter meter;
   std::vector<MeshParts> levels;  ///< of detail, from 1 on

@@ -86,6 +86,7 @@ struct Server::Impl {
             .ready = [this] { return !stopping; },
             .metrics = [this] { return metrics(); },
             .denied = [this] { house->metrics().denied(); },
+            .admit = [this] { return admit(Clock::now()); },
             .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
                               bool proven) { welcome(std::move(transport), std::move(peer), proven); }};
     house = std::make_unique<House>(io, workers, std::move(options), std::move(models), std::move(seams));
@@ -94,6 +95,7 @@ struct Server::Impl {
   net::awaitable<void> accept(tcp::acceptor& at, bool web);
   net::awaitable<void> watch();
   net::awaitable<void> pause(net::steady_timer& timer);
+  bool admit(Clock::time_point now);
   void look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool web);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven);
@@ -113,6 +115,8 @@ struct Server::Impl {
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
   bool stopping = false;
+  double allowance = 0;  ///< requests that may be answered at once
+  Clock::time_point allowance_at{};
 };
 
 Server::Server(Options options, std::vector<NamedModel> models, Workers& workers, Seams seams)
@@ -180,6 +184,19 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
   requests.back()->start();
 }
 
+// At most a second's worth in one go.
+bool Server::Impl::admit(Clock::time_point now) {
+  const double rate = house->limits().requests_per_second;
+  allowance = std::min(rate, allowance + rate * seconds(now - allowance_at));
+  allowance_at = now;
+  if (allowance < 1) {
+    house->metrics().hit("requests");
+    return false;
+  }
+  allowance -= 1;
+  return true;
+}
+
 void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven) {
   const auto limit = house->limits().connections;
   const auto alive = static_cast<std::size_t>(std::count_if(
@@ -205,6 +222,7 @@ net::awaitable<void> Server::Impl::watch() {
     }
     co_await pause(tick);
   }
+  house->end_recordings();
   // Until the last client had its goodbye, the HTTP port tells that the server stops.
   http_acceptor.close(ec);
   for (const auto& request : requests) request->close();
@@ -233,6 +251,7 @@ std::string Server::Impl::metrics() {
 void Server::Impl::begin_shutdown() {
   if (std::exchange(stopping, true)) return;
   spdlog::info("stopping: {} connections", connections.size());
+  house->stop();
   boost::system::error_code ec;
   acceptor.close(ec);
   tick.cancel();

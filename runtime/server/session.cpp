@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/session.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -10,26 +8,6 @@
 #include "runtime/server/volume_stream.hpp"
 
 namespace ecorche::server {
-namespace {
-
-// So long after the last probe, poses are still made ready for the next.
-constexpr auto kProbing = std::chrono::seconds(1);
-// Between keyframes that laggards ask for: one must not make everybody's frames three times as large.
-constexpr std::chrono::milliseconds kKeyframePause{100};
-// Without another pose for so long, the body stands still, and is shown in full detail.
-constexpr std::chrono::milliseconds kStill{150};
-
-double rate_of(const Want& want) {
-  return std::visit([](const auto& w) { return w.max_rate; }, want);
-}
-
-bool same(const Pose& a, const Pose& b) {
-  const auto equal = [](const auto& x, const auto& y) { return x.coeffs() == y.coeffs(); };
-  return a.root_translation == b.root_translation && a.translation == b.translation &&
-         std::equal(a.rotation.begin(), a.rotation.end(), b.rotation.begin(), b.rotation.end(), equal);
-}
-
-}  // namespace
 
 void Skipped::add(std::uint64_t sequence) {
   ++count;
@@ -38,9 +16,12 @@ void Skipped::add(std::uint64_t sequence) {
 }
 
 Session::Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model,
-                 std::string name, bool named, const Limits& limits, Metrics& metrics)
+                 std::string name, bool named, const Limits& limits, const FrameMemory& memory,
+                 Judging& judging, Metrics& metrics)
     : io_(io),
       metrics_(metrics),
+      memory_(memory),
+      judging_(judging),
       workers_(workers),
       model_(std::move(model)),
       name_(std::move(name)),
@@ -172,7 +153,8 @@ void Session::play(std::shared_ptr<const Clip> clip, double speed, bool loop) {
 
 void Session::set_thresholds(const runtime::QualityThresholds& thresholds) {
   thresholds_ = thresholds;
-  for (const Row& row : rows_) {
+  for (Row& row : rows_) {
+    row.subscription.quality = nullptr;  // with the next frame
     const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
     if (mesh && mesh->quality) fresh_.insert(row.subscription.id);
   }
@@ -202,109 +184,6 @@ std::optional<Clock::time_point> Session::waiting() const {
   return last_seen_;
 }
 
-void Session::start_job() {
-  if (busy_ || (!slot_ && fresh_.empty() && probes_.empty())) return;
-  const auto now = Clock::now();
-  if (now < next_start_) {
-    if (std::exchange(pacing_, true)) return;
-    pace_.expires_at(next_start_);
-    pace_.async_wait([weak = weak_from_this()](const boost::system::error_code&) {
-      const auto self = weak.lock();
-      if (!self) return;
-      self->pacing_ = false;
-      self->start_job();
-    });
-    return;
-  }
-  next_start_ = now + duration(1 / limits_.poses_per_second);
-  const bool refresh = !slot_;
-  auto job = std::make_shared<PoseJob>();
-  take_up(*job);
-  busy_ = true;
-  try {
-    submit(std::move(job), refresh);
-  } catch (...) {  // out of memory: this pose is lost, the next one is not
-    busy_ = false;
-    throw;
-  }
-}
-
-void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
-  auto skipped = std::make_shared<const Skipped>(refresh ? Skipped{} : std::exchange(skipped_, {}));
-  std::shared_ptr<Session> self = shared_from_this();
-  // Posted by the job itself, which holds these.
-  job->on_outcome = [self, skipped, shown = job.get(), refresh](PoseOutcome outcome) {
-    auto said = std::make_shared<PoseJob>();
-    said->number = shown->number;
-    said->request = shown->request;
-    net::post(self->io_, [self, skipped, said, refresh, outcome = std::move(outcome)] {
-      self->finish_pose(outcome, *skipped, *said, refresh);
-    });
-  };
-  job->on_probe = [self, frame = job->probe] {
-    net::post(self->io_, [self, frame] { self->probe_ready(frame); });
-  };
-  job->on_frame = [self](PosedFrame frame) {
-    net::post(self->io_, [self, frame = std::move(frame)] { self->publish(frame); });
-  };
-  // The guard keeps the I/O thread waiting for the job's end. All that the job holds goes back with it, so
-  // that no worker ever destroys a session.
-  workers_.submit(
-      [self = std::move(self), job = std::move(job), guard = net::make_work_guard(io_)]() mutable {
-        const Status status = run(*job, self->body_);
-        net::io_context& io = self->io_;
-        net::post(io, [self = std::move(self), job = std::move(job), guard = std::move(guard), status] {
-          if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
-          self->busy_ = false;
-          // Asked for, and not made: the pose could not be.
-          if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
-          self->start_job();
-        });
-      });
-}
-
-// The waiting pose for everyone, or the present one for those who have not seen it.
-void Session::take_up(PoseJob& job) {
-  const bool refresh = !slot_;
-  job.model = model_;
-  job.number = ++frames_;
-  job.volume_voxels = limits_.volume_voxels;
-  job.thresholds = thresholds_;
-  job.digests = recording_ != nullptr;
-  const bool probing = !probes_.empty() || (probed_ && Clock::now() - *probed_ < kProbing);
-  if (probing) job.probe = spare_probe();
-  if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
-  const auto now = Clock::now();
-  if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
-  const bool still = refresh || now - moved_ > kStill;
-  std::set<std::uint32_t> later;
-  for (Row& row : rows_) {
-    const bool fresh = fresh_.contains(row.subscription.id);
-    if (!fresh && (refresh || held_back(row, now))) continue;
-    ask_levels(row, still, now);
-    if (const double rate = rate_of(row.subscription.want); rate > 0)
-      row.next_due = std::max(row.next_due + duration(1 / rate), now);
-    const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
-    job.subscriptions.push_back(row.subscription);
-    if (asked == 0) continue;
-    if (refresh || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) {
-      row.subscription.keyframes &= ~asked;
-      row.last_keyframe = now;
-    } else {
-      job.subscriptions.back().keyframes = 0;
-      later.insert(row.subscription.id);
-    }
-  }
-  fresh_ = std::move(later);
-  keep_time();
-  if (refresh) {
-    job.request = present_;
-    job.request.arrived = Clock::now();
-  } else {
-    job.request = *std::exchange(slot_, std::nullopt);
-  }
-}
-
 void Session::probe(Ready ready) {
   probed_ = Clock::now();
   if (probe_frame_) return ready(probe_frame_);
@@ -323,82 +202,6 @@ std::shared_ptr<ProbeFrame> Session::spare_probe() {
 void Session::probe_ready(const std::shared_ptr<ProbeFrame>& frame) {
   probe_frame_ = frame;
   for (const Ready& ready : std::exchange(probes_, {})) ready(frame);
-}
-
-// Too early for the row's rate; it is served when it is due.
-bool Session::held_back(Row& row, Clock::time_point now) const {
-  if (rate_of(row.subscription.want) == 0 || now >= row.next_due) return false;
-  row.refresh_at = row.next_due;
-  return true;
-}
-
-// What each member's way takes; whoever got less detail gets all once the body stands still.
-void Session::ask_levels(Row& row, bool still, Clock::time_point now) const {
-  row.refresh_at.reset();
-  Subscription& subscription = row.subscription;
-  if (subscription.streams.empty()) return;
-  const std::uint32_t finest = subscription.streams.front()->level(),
-                      coarsest = subscription.streams.back()->level();
-  subscription.levels = 0;
-  for (Member* member : row.members)
-    subscription.levels |= 1U << (member->ask_level(subscription.id, finest, coarsest, still) - finest);
-  if (subscription.levels > 1) row.refresh_at = now + kStill;
-}
-
-void Session::keep_time() {
-  std::optional<Clock::time_point> next;
-  for (const Row& row : rows_) {
-    if (row.refresh_at) next = std::min(next.value_or(Clock::time_point::max()), *row.refresh_at);
-  }
-  if (next == clock_at_) return;
-  clock_at_ = next;
-  if (!next) {
-    clock_.cancel();
-    return;
-  }
-  clock_.expires_at(*next);
-  clock_.async_wait([weak = weak_from_this()](const boost::system::error_code& ec) {
-    const auto self = weak.lock();
-    if (!self || ec) return;
-    self->clock_at_.reset();
-    for (Row& row : self->rows_) {
-      if (!row.refresh_at || *row.refresh_at > Clock::now()) continue;
-      row.refresh_at.reset();
-      self->fresh_.insert(row.subscription.id);
-    }
-    self->keep_time();
-    self->start_job();
-  });
-}
-
-void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,
-                          bool refresh) {
-  if (refresh) return;
-  metrics_.took(Metrics::Stage::waited, 1e-6 * static_cast<double>(outcome.timings.waited()));
-  metrics_.took(Metrics::Stage::posed, 1e-6 * static_cast<double>(outcome.timings.posed()));
-  metrics_.skipped(skipped.count);
-  if (outcome.status.ok()) present_ = job.request;
-  if (outcome.status.ok() && recording_) {
-    recording_->add(job.request);
-    recorded_job_ = job.number;
-  }
-  if (controller_) controller_->pose_done(outcome, skipped);
-}
-
-void Session::publish(const PosedFrame& frame) {
-  metrics_.took(Metrics::Stage::encoded, 1e-6 * static_cast<double>(frame.encoded));
-  const auto row = std::find_if(rows_.begin(), rows_.end(),
-                                [&](const Row& r) { return r.subscription.id == frame.subscription; });
-  if (row == rows_.end()) return;
-  if (recording_ && frame.number == recorded_job_ && frame.keyframe == 0)
-    recording_->add(frame, row->request);
-  bool all = true;
-  for (Member* member : row->members) all = member->deliver(frame) && all;
-  if (all) return;
-  // With the next pose, or, where none comes, of the present one.
-  const auto& streams = row->subscription.streams;
-  row->subscription.keyframes |= streams.empty() ? 1U : 1U << (frame.level - streams.front()->level());
-  fresh_.insert(row->subscription.id);
 }
 
 }  // namespace ecorche::server

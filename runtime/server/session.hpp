@@ -8,10 +8,13 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/clip.hpp"
+#include "runtime/server/frame_memory.hpp"
+#include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"
 #include "runtime/server/options.hpp"
 #include "runtime/server/pose_job.hpp"
@@ -54,11 +57,11 @@ struct Asked {
 };
 
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the
-/// workers and owns `body_` until its end is posted back.
+/// workers until its end is posted back.
 class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model, std::string name,
-          bool named, const Limits& limits, Metrics& metrics);
+          bool named, const Limits& limits, const FrameMemory& memory, Judging& judging, Metrics& metrics);
   ~Session();
 
   const std::string& name() const { return name_; }
@@ -107,6 +110,13 @@ class Session : public std::enable_shared_from_this<Session> {
   void record(std::shared_ptr<Recording> recording) { recording_ = std::move(recording); }
   const std::shared_ptr<Recording>& recording() const { return recording_; }
 
+  /// Makes what had to wait for memory.
+  void catch_up();
+  /// From now on its turn is awaited; whether it was already.
+  bool await_judgement() { return std::exchange(awaits_judgement_, true); }
+  /// Its turn: has the present pose judged, and Judging::done() called then; false where nobody looks.
+  bool judge();
+
   /// Its model's name means another one now: nobody joins any more, and it ends with its last member.
   void retire(std::uint64_t identity);
   bool retired() const { return retired_; }
@@ -126,7 +136,10 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<Clock::time_point> refresh_at;     ///< when the present pose is to be shown (again)
   };
 
+  class Teller;
   void tell_control();
+  void judged(const JudgeJob& job);
+  bool by_present_thresholds(const v1::PoseQuality& quality) const;
   std::shared_ptr<ProbeFrame> spare_probe();
   void probe_ready(const std::shared_ptr<ProbeFrame>& frame);
   void take(PoseRequest request);
@@ -141,6 +154,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   net::io_context& io_;
   Metrics& metrics_;
+  const FrameMemory& memory_;
+  Judging& judging_;
   Workers& workers_;
   std::shared_ptr<const ServedModel> model_;
   std::string name_;
@@ -154,6 +169,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   bool awaited_ = false;  ///< the last one may come back
   bool retired_ = false;
+  bool awaits_judgement_ = false;
 
   std::vector<Row> rows_;
   std::uint32_t last_subscription_ = 0;
@@ -164,12 +180,12 @@ class Session : public std::enable_shared_from_this<Session> {
   PoseRequest present_;
   std::uint64_t frames_ = 0;
   bool busy_ = false;
-  runtime::PosedBody body_;  ///< the job's while busy_
   net::steady_timer pace_;
   Clock::time_point next_start_ = Clock::now();
   bool pacing_ = false;
   net::steady_timer clock_;  ///< for the rows' refresh_at
   std::optional<Clock::time_point> clock_at_;
+  Clock::time_point taken_{};               ///< when the last pose was taken up
   Clock::time_point moved_ = Clock::now();  ///< when the pose last became another one
 
   std::uint64_t last_sequence_ = 0;

@@ -22,7 +22,7 @@ class Transport {
   virtual net::awaitable<void> open(boost::system::error_code& ec) = 0;
   /// At least a byte, unless a message of the carrier was empty.
   virtual net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) = 0;
-  /// All of one frame.
+  /// All of one frame, or, where joins_frames(), of several.
   virtual net::awaitable<void> write(std::span<const net::const_buffer> frame,
                                      boost::system::error_code& ec) = 0;
   /// Nothing more is written; the client may read to the end.
@@ -31,6 +31,8 @@ class Transport {
 
   /// Where the carrier has messages, and one must be one frame: whether the last byte read ended one.
   virtual std::optional<bool> message_ended() const { return std::nullopt; }
+  /// Without messages, frames may leave in one write.
+  bool joins_frames() const { return !message_ended().has_value(); }
 };
 
 std::unique_ptr<Transport> tcp_transport(tcp::socket socket);

@@ -42,6 +42,7 @@ void append_brick(const Image& image, const runtime::VoxelRange& range, std::vec
 Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& body,
                            std::uint64_t most_voxels, bool keyframe, v1::VolumeFrame& frame,
                            wire::Payload& payload) {
+  payload.clear();
   if (!want_.slices.empty()) {
     write_slices(served, body, frame, payload);
     return {};

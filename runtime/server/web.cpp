@@ -188,6 +188,7 @@ class Request final : public WebRequest {
     if (ec) co_return;
     const auto& request = parser_.get();
     const std::string_view target(request.target().data(), request.target().size());
+    if (!room_.admit()) co_return co_await answer(http::status::too_many_requests, "try again in a second\n");
     if (target == "/v1") co_return co_await upgrade();
     if (request.method() != http::verb::get && request.method() != http::verb::head)
       co_return co_await answer(http::status::method_not_allowed, "GET and HEAD only\n");

@@ -19,6 +19,8 @@ struct WebRoom {
   std::function<bool()> ready;
   std::function<std::string()> metrics;
   std::function<void()> denied;
+  /// Whether one more request may be answered now.
+  std::function<bool()> admit;
   /// A client that speaks WebSocket from here on; `proven`: its request had the token.
   std::function<void(std::unique_ptr<Transport> transport, std::string peer, bool proven)> welcome;
 };

@@ -192,5 +192,70 @@ TEST(LimitsTest, NoMoreFramesAreSentThanAreAcknowledged) {
   EXPECT_EQ(frames[2].pose_sequence(), 20U);  // the newest replaced all that waited
 }
 
+// A client whose frames never leave the server; its answers do.
+class HeldTransport final : public Transport {
+ public:
+  explicit HeldTransport(std::unique_ptr<Transport> inner)
+      : inner_(std::move(inner)), held_(inner_->executor()) {}
+
+  net::any_io_executor executor() override { return inner_->executor(); }
+  net::awaitable<void> open(boost::system::error_code& ec) override { return inner_->open(ec); }
+  net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) override {
+    return inner_->read_some(out, ec);
+  }
+  net::awaitable<void> write(std::span<const net::const_buffer> frames,
+                             boost::system::error_code& ec) override {
+    // The first payload is the triangles of OpenModel.
+    if (frames.size() < 2 || ++payloads_ == 1) co_return co_await inner_->write(frames, ec);
+    held_.expires_at(Clock::time_point::max());
+    co_await held_.async_wait(quietly(ec));
+  }
+  net::awaitable<void> finish(boost::system::error_code& ec) override { return inner_->finish(ec); }
+  void close() override {
+    inner_->close();
+    held_.cancel();
+  }
+
+ private:
+  std::unique_ptr<Transport> inner_;
+  net::steady_timer held_;
+  int payloads_ = 0;
+};
+
+TEST(LimitsTest, WhereFramesFillTheMemoryNewOnesWaitAndPatienceIsShort) {
+  Options options;
+  options.limits.queued_bytes = 0;
+  options.limits.stall_seconds = 4;
+  int clients = 0;
+  const TestServer server(
+      options, {.transport = [&](std::unique_ptr<Transport> transport) -> std::unique_ptr<Transport> {
+                  if (++clients != 2) return transport;
+                  return std::make_unique<HeldTransport>(std::move(transport));
+                },
+                .timer_fails = {},
+                .handling = {}});
+  TestClient streams(server);
+  streams.subscribe_mesh();
+  streams.next_mesh(0);
+  RawClient sleeper(server);
+  subscribe_and_sleep(sleeper, "");
+  const auto start = client::Clock::now();
+  TestClient late(server);
+  late.subscribe_mesh();
+  // Who had frames gets more of them, who had none waits until the sleeper has been dropped.
+  std::uint64_t sequence = 0;
+  for (bool first = false; !first;) {
+    ++sequence;
+    streams.send(sequence, streams.bent(0.001 * static_cast<double>(sequence)));
+    streams.next_mesh(sequence);
+    const auto until = client::Clock::now() + std::chrono::milliseconds(20);
+    while (const auto frame = late.client().receive(until)) first = first || frame->envelope.has_mesh_frame();
+  }
+  const double waited = std::chrono::duration<double>(client::Clock::now() - start).count();
+  EXPECT_GT(waited, 0.5);
+  EXPECT_LT(waited, 3.5);  // a quarter of the usual, not all of it
+  EXPECT_GT(sequence, 10U);
+}
+
 }  // namespace
 }  // namespace ecorche::server

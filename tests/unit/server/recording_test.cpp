@@ -106,6 +106,37 @@ TEST_F(RecordingTest, HoldsThePosesAndWhatTheirFramesWere) {
   }
 }
 
+TEST_F(RecordingTest, OneThatNobodyEndsIsKeptWhenItsSessionEnds) {
+  Options some = options();
+  some.limits.linger_seconds = 0.1;
+  TestServer server(some);
+  const auto record_one = [&](const std::string& name, const std::string& session) {
+    TestClient client(server, session);
+    client.subscribe_mesh({"skin"});
+    client.client().call(record(true, name));
+    client.send(1, client.bent(0.3));
+    client.next_mesh(1);
+  };
+  const auto whole = [&](const std::string& name) {
+    wire::RecordedSession session;
+    return !bytes(name).empty() && read(bytes(name), session).ok() && session.steps.size() == 1;
+  };
+  record_one("left", "");
+  record_one("left_named", "room");
+  for (int i = 0; i < 500 && !(whole("left") && whole("left_named")); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_TRUE(whole("left"));
+  EXPECT_TRUE(whole("left_named"));
+  TestClient stays(server);
+  stays.subscribe_mesh({"skin"});
+  stays.client().call(record(true, "stopped"));
+  stays.send(1, stays.bent(0.3));
+  stays.next_mesh(1);
+  server.stop();
+  server.join();
+  EXPECT_TRUE(whole("stopped"));
+}
+
 TEST_F(RecordingTest, NamesFoldersAndOrderAreChecked) {
   const TestServer server(options()), keeps_none;
   TestClient client(server), other(keeps_none);

@@ -135,6 +135,27 @@ TEST(Stream, EveryFrameEqualsOfflinePosingForEveryMethod) {
   }
 }
 
+// Jobs take up bodies that others left, of other tissues and encodings.
+TEST(Stream, SessionsLeaveNothingBehindInTheBodiesTheyShare) {
+  const TestServer server;
+  TestClient one(server), other(server), third(server);
+  one.subscribe_mesh({"skin"});
+  other.subscribe_mesh();
+  v1::Envelope quantised;
+  quantised.mutable_subscribe()->mutable_mesh()->set_encoding(v1::ENCODING_U16);
+  quantised.mutable_subscribe()->mutable_mesh()->set_normals(true);
+  third.client().call(quantised);
+  for (std::uint64_t sequence = 1; sequence <= 6; ++sequence) {
+    const double angle = 0.1 * static_cast<double>(sequence);
+    one.send(sequence, one.bent(angle));
+    other.send(sequence, other.bent(-angle));
+    third.send(sequence, third.bent(2 * angle));
+    expect_equal(one.next_mesh(sequence), Offline(one.bent(angle)));
+    expect_equal(other.next_mesh(sequence), Offline(other.bent(-angle)));
+    EXPECT_EQ(third.next_mesh(sequence).envelope.mesh_frame().encoding(), v1::ENCODING_U16);
+  }
+}
+
 TEST(Stream, OnlyTheTissuesAskedFor) {
   const TestServer server;
   TestClient client(server);
@@ -144,7 +165,6 @@ TEST(Stream, OnlyTheTissuesAskedFor) {
   ASSERT_EQ(frame.envelope.mesh_frame().arrays_size(), 1);
   EXPECT_EQ(frame.envelope.mesh_frame().arrays(0).tissue(),
             static_cast<std::uint32_t>(client.opened().tissues_size() - 1));
-  EXPECT_FALSE(frame.envelope.mesh_frame().has_quality());
 }
 
 TEST(Stream, VolumesEqualOfflineResampling) {

@@ -84,6 +84,24 @@ TEST(Web, MetricsCountWhatHappened) {
   EXPECT_EQ(sample(page, "ecorche_sent_bytes_total"), static_cast<double>(client.client().bytes_received()));
 }
 
+TEST(Web, RequestsBeyondTheRateAreTurnedAway) {
+  Options options = with_http();
+  options.limits.requests_per_second = 4;
+  const TestServer server(options);
+  int alive = 0, turned_away = 0;
+  for (int i = 0; i < 40; ++i) {
+    const std::string answer = WebClient(server.http()).get("/healthz");
+    alive += starts(answer, "HTTP/1.1 200");
+    turned_away += starts(answer, "HTTP/1.1 429");
+  }
+  EXPECT_GE(alive, 4);  // a second's worth at once
+  EXPECT_EQ(alive + turned_away, 40);
+  EXPECT_GT(turned_away, 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  const std::string page = WebClient(server.http()).get("/metrics");
+  EXPECT_EQ(sample(page, "ecorche_limits_hit_total{limit=\"requests\"}"), turned_away);
+}
+
 TEST(Web, WhatIsNoHttpIsRefused) {
   const TestServer server(with_http());
   WebClient noise(server.http());

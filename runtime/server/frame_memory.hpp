@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many bytes of frames wait for clients, over the whole server.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "proto/framing.hpp"
+
+namespace ecorche::server {
+
+/// A frame counts from the start of its job until the last connection lets go of it, once however many share
+/// it. Above the limit no subscription gets its first frame, and who keeps frames without acknowledging them
+/// has a quarter of the usual time to do so (docs/protocol.md, "Limits"). From any thread.
+class FrameMemory {
+ public:
+  explicit FrameMemory(std::uint64_t limit) : limit_(limit) {}
+
+  std::uint64_t bytes() const { return sum_->load(std::memory_order_relaxed); }
+  bool full() const { return bytes() > limit_; }
+
+  /// So many bytes more, for as long as it lives: of frames that a job is going to make.
+  class Room {
+   public:
+    Room() = default;
+    Room(const FrameMemory& memory, std::uint64_t bytes) : bytes_(bytes), sum_(memory.sum_) {
+      sum_->fetch_add(bytes_, std::memory_order_relaxed);
+    }
+    ~Room() {
+      if (sum_) sum_->fetch_sub(bytes_, std::memory_order_relaxed);
+    }
+    Room(Room&& other) noexcept : bytes_(other.bytes_), sum_(std::move(other.sum_)) {}
+    Room& operator=(Room&& other) noexcept {
+      std::swap(bytes_, other.bytes_);
+      std::swap(sum_, other.sum_);
+      return *this;
+    }
+
+   private:
+    std::uint64_t bytes_ = 0;
+    std::shared_ptr<std::atomic<std::uint64_t>> sum_;
+  };
+
+  /// The frame, shared and counted.
+  std::shared_ptr<const wire::EncodedFrame> hold(wire::EncodedFrame frame) const {
+    return std::make_shared<const Counted>(std::move(frame), sum_);
+  }
+
+ private:
+  using Sum = std::atomic<std::uint64_t>;
+  struct Counted : wire::EncodedFrame {
+    Counted(wire::EncodedFrame frame, std::shared_ptr<Sum> into)
+        : wire::EncodedFrame(std::move(frame)), size(bytes()), sum(std::move(into)) {
+      sum->fetch_add(size, std::memory_order_relaxed);
+    }
+    ~Counted() { sum->fetch_sub(size, std::memory_order_relaxed); }
+    Counted(const Counted&) = delete;
+    Counted& operator=(const Counted&) = delete;
+    std::uint64_t size;
+    std::shared_ptr<Sum> sum;
+  };
+
+  std::uint64_t limit_;
+  std::shared_ptr<Sum> sum_ = std::make_shared<Sum>(0);
+};
+
+}  // namespace ecorche::server

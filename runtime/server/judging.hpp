@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The quality of poses, measured beside the stream.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include "runtime/quality/pose_quality.hpp"
+#include "runtime/server/asio.hpp"
+#include "runtime/server/pose_job.hpp"
+
+namespace ecorche::server {
+
+class Session;
+
+/// Sessions take turns: one pose is judged at a time, and after it nothing for `pause` times as long, so that
+/// judging costs less than a tenth of a processor however many watch. On the I/O thread.
+class Judging {
+ public:
+  static constexpr int pause = 10;
+
+  explicit Judging(net::io_context& io) : timer_(io) {}
+
+  /// The session has a pose that was not judged; its turn comes.
+  void ask(const std::shared_ptr<Session>& session);
+  /// The turn took so long.
+  void done(Clock::duration cost);
+  /// No more turns.
+  void stop();
+
+ private:
+  void next();
+
+  net::steady_timer timer_;
+  std::deque<std::weak_ptr<Session>> waiting_;
+  bool busy_ = false;     ///< a turn is taken
+  bool resting_ = false;  ///< the timer runs
+  bool stopped_ = false;
+};
+
+/// What one turn judges: the pose, for every subscription of tissues.
+struct JudgeJob {
+  struct Row {
+    std::uint32_t subscription = 0;
+    std::vector<std::uint32_t> tissues;
+    std::shared_ptr<const v1::PoseQuality> quality;  ///< the result; null where it could not be measured
+  };
+  std::shared_ptr<const ServedModel> model;
+  PoseRequest request;
+  runtime::QualityThresholds thresholds;
+  std::vector<Row> rows;
+};
+
+/// Poses and measures, on the calling thread alone: the other cores are for frames. Throws nothing.
+void run(JudgeJob& job);
+
+/// `pose`: the sequence number that was judged.
+v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,
+                         std::uint64_t pose);
+
+}  // namespace ecorche::server

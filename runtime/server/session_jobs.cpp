@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a session has posed, one job after another, and judged.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/server/judging.hpp"
+#include "runtime/server/mesh_stream.hpp"
+#include "runtime/server/session.hpp"
+
+namespace ecorche::server {
+namespace {
+
+// So long after the last probe, poses are still made ready for the next.
+constexpr auto kProbing = std::chrono::seconds(1);
+// Between keyframes that laggards ask for: one must not make everybody's frames three times as large.
+constexpr std::chrono::milliseconds kKeyframePause{100};
+// Without another pose for so long, the body stands still: it is shown in full detail, and what comes next is
+// judged at once.
+constexpr std::chrono::milliseconds kStill{150};
+
+double rate_of(const Want& want) {
+  return std::visit([](const auto& w) { return w.max_rate; }, want);
+}
+
+bool same(const Pose& a, const Pose& b) {
+  const auto equal = [](const auto& x, const auto& y) { return x.coeffs() == y.coeffs(); };
+  return a.root_translation == b.root_translation && a.translation == b.translation &&
+         std::equal(a.rotation.begin(), a.rotation.end(), b.rotation.begin(), b.rotation.end(), equal);
+}
+
+// About the bytes of a frame that holds everything.
+std::uint64_t bytes_of(const Model& model, const Want& want) {
+  if (const auto* volume = std::get_if<VolumeWant>(&want))
+    return model.volumes[volume->volume].image.bytes.size();
+  const MeshWant& mesh = std::get<MeshWant>(want);
+  std::uint64_t vertices = 0;
+  for (const std::uint32_t t : mesh.tissues)
+    vertices += static_cast<std::uint64_t>(model.tissues[t].V.rows());
+  return vertices * (mesh.encoding == v1::ENCODING_F32 ? 3 * sizeof(float) : 3 * sizeof(std::uint16_t));
+}
+
+}  // namespace
+
+// What a job has to tell, posted from the worker. The outcome waits for the first mesh: the I/O thread wakes
+// once for both, and they leave in one write.
+class Session::Teller {
+ public:
+  Teller(std::shared_ptr<Session> session, std::shared_ptr<const Skipped> skipped, const PoseJob& job,
+         bool refresh)
+      : session_(std::move(session)), skipped_(std::move(skipped)), refresh_(refresh) {
+    shown_->number = job.number;
+    shown_->request = job.request;
+    waits_ = std::any_of(job.subscriptions.begin(), job.subscriptions.end(),
+                         [](const Subscription& s) { return !s.streams.empty() && s.levels != 0; });
+  }
+
+  void outcome(PoseOutcome outcome) {
+    outcome_ = std::make_shared<const PoseOutcome>(std::move(outcome));
+    if (!waits_ || !outcome_->status.ok()) tell_outcome();
+  }
+  void probe(const std::shared_ptr<ProbeFrame>& frame) {
+    tell_outcome();
+    net::post(session_->io_, [self = session_, frame] { self->probe_ready(frame); });
+  }
+  void frame(PosedFrame frame) {
+    net::post(session_->io_, [self = session_, told = std::exchange(outcome_, nullptr), skipped = skipped_,
+                              shown = shown_, refresh = refresh_, frame = std::move(frame)] {
+      if (told) self->finish_pose(*told, *skipped, *shown, refresh);
+      self->publish(frame);
+    });
+  }
+  void tell_outcome() {
+    if (!outcome_) return;
+    net::post(session_->io_,
+              [self = session_, told = std::exchange(outcome_, nullptr), skipped = skipped_, shown = shown_,
+               refresh = refresh_] { self->finish_pose(*told, *skipped, *shown, refresh); });
+  }
+
+ private:
+  std::shared_ptr<Session> session_;
+  std::shared_ptr<const Skipped> skipped_;
+  bool refresh_;
+  bool waits_ = false;
+  std::shared_ptr<PoseJob> shown_ = std::make_shared<PoseJob>();  // its number and request
+  std::shared_ptr<const PoseOutcome> outcome_;
+};
+
+void Session::start_job() {
+  // With no room for more frames, who has none yet waits (catch_up).
+  const bool fresh = !fresh_.empty() && !memory_.full();
+  if (busy_ || (!slot_ && !fresh && probes_.empty())) return;
+  const auto now = Clock::now();
+  if (now < next_start_) {
+    if (std::exchange(pacing_, true)) return;
+    pace_.expires_at(next_start_);
+    pace_.async_wait([weak = weak_from_this()](const boost::system::error_code&) {
+      const auto self = weak.lock();
+      if (!self) return;
+      self->pacing_ = false;
+      self->start_job();
+    });
+    return;
+  }
+  next_start_ = now + duration(1 / limits_.poses_per_second);
+  const bool refresh = !slot_;
+  auto job = std::make_shared<PoseJob>();
+  take_up(*job);
+  busy_ = true;
+  try {
+    submit(std::move(job), refresh);
+  } catch (...) {  // out of memory: this pose is lost, the next one is not
+    busy_ = false;
+    throw;
+  }
+}
+
+void Session::catch_up() {
+  if (!fresh_.empty()) start_job();
+}
+
+void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
+  auto skipped = std::make_shared<const Skipped>(refresh ? Skipped{} : std::exchange(skipped_, {}));
+  std::shared_ptr<Session> self = shared_from_this();
+  const auto teller = std::make_shared<Teller>(self, std::move(skipped), *job, refresh);
+  job->on_outcome = [teller](PoseOutcome outcome) { teller->outcome(std::move(outcome)); };
+  job->on_probe = [teller, frame = job->probe] { teller->probe(frame); };
+  job->on_frame = [teller](PosedFrame frame) { teller->frame(std::move(frame)); };
+  // The guard keeps the I/O thread waiting for the job's end. All that the job holds goes back with it, so
+  // that no worker ever destroys a session.
+  workers_.submit(
+      [self = std::move(self), job = std::move(job), teller, guard = net::make_work_guard(io_)]() mutable {
+        const Status status = run(*job);
+        teller->tell_outcome();  // where no frame could be made
+        net::io_context& io = self->io_;
+        net::post(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
+                       guard = std::move(guard), status] {
+          if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
+          self->busy_ = false;
+          // Asked for, and not made: the pose could not be.
+          if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
+          self->start_job();
+        });
+      });
+}
+
+// The waiting pose for everyone, or the present one for those who have not seen it.
+void Session::take_up(PoseJob& job) {
+  const bool refresh = !slot_;
+  job.model = model_;
+  job.number = ++frames_;
+  job.volume_voxels = limits_.volume_voxels;
+  job.thresholds = thresholds_;
+  job.digests = recording_ != nullptr;
+  job.memory = &memory_;
+  const bool probing = !probes_.empty() || (probed_ && Clock::now() - *probed_ < kProbing);
+  if (probing) job.probe = spare_probe();
+  if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
+  const auto now = Clock::now();
+  job.judge = now - taken_ > kStill;
+  if (!refresh) taken_ = now;
+  if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
+  const bool still = refresh || now - moved_ > kStill;
+  std::set<std::uint32_t> later;
+  for (Row& row : rows_) {
+    const bool fresh = fresh_.contains(row.subscription.id);
+    if (!fresh && (refresh || held_back(row, now))) continue;
+    if (fresh && refresh && memory_.full()) {  // this job is for a probe
+      later.insert(row.subscription.id);
+      continue;
+    }
+    ask_levels(row, still, now);
+    if (const double rate = rate_of(row.subscription.want); rate > 0)
+      row.next_due = std::max(row.next_due + duration(1 / rate), now);
+    const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
+    job.subscriptions.push_back(row.subscription);
+    if (asked == 0) continue;
+    if (refresh || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) {
+      row.subscription.keyframes &= ~asked;
+      row.last_keyframe = now;
+    } else {
+      job.subscriptions.back().keyframes = 0;
+      later.insert(row.subscription.id);
+    }
+  }
+  std::uint64_t bytes = 0;
+  for (const Subscription& subscription : job.subscriptions)
+    bytes += bytes_of(model_->model(), subscription.want);
+  job.room = FrameMemory::Room(memory_, bytes);
+  fresh_ = std::move(later);
+  keep_time();
+  if (refresh) {
+    job.request = present_;
+    job.request.arrived = Clock::now();
+  } else {
+    job.request = *std::exchange(slot_, std::nullopt);
+  }
+}
+
+// Too early for the row's rate; it is served when it is due.
+bool Session::held_back(Row& row, Clock::time_point now) const {
+  if (rate_of(row.subscription.want) == 0 || now >= row.next_due) return false;
+  row.refresh_at = row.next_due;
+  return true;
+}
+
+// What each member's way takes; whoever got less detail gets all once the body stands still.
+void Session::ask_levels(Row& row, bool still, Clock::time_point now) const {
+  row.refresh_at.reset();
+  Subscription& subscription = row.subscription;
+  if (subscription.streams.empty()) return;
+  const std::uint32_t finest = subscription.streams.front()->level(),
+                      coarsest = subscription.streams.back()->level();
+  subscription.levels = 0;
+  for (Member* member : row.members)
+    subscription.levels |= 1U << (member->ask_level(subscription.id, finest, coarsest, still) - finest);
+  if (subscription.levels > 1) row.refresh_at = now + kStill;
+}
+
+void Session::keep_time() {
+  std::optional<Clock::time_point> next;
+  for (const Row& row : rows_) {
+    if (row.refresh_at) next = std::min(next.value_or(Clock::time_point::max()), *row.refresh_at);
+  }
+  if (next == clock_at_) return;
+  clock_at_ = next;
+  if (!next) {
+    clock_.cancel();
+    return;
+  }
+  clock_.expires_at(*next);
+  clock_.async_wait([weak = weak_from_this()](const boost::system::error_code& ec) {
+    const auto self = weak.lock();
+    if (!self || ec) return;
+    self->clock_at_.reset();
+    for (Row& row : self->rows_) {
+      if (!row.refresh_at || *row.refresh_at > Clock::now()) continue;
+      row.refresh_at.reset();
+      self->fresh_.insert(row.subscription.id);
+    }
+    self->keep_time();
+    self->start_job();
+  });
+}
+
+void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,
+                          bool refresh) {
+  if (refresh) return;
+  metrics_.took(Metrics::Stage::waited, 1e-6 * static_cast<double>(outcome.timings.waited()));
+  metrics_.took(Metrics::Stage::posed, 1e-6 * static_cast<double>(outcome.timings.posed()));
+  metrics_.skipped(skipped.count);
+  if (outcome.status.ok()) present_ = job.request;
+  if (outcome.status.ok() && recording_) {
+    recording_->add(job.request);
+    recorded_job_ = job.number;
+  }
+  if (controller_) controller_->pose_done(outcome, skipped);
+}
+
+void Session::publish(const PosedFrame& frame) {
+  metrics_.took(Metrics::Stage::encoded, 1e-6 * static_cast<double>(frame.encoded));
+  const auto row = std::find_if(rows_.begin(), rows_.end(),
+                                [&](const Row& r) { return r.subscription.id == frame.subscription; });
+  if (row == rows_.end()) return;
+  if (recording_ && frame.number == recorded_job_ && frame.keyframe == 0)
+    recording_->add(frame, row->request);
+  if (frame.judged && by_present_thresholds(*frame.judged)) row->subscription.quality = frame.judged;
+  const bool mesh = !row->subscription.streams.empty();
+  if (mesh && (!row->subscription.quality || row->subscription.quality->pose_sequence() != present_.sequence))
+    judging_.ask(shared_from_this());
+  bool all = true;
+  for (Member* member : row->members) all = member->deliver(frame) && all;
+  if (all) return;
+  // With the next pose, or, where none comes, of the present one.
+  const auto& streams = row->subscription.streams;
+  row->subscription.keyframes |= streams.empty() ? 1U : 1U << (frame.level - streams.front()->level());
+  fresh_.insert(row->subscription.id);
+}
+
+bool Session::by_present_thresholds(const v1::PoseQuality& quality) const {
+  return quality.max_inverted_share() == thresholds_.max_inverted_share &&
+         quality.max_volume_change() == thresholds_.max_volume_change &&
+         quality.max_bone_rigidity() == thresholds_.max_bone_rigidity_mm;
+}
+
+bool Session::judge() {
+  awaits_judgement_ = false;
+  auto job = std::make_shared<JudgeJob>();
+  job->model = model_;
+  job->request = present_;
+  job->thresholds = thresholds_;
+  for (const Row& row : rows_) {
+    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
+    if (mesh && !mesh->quality) job->rows.push_back({row.subscription.id, mesh->tissues, nullptr});
+  }
+  if (job->rows.empty()) return false;
+  const auto start = Clock::now();
+  workers_.submit([self = shared_from_this(), job, start, guard = net::make_work_guard(io_)]() mutable {
+    run(*job);
+    net::io_context& io = self->io_;
+    net::post(io, [self = std::move(self), job = std::move(job), cost = Clock::now() - start,
+                   guard = std::move(guard)] {
+      self->judging_.done(cost);
+      self->judged(*job);
+    });
+  });
+  return true;
+}
+
+void Session::judged(const JudgeJob& job) {
+  for (const JudgeJob::Row& done : job.rows) {
+    const auto row = std::find_if(rows_.begin(), rows_.end(),
+                                  [&](const Row& r) { return r.subscription.id == done.subscription; });
+    if (row != rows_.end() && done.quality && by_present_thresholds(*done.quality))
+      row->subscription.quality = done.quality;
+  }
+}
+
+}  // namespace ecorche::server

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Quality in every reply, of the pose itself or of one before it.
+#include <set>
+
+#include "runtime/quality/quality_meter.hpp"
+#include "runtime/skin/body_poser.hpp"
+#include "tests/unit/server/test_server.hpp"
+
+namespace ecorche::server {
+namespace {
+
+double angle_of(std::uint64_t sequence) {
+  return 0.002 * static_cast<double>(sequence % 400);
+}
+
+// What the frame tells is what offline measuring says of the pose that it names.
+void expect_measured(const TestServer& server, const TestClient& client, const v1::MeshFrame& frame,
+                     const runtime::QualityThresholds& thresholds = {}) {
+  ASSERT_TRUE(frame.has_quality()) << frame.pose_sequence();
+  const v1::PoseQuality& told = frame.quality();
+  ASSERT_LE(told.pose_sequence(), frame.pose_sequence());
+  const auto model = std::make_shared<const Model>(server.model());
+  const runtime::BodyPoser poser(model);
+  runtime::PosedBody body = poser.make_frame();
+  ASSERT_TRUE(
+      poser
+          .run(client.bent(angle_of(told.pose_sequence())), runtime::Skinning::cor, poser.all_tissues(), body)
+          .ok());
+  std::vector<std::uint32_t> tissues;
+  for (const v1::TissueChange& change : told.tissues()) tissues.push_back(change.tissue());
+  const runtime::PoseQuality expected = runtime::QualityMeter(model).measure(body, tissues, thresholds);
+  EXPECT_EQ(told.inverted_tets(), expected.inverted_tets) << told.pose_sequence();
+  EXPECT_EQ(told.min_det_f(), expected.min_det_f);
+  EXPECT_EQ(told.volume_change(), expected.volume_change);
+  EXPECT_EQ(told.max_volume_change(), thresholds.max_volume_change);
+  EXPECT_EQ(told.verdict(), expected.pass ? v1::PoseQuality::VERDICT_PASS : v1::PoseQuality::VERDICT_WARN);
+  for (std::size_t t = 0; t < tissues.size(); ++t)
+    EXPECT_EQ(told.tissues(static_cast<int>(t)).share(), expected.tissues[t].share)
+        << expected.tissues[t].name;
+}
+
+TEST(Quality, IsThePosesOwnWhereNoneCameShortlyBefore) {
+  const TestServer server;
+  TestClient client(server);
+  client.subscribe_mesh({"skin"});
+  const wire::Frame first = client.next_mesh(0);
+  EXPECT_EQ(first.envelope.mesh_frame().quality().tissues_size(), 1);
+  expect_measured(server, client, first.envelope.mesh_frame());
+  for (const std::uint64_t sequence : {100, 300}) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    client.send(sequence, client.bent(angle_of(sequence)));
+    const wire::Frame frame = client.next_mesh(sequence);
+    EXPECT_EQ(frame.envelope.mesh_frame().quality().pose_sequence(), sequence);
+    EXPECT_GT(frame.envelope.mesh_frame().timings().posed(), 0U);
+    expect_measured(server, client, frame.envelope.mesh_frame());
+  }
+}
+
+TEST(Quality, FollowsAStreamBesideIt) {
+  const TestServer server;
+  TestClient client(server, "shared"), observer(server, "shared");
+  client.subscribe_mesh();
+  observer.subscribe_mesh({"skin"});
+  std::uint64_t newest = 0;
+  std::set<std::uint64_t> judged;
+  for (std::uint64_t sequence = 1; sequence <= 2000 && judged.size() < 4; ++sequence) {
+    client.send(sequence, client.bent(angle_of(sequence)));
+    for (TestClient* who : {&client, &observer}) {
+      const wire::Frame frame = who->next_mesh(sequence);
+      const v1::PoseQuality& told = frame.envelope.mesh_frame().quality();
+      EXPECT_EQ(told.tissues_size(), who == &observer ? 1 : client.opened().tissues_size());
+      if (who == &observer) continue;
+      EXPECT_GE(told.pose_sequence(), newest);
+      newest = told.pose_sequence();
+      if (judged.insert(newest).second) expect_measured(server, client, frame.envelope.mesh_frame());
+    }
+  }
+  EXPECT_EQ(judged.size(), 4U);
+}
+
+TEST(Quality, IsJudgedByThresholdsFromTheNextFrameOn) {
+  const TestServer server;
+  TestClient client(server);
+  client.subscribe_mesh();
+  client.next_mesh(0);
+  v1::Envelope request;
+  request.mutable_set_thresholds()->set_max_volume_change(1e-9);
+  client.client().call(request);
+  client.send(200, client.bent(angle_of(200)));
+  const wire::Frame frame = client.next_mesh(200);
+  expect_measured(server, client, frame.envelope.mesh_frame(), {.max_volume_change = 1e-9});
+  EXPECT_EQ(frame.envelope.mesh_frame().quality().verdict(), v1::PoseQuality::VERDICT_WARN);
+}
+
+}  // namespace
+}  // namespace ecorche::server
