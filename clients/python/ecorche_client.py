@@ -14,7 +14,7 @@
             for frame in client.frames(seconds=1 / 90):
                 print(frame.pose_sequence, frame.positions["skin"].shape)   # mm, LPS
 
-Needs numpy and the messages generated from proto/ecorche/v1 (the build leaves them in BUILD/proto/python):
+Needs numpy, the zstd library for compressed volumes, and the messages generated from proto/ecorche/v1 (the build leaves them in BUILD/proto/python):
 
     protoc -I proto --python_out=SOMEWHERE proto/ecorche/v1/*.proto       and SOMEWHERE on PYTHONPATH
 """
@@ -89,13 +89,23 @@ class Body:
         return pose
 
 
+class Part:
+    """What a level of detail or a region shows of a tissue: `vertices`, its rows of the whole one, and `triangles`, #F x 3 rows
+    of `vertices`."""
+
+    def __init__(self, message, payload):
+        self.vertices = array(message.vertices, payload)[:, 0]
+        self.triangles = array(message.triangles, payload)
+
+
 class MeshFrame:
-    """`positions`: #V x 3 float32, mm, LPS, by tissue name; `normals` likewise where they were asked for.
+    """`positions`: #V x 3 float32, mm, LPS, by tissue name; `normals` likewise where they were asked for. `parts`: a Part by
+    tissue name where it shows less than whole tissues, else None. `quality`: the newest v1.PoseQuality.
 
     `keyframes` is kept from frame to frame: the numbers of the last keyframe of every subscription and level."""
 
-    def __init__(self, message, payload, body, keyframes):
-        self.message = message
+    def __init__(self, message, payload, body, keyframes, parts=None):
+        self.message, self.parts, self.level, self.quality = message, parts, message.level, message.quality
         self.subscription, self.pose_sequence = message.subscription, message.pose_sequence
         self.positions, self.normals = {}, {}
         numbers = {}
@@ -120,16 +130,31 @@ class MeshFrame:
 
 
 class VolumeFrame:
-    """`voxels`: size_k x size_j x size_i (x components); where they lie is in `message.grid`."""
+    """`voxels`: size_k x size_j x size_i (x components); where they lie is in `message.grid`. Of slices, which have no grid, all
+    pixels in one row.
 
-    def __init__(self, message, payload):
+    `keyframes` is kept from frame to frame: the last keyframe of every subscription, for those of changed bricks."""
+
+    def __init__(self, message, payload, keyframes):
         self.message = message
         self.subscription, self.pose_sequence = message.subscription, message.pose_sequence
         if message.status.code:
             raise ServerError(message.status)
-        grid = message.grid
         rows = array(message.voxels, payload)
-        self.voxels = rows.reshape(grid.size_k, grid.size_j, grid.size_i, *rows.shape[1:]).squeeze(-1)
+        if message.HasField("content"):
+            size = message.content.count * message.content.components * SCALARS[message.content.type].itemsize
+            rows = array(message.content, ecorche_encodings.decompress(rows, size))
+        if message.HasField("bricks"):
+            number, key = keyframes.get(message.subscription, (None, None))
+            if number != message.keyframe:
+                raise ValueError(f"frame {message.frame} is against keyframe {message.keyframe}, which did not come")
+            self.voxels = ecorche_encodings.with_bricks(key, array(message.bricks, payload)[:, 0], rows)
+            return
+        if message.HasField("grid"):
+            rows = rows.reshape(message.grid.size_k, message.grid.size_j, message.grid.size_i, *rows.shape[1:])
+        self.voxels = rows.squeeze(-1) if rows.shape[-1] == 1 else rows
+        if message.keyframe == message.frame:
+            keyframes[message.subscription] = message.frame, self.voxels
 
 
 class Client:
@@ -147,7 +172,8 @@ class Client:
         self._sequence = 0
         self._waiting = []
         self._address, self._access = (host, port), {"tls_ca": tls_ca, "token": token}
-        self._keyframes = {}
+        self.parts = {}           # of subscriptions and levels that show less than whole tissues: Parts by tissue name
+        self._keyframes, self._volume_keyframes = {}, {}
         self._buffer = bytearray()
         self._socket = socket.create_connection((host, port), timeout)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -193,21 +219,42 @@ class Client:
         self.model_changed = False
         return self.body
 
-    def subscribe_mesh(self, tissues=(), quality=False, encoding="f32", normals=False):
-        """Frames of these tissues, of all by default; returns the subscription's number. `encoding`: of ENCODINGS."""
+    def subscribe_mesh(self, tissues=(), quality=False, encoding="f32", normals=False, level=0, adaptive=False, region=None,
+                       max_rate=0.0):
+        """Frames of these tissues, of all by default; returns the subscription's number. `encoding`: of ENCODINGS. `level`: of
+        detail, 0 (all) to 3; `adaptive`: the server may choose coarser ones. `region`: (low, high), mm, LPS, in the scan. See
+        `parts` for which vertices come."""
         request = envelope_pb2.Envelope()
-        request.subscribe.mesh.tissues.extend(tissues)
-        request.subscribe.mesh.encoding = ENCODINGS[encoding]
-        request.subscribe.mesh.normals = normals
-        request.subscribe.mesh.quality = quality
+        mesh = request.subscribe.mesh
+        mesh.tissues.extend(tissues)
+        mesh.encoding = ENCODINGS[encoding]
+        mesh.normals, mesh.quality, mesh.level, mesh.adaptive = normals, quality, level, adaptive
+        request.subscribe.max_rate = max_rate
+        self._set_box(mesh, region)
+        answer, payload = self._call(request)
+        subscribed = answer.subscribed
+        for one in subscribed.levels:
+            self.parts[subscribed.subscription, one.level] = {
+                self.body.tissues[part.tissue]: Part(part, payload) for part in one.parts}
+        return subscribed.subscription
+
+    def subscribe_volume(self, name, nearest=False, compressed=False, changed_bricks=False, region=None, max_rate=0.0):
+        """Frames of a posed volume; returns the subscription's number. `compressed`: by zstd on the way; `changed_bricks`: only
+        those between keyframes; either way frames hold all voxels. `region`: (low, high), mm, LPS, of the posed space."""
+        request = envelope_pb2.Envelope()
+        volume = request.subscribe.volume
+        volume.volume = name
+        volume.nearest, volume.compressed, volume.changed_bricks = nearest, compressed, changed_bricks
+        request.subscribe.max_rate = max_rate
+        self._set_box(volume, region)
         return self._call(request)[0].subscribed.subscription
 
-    def subscribe_volume(self, name, nearest=False):
-        """Frames of a posed volume; returns the subscription's number."""
-        request = envelope_pb2.Envelope()
-        request.subscribe.volume.volume = name
-        request.subscribe.volume.nearest = nearest
-        return self._call(request)[0].subscribed.subscription
+    @staticmethod
+    def _set_box(selection, region):
+        if region is None:
+            return
+        for corner, values in zip((selection.region.min, selection.region.max), region):
+            corner.x, corner.y, corner.z = map(float, values)
 
     def resume(self):
         """Goes on where `resume_token` says, once `server` has `resumed`: subscriptions are there, poses go on. The skeleton is
@@ -281,9 +328,10 @@ class Client:
             envelope, payload = message
             kind = envelope.WhichOneof("message")
             if kind == "mesh_frame":
-                yield MeshFrame(envelope.mesh_frame, payload, self.body, self._keyframes)
+                mesh = envelope.mesh_frame
+                yield MeshFrame(mesh, payload, self.body, self._keyframes, self.parts.get((mesh.subscription, mesh.level)))
             elif kind == "volume_frame":
-                yield VolumeFrame(envelope.volume_frame, payload)
+                yield VolumeFrame(envelope.volume_frame, payload, self._volume_keyframes)
             elif kind == "pose_ack":
                 self.acks.append(envelope.pose_ack)
 

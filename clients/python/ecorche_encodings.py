@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The encodings of mesh frames (docs/protocol.md, "Encodings"), as numpy arrays. Needs no server."""
+"""The encodings of frames (docs/protocol.md, "Encodings"), as numpy arrays. Needs no server."""
+import ctypes
+import ctypes.util
+
 import numpy as np
 
 BLOCK, LANES, HEADER, MOVED_ONLY = 512, 32, 34, 255
+BRICK = 32           # voxels along each edge
 LEFT_OUT = -128      # both numbers of the normal of a vertex of no triangle
 
 
@@ -69,3 +73,36 @@ def normals(packed):
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     out[(packed == LEFT_OUT).all(axis=1)] = 0
     return out.astype(np.float32)
+
+
+def decompress(packed, size):
+    """The `size` bytes of one zstd frame; ValueError for anything else. By the system's library: Python 3.11 has none."""
+    path = ctypes.util.find_library("zstd")
+    if path is None:
+        raise OSError("the zstd library is not installed (subscribe without `compressed`)")
+    library = ctypes.CDLL(path)
+    library.ZSTD_decompress.restype = ctypes.c_size_t
+    library.ZSTD_decompress.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t]
+    out = ctypes.create_string_buffer(max(size, 1))
+    packed = np.ascontiguousarray(packed).tobytes()
+    if library.ZSTD_decompress(out, size, packed, len(packed)) != size:
+        raise ValueError("the compressed voxels are not what they should be")
+    return out.raw[:size]
+
+
+def with_bricks(key, bricks, rows):
+    """`key` (size_k x size_j x size_i, perhaps x components) with these bricks of BRICK^3 voxels replaced by `rows`, i fastest."""
+    out = key.copy()
+    counts = [-(-size // BRICK) for size in key.shape[2::-1]]  # along i, j, k
+    at = 0
+    for brick in bricks.tolist():
+        i, j, k = brick % counts[0], brick // counts[0] % counts[1], brick // (counts[0] * counts[1])
+        place = out[k * BRICK:(k + 1) * BRICK, j * BRICK:(j + 1) * BRICK, i * BRICK:(i + 1) * BRICK]
+        voxels = place.shape[0] * place.shape[1] * place.shape[2]
+        if voxels == 0 or at + voxels > len(rows):
+            raise ValueError("the bricks are not those of the grid")
+        place[...] = rows[at:at + voxels].reshape(place.shape)
+        at += voxels
+    if at != len(rows):
+        raise ValueError("the bricks go on behind their last one")
+    return out
