@@ -5,13 +5,16 @@
 #include <cstring>
 #include <vector>
 
-#include "bench/server/walker.hpp"
+#include "bench/server/walking.hpp"
+#include "clients/cpp/client.hpp"
 #include "core/values/error.hpp"
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
 
 namespace ecorche::bench {
 namespace {
+
+using client::Clock;
 
 // The box of `edge` voxel centres each way around the middle of the grid.
 v1::Box middle_of(const ImageGrid& grid, int edge) {

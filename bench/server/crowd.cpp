@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/server/crowd.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/epoll.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include "bench/server/walking.hpp"
+#include "core/values/error.hpp"
+#include "proto/convert.hpp"
+
+namespace ecorche::bench {
+namespace {
+
+constexpr std::size_t kScratch = 256 << 10;  // stays in the second-level cache
+constexpr std::size_t kStride = 90;          // poses of the stride, one a 90th of a second
+constexpr std::size_t kRemembered = 1024;    // when poses were sent
+constexpr double kKernelRounding = 1e-3;     // mm; as app/stream_check
+
+Error refused(const std::string& what) {
+  return Error(ErrorKind::temporary, "bench", what, "see the server");
+}
+
+void append_varint(std::string& out, std::uint64_t value) {
+  for (; value >= 128; value >>= 7) out.push_back(static_cast<char>(value | 128));
+  out.push_back(static_cast<char>(value));
+}
+
+std::uint32_t load_u32(const char* p) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, p, 4);
+  return value;
+}
+
+double ms(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+// Poses of a session: when each was sent.
+class Times {
+ public:
+  void note(std::uint64_t sequence, Clock::time_point now) { at_[sequence % kRemembered] = {sequence, now}; }
+  const Clock::time_point* find(std::uint64_t sequence) const {
+    const auto& entry = at_[sequence % kRemembered];
+    return entry.first == sequence && sequence > 0 ? &entry.second : nullptr;
+  }
+
+ private:
+  std::array<std::pair<std::uint64_t, Clock::time_point>, kRemembered> at_{};
+};
+
+}  // namespace
+
+void Arrived::add(const Arrived& other) {
+  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  append(ms, other.ms);
+  append(posed_ms, other.posed_ms);
+  append(encoded_ms, other.encoded_ms);
+  append(judged_ago, other.judged_ago);
+  frames += other.frames;
+  bytes += other.bytes;
+  checked += other.checked;
+  wrong += other.wrong;
+  unjudged += other.unjudged;
+  if (!other.error.empty()) error = other.error;
+}
+
+struct Crowd::Member {
+  Asked asked;
+  int fd = -1;
+  std::size_t vertices = 0;
+  std::uint64_t sequence = 0;
+  Clock::time_point due{};
+  std::shared_ptr<Times> times;
+  std::string head;            // of the present frame, as far as it came
+  std::size_t head_bytes = 0;  // 0: not known yet
+  std::uint32_t envelope_bytes = 0;
+  std::size_t payload_left = 0, payload_bytes = 0;
+  bool keeps = false;  // the present frame's payload
+  wire::Payload payload;
+  v1::Envelope envelope;
+  wire::MeshDecoder decoder;
+  std::vector<wire::DecodedTissue> decoded;
+  std::uint64_t seen = 0;
+  Arrived arrived;
+
+  void say(const std::string& bytes) const {
+    // Small and rare beside what the socket's buffer holds.
+    if (send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(bytes.size()) &&
+        errno != EPIPE && errno != ECONNRESET)
+      throw refused("the server does not read");
+  }
+};
+
+Crowd::Crowd(const wire::Address& address, std::shared_ptr<const Model> model)
+    : address_(address), scratch_(kScratch), epoll_(epoll_create1(EPOLL_CLOEXEC)) {
+  prctl(PR_SET_TIMERSLACK, 1);  // ns: poses leave when they are due
+  client::Client client(address, "bench");
+  v1::Envelope open;
+  open.mutable_open_model()->set_without_triangles(true);
+  opened_ = client.call(open).envelope.model_opened();
+  if (const Status status = wire::from_proto(opened_.skeleton(), rig_); !status.ok())
+    throw refused(status.message);
+  for (std::size_t k = 0; k < kStride; ++k) {
+    v1::PoseUpdate update;
+    update.set_rig_digest(opened_.rig_digest());
+    wire::to_proto(walking(rig_, static_cast<double>(k) / kStride), update);
+    update.clear_root_translation();
+    strides_.push_back(update.SerializeAsString());
+  }
+  if (!model) return;
+  poser_ = std::make_unique<runtime::BodyPoser>(std::move(model));
+  body_ = poser_->make_frame();
+}
+
+Crowd::~Crowd() {
+  for (const auto& member : members_) {
+    if (member && member->fd >= 0) close(member->fd);
+  }
+  close(epoll_);
+}
+
+// Whole tissues, largest first, up to `vertices` together.
+std::size_t Crowd::tissues_of(std::size_t vertices, v1::MeshSelection& mesh) const {
+  std::vector<int> order(static_cast<std::size_t>(opened_.tissues_size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return opened_.tissues(a).vertices() > opened_.tissues(b).vertices();
+  });
+  std::size_t total = 0;
+  for (const int row : order) {
+    const auto size = static_cast<std::size_t>(opened_.tissues(row).vertices());
+    if (vertices != 0 && total + size > vertices + vertices / 50) continue;
+    total += size;
+    mesh.add_tissues(opened_.tissues(row).name());
+  }
+  return total;
+}
+
+std::size_t Crowd::join(const Asked& asked) {
+  auto member = std::make_unique<Member>();
+  member->asked = asked;
+  member->fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(address_.port);
+  inet_pton(AF_INET, address_.host.c_str(), &to.sin_addr);
+  if (member->fd < 0 || connect(member->fd, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0)
+    throw refused("cannot connect (raise the limit of open files)");
+  const int on = 1;
+  setsockopt(member->fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+
+  v1::Envelope hello, open, subscribe;
+  hello.set_request_id(1);
+  hello.mutable_client_hello()->set_protocol_min(1);
+  hello.mutable_client_hello()->set_protocol_max(1);
+  for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
+    hello.mutable_client_hello()->add_encodings(encoding);
+  open.set_request_id(2);
+  open.mutable_open_model()->set_session(asked.session);
+  open.mutable_open_model()->set_without_triangles(true);
+  subscribe.set_request_id(3);
+  v1::MeshSelection& mesh = *subscribe.mutable_subscribe()->mutable_mesh();
+  mesh.set_encoding(asked.encoding);
+  member->vertices = tissues_of(asked.vertices, mesh);
+  member->say(wire::encode(hello).head + wire::encode(open).head + wire::encode(subscribe).head);
+
+  // Who watches knows when the session's poses were sent.
+  for (const auto& other : members_) {
+    if (other && !asked.session.empty() && other->asked.session == asked.session)
+      member->times = other->times;
+  }
+  if (!member->times) member->times = std::make_shared<Times>();
+  // Clients do not all pose at the same moment.
+  const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / std::max(asked.rate, 1.0)));
+  member->due = Clock::now() + std::chrono::milliseconds(200) +
+                period * static_cast<int>(members_.size() * 31 % 97) / 97;
+  const auto free = std::find(members_.begin(), members_.end(), nullptr);
+  const auto number = static_cast<std::size_t>(free - members_.begin());
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = number;
+  epoll_ctl(epoll_, EPOLL_CTL_ADD, member->fd, &event);
+  if (free == members_.end()) members_.emplace_back();
+  members_[number] = std::move(member);
+  return number;
+}
+
+void Crowd::leave(std::size_t client) {
+  if (members_[client]->fd >= 0) close(members_[client]->fd);
+  members_[client] = nullptr;
+}
+
+std::size_t Crowd::vertices(std::size_t client) const {
+  return members_[client]->vertices;
+}
+
+void Crowd::begin() {
+  for (const auto& member : members_) {
+    if (member) member->arrived = {};
+  }
+  begun_ = Clock::now();
+}
+
+const Arrived& Crowd::arrived(std::size_t client) const {
+  return members_[client]->arrived;
+}
+
+double Crowd::seconds() const {
+  return std::chrono::duration<double>(Clock::now() - begun_).count();
+}
+
+void Crowd::fail(Member& member, const std::string& why) {
+  member.arrived.error = why;
+  close(member.fd);
+  member.fd = -1;
+}
+
+void Crowd::run(double seconds, const std::function<void()>& tick) {
+  const auto end =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  auto next_tick = Clock::now();
+  std::array<epoll_event, 64> events{};
+  while (true) {
+    auto now = Clock::now();
+    if (now >= end) return;
+    if (tick && now >= next_tick) {
+      next_tick += std::chrono::milliseconds(100);
+      tick();
+    }
+    auto until = tick ? std::min(end, next_tick) : end;
+    for (const auto& member : members_) {
+      if (!member || member->fd < 0 || member->asked.rate <= 0) continue;
+      if (member->due <= now) pose(*member);
+      until = std::min(until, member->due);
+    }
+    const auto wait = std::max(std::chrono::nanoseconds(0), std::chrono::nanoseconds(until - Clock::now()));
+    timespec timeout{};
+    timeout.tv_sec = wait.count() / 1'000'000'000;
+    timeout.tv_nsec = wait.count() % 1'000'000'000;
+    const int ready = epoll_pwait2(epoll_, events.data(), static_cast<int>(events.size()), &timeout, nullptr);
+    for (int i = 0; i < ready; ++i) take(*members_[events[static_cast<std::size_t>(i)].data.u64]);
+  }
+}
+
+// The whole pose: the turns as they were encoded once, then what differs, which Protobuf merges.
+void Crowd::pose(Member& member) {
+  const auto now = Clock::now();
+  const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / member.asked.rate));
+  member.due = std::max(member.due + period, now);
+  v1::PoseUpdate rest;
+  rest.set_sequence(++member.sequence);
+  const Pose walk = walking(rig_, static_cast<double>(member.sequence) / kStride);
+  rest.mutable_root_translation()->set_x(walk.root_translation[0]);
+  rest.mutable_root_translation()->set_y(walk.root_translation[1]);
+  rest.mutable_root_translation()->set_z(walk.root_translation[2]);
+  const std::string& turns = strides_[member.sequence % kStride];
+  const std::string more = rest.SerializeAsString();
+  std::string frame(8, '\0');
+  append_varint(frame, v1::Envelope::kPoseUpdateFieldNumber << 3 | 2);
+  append_varint(frame, turns.size() + more.size());
+  frame += turns;
+  frame += more;
+  const auto bytes = static_cast<std::uint32_t>(frame.size() - 8);
+  std::memcpy(frame.data(), &bytes, 4);
+  frame.resize(wire::aligned(frame.size()), '\0');
+  member.times->note(member.sequence, now);
+  member.say(frame);
+}
+
+void Crowd::take(Member& member) {
+  if (member.fd < 0) return;
+  const ssize_t got = recv(member.fd, scratch_.data(), scratch_.size(), MSG_DONTWAIT);
+  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return fail(member, "the server hung up");
+  std::size_t at = 0;
+  const std::size_t size = got > 0 ? static_cast<std::size_t>(got) : 0;
+  while (at < size && member.fd >= 0) {
+    if (member.payload_left > 0) {
+      const std::size_t n = std::min(member.payload_left, size - at);
+      if (member.keeps)
+        member.payload.insert(member.payload.end(), scratch_.begin() + static_cast<std::ptrdiff_t>(at),
+                              scratch_.begin() + static_cast<std::ptrdiff_t>(at + n));
+      at += n;
+      member.payload_left -= n;
+      if (member.payload_left == 0) arrive(member);
+      continue;
+    }
+    const std::size_t want = (member.head_bytes == 0 ? 8 : member.head_bytes) - member.head.size();
+    const std::size_t n = std::min(want, size - at);
+    member.head.append(reinterpret_cast<const char*>(scratch_.data()) + at, n);
+    at += n;
+    if (n < want) continue;
+    if (member.head_bytes == 0) {
+      member.envelope_bytes = load_u32(member.head.data());
+      member.payload_bytes = load_u32(member.head.data() + 4);
+      member.head_bytes = wire::aligned(8 + member.envelope_bytes);
+      continue;
+    }
+    finish_head(member);
+  }
+}
+
+void Crowd::finish_head(Member& member) {
+  if (!member.envelope.ParseFromArray(member.head.data() + 8, static_cast<int>(member.envelope_bytes)))
+    return fail(member, "no envelope");
+  member.head.clear();
+  member.head_bytes = 0;
+  member.payload_left = member.payload_bytes;
+  const v1::Envelope& envelope = member.envelope;
+  if (envelope.has_status() && envelope.status().code() != 0)
+    return fail(member, envelope.status().message());
+  if (envelope.has_goodbye()) return fail(member, envelope.goodbye().status().message());
+  if (envelope.has_pose_ack() && envelope.pose_ack().status().code() != 0)
+    return fail(member, envelope.pose_ack().status().message());
+  member.keeps = false;
+  if (envelope.has_mesh_frame()) {
+    const v1::MeshFrame& frame = envelope.mesh_frame();
+    const std::uint64_t each = member.asked.check_each;
+    ++member.seen;
+    member.keeps = poser_ && each > 0 && (member.seen % each == 0 || frame.keyframe() == frame.frame());
+    member.payload.clear();
+    member.payload.reserve(member.keeps ? member.payload_bytes : 0);
+  }
+  if (member.payload_left == 0) arrive(member);
+}
+
+void Crowd::arrive(Member& member) {
+  if (!member.envelope.has_mesh_frame()) return;
+  const v1::MeshFrame& frame = member.envelope.mesh_frame();
+  const auto now = Clock::now();
+  v1::Envelope answer;
+  answer.mutable_frame_ack()->set_subscription(frame.subscription());
+  answer.mutable_frame_ack()->set_frame(frame.frame());
+  member.say(wire::encode(answer).head);
+  ++member.arrived.frames;
+  member.arrived.bytes += member.payload_bytes;
+  member.arrived.posed_ms.push_back(static_cast<double>(frame.timings().posed()) / 1e3);
+  member.arrived.encoded_ms.push_back(static_cast<double>(frame.timings().encoded()) / 1e3);
+  if (!frame.has_quality()) ++member.arrived.unjudged;
+  member.arrived.judged_ago.push_back(
+      static_cast<double>(frame.pose_sequence() - frame.quality().pose_sequence()));
+  if (const Clock::time_point* sent = member.times->find(frame.pose_sequence()))
+    member.arrived.ms.push_back(ms(now - *sent));
+  if (member.keeps) check(member);
+}
+
+// Decodes, and compares with offline posing: every vertex within the encoding's bound, float32 to the bit.
+void Crowd::check(Member& member) {
+  const v1::MeshFrame& frame = member.envelope.mesh_frame();
+  ++member.arrived.checked;
+  if (!member.decoder.decode(frame, member.payload, member.decoded).ok()) {
+    ++member.arrived.wrong;
+    return;
+  }
+  std::vector<std::uint32_t> rows;
+  for (const wire::DecodedTissue& tissue : member.decoded) rows.push_back(tissue.tissue);
+  Pose pose = Pose::rest(rig_.skeleton.segments.size());
+  if (frame.pose_sequence() > 0) {
+    pose = walking(rig_, static_cast<double>(frame.pose_sequence() % kStride) / kStride);
+    pose.root_translation =
+        walking(rig_, static_cast<double>(frame.pose_sequence()) / kStride).root_translation;
+  }
+  bool right = poser_->run(pose, runtime::Skinning::cor, rows, body_, runtime::NodesOf::tissues).ok();
+  const double bound = frame.encoding() == v1::ENCODING_F32 ? 0 : frame.box().step() / 2 + kKernelRounding;
+  for (const wire::DecodedTissue& tissue : member.decoded) {
+    const std::vector<float>& expected = body_.tissues[tissue.tissue];
+    right = right && tissue.positions.size() == expected.size();
+    for (std::size_t i = 0; right && i < expected.size(); ++i) {
+      const double off =
+          std::abs(static_cast<double>(tissue.positions[i]) - static_cast<double>(expected[i]));
+      right = off <= bound + (bound > 0 ? 4e-7 * std::abs(static_cast<double>(expected[i])) : 0);
+    }
+  }
+  member.arrived.wrong += right ? 0 : 1;
+}
+
+}  // namespace ecorche::bench
