@@ -31,6 +31,11 @@ class BccLattice {
   std::int64_t cube_count() const { return std::int64_t{cubes_[0]} * cubes_[1] * cubes_[2]; }
   std::int64_t slot_count() const { return slots_per_cube * cube_count(); }
   std::int64_t node_count() const { return corner_count_ + cube_count(); }
+  /// The node at a place told in halves of a cube from the first corner: all three even, or all odd.
+  std::int64_t node_at(const Cell& halves) const {
+    const Cell c{halves[0] / 2, halves[1] / 2, halves[2] / 2};
+    return halves[0] % 2 == 0 ? corner(c) : corner_count_ + cube(c);
+  }
   std::int64_t first_centre() const { return corner_count_; }  ///< corners come before
   std::int64_t cube(const Cell& c) const {
     return (std::int64_t{c[2]} * cubes_[1] + c[1]) * cubes_[0] + c[0];

@@ -87,7 +87,7 @@ Clipper::Clipper(const Image& labels, const Context& context)
 
 Clipped Clipper::clip(double side) const {
   Clipped out;
-  out.lattice = lay(side);
+  out.lattice = lay(side, kMargin, false);
   sample(out);
   keep_thin_bones(out);
   fill_to_manifold(out.lattice, out.kept, voxel::soft, context_);
@@ -96,14 +96,15 @@ Clipped Clipper::clip(double side) const {
 
 /// Corners and centres are multiples of a power of two, exact in float32: right angles stay right, and the
 /// off-diagonals between centres stay 0.
-BccLattice Clipper::lay(double side) const {
+BccLattice Clipper::lay(double side, int margin, bool even) const {
   const double unit = std::exp2(std::floor(std::log2(side)) - 8);
   side = std::ceil(side / unit) * unit;
   BccLattice::Cell cubes;
   Eigen::Vector3d start;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double extent = grid_.size[axis] * grid_.spacing[axis];
-    cubes[axis] = static_cast<std::int32_t>(std::ceil(extent / side)) + 2 * kMargin;
+    cubes[axis] = static_cast<std::int32_t>(std::ceil(extent / side)) + 2 * margin;
+    if (even) cubes[axis] += cubes[axis] % 2;
     start[static_cast<Eigen::Index>(axis)] =
         std::floor((grid_.origin[axis] - 0.5 * grid_.spacing[axis] + 0.5 * (extent - cubes[axis] * side)) /
                    unit) *

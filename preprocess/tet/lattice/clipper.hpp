@@ -27,8 +27,9 @@ class Clipper {
   double body_volume() const { return body_; }  ///< mm^3
   double voxel() const { return grid_.spacing[0]; }
 
-  /// The lattice alone, over the whole image with three cubes to spare: cubes of `side` mm, or a little more.
-  BccLattice lay(double side) const;
+  /// The lattice alone, over the whole image with `margin` cubes to spare, an even number along each axis
+  /// where `even`: cubes of `side` mm, or a little more.
+  BccLattice lay(double side, int margin, bool even) const;
   /// The tets of that lattice. The boundary is a manifold, and no bone is lost. Throws
   /// Error{data} where two bones want the same only tet.
   Clipped clip(double side) const;

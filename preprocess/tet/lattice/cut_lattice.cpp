@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "preprocess/tet/lattice/grade.hpp"
 #include "preprocess/tet/lattice/manifold_labels.hpp"
 #include "preprocess/tet/lattice/split_tet.hpp"
 #include "preprocess/voxel/voxelize.hpp"
@@ -23,7 +24,7 @@ constexpr double kNearLong = 0.25, kNearShort = 0.41;  // shares of an edge, Lab
 using Eigen::Vector3d;
 using Quad = std::array<std::int32_t, 4>;
 
-class Cutter : public CutPoints {
+class Cutter : public CutPoints, private Quiet {
  public:
   Cutter(const BccLattice& lattice, NodeMaterials materials, const Context& context)
       : lattice_(lattice),
@@ -71,7 +72,13 @@ class Cutter : public CutPoints {
   }
 
  private:
-  std::uint16_t material(std::int64_t node) const { return material_[static_cast<std::size_t>(node)]; }
+  bool quiet(std::int64_t node) const override {
+    const auto n = static_cast<std::size_t>(node);
+    return number_[n] >= 0 && busy_[n] == 0;
+  }
+  std::uint16_t material(std::int64_t node) const override {
+    return material_[static_cast<std::size_t>(node)];
+  }
   bool is_long(const LatticeEdge& e) const { return lattice_.is_centre(e.a) == lattice_.is_centre(e.b); }
   double nearest_share(const LatticeEdge& e) const { return is_long(e) ? kNearLong : kNearShort; }
 
@@ -234,38 +241,65 @@ class Cutter : public CutPoints {
     return std::abs((at(q[1]) - at(q[0])).cross(at(q[2]) - at(q[0])).dot(at(q[3]) - at(q[0])));
   }
 
-  void split() {
-    std::vector<Piece> pieces;
-    each_slot([&](const std::array<std::int64_t, 4>& nodes) {
-      MixedTet tet{};
-      std::array<std::uint16_t, 4> own{};
-      bool same = true;
-      for (std::size_t c = 0; c < 4; ++c) {
-        tet.node[c] = number_[static_cast<std::size_t>(nodes[c])];
-        own[c] = material(nodes[c]);
-        tet.material[c] = is_warped(nodes[c]) ? MixedTet::at_interface : own[c];
-        same = same && tet.material[c] == own[0];
-      }
-      if (same) {
-        quads_.push_back(tet.node);
-        labels_.push_back(own[0]);
-        return;
-      }
-      std::array<std::uint16_t, 4> sorted = own;  // of nodes moved to the interface, most
-      std::sort(sorted.begin(), sorted.end());
-      std::vector<std::uint16_t> kinds(own.begin(), own.end());
-      std::sort(kinds.begin(), kinds.end());
-      if (std::unique(kinds.begin(), kinds.end()) - kinds.begin() > 2) ++out_.report.stars;
-      pieces.clear();
-      split_tet(tet, sorted[2], *this, pieces);
-      double misfit = -volume(tet.node);
-      for (const Piece& piece : pieces) misfit += volume(piece.node);
-      out_.report.largest_misfit = std::max(out_.report.largest_misfit, std::abs(misfit) / volume(tet.node));
-      for (const Piece& piece : pieces) {
-        quads_.push_back(piece.node);
-        labels_.push_back(piece.material);
-      }
+  bool is_near(const std::array<std::int64_t, 4>& nodes) const {
+    return std::all_of(nodes.begin(), nodes.end(),
+                       [&](std::int64_t node) { return number_[static_cast<std::size_t>(node)] >= 0; });
+  }
+  /// Of one material, and with no node moved.
+  bool is_plain(const std::array<std::int64_t, 4>& nodes) const {
+    return std::all_of(nodes.begin(), nodes.end(), [&](std::int64_t node) {
+      return material(node) == material(nodes[0]) && !is_warped(node);
     });
+  }
+
+  void fill(const std::array<std::int64_t, 4>& nodes) {
+    Quad quad{};
+    for (std::size_t c = 0; c < 4; ++c) quad[c] = number_[static_cast<std::size_t>(nodes[c])];
+    if ((at(quad[1]) - at(quad[0])).cross(at(quad[2]) - at(quad[0])).dot(at(quad[3]) - at(quad[0])) < 0)
+      std::swap(quad[2], quad[3]);
+    quads_.push_back(quad);
+    labels_.push_back(material(nodes[0]));
+  }
+
+  void split() {
+    busy_.assign(material_.size(), 0);
+    each_slot([&](const std::array<std::int64_t, 4>& nodes) {
+      if (is_plain(nodes) && material(nodes[0]) != voxel::outside) return;
+      for (const std::int64_t node : nodes) busy_[static_cast<std::size_t>(node)] = 1;
+    });
+    const Graded graded = grade(lattice_, *this);
+    for (const LatticeTet& nodes : graded.large) fill(nodes);
+    out_.report.large = static_cast<std::int64_t>(graded.large.size());
+    for (const LatticeTet& nodes : graded.fine) {
+      if (!is_near(nodes)) continue;
+      if (is_plain(nodes))
+        fill(nodes);
+      else
+        split_mixed(nodes);
+    }
+  }
+
+  void split_mixed(const std::array<std::int64_t, 4>& nodes) {
+    MixedTet tet{};
+    std::array<std::uint16_t, 4> own{};
+    for (std::size_t c = 0; c < 4; ++c) {
+      tet.node[c] = number_[static_cast<std::size_t>(nodes[c])];
+      own[c] = material(nodes[c]);
+      tet.material[c] = is_warped(nodes[c]) ? MixedTet::at_interface : own[c];
+    }
+    std::array<std::uint16_t, 4> sorted = own;
+    std::sort(sorted.begin(), sorted.end());
+    const std::uint16_t most = sorted[2];  // for a tet whose nodes all moved to the interface
+    if (std::unique(sorted.begin(), sorted.end()) - sorted.begin() > 2) ++out_.report.stars;
+    pieces_.clear();
+    split_tet(tet, most, *this, pieces_);
+    double misfit = -volume(tet.node);
+    for (const Piece& piece : pieces_) misfit += volume(piece.node);
+    out_.report.largest_misfit = std::max(out_.report.largest_misfit, std::abs(misfit) / volume(tet.node));
+    for (const Piece& piece : pieces_) {
+      quads_.push_back(piece.node);
+      labels_.push_back(piece.material);
+    }
   }
 
   void gather() {
@@ -307,6 +341,8 @@ class Cutter : public CutPoints {
   std::vector<std::int64_t> node_of_;  // of the first points
   std::vector<Vector3d> points_;
   std::map<std::array<std::int32_t, 3>, std::int32_t> faces_;
+  std::vector<std::uint8_t> busy_;  // per node: at a tet that is cut, moved, of several materials or outside
+  std::vector<Piece> pieces_;       // of the tet at hand
   std::vector<Quad> quads_;
   std::vector<std::uint16_t> labels_;
   CutMesh out_;

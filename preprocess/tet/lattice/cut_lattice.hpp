@@ -20,6 +20,7 @@ struct CutReport {
   std::int64_t warped = 0;      ///< nodes moved to a surface
   std::int64_t cut = 0;         ///< edges cut
   std::int64_t stars = 0;       ///< tets where three materials or more meet
+  std::int64_t large = 0;       ///< tets larger than the lattice's
   std::int64_t lent = 0;        ///< nodes given to parts thinner than the lattice
   double largest_misfit = 0;    ///< of a tet's volume, by which its pieces' differ: rounding
   std::int64_t relabelled = 0;  ///< tets relabelled, so that boundaries are manifolds
@@ -37,8 +38,10 @@ using PlaceCuts = std::function<void(std::vector<LatticeEdge>&, const std::vecto
 /// the interface where an edge of it is cut nearer than 0.25 (long edges) or 0.41 (short ones) of its length.
 /// A node stays where it is if its tets see three or more, if it was lent to a thin part, or if it has such
 /// cuts on opposite sides; its edges are then cut no nearer to it than that. Tets are split (split_tet.hpp)
-/// and relabelled (manifold_labels.hpp). Found over random materials and cuts: no dihedral angle below 8
-/// degrees, nor below 5 where three materials meet. Three cubes all round must be outside.
+/// and relabelled (manifold_labels.hpp); within a material they are twice
+/// as large (grade.hpp). Found over random materials and cuts: no dihedral angle below 8
+/// degrees, nor below 5 where three materials meet. Six cubes all round must be outside, their number along
+/// each axis even.
 CutMesh cut_lattice(const BccLattice& lattice, NodeMaterials materials, const PlaceCuts& place_cuts,
                     const Context& context);
 

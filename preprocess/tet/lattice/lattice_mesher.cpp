@@ -13,6 +13,9 @@ namespace {
 
 /// Finer than this many voxels a cube shows the image's steps and nothing else.
 constexpr double kFinestInVoxels = 1.5;
+constexpr int kCutMargin = 6;  // empty cubes around the body
+constexpr double kTetsPower =
+    2.4;  // tets of a graded lattice go by this power of 1 / side, between surface and volume
 
 class LatticeMesher : public Mesher {
  public:
@@ -31,20 +34,27 @@ class LatticeMesher : public Mesher {
     check_budget(tets);
     const double finest = kFinestInVoxels * clipper.voxel();
     double side = std::max(finest, std::cbrt(12 * 1.03 * clipper.body_volume() / tets));
-    for (;;) {
-      TetMesh mesh = cut_ ? cut(clipper.lay(side), input, context) : gather(clipper.clip(side));
-      const double excess =
-          std::max(static_cast<double>(mesh.T.rows()) / static_cast<double>(options.max_tets),
-                   static_cast<double>(mesh.V.rows()) / static_cast<double>(options.max_nodes));
-      if (excess <= 1) {
-        context.report(1);
-        return mesh;
-      }
-      side *= 1.01 * std::cbrt(excess);
+    const auto share_of = [&](const TetMesh& mesh) {
+      return std::max(static_cast<double>(mesh.T.rows()) / static_cast<double>(options.max_tets),
+                      static_cast<double>(mesh.V.rows()) / static_cast<double>(options.max_nodes));
+    };
+    const auto make = [&] {
+      return cut_ ? cut(clipper.lay(side, kCutMargin, true), input, context) : gather(clipper.clip(side));
+    };
+    TetMesh mesh = make();
+    if (const double used = share_of(mesh); cut_ && used < 0.8 && side > finest) {  // large tets made room
+      side = std::max(finest, side * std::pow(used / 0.9, 1 / kTetsPower));
+      mesh = make();
+    }
+    for (double excess = share_of(mesh); excess > 1; excess = share_of(mesh)) {
+      side *= 1.01 * std::pow(excess, 1 / (cut_ ? kTetsPower : 3));
       context.warn("the lattice has " + std::to_string(mesh.T.rows()) + " tets and " +
                    std::to_string(mesh.V.rows()) + " nodes, more than allowed: cubes of " +
                    std::to_string(side) + " mm are tried");
+      mesh = make();
     }
+    context.report(1);
+    return mesh;
   }
 
  private:
@@ -53,7 +63,8 @@ class LatticeMesher : public Mesher {
     const CutReport& r = made.report;
     context.info("lattice of " + std::to_string(lattice.side()) + " mm: " + std::to_string(r.warped) +
                  " nodes moved to surfaces, " + std::to_string(r.cut) + " edges cut, " +
-                 std::to_string(r.stars) + " tets where three materials meet, " + std::to_string(r.lent) +
+                 std::to_string(r.stars) + " tets where three materials meet, " + std::to_string(r.large) +
+                 " larger tets, " + std::to_string(r.lent) +
                  " nodes lent to parts thinner than the lattice, " + std::to_string(r.relabelled) +
                  " tets relabelled for the sake of manifold boundaries");
     return std::move(made.mesh);

@@ -8,6 +8,7 @@
 
 #include "preprocess/geometry/closest_point.hpp"
 #include "preprocess/tet/lattice/cut_lattice.hpp"
+#include "preprocess/tet/lattice/grade.hpp"
 #include "preprocess/tet/lattice/manifold_labels.hpp"
 #include "preprocess/tet/lattice/split_tet.hpp"
 #include "preprocess/voxel/voxelize.hpp"
@@ -45,7 +46,7 @@ NodeMaterials random_materials(const BccLattice& lattice, std::uint16_t kinds, u
   out.lent.assign(out.label.size(), 0);
   for (std::int64_t node = 0; node < lattice.node_count(); ++node) {
     const BccLattice::Cell c = lattice.node_cell(node);
-    const bool middle = std::min({c[0], c[1], c[2]}) >= 4 && std::max({c[0], c[1], c[2]}) <= 8;
+    const bool middle = std::min({c[0], c[1], c[2]}) >= 6 && std::max({c[0], c[1], c[2]}) <= 10;
     if (middle && random() % 10 >= most_outside)
       out.label[static_cast<std::size_t>(node)] = static_cast<std::uint16_t>(1 + random() % kinds);
   }
@@ -56,7 +57,7 @@ TEST(CutLattice, EveryTetOfRandomMaterialsIsSound) {
   std::mt19937 random(5);
   double two = 180, more = 180;
   for (int n = 0; n < 36; ++n) {
-    const BccLattice lattice({0, 0, 0}, 1, {13, 13, 13});
+    const BccLattice lattice({0, 0, 0}, 1, {18, 18, 18});
     const std::uint16_t kinds = n % 2 == 0 ? 1 : static_cast<std::uint16_t>(2 + n % 4);
     const CutMesh made =
         cut_lattice(lattice, random_materials(lattice, kinds, 5, random),
@@ -80,6 +81,63 @@ TEST(CutLattice, EveryTetOfRandomMaterialsIsSound) {
   EXPECT_GT(two, 8);
   EXPECT_GT(more, 5);
   std::printf("smallest dihedral angle: %.2f degrees, %.2f where three materials meet\n", two, more);
+}
+
+class RandomQuiet : public Quiet {
+ public:
+  RandomQuiet(const BccLattice& lattice, unsigned loud, std::mt19937& random)
+      : quiet_(static_cast<std::size_t>(lattice.node_count()), 1) {
+    for (std::uint8_t& node : quiet_) node = random() % 1000 >= loud ? 1 : 0;
+  }
+  bool quiet(std::int64_t node) const override { return quiet_[static_cast<std::size_t>(node)] != 0; }
+  std::uint16_t material(std::int64_t) const override { return 1; }
+
+ private:
+  std::vector<std::uint8_t> quiet_;
+};
+
+TEST(Grade, TetsOfTwoSizesFillSpaceOnceAndMeetAtFaces) {
+  const BccLattice lattice({1, 2, 3}, 0.5, {16, 12, 14});
+  std::mt19937 random(12);
+  const auto mesh_of = [&](const Graded& graded) {
+    TetMesh mesh;
+    mesh.V.resize(lattice.node_count(), 3);
+    for (std::int64_t v = 0; v < lattice.node_count(); ++v) mesh.V.row(v) = lattice.position(v).transpose();
+    mesh.T.resize(static_cast<Eigen::Index>(graded.fine.size() + graded.large.size()), 4);
+    Eigen::Index row = 0;
+    for (const auto& tets : {graded.fine, graded.large})
+      for (const LatticeTet& tet : tets) {
+        mesh.T.row(row) << static_cast<std::int32_t>(tet[0]), static_cast<std::int32_t>(tet[1]),
+            static_cast<std::int32_t>(tet[2]), static_cast<std::int32_t>(tet[3]);
+        if (measures::volume(mesh, row) < 0) std::swap(mesh.T(row, 2), mesh.T(row, 3));
+        ++row;
+      }
+    mesh.label.assign(static_cast<std::size_t>(row), 0);
+    return mesh;
+  };
+  const auto measure = [](const TetMesh& mesh) {
+    double volume = 0, area = 0;
+    for (Eigen::Index t = 0; t < mesh.T.rows(); ++t) volume += measures::volume(mesh, t);
+    for (const auto& [face, tets] : measures::faces(mesh)) {
+      EXPECT_LE(tets.size(), 2U);
+      const Eigen::Vector3d a = mesh.V.row(face[0]).transpose(), b = mesh.V.row(face[1]).transpose(),
+                            c = mesh.V.row(face[2]).transpose();
+      if (tets.size() == 1) area += (b - a).cross(c - a).norm();
+    }
+    return std::array{volume, area};
+  };
+  const auto fine = measure(mesh_of(grade(lattice, RandomQuiet(lattice, 1000, random))));
+  for (const unsigned loud : {0U, 2U, 10U, 40U}) {
+    const Graded graded = grade(lattice, RandomQuiet(lattice, loud, random));
+    EXPECT_FALSE(graded.large.empty());
+    const TetMesh mesh = mesh_of(graded);
+    const auto found = measure(mesh);
+    EXPECT_NEAR(found[0], fine[0], 1e-9 * fine[0]);
+    EXPECT_NEAR(found[1], fine[1], 1e-9 * fine[1]) << "a face inside has two tets";
+    const auto angles = measures::dihedral_angles(mesh);
+    EXPECT_GT(angles[0], 25.3);
+    EXPECT_LT(angles[1], 135.01);
+  }
 }
 
 /// One tet (nodes 0 to 3), its edges cut at given shares.
@@ -281,7 +339,7 @@ TEST(CutLattice, BonesThatNearlyTouchStayApartAndWhereTheyAre) {
 
 TEST(CutLattice, APlateAndARodThinnerThanAVoxelStayWhole) {
   const Body body(
-      shapes::body(shapes::box({-15, -11, -15}, {15, 11, 13}),
+      shapes::body(shapes::ellipsoid({0, 0, 0}, {17, 14, 19}, 6),
                    {shapes::box({-8, -7, 7.2}, {8, 7, 7.6}), shapes::box({-12, 5.1, -9.3}, {12, 5.4, -9.1})}),
       1);
   EXPECT_EQ(faults(body.mesh, 3), 0U);
@@ -307,7 +365,7 @@ TEST(CutLattice, ABoneOutOfTheSkinIsOfTheBody) {
       1.5);
   EXPECT_EQ(faults(body.mesh, 2), 0U);
   EXPECT_EQ(measures::parts(body.mesh), 1U);
-  EXPECT_LT(body.far(1), 0.6);
+  EXPECT_LT(body.far(1), 0.8) << "the crease where it leaves the skin is a lattice cell wide";
 }
 
 }  // namespace
