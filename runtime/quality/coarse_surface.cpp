@@ -11,7 +11,7 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr double kVolumeKept = 0.03;
+constexpr double kVolumeKept = 0.08;
 constexpr float kFiner = 0.7F;  // grids that are tried one after the other
 
 std::span<const float> floats(const PointsF& points) {
@@ -100,7 +100,9 @@ std::vector<CoarseSurface> coarsen(const PointsF& V, const Triangles& F, std::si
     if (coarse.triangle.size() > all / 2) break;
     if (std::abs(coarse.rest_6 - volume) > kVolumeKept * std::abs(volume)) continue;
     CoarseSurface coarser = cluster_vertices(V, F, edge * std::numbers::sqrt2_v<float>);
-    if (coarser.rest_6 != 0) return {std::move(coarse), std::move(coarser)};
+    // Else the first one was near by chance.
+    if (std::abs(coarser.rest_6 - volume) > 2 * kVolumeKept * std::abs(volume)) continue;
+    return {std::move(coarse), std::move(coarser)};
   }
   return {whole_surface(V, F)};
 }

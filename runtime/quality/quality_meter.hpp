@@ -18,7 +18,7 @@ class QualityMeter {
   /// Default subset: at a share of 1e-3 of inverted tets, the threshold, the standard error is 3.5e-4.
   static constexpr std::size_t default_tets = 8192;
   /// About so many of a tissue: see coarsen.
-  static constexpr std::size_t coarse_triangles = 512;
+  static constexpr std::size_t coarse_triangles = 256;
 
   /// Looks at `most_tets` tets, one drawn from each of as many equal runs of the model's order (Morton: so
   /// everywhere in the body), the same ones in every pose; at all where there are no more.
