@@ -11,7 +11,7 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr double kVolumeKept = 0.08;
+constexpr double kVolumeKept = 0.2;
 constexpr float kFiner = 0.7F;  // grids that are tried one after the other
 
 std::span<const float> floats(const PointsF& points) {

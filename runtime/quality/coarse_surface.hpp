@@ -23,10 +23,10 @@ struct CoarseSurface {
 /// closed stays closed, since a map of vertices keeps the boundary of a cycle. #F >= 1.
 CoarseSurface cluster_vertices(const PointsF& V, const Triangles& F, float edge);
 
-/// A coarse surface of about `triangles` triangles whose volume at rest keeps to 8 % of the whole surface's,
-/// then one on cells sqrt 2 times as wide. What clustering gets wrong grows as the cells' square, so the
-/// difference of what the two say of a pose is the error of the first (Richardson). A surface that has no
-/// more than twice as many triangles, or needs more than half of its own, is returned itself, alone.
+/// A coarse surface of about `triangles` triangles whose volume at rest keeps to a fifth of the whole
+/// surface's, then one on cells sqrt 2 times as wide. What clustering gets wrong grows as the cells' square,
+/// so the difference of what the two say of a pose is the error of the first (Richardson). A surface that has
+/// no more than twice as many triangles, or needs more than half of its own, is returned itself, alone.
 std::vector<CoarseSurface> coarsen(const PointsF& V, const Triangles& F, std::size_t triangles);
 
 /// Six times the signed volume with the whole surface's vertices at `vertices`, 3 * #V, about its first one.

@@ -103,7 +103,7 @@ TEST(CoarseSurface, VolumesStayNearThoseOfTheWhole) {
     double shares[2];
     for (std::size_t i = 0; i < 2; ++i) {
       EXPECT_LT(coarse[i].triangle.size(), static_cast<std::size_t>(tissue.F.rows()) / 4);
-      EXPECT_NEAR(coarse[i].rest_6, whole, (i == 0 ? 0.08 : 0.2) * whole);
+      EXPECT_NEAR(coarse[i].rest_6, whole, (i == 0 ? 0.2 : 0.4) * whole);
       EXPECT_NEAR(volume_6(coarse[i], floats(stretched)) / coarse[i].rest_6, 1.331, 1e-4);
       shares[i] = volume_6(coarse[i], floats(moved)) / coarse[i].rest_6 - 1;
     }
@@ -118,7 +118,7 @@ TEST(CoarseSurface, ASheetThatCellsWouldFlattenIsMeasuredWhole) {
   const Tissue tissue = ellipsoid(0.05F);
   const std::vector<CoarseSurface> coarse = coarsen(tissue.V, tissue.F, 64);
   for (const CoarseSurface& surface : coarse) {
-    EXPECT_NEAR(surface.rest_6, 6 * enclosed_volume(floats(tissue.V), tissue.F), 0.08 * surface.rest_6);
+    EXPECT_NEAR(surface.rest_6, 6 * enclosed_volume(floats(tissue.V), tissue.F), 0.2 * surface.rest_6);
   }
   EXPECT_EQ(coarse.size(), 1U);
 }
