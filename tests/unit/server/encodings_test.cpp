@@ -84,7 +84,7 @@ TEST(Encodings, DeltasFollowOneKeyframeAndTheNextComesInTime) {
   EXPECT_GT(first, 0U);
   std::uint64_t keyframes = 0, deltas = 0;
   for (std::uint64_t sequence = 1; sequence <= MeshStream::keyframe_interval + 5; ++sequence) {
-    client.send(sequence, client.bent(1e-3 * static_cast<double>(sequence % 100)));  // deltas must not grow
+    client.send(sequence, client.bent(0.05 + 1e-4 * static_cast<double>(sequence)));  // deltas must not grow
     const wire::Frame frame = client.next_mesh(sequence);
     const v1::MeshFrame& mesh = frame.envelope.mesh_frame();
     mesh.keyframe() == mesh.frame() ? ++keyframes : ++deltas;
