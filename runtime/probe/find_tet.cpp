@@ -4,7 +4,6 @@
 #define HWY_TARGET_INCLUDE "runtime/probe/find_tet.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as Highway asks.
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -200,9 +199,10 @@ HWY_INLINE std::int32_t search_run(const FindTets& where, std::size_t r, const f
   return TetPlace::none;
 }
 
-// `visit(r)` for every run whose box holds the point, ascending, until it says true.
-template <class Visit>
-HWY_INLINE void for_runs_around(const FindTets& where, const float* point, Visit visit) {
+std::int32_t find_tet(const FindTets& where, const float* point, double* barycentric) {
+  const float padded[4] = {point[0], point[1], point[2], 0};
+  const V4 at = load4(padded);
+  TetPlace inverted;
   // Depth first with the lowest child first: tets come in ascending order.
   std::uint32_t waiting[TetRuns::most_levels];
   std::size_t node[TetRuns::most_levels];
@@ -212,7 +212,7 @@ HWY_INLINE void for_runs_around(const FindTets& where, const float* point, Visit
   waiting[top] = children_around(where.tree[where.runs.first(top)], point);
   for (;;) {
     if (waiting[level] == 0) {
-      if (level == top) return;
+      if (level == top) break;
       ++level;
       continue;
     }
@@ -222,87 +222,13 @@ HWY_INLINE void for_runs_around(const FindTets& where, const float* point, Visit
       --level;
       node[level] = child;
       waiting[level] = children_around(where.tree[where.runs.first(level) + child], point);
-    } else if (visit(child)) {
-      return;
+      continue;
     }
+    const std::int32_t found = search_run(where, child, point, at, barycentric, inverted);
+    if (found != TetPlace::none) return found;
   }
-}
-
-// The runs around a point, looked up before it is its turn.
-struct Candidates {
-  static constexpr std::size_t most = 64;
-  std::size_t count = 0;  // beyond `most`: there are more than `run` holds
-  std::array<std::uint32_t, most> run;
-};
-
-HWY_INLINE void collect(const FindTets& where, const float* point, Candidates& out) {
-  out.count = 0;
-  for_runs_around(where, point, [&](std::size_t r) HWY_ATTR {
-    if (out.count < Candidates::most) out.run[out.count] = static_cast<std::uint32_t>(r);
-    return ++out.count > Candidates::most;
-  });
-}
-
-// A point is found in one of its first few runs more often than not.
-constexpr std::size_t kAskedFor = 8;
-
-HWY_INLINE const std::int32_t* corners_of(const FindTets& where, std::size_t r) {
-  return where.tets.data() + 4 * kWidth * r;
-}
-
-HWY_INLINE void ask_for_tets(const FindTets& where, const Candidates& around) {
-  for (std::size_t i = 0; i < std::min(around.count, kAskedFor); ++i) {
-    for (std::size_t line = 0; line < 4; ++line) hwy::Prefetch(corners_of(where, around.run[i]) + 16 * line);
-  }
-}
-
-HWY_INLINE void ask_for_nodes(const FindTets& where, const Candidates& around) {
-  const auto tets = static_cast<std::size_t>(where.tets.rows());
-  for (std::size_t i = 0; i < std::min(around.count, kAskedFor); ++i) {
-    const std::int32_t* corners = corners_of(where, around.run[i]);
-    const std::size_t count = 4 * std::min(kWidth, tets - kWidth * around.run[i]);
-    for (std::size_t c = 0; c < count; ++c)
-      hwy::Prefetch(node_at(where.nodes, static_cast<std::size_t>(corners[c])));
-  }
-}
-
-HWY_INLINE void find_among(const FindTets& where, const float* point, const Candidates& around,
-                           TetPlace& out) {
-  const float padded[4] = {point[0], point[1], point[2], 0};
-  const V4 at = load4(padded);
-  TetPlace inverted;
-  out.tet = TetPlace::none;
-  const auto search = [&](std::size_t r) HWY_ATTR {
-    out.tet = search_run(where, r, point, at, out.barycentric.data(), inverted);
-    return out.tet != TetPlace::none;
-  };
-  if (around.count <= Candidates::most) {
-    for (std::size_t i = 0; i < around.count; ++i) {
-      if (search(around.run[i])) return;
-    }
-  } else {
-    for_runs_around(where, point, search);
-    if (out.tet != TetPlace::none) return;
-  }
-  out = inverted;
-}
-
-// Most of the time would be waiting for memory: while one point is searched, the nodes of a later one and the
-// tets of one still later are on their way.
-void find_tets(const FindTets& where, const float* points, const std::uint32_t* order, std::size_t count,
-               TetPlace* out) {
-  constexpr std::size_t ahead = 4, ring = 16;
-  std::array<Candidates, ring> around;
-  for (std::size_t step = 0; step < count + 2 * ahead; ++step) {
-    if (step < count) {
-      collect(where, points + 3 * std::size_t{order[step]}, around[step % ring]);
-      ask_for_tets(where, around[step % ring]);
-    }
-    if (step >= ahead && step - ahead < count) ask_for_nodes(where, around[(step - ahead) % ring]);
-    if (step < 2 * ahead) continue;
-    const std::size_t i = step - 2 * ahead;
-    find_among(where, points + 3 * std::size_t{order[i]}, around[i % ring], out[i]);
-  }
+  std::copy_n(inverted.barycentric.begin(), 4, barycentric);
+  return inverted.tet;
 }
 
 }  // namespace ecorche::runtime::HWY_NAMESPACE
@@ -312,16 +238,15 @@ HWY_AFTER_NAMESPACE();
 namespace ecorche::runtime::kernels {
 
 HWY_EXPORT(fit_boxes);
-HWY_EXPORT(find_tets);
+HWY_EXPORT(find_tet);
 
 void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end) {
   HWY_DYNAMIC_DISPATCH(fit_boxes)(runs, nodes, tree, begin, end);
 }
 
-void find_tets(const FindTets& where, const float* points, const std::uint32_t* order, std::size_t count,
-               TetPlace* out) {
-  HWY_DYNAMIC_DISPATCH(find_tets)(where, points, order, count, out);
+std::int32_t find_tet(const FindTets& where, const float* point, double* barycentric) {
+  return HWY_DYNAMIC_DISPATCH(find_tet)(where, point, barycentric);
 }
 
 }  // namespace ecorche::runtime::kernels

@@ -142,16 +142,10 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
   const Tets& tets = model_->tets;
   const std::vector<std::uint32_t> order = near_order(points, way.here.tree.back());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kPointsPerTask), [&](const auto& range) {
-    std::array<TetPlace, kPointsPerTask> places;
     for (std::size_t turn = range.begin(); turn < range.end(); ++turn) {
-      const std::size_t in_task = (turn - range.begin()) % kPointsPerTask;
-      if (in_task == 0) {
-        find_tets(way.here, points,
-                  std::span(order).subspan(turn, std::min(kPointsPerTask, range.end() - turn)), places);
-      }
       const std::size_t i = order[turn];
       const std::array<float, 3> point{points[3 * i], points[3 * i + 1], points[3 * i + 2]};
-      const TetPlace& place = places[in_task];
+      const TetPlace place = find_tet(way.here, point);
       const bool held = place.tet != TetPlace::none;
       out.tet[i] = place.tet;
       out.label[i] = held ? model_->tet_label[static_cast<std::size_t>(place.tet)] : TetMesh::soft;

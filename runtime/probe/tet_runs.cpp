@@ -74,14 +74,8 @@ void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree) {
 
 TetPlace find_tet(const FindTets& where, const std::array<float, 3>& point) {
   TetPlace place;
-  const std::uint32_t first = 0;
-  kernels::find_tets(where, point.data(), &first, 1, &place);
+  place.tet = kernels::find_tet(where, point.data(), place.barycentric.data());
   return place;
-}
-
-void find_tets(const FindTets& where, std::span<const float> points, std::span<const std::uint32_t> order,
-               std::span<TetPlace> out) {
-  kernels::find_tets(where, points.data(), order.data(), order.size(), out.data());
 }
 
 }  // namespace ecorche::runtime

@@ -77,17 +77,12 @@ struct TetPlace {
 /// lowest index, as volumes are posed (resample.hpp). Faces belong to both their tets, with a margin of 1e-10
 /// of the tet's longest edge that absorbs rounding; a tet flatter than 1e-12 of its edge cubed holds nothing.
 TetPlace find_tet(const FindTets& where, const std::array<float, 3>& point);
-/// The same for the points that `order` names, rows of `points` (3 * #P); their places in that order. Several
-/// at once wait for memory together: near ones should follow each other.
-void find_tets(const FindTets& where, std::span<const float> points, std::span<const std::uint32_t> order,
-               std::span<TetPlace> out);
 
 namespace kernels {
 /// The boxes of the runs under nodes [begin, end) of level 1 of the tree, and of those nodes.
 void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end);
-void find_tets(const FindTets& where, const float* points, const std::uint32_t* order, std::size_t count,
-               TetPlace* out);
+std::int32_t find_tet(const FindTets& where, const float* point, double* barycentric);
 }  // namespace kernels
 
 }  // namespace ecorche::runtime
