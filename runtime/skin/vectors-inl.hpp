@@ -69,7 +69,7 @@ HWY_INLINE V3 matrix_times(const float* m, const V3& v) {
 /// than a root and a division, where there is a good guess.
 HWY_INLINE V inverse_root(V x) {
   const V within = hn::Min(hn::Max(x, all(1e-30F)), all(1e30F));
-#if HWY_TARGET == HWY_SCALAR
+#if HWY_TARGET == HWY_SCALAR || HWY_TARGET == HWY_EMU128
   return hn::Div(all(1), hn::Sqrt(within));
 #else
   V guess = hn::ApproximateReciprocalSqrt(within);
