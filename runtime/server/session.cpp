@@ -168,7 +168,12 @@ void Session::pose(PoseRequest request) {
 
 void Session::take(PoseRequest request) {
   last_sequence_ = request.sequence;
-  if (slot_) skipped_.add(slot_->sequence);
+  const auto now = Clock::now();
+  if (slot_)
+    skipped_.add(slot_->sequence);
+  else
+    rested_ = rests(now);
+  stirred_ = now;
   slot_ = std::move(request);
   start_job();
 }

@@ -148,6 +148,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void take_up(PoseJob& job);
   bool held_back(Row& row, Clock::time_point now) const;
   void ask_levels(Row& row, bool still, Clock::time_point now) const;
+  bool rests(Clock::time_point now) const;
   void keep_time();
   void finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job, bool refresh);
   void publish(const PosedFrame& frame);
@@ -185,7 +186,8 @@ class Session : public std::enable_shared_from_this<Session> {
   bool pacing_ = false;
   net::steady_timer clock_;  ///< for the rows' refresh_at
   std::optional<Clock::time_point> clock_at_;
-  Clock::time_point taken_{};               ///< when the last pose was taken up
+  Clock::time_point stirred_{};             ///< when the last pose came, or the last job ended
+  bool rested_ = false;                     ///< the waiting pose came after a rest
   Clock::time_point moved_ = Clock::now();  ///< when the pose last became another one
 
   std::uint64_t last_sequence_ = 0;

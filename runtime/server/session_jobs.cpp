@@ -138,11 +138,18 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
                        guard = std::move(guard), status] {
           if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
           self->busy_ = false;
+          self->stirred_ = Clock::now();
           // Asked for, and not made: the pose could not be.
           if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
           self->start_job();
         });
       });
+}
+
+// Nothing comes, and nothing is being made: where frames lag behind poses, however far, each would lag
+// farther for being judged on its way.
+bool Session::rests(Clock::time_point now) const {
+  return !busy_ && now - stirred_ > kStill;
 }
 
 // The waiting pose for everyone, or the present one for those who have not seen it.
@@ -158,8 +165,7 @@ void Session::take_up(PoseJob& job) {
   if (probing) job.probe = spare_probe();
   if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
   const auto now = Clock::now();
-  job.judge = now - taken_ > kStill;
-  if (!refresh) taken_ = now;
+  job.judge = refresh ? rests(now) : rested_;
   if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
   const bool still = refresh || now - moved_ > kStill;
   std::set<std::uint32_t> later;
