@@ -123,7 +123,7 @@ void Session::catch_up() {
 void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
   auto skipped = std::make_shared<const Skipped>(refresh ? Skipped{} : std::exchange(skipped_, {}));
   std::shared_ptr<Session> self = shared_from_this();
-  const auto teller = std::make_shared<Teller>(self, std::move(skipped), *job, refresh);
+  auto teller = std::make_shared<Teller>(self, std::move(skipped), *job, refresh);
   job->on_outcome = [teller](PoseOutcome outcome) { teller->outcome(std::move(outcome)); };
   job->on_probe = [teller, frame = job->probe] { teller->probe(frame); };
   job->on_frame = [teller](PosedFrame frame) { teller->frame(std::move(frame)); };
