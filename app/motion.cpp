@@ -7,6 +7,7 @@
 
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
+#include "core/kinematics/motion_compare.hpp"
 #include "core/kinematics/motion_report.hpp"
 #include "core/model_file/model_file.hpp"
 
@@ -92,7 +93,8 @@ std::string to_text(const json& result) {
                 limit["worst_deg"].get<double>(), limit["worst_frame"].get<unsigned long long>());
   if (!result.contains("against")) return out;
   out += "\nagainst " + text(result["against"]) + ", both aligned at " + text(result["aligned_at"]) +
-         ": joint, mean, worst, mean without a constant turn (deg)\n";
+         line(", the first begins at %.4f s of it", result["begins_later_s"].get<double>());
+  out += "joint, mean, worst, mean without a constant turn (deg)\n";
   for (const json& joint : result["differences"])
     out += line("  %-28s %8.2f %8.2f %8.2f", text(joint["joint"]).c_str(), joint["mean_deg"].get<double>(),
                 joint["worst_deg"].get<double>(), joint["varying_deg"].get<double>());
@@ -121,30 +123,30 @@ int run(const Program& program, const Settings& settings) {
   result.update(report_json(kinematics::report(rig, motion->frames(), motion->frame_seconds(), pose)));
   bool apart = false;
   if (!settings.against.empty()) {
-    // Two makers' zero poses are two poses: both takes are held against the scan at one moment.
+    // Two makers' zero poses are two poses: both are held against the scan over the whole take.
     MotionChoice choice = settings.motion;
     std::unique_ptr<MotionSource> again;
     MotionSource* one = motion.get();
-    const auto moment = choice.rest == "auto" ? motion->nearest_seconds() : std::nullopt;
-    if (moment) {
-      choice.rest = line("%.4fs", *moment);
-      choice.rest.pop_back();
+    if (choice.rest == "auto" && motion->retarget() != nullptr && motion->retarget()->limbs.limbs > 0) {
+      choice.rest = "clip";
       again = open_motion(program, choice, rig);
       one = again.get();
     }
     choice.file = settings.against;
     const auto other = open_motion(program, choice, rig);
-    const auto differences = kinematics::compare(
-        rig, one->frames(), one->frame_seconds(),
-        [&](std::size_t frame) {
-          stop(program);
-          return one->at(frame);
-        },
-        other->frames(), other->frame_seconds(), [&](std::size_t frame) { return other->at(frame); });
+    const auto track = [&](MotionSource& source) {
+      return kinematics::PoseTrack{source.frames(), source.frame_seconds(),
+                                   [&program, &source](std::size_t frame) {
+                                     stop(program);
+                                     return source.at(frame);
+                                   }};
+    };
+    const auto apart_by = kinematics::compare(rig, track(*one), track(*other));
+    result["begins_later_s"] = apart_by.shift_seconds;
     result["aligned_at"] = one->reference;
     result["against"] = settings.against.string();
     result["differences"] = json::array();
-    for (const kinematics::JointDifference& d : differences) {
+    for (const kinematics::JointDifference& d : apart_by.joints) {
       apart = apart || (settings.most_deg > 0 && d.mean * kDegrees > settings.most_deg);
       result["differences"].push_back({{"joint", d.joint},
                                        {"mean_deg", d.mean * kDegrees},
@@ -168,7 +170,7 @@ void declare_motion(CLI::App& app, Program& program, Run& chosen) {
   add_motion_options(*command, s->motion, false);
   command->add_option(
       "--against", s->against,
-      "another file of the same motion: differences joint by joint, both from their beginning");
+      "another file of the same motion: differences joint by joint; it begins within two frames of this one");
   command
       ->add_option("--most-deg", s->most_deg,
                    "exit with 1 when a joint differs by more than this in the mean")

@@ -55,7 +55,8 @@ std::optional<double> decimal(std::string_view text) {
 }
 
 [[noreturn]] void no_reference(const std::string& word) {
-  usage("--motion-rest", "'" + word + "' is no reference", "use auto, zero, FRAME, SECONDSs or CLIP:FRAME");
+  usage("--motion-rest", "'" + word + "' is no reference",
+        "use auto, zero, clip, FRAME, SECONDSs or CLIP:FRAME");
 }
 
 kinematics::ClipFrame frame_of(io::ClipFile& clip, std::size_t frame) {
@@ -89,10 +90,6 @@ class ClipSource final : public MotionSource {
     return kinematics::pose_at(rig_, clip_->head(), match_, frame_of(*clip_, frame));
   }
   const kinematics::Retarget* retarget() const override { return &match_; }
-  std::optional<double> nearest_seconds() override {
-    if (match_.limbs.limbs == 0) return std::nullopt;
-    return static_cast<double>(nearest()) * clip_->head().frame_seconds;
-  }
 
  private:
   // Frames over the whole clip, few enough to be read before it plays.
@@ -109,12 +106,10 @@ class ClipSource final : public MotionSource {
     if (choice.rest == "zero") return;
     if (choice.rest == "auto") {
       // Then the zero pose is no pose of a body.
-      if (match_.limbs.worst > kNoBody) {
-        const std::size_t best = nearest();
-        align_at(*clip_, best, "frame " + std::to_string(best));
-      }
+      if (match_.limbs.worst > kNoBody) align_over_clip();
       return;
     }
+    if (choice.rest == "clip") return align_over_clip();
     if (choice.rest.ends_with('s')) {
       const auto seconds = decimal(std::string_view(choice.rest).substr(0, choice.rest.size() - 1));
       if (!seconds) no_reference(choice.rest);
@@ -145,7 +140,7 @@ class ClipSource final : public MotionSource {
       }
       named.rotation.push_back((above.conjugate() * global[j]).normalized());
     }
-    kinematics::align_at(rig_, head, named, match_);
+    kinematics::align_at(rig_, head, std::span(&named, 1), match_);
     reference = choice.rest;
   }
 
@@ -153,22 +148,27 @@ class ClipSource final : public MotionSource {
     if (frame >= clip.frames())
       usage("--motion-rest", "the clip has frames 0 to " + std::to_string(clip.frames() - 1),
             "name one of them");
-    kinematics::align_at(rig_, clip_->head(), frame_of(clip, frame), match_);
+    const kinematics::ClipFrame read = frame_of(clip, frame);
+    kinematics::align_at(rig_, clip_->head(), std::span(&read, 1), match_);
     reference = name;
   }
 
-  // The frame that is nearest to the scan's pose.
-  std::size_t nearest() {
+  // At frames over the whole clip, that which is nearest to the scan's pose first.
+  void align_over_clip() {
+    std::vector<kinematics::ClipFrame> frames;
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t f = 0; f < clip_->frames(); f += tried_step()) {
-      const auto places = kinematics::places(clip_->head(), frame_of(*clip_, f));
+      frames.push_back(frame_of(*clip_, f));
+      const auto places = kinematics::places(clip_->head(), frames.back());
       const auto limbs = kinematics::check_limbs(rig_, places, match_.clip_joint);
       if (limbs.rms >= least) continue;
       least = limbs.rms;
       best = f;
     }
-    return best;
+    std::swap(frames[0], frames[best / tried_step()]);
+    kinematics::align_at(rig_, clip_->head(), frames, match_);
+    reference = "the clip, most of all at frame " + std::to_string(best);
   }
 
   // Where the reference is not the scan's pose.
@@ -329,10 +329,11 @@ void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file)
   command.add_option("--motion-frame", choice.frame,
                      "axes of the clip: three letters, default LSA (y up, facing z)");
   command
-      .add_option("--motion-rest", choice.rest,
-                  "the clip's pose that is held against the scan: zero, FRAME, SECONDSs, CLIP:FRAME, or auto "
-                  "(the zero pose, "
-                  "or the frame nearest to the scan where that is no pose of a body)")
+      .add_option(
+          "--motion-rest", choice.rest,
+          "the clip's pose that is held against the scan: zero, clip (its frames in the mean, those near "
+          "the scan most of all), FRAME, SECONDSs, CLIP:FRAME, or auto (zero, or clip where that is no "
+          "pose of a body)")
       ->capture_default_str();
   command.add_option("--asf", choice.asf, "skeleton of an .amc; default: the one beside it");
   command.add_option("--map", choice.map,

@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +19,7 @@ namespace ecorche::app {
 struct MotionChoice {
   std::filesystem::path file, map, asf;
   std::string unit, frame;    ///< empty: the file's own, or its format's
-  std::string rest = "auto";  ///< zero, a frame's number, 1.5s, CLIP:FRAME, or auto
+  std::string rest = "auto";  ///< zero, clip, a frame's number, 1.5s, CLIP:FRAME, or auto
 };
 
 /// --motion (unless `with_file` is false) and what belongs to it.
@@ -39,9 +38,7 @@ class MotionSource {
   virtual Pose at(std::size_t frame) = 0;
   /// How its joints are matched, where it has joints.
   virtual const kinematics::Retarget* retarget() const { return nullptr; }
-  /// When its figure stands nearest to the scan, s from the beginning; nothing where it has no figure.
-  virtual std::optional<double> nearest_seconds() { return std::nullopt; }
-  /// Of which pose the alignment was made: `the zero pose`, `frame 12`.
+  /// Of which pose the alignment was made: `the zero pose`, `frame 12`, `the clip, ...`.
   std::string reference;
 };
 

@@ -6,7 +6,6 @@
 
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
-#include "core/kinematics/interpolate.hpp"
 #include "core/kinematics/joint_names.hpp"
 
 namespace ecorche::kinematics {
@@ -32,13 +31,6 @@ std::vector<std::size_t> feet(const Skeleton& skeleton) {
   }
   return out;
 }
-
-// The mean of turns that lie near each other: normalised sum, signs made alike.
-struct MeanTurn {
-  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-  void add(const Quaterniond& q) { sum += (sum.dot(q.coeffs()) < 0 ? -1 : 1) * q.coeffs(); }
-  Quaterniond mean() const { return sum.isZero() ? Quaterniond::Identity() : Quaterniond(sum.normalized()); }
-};
 
 }  // namespace
 
@@ -109,61 +101,6 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
   for (FootSliding& f : out.feet) {
     if (f.contact_share > 0) f.mean_mm_per_s /= f.contact_share;
     f.contact_share /= static_cast<double>(frames);
-  }
-  return out;
-}
-
-std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double frame_seconds,
-                                     const std::function<Pose(std::size_t)>& one, std::size_t other_frames,
-                                     double other_seconds, const std::function<Pose(std::size_t)>& other) {
-  const std::size_t joints = rig.skeleton.segments.size();
-  std::vector<JointDifference> out(joints);
-  std::vector<MeanTurn> means(joints);
-  std::size_t compared = 0;
-  const Quaterniond frame0(rig.skeleton.segments[0].joint.axes);
-  const auto in_room = [&](const Quaterniond& q) { return frame0 * q * frame0.conjugate(); };
-  Eigen::Vector2d heading = Eigen::Vector2d::Zero();  // cosine and sine of half the turn, summed
-  Quaterniond back = Quaterniond::Identity();
-  // Three passes: how the rooms are turned against each other, the mean turns, what is left of them.
-  for (const int pass : {0, 1, 2}) {
-    compared = 0;
-    for (std::size_t frame = 0; frame < frames; ++frame) {
-      const double at = static_cast<double>(frame) * frame_seconds / other_seconds;
-      const auto k = static_cast<std::size_t>(at);
-      if (k + 1 >= other_frames && at > static_cast<double>(k) + 1e-9) break;
-      if (k >= other_frames) break;
-      const Pose a = one(frame);
-      Pose b = between(other(k), other(std::min(k + 1, other_frames - 1)), at - static_cast<double>(k));
-      ++compared;
-      if (pass == 0) {
-        const Quaterniond apart = in_room(b.rotation[0]) * in_room(a.rotation[0]).conjugate();
-        const Eigen::Vector2d turn(apart.w(), apart.z());
-        heading += heading.dot(turn) < 0 ? -turn : turn;
-        continue;
-      }
-      b.rotation[0] = frame0.conjugate() * back * in_room(b.rotation[0]) * frame0;
-      for (std::size_t j = 0; j < joints; ++j) {
-        const Quaterniond &p = a.rotation[j], &q = b.rotation[j];
-        const Quaterniond apart = p.conjugate() * q;
-        if (pass == 1) {
-          means[j].add(apart);
-          out[j].mean += p.angularDistance(q);
-          out[j].worst = std::max(out[j].worst, p.angularDistance(q));
-        } else {
-          out[j].varying += apart.angularDistance(means[j].mean());
-        }
-      }
-    }
-    if (pass == 0 && heading.norm() > 0) {
-      heading.normalize();
-      back = Quaterniond(heading[0], 0, 0, -heading[1]);
-    }
-  }
-  for (std::size_t j = 0; j < joints; ++j) {
-    out[j].joint = rig.skeleton.segments[j].joint.name;
-    if (compared == 0) continue;
-    out[j].mean /= static_cast<double>(compared);
-    out[j].varying /= static_cast<double>(compared);
   }
   return out;
 }

@@ -41,17 +41,4 @@ struct MotionReport {
 MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
                     const std::function<Pose(std::size_t)>& pose);
 
-/// One joint in two motions.
-struct JointDifference {
-  std::string joint;
-  double mean = 0, worst = 0;  ///< radians between the rotations
-  double varying = 0;          ///< mean, when the constant turn between the two (their mean) is taken out
-};
-
-/// Joint by joint over the frames of the first motion. Both begin together; the second is interpolated. What
-/// turns the whole second motion about the vertical, in the mean, is another room and left out.
-std::vector<JointDifference> compare(const Rig& rig, std::size_t frames, double frame_seconds,
-                                     const std::function<Pose(std::size_t)>& one, std::size_t other_frames,
-                                     double other_seconds, const std::function<Pose(std::size_t)>& other);
-
 }  // namespace ecorche::kinematics

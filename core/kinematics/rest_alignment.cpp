@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/kinematics/mean_turn.hpp"
 #include "core/values/error.hpp"
 
 namespace ecorche::kinematics {
@@ -14,7 +15,9 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kLimb = 0.12;                          // of the skeleton's extent
+constexpr double kLimb = 0.12;                              // of the skeleton's extent
+constexpr double kAlike = 1e-3;                             // radians: no nearer than this counts more
+constexpr double kStretched = 45 * std::numbers::pi / 180;  // a limb so far from the scan tells no twist
 constexpr double kFacing = 5 * std::numbers::pi / 180;  // hips and shoulders differ so between any two bodies
 
 double extent(const Skeleton& skeleton) {
@@ -72,6 +75,34 @@ Quaterniond facing(const Skeleton& skeleton, const std::vector<int>& child, cons
   return Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitZ()));
 }
 
+// The turn of a limb whose parent has turned by `above`.
+Quaterniond aligned(const Rig& rig, const Limb& limb, const ClipPlaces& reference,
+                    const std::vector<int>& clip_joint, const std::vector<int>& child,
+                    const std::vector<LimbBend>& bends, std::size_t s, const Quaterniond& above) {
+  const Quaterniond turn =
+      (Quaterniond::FromTwoVectors(above * limb.scanned, limb.drawn) * above).normalized();
+  if (bends.empty()) return turn;
+  // Its own hinge and the one at its end: a shank has the knee alone, a thigh too; the knee tells both.
+  const std::size_t hinge = bends[s].known ? s : static_cast<std::size_t>(child[s]);
+  const LimbBend own = bends[hinge].known ? bend_of(rig, hinge, bends[hinge].angles) : LimbBend();
+  if (!own.known) return turn;
+  const auto joint = static_cast<std::size_t>(clip_joint[s]);
+  const LimbBend& clip = bends[hinge];
+  const Vector3d from = turn * (hinge == s ? own.below : own.above);
+  const Vector3d to = reference.turn[joint] * (hinge == s ? clip.below : clip.above);
+  return (about(limb.drawn.normalized(), from, to) * turn).normalized();
+}
+
+// What each reference counts: 1 for the one whose limbs point most as the scan's do.
+std::vector<double> nearness(const Rig& rig, std::span<const ClipPlaces> references,
+                             const std::vector<int>& clip_joint) {
+  std::vector<double> out;
+  for (const ClipPlaces& reference : references) out.push_back(check_limbs(rig, reference, clip_joint).rms);
+  const double least = std::max(*std::min_element(out.begin(), out.end()), kAlike);
+  for (double& rms : out) rms = least / std::max(rms, kAlike);
+  return out;
+}
+
 }  // namespace
 
 ClipPlaces places(const Clip& clip, const ClipFrame& frame) {
@@ -102,31 +133,64 @@ ClipPlaces zero_places(const Clip& clip) {
   return places(clip, zero);
 }
 
-std::vector<Quaterniond> align_rest(const Rig& rig, const ClipPlaces& reference,
-                                    const std::vector<int>& clip_joint, const std::vector<LimbBend>& bends) {
+RestAlignment align_rest(const Rig& rig, std::span<const ClipPlaces> references,
+                         const std::vector<int>& clip_joint, const std::vector<LimbBend>& bends) {
+  if (references.empty()) throw Error(ErrorKind::internal, "alignment", "no reference", "name one or more");
   const auto& segments = rig.skeleton.segments;
   const double shortest = kLimb * extent(rig.skeleton);
   const std::vector<int> child = only_child(rig.skeleton);
-  std::vector<Quaterniond> turn(segments.size(), Quaterniond::Identity());
+  const std::vector<double> weights = nearness(rig, references, clip_joint);
+  std::vector<std::vector<Quaterniond>> turn(references.size(), std::vector<Quaterniond>(segments.size()));
+  RestAlignment out;
   for (std::size_t s = 0; s < segments.size(); ++s) {
-    turn[s] = segments[s].parent < 0 ? facing(rig.skeleton, child, reference, clip_joint)
-                                     : turn[static_cast<std::size_t>(segments[s].parent)];
-    const Limb limb = limb_of(rig.skeleton, child, shortest, reference, clip_joint, s);
-    if (!limb.is) continue;
-    turn[s] = (Quaterniond::FromTwoVectors(turn[s] * limb.scanned, limb.drawn) * turn[s]).normalized();
-    if (bends.empty()) continue;
-    // Its own hinge and the one at its end: a shank has the knee alone, a thigh too; the knee tells both.
-    const auto end = static_cast<std::size_t>(child[s]);
-    const std::size_t hinge = bends[s].known ? s : end;
-    const LimbBend own = bends[hinge].known ? bend_of(rig, hinge, bends[hinge].angles) : LimbBend();
-    if (!own.known) continue;
-    const auto joint = static_cast<std::size_t>(clip_joint[s]);
-    const LimbBend& clip = bends[hinge];
-    const Vector3d from = turn[s] * (hinge == s ? own.below : own.above);
-    const Vector3d to = reference.turn[joint] * (hinge == s ? clip.below : clip.above);
-    turn[s] = (about(limb.drawn.normalized(), from, to) * turn[s]).normalized();
+    MeanTurn mean;
+    for (std::size_t r = 0; r < references.size(); ++r) {
+      const Quaterniond above = segments[s].parent < 0
+                                    ? facing(rig.skeleton, child, references[r], clip_joint)
+                                    : turn[r][static_cast<std::size_t>(segments[s].parent)];
+      const Limb limb = limb_of(rig.skeleton, child, shortest, references[r], clip_joint, s);
+      turn[r][s] = limb.is ? aligned(rig, limb, references[r], clip_joint, child, bends, s, above) : above;
+      if (clip_joint[s] < 0) continue;
+      const auto& joint = references[r].turn[static_cast<std::size_t>(clip_joint[s])];
+      mean.add(joint.conjugate() * turn[r][s], weights[r]);
+    }
+    out.alignment.push_back(mean.mean());
+    if (references.size() == 1 || clip_joint[s] < 0) continue;
+    for (std::size_t r = 0; r < references.size(); ++r) {
+      const auto& joint = references[r].turn[static_cast<std::size_t>(clip_joint[s])];
+      turn[r][s] = (joint * out.alignment[s]).normalized();
+    }
   }
-  return turn;
+  out.rest_turn = turn[0];
+  return out;
+}
+
+void hang_ends(const Rig& rig, const ClipPlaces& zero, const std::vector<int>& clip_joint,
+               const RestAlignment& over_clip, RestAlignment& at_zero) {
+  const auto& segments = rig.skeleton.segments;
+  const double shortest = kLimb * extent(rig.skeleton);
+  const std::vector<int> child = only_child(rig.skeleton);
+  const Quaterniond upright = facing(rig.skeleton, child, zero, clip_joint);
+  std::vector<bool> away(segments.size(), false), limb(segments.size(), false), moved(segments.size(), false);
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    const Limb here = limb_of(rig.skeleton, child, shortest, zero, clip_joint, s);
+    limb[s] = here.is;
+    if (here.is)
+      away[s] = Quaterniond::FromTwoVectors(upright * here.scanned, here.drawn)
+                    .angularDistance(Quaterniond::Identity()) > kStretched;
+    if (here.is || segments[s].parent < 0) continue;
+    const auto p = static_cast<std::size_t>(segments[s].parent);
+    moved[s] = moved[p] || (limb[p] && away[p] && clip_joint[s] >= 0 && clip_joint[p] >= 0);
+    if (!moved[s]) continue;
+    const Quaterniond before = at_zero.alignment[s];
+    if (clip_joint[s] < 0) {
+      at_zero.rest_turn[s] = at_zero.rest_turn[p];
+      continue;
+    }
+    at_zero.alignment[s] =
+        (over_clip.alignment[s] * over_clip.alignment[p].conjugate() * at_zero.alignment[p]).normalized();
+    at_zero.rest_turn[s] = (at_zero.rest_turn[s] * before.conjugate() * at_zero.alignment[s]).normalized();
+  }
 }
 
 LimbCheck check_limbs(const Rig& rig, const ClipPlaces& reference, const std::vector<int>& clip_joint) {

@@ -89,6 +89,11 @@ Eigen::Vector3d standing_home(const Clip& clip, std::size_t root, double long_bo
   return home;
 }
 
+void take(RestAlignment&& from, Retarget& retarget) {
+  retarget.alignment = std::move(from.alignment);
+  retarget.rest_turn = std::move(from.rest_turn);
+}
+
 double extent(const ClipPlaces& at) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : at.point) box.extend(point);
@@ -134,7 +139,7 @@ Retarget match(const Rig& rig, const Clip& clip, const NameMap& names) {
                 "say by --map FILE which joint moves which segment");
   }
   const ClipPlaces zero = zero_places(clip);
-  out.rest_turn = out.alignment = align_rest(rig, zero, out.clip_joint);
+  take(align_rest(rig, std::span(&zero, 1), out.clip_joint), out);
   out.limbs = check_limbs(rig, zero, out.clip_joint);
   out.home = standing_home(clip, root_joint(out), kLongBone * extent(zero));
   return out;
@@ -142,23 +147,26 @@ Retarget match(const Rig& rig, const Clip& clip, const NameMap& names) {
 
 void find_bends(const Rig& rig, const Clip& clip, std::span<const ClipFrame> frames, Retarget& retarget) {
   BendFinder finder(rig, retarget.clip_joint);
-  for (const ClipFrame& frame : frames) finder.add(places(clip, frame));
+  std::vector<ClipPlaces> at;
+  for (const ClipFrame& frame : frames) {
+    at.push_back(places(clip, frame));
+    finder.add(at.back());
+  }
   retarget.bends = finder.bends();
-  retarget.rest_turn = retarget.alignment =
-      align_rest(rig, zero_places(clip), retarget.clip_joint, retarget.bends);
+  const ClipPlaces zero = zero_places(clip);
+  RestAlignment aligned = align_rest(rig, std::span(&zero, 1), retarget.clip_joint, retarget.bends);
+  if (!at.empty())
+    hang_ends(rig, zero, retarget.clip_joint, align_rest(rig, at, retarget.clip_joint, retarget.bends),
+              aligned);
+  take(std::move(aligned), retarget);
 }
 
-void align_at(const Rig& rig, const Clip& clip, const ClipFrame& reference, Retarget& retarget) {
-  const ClipPlaces at = places(clip, reference);
-  retarget.rest_turn = align_rest(rig, at, retarget.clip_joint, retarget.bends);
-  retarget.limbs = check_limbs(rig, at, retarget.clip_joint);
-  retarget.home = at.point[root_joint(retarget)];
-  for (std::size_t s = 0; s < retarget.alignment.size(); ++s) {
-    const int joint = retarget.clip_joint[s];
-    if (joint < 0) continue;
-    retarget.alignment[s] =
-        (at.turn[static_cast<std::size_t>(joint)].conjugate() * retarget.rest_turn[s]).normalized();
-  }
+void align_at(const Rig& rig, const Clip& clip, std::span<const ClipFrame> references, Retarget& retarget) {
+  std::vector<ClipPlaces> at;
+  for (const ClipFrame& reference : references) at.push_back(places(clip, reference));
+  take(align_rest(rig, at, retarget.clip_joint, retarget.bends), retarget);
+  retarget.limbs = check_limbs(rig, at[0], retarget.clip_joint);
+  retarget.home = at[0].point[root_joint(retarget)];
 }
 
 Pose pose_at(const Rig& rig, const Clip& clip, const Retarget& retarget, const ClipFrame& frame) {

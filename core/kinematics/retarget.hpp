@@ -41,13 +41,14 @@ using NameMap = std::map<std::string, std::string>;
 Retarget match(const Rig& rig, const Clip& clip, const NameMap& names = {});
 
 /// Looks through frames of the clip (64 or so do, over its length) for the planes in which its limbs bend,
-/// and aligns at the zero pose with them; align_at uses them from then on.
+/// and how hands stand on the arms (hang_ends), and aligns at the zero pose with them; align_at uses the
+/// planes.
 void find_bends(const Rig& rig, const Clip& clip, std::span<const ClipFrame> frames, Retarget& retarget);
 
-/// `match` at a frame of a clip with the same joints in which the person stands as the patient was scanned
-/// but for its limbs' directions: for rigs whose zero pose is no pose of a body. `home` is where the root is
-/// there.
-void align_at(const Rig& rig, const Clip& clip, const ClipFrame& reference, Retarget& retarget);
+/// `match` at frames of a clip with the same joints in which the person stands as the patient was scanned
+/// but for its limbs' directions (align_rest): for rigs whose zero pose is no pose of a body. `home` and
+/// `limbs` are of the first. Throws Error{internal} for no frames.
+void align_at(const Rig& rig, const Clip& clip, std::span<const ClipFrame> references, Retarget& retarget);
 
 /// The pose of `rig` at a frame: global turns of the clip's joints become turns of the segments, so that clip
 /// joints without a segment are folded into their descendants; the root's translation is its way from home.

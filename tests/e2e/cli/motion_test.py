@@ -114,6 +114,17 @@ class Motion(unittest.TestCase):
         apart = run(*self.motion(WALK, "--against", CASE / "motion" / "bend.bvh", "--most-deg", "5"))
         self.assertEqual(apart.returncode, 1, apart.stderr)
         self.assertIn("mean without a constant turn", apart.stdout)
+        self.assertEqual(same["begins_later_s"], 0)
+        self.assertIn("the clip, most of all at frame", same["aligned_at"])
+        # The same take, its first two frames cut off.
+        lines = WALK.read_text().split("\n")
+        first = next(i for i, text in enumerate(lines) if text.startswith("Frame Time")) + 1
+        frames = next(i for i, text in enumerate(lines) if text.startswith("Frames:"))
+        lines[frames] = "Frames: 70"
+        cut = self.put("cut.bvh", "\n".join(lines[:first] + lines[first + 2:]))
+        later = self.ok(*self.motion(WALK, "--motion-rest", "zero", "--against", cut, "--most-deg", "1"))
+        self.assertAlmostEqual(later["begins_later_s"], -2 * later["frame_seconds"], delta=1e-9)
+        self.assertLess(max(joint["mean_deg"] for joint in later["differences"]), 0.01)
 
     def test_every_format_poses(self):
         self.put("subject.asf", ASF)
@@ -235,7 +246,7 @@ class Motion(unittest.TestCase):
             clips.played(file, MODEL)
             self.assertTrue(clips.agree(file, file, MODEL))
         self.assertRegex(said.getvalue(), r"walk.bvh +72 +\d+/\d+ .* mm/s")
-        self.assertRegex(said.getvalue(), r"aligned at [\d.]+s: \w+ 0\.0 .*in the files: \w+ 0\.0")
+        self.assertRegex(said.getvalue(), r"most of all at frame \d+: \w+ 0\.0 .*in the files: \w+ 0\.0")
         other = self.folder / "cmu_31joint" / "bend.bvh"
         shutil.copy(CASE / "motion" / "bend.bvh", other)
         with contextlib.redirect_stdout(said):

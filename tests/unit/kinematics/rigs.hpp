@@ -51,4 +51,27 @@ inline Rig chain(int count) {
   return rig;
 }
 
+/// A body with trunk and two legs.
+inline Rig legs() {
+  Rig rig;
+  const auto add = [&](const char* name, int parent, const Eigen::Vector3d& center) {
+    Segment segment;
+    segment.name = name;
+    segment.parent = parent;
+    segment.joint.name = std::string(name) + "_joint";
+    segment.joint.center = center;
+    segment.joint.sequence = sequence({0, 1, 2});
+    rig.skeleton.segments.push_back(segment);
+    rig.fits.push_back({segment.joint.name, CenterRule::given, 0, 0, 1, 0});
+  };
+  add("pelvis", -1, {0, 0, 900});
+  add("thigh_left", 0, {90, 0, 880});
+  add("shank_left", 1, {90, 10, 480});
+  add("foot_left", 2, {90, 20, 80});
+  add("thigh_right", 0, {-90, 0, 880});
+  add("shank_right", 4, {-90, 10, 480});
+  add("foot_right", 5, {-90, 20, 80});
+  return rig;
+}
+
 }  // namespace ecorche::test
