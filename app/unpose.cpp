@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "app/command.hpp"
@@ -11,6 +12,7 @@
 #include "io/surface/surface_file.hpp"
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/mapping/round_trip.hpp"
+#include "runtime/volume/grid_affine.hpp"
 #include "runtime/volume/resample.hpp"
 
 namespace ecorche::app {
@@ -129,6 +131,7 @@ class WayBack {
     ModelVolume volume;
     volume.name = name_of(from);
     volume.image = io::read_image(from);
+    if (!voxels_) voxels_ = volume.image.grid;
     volume.labels = is_labels(volume.name, settings_);
     volume.background = background_of(volume.image);
     const runtime::Deformation back = body_.way_back();
@@ -139,6 +142,14 @@ class WayBack {
                     runtime::resample(back, back_, volume,
                                       nearest ? runtime::Sampling::nearest : runtime::Sampling::trilinear));
   }
+
+  // In voxels of the first image that was brought back too.
+  mapping::RoundTrip round_trip() const {
+    const Eigen::Matrix3d to_voxels =
+        voxels_ ? runtime::to_index(*voxels_).linear : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    return mapping::round_trip(body_.rest, body_.posed, body_.tets, context_, to_voxels);
+  }
+  bool has_voxels() const { return voxels_.has_value(); }
 
  private:
   // What the posed image holds where the body is not; 0 where the body fills it.
@@ -155,6 +166,7 @@ class WayBack {
   const Context& context_;
   runtime::InverseMap there_, back_;
   std::unique_ptr<mapping::Locator> locator_;
+  std::optional<ImageGrid> voxels_;
 };
 
 int run(const Program& program, const Settings& settings) {
@@ -170,7 +182,6 @@ int run(const Program& program, const Settings& settings) {
   }
   const Context context = program.context("unpose");
   PosedTets body = read_posed(tets);
-  const mapping::RoundTrip trip = mapping::round_trip(body.rest, body.posed, body.tets, context);
   WayBack back(settings, std::move(body), context);
   files::make_folder(settings.output);
   json written = json::array();
@@ -188,18 +199,18 @@ int run(const Program& program, const Settings& settings) {
     written.push_back(to.string());
     context.report(static_cast<double>(written.size()) / static_cast<double>(files.size()));
   }
+  const mapping::RoundTrip trip = back.round_trip();
   char line[200];
   std::snprintf(
       line, sizeof line,
       "%zu files; points come back within %.2g mm on average, %.3g %% of the body lay under another part",
       files.size(), trip.mean_mm, 100 * trip.elsewhere_share);
-  program.result(line, {{"ok", true},
-                        {"files", written},
-                        {"round_trip",
-                         {{"points", trip.points},
-                          {"mean_mm", trip.mean_mm},
-                          {"max_mm", trip.max_mm},
-                          {"elsewhere_share", trip.elsewhere_share}}}});
+  json found{{"points", trip.points},
+             {"mean_mm", trip.mean_mm},
+             {"max_mm", trip.max_mm},
+             {"elsewhere_share", trip.elsewhere_share}};
+  if (back.has_voxels()) found["mean_voxels"] = trip.mean_voxels;
+  program.result(line, {{"ok", true}, {"files", written}, {"round_trip", std::move(found)}});
   return 0;
 }
 

@@ -30,12 +30,13 @@ Vector3d centroid(const std::array<Vector3d, 4>& x) {
 }
 
 struct Sums {
-  double volume = 0, moved = 0, elsewhere = 0, worst = 0;
+  double volume = 0, moved = 0, voxels = 0, elsewhere = 0, worst = 0;
 };
 
 }  // namespace
 
-RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets, const Context& context) {
+RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets, const Context& context,
+                     const Eigen::Matrix3d& to_voxels) {
   const TetGrid grid(posed, tets, context);
   // Summed block by block in order, so that threads change nothing.
   std::vector<Sums> blocks(static_cast<std::size_t>((tets.rows() + kBlock - 1) / kBlock));
@@ -55,8 +56,10 @@ RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets
       const std::array<Vector3d, 4> there = corners_of(rest, tets, holder);
       Vector3d back = Vector3d::Zero();
       for (std::size_t c = 0; c < 4; ++c) back += share[static_cast<Eigen::Index>(c)] * there[c];
-      const double moved = (back - centroid(before)).norm();
+      const Vector3d away = back - centroid(before);
+      const double moved = away.norm();
       sums.moved += volume * moved;
+      sums.voxels += volume * (to_voxels * away).norm();
       sums.elsewhere += volume;
       sums.worst = std::max(sums.worst, moved);
     }
@@ -67,11 +70,13 @@ RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets
   for (const Sums& sums : blocks) {
     volume += sums.volume;
     out.mean_mm += sums.moved;
+    out.mean_voxels += sums.voxels;
     out.elsewhere_share += sums.elsewhere;
     out.max_mm = std::max(out.max_mm, sums.worst);
   }
   if (volume > 0) {
     out.mean_mm /= volume;
+    out.mean_voxels /= volume;
     out.elsewhere_share /= volume;
   }
   return out;

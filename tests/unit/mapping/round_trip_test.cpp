@@ -42,6 +42,12 @@ TEST(RoundTrip, WhatLiesUnderAnotherComesBackAsTheOther) {
   EXPECT_NEAR(trip.max_mm, moved, 1e-6);
   EXPECT_NEAR(trip.elsewhere_share, 8.0 / 9, 1e-12);
   EXPECT_NEAR(trip.mean_mm, moved * 8 / 9, 1e-6);
+  EXPECT_EQ(trip.mean_voxels, trip.mean_mm);
+  // Counted in voxels, of 2 x 1 x 4 mm.
+  const Eigen::Vector3d away(10.375 / 2, 0.375, 0.375 / 4);
+  EXPECT_NEAR(
+      round_trip(two.rest, posed, two.tets, {}, Eigen::Vector3d(0.5, 1, 0.25).asDiagonal()).mean_voxels,
+      away.norm() * 8 / 9, 1e-6);
 }
 
 // An inverted tet holds nothing where another lies, and keeps its own where none does.
