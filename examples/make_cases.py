@@ -95,7 +95,7 @@ class Skeleton:
     def __init__(self, name):
         self.lines = ["# SPDX-License-Identifier: Apache-2.0", "ecorche_skeleton: 1", f"name: {name}", "segments:"]
 
-    def add(self, segment, parent, joint, kind, center, sequence, limits, source, axes=None, rest=None, aliases=()):
+    def add(self, segment, parent, joint, kind, center, sequence, limits, source, axes=None, rest=None, aliases=(), coupled=()):
         self.lines.append(f"  {segment}:")
         if parent:
             self.lines.append(f"    parent: {parent}")
@@ -109,6 +109,8 @@ class Skeleton:
         if limits:
             bounds = ", ".join(f"{k}: [{a}, {b}]" for k, (a, b) in limits.items())
             self.lines.append(f'      limits_deg: {{{bounds}, source: "{source}"}}')
+        if coupled:
+            self.lines += ["      coupled:", *(f"        - {{joint: {by}, angle: {angle}, drives: {drives}, ratio: {ratio}}}" for by, angle, drives, ratio in coupled)]
         if aliases:
             self.lines.append("    aliases: [" + ", ".join(aliases) + "]")
 
@@ -188,8 +190,9 @@ def arm(skeleton, bones, side):
                  aliases=[f"{side.capitalize()}Hand", f"{side}Hand"])
 
 
-def leg(skeleton, bones, side, hip_bone=None, root=False, foot=True):
-    """`hip_bone`: the single bone that holds the head of the femur, for a sphere fit; `root`: the thigh has no parent."""
+def leg(skeleton, bones, side, hip_bone=None, root=False, foot=True, patella=False):
+    """`hip_bone`: the single bone that holds the head of the femur, for a sphere fit; `root`: the thigh has no parent; `patella`: it is a segment
+    of its own, which glides about the condyles by seven tenths of the knee's flexion. On the shank it is pressed into them."""
     s = 1 if side == "left" else -1
     sign = lambda axis, positive: axis if positive * s > 0 else "-" + axis  # noqa: E731
     hip = sphere(head(bones, side))
@@ -211,9 +214,12 @@ def leg(skeleton, bones, side, hip_bone=None, root=False, foot=True):
     tibia, fibula = bones.vertices(f"{side} tibia"), bones.vertices(f"{side} fibula")
     malleoli = [bone[bone[:, 2] < bone[:, 2].min() + 8].mean(axis=0) for bone in (tibia, fibula)]
     ankle = np.mean(malleoli, axis=0)
+    hinge = frame(s * (condyles[1] - condyles[0]), knee - ankle)
     skeleton.add(f"shank_{side}", f"thigh_{side}", f"knee_{side}", "hinge", knee, [("flexion", "x")], {"flexion": (-5, 140)},
-                 LIMBS, frame(s * (condyles[1] - condyles[0]), knee - ankle), None,
-                 [f"{side.capitalize()}Leg", f"{side}LowerLeg"])
+                 LIMBS, hinge, None, [f"{side.capitalize()}Leg", f"{side}LowerLeg"])
+    if patella:
+        skeleton.add(f"patella_{side}", f"thigh_{side}", f"patellofemoral_{side}", "hinge", knee, [("glide", "x")], {}, "", hinge,
+                     coupled=[(f"knee_{side}", "flexion", "glide", 0.7)])
     if not foot:
         return
     heads = []
@@ -273,12 +279,12 @@ def right_leg(folder):
     better = {"right femur": "right_leg/FMA24474_right_femur.stl", "right tibia": "right_leg/FMA24477_right_tibia.stl",
               "right fibula": "right_leg/FMA24480_right_fibula.stl", "right patella": "right_leg/FMA24486_right_patella.stl"}
     case, bones = Case("right_leg", BODYPARTS3D, "LPS"), BodyParts3D(folder, better)
-    leg(case.skeleton, bones, "right", root=True)
+    leg(case.skeleton, bones, "right", root=True, patella=True)
     case.lines += ["skin: {root: data, file: bodyparts3d/right_leg/right_leg_skin_closed.stl}", "bones:"]
     for row in bones.rows:
         if row["segment"] in ("thigh_right", "shank_right", "foot_right", "toes_right"):
-            case.entry(identifier(row["name"]), f"bodyparts3d/{better.get(row['name'].lower(), row['file'])}",
-                       f"segment: {row['segment']}")
+            segment = "patella_right" if row["name"].lower() == "right patella" else row["segment"]
+            case.entry(identifier(row["name"]), f"bodyparts3d/{better.get(row['name'].lower(), row['file'])}", f"segment: {segment}")
     case.lines.append("tissues:")
     case.entry("muscles_right", "bodyparts3d/right_leg/right_leg_muscles_union.ply", "group: muscle")
     case.write()
@@ -289,11 +295,12 @@ def visible_human_male(folder):
     case, bones = Case("visible_human_male", VISIBLE_HUMAN, "LPS"), VisibleHuman(folder)
     pelvis(case.skeleton, bones)
     for side in ("left", "right"):
-        leg(case.skeleton, bones, side, foot=False)
+        leg(case.skeleton, bones, side, foot=False, patella=True)
     case.lines += ["skin: {root: data, file: visible_human_male/skin.stl, frame: LSA}", "bones:"]
     for row in csv.DictReader((folder / "parts.csv").open()):
         if row["segment"] != "skin" and row["file"].startswith("bones/"):
-            case.entry(row["name"], f"visible_human_male/{row['file']}", f"segment: {row['segment']}, frame: LSA")
+            segment = row["name"] if row["name"].startswith("patella_") else row["segment"]
+            case.entry(row["name"], f"visible_human_male/{row['file']}", f"segment: {segment}, frame: LSA")
     case.lines.append("tissues:")
     for organ in ("Heart", "Kidney_L", "Kidney_R", "Liver", "Pancreas", "Spinal_Cord", "Spleen", "Urinary_Bladder"):
         name = re.sub("_r$", "_right", re.sub("_l$", "_left", organ.lower()))
