@@ -2,6 +2,7 @@
 #include "core/kinematics/posed_rest.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
@@ -16,6 +17,27 @@ double within(const AngleAxis& angle, double value) {
   if (value < angle.min && value > angle.min - kRounding) return angle.min;
   if (value > angle.max && value < angle.max + kRounding) return angle.max;
   return std::abs(value) < kRounding ? 0 : value;
+}
+
+// A joint slides along its axes at rest, which its parent carries; `turned` brings these to the posed
+// joint's. So one slide becomes up to three.
+std::vector<Coupling> turned_slides(const std::vector<Coupling>& coupled, const Eigen::Matrix3d& turned) {
+  constexpr double kNothing = 1e-12;
+  std::vector<Coupling> out;
+  for (const Coupling& coupling : coupled) {
+    const int axis = coupling.slides();
+    if (axis < 0) {
+      out.push_back(coupling);
+      continue;
+    }
+    for (int a = 0; a < 3; ++a) {
+      if (std::abs(turned(a, axis)) < kNothing) continue;
+      out.push_back(coupling);
+      out.back().drives[0] = static_cast<char>('x' + a);
+      out.back().ratio *= turned(a, axis);
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -35,7 +57,12 @@ Skeleton posed_rest(const Rig& rig, const Pose& pose) {
     joint.facing_bone.clear();
     joint.how.reset();
     joint.center = motion[s] * joint.center;
-    joint.axes = motion[s].q.toRotationMatrix() * joint.axes;
+    const Eigen::Matrix3d axes = motion[s].q.toRotationMatrix() * joint.axes;
+    if (const int parent = posed.segments[s].parent; parent >= 0) {
+      joint.coupled = turned_slides(
+          joint.coupled, axes.transpose() * motion[static_cast<std::size_t>(parent)].q * joint.axes);
+    }
+    joint.axes = axes;
   }
   return posed;
 }

@@ -72,6 +72,33 @@ TEST(PosedRest, NamedAnglesMeanTheSameStance) {
   }
 }
 
+// A knee that rolls back as it bends, scanned bent: stretched again it lies where it did.
+TEST(PosedRest, SlidesGoOnAlongTheParent) {
+  std::mt19937 random(6);
+  Rig rig = turned_chain(random);
+  Joint& knee = rig.skeleton.segments[2].joint;
+  knee.name = "knee";
+  knee.coupled = {{"knee", knee.sequence[0].name, "z_mm", -4}, {"knee", knee.sequence[1].name, "x_mm", 3}};
+  const auto stance = [](const Skeleton& skeleton, const std::array<double, 3>& angles) {
+    Pose pose = Pose::rest(4);
+    for (std::size_t s = 1; s < 4; ++s)
+      pose.rotation[s] = rotation_from_angles(skeleton.segments[s].joint, angles);
+    slide(skeleton, pose);
+    return pose;
+  };
+  const Pose first = stance(rig.skeleton, {1.2, -0.4, 0.8});
+  EXPECT_GT(first.translation[2].norm(), 1);
+  Rig posed = rig;
+  posed.skeleton = posed_rest(rig, first);
+  const std::array<double, 3> asked{-0.2, 0.6, 0.1};
+  const auto before = forward(rig, first), after = forward(posed, stance(posed.skeleton, asked)),
+             whole = forward(rig, stance(rig.skeleton, asked));
+  for (std::size_t s = 0; s < 4; ++s) {
+    const Vector3d p(10, 20, 300);
+    EXPECT_LT((after[s] * (before[s] * p) - whole[s] * p).norm(), 1e-9) << s;
+  }
+}
+
 TEST(PosedRest, TheRestPoseGivesTheSameSkeleton) {
   std::mt19937 random(5);
   const Rig rig = turned_chain(random);
