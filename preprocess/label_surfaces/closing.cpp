@@ -101,15 +101,13 @@ std::size_t flood(Mask& mask, std::size_t start, std::uint8_t to, std::vector<st
 
 void close_gaps(Mask& mask, const std::array<double, 3>& spacing, double radius_mm, const Context& context) {
   const auto limit = static_cast<float>(radius_mm * radius_mm);
-  const std::vector<std::uint8_t> before = mask.inside;
   {
     const std::vector<float> d = squared_distance(mask, 1, spacing, context);
     for (std::size_t i = 0; i < d.size(); ++i) mask.inside[i] = d[i] <= limit ? 1 : 0;
   }
   const std::vector<float> d = squared_distance(mask, 0, spacing, context);
-  for (std::size_t i = 0; i < d.size(); ++i) {
-    mask.inside[i] = d[i] > limit || before[i] != 0 ? 1 : 0;
-  }
+  // What was inside still is: nothing outside now lies within the radius of it.
+  for (std::size_t i = 0; i < d.size(); ++i) mask.inside[i] = d[i] > limit ? 1 : 0;
 }
 
 void fill_hollows(Mask& mask) {

@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "preprocess/label_surfaces/closing.hpp"
+#include "preprocess/label_surfaces/hold.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "tests/unit/label_surfaces/bodies.hpp"
 
@@ -106,6 +108,16 @@ TEST(LabelMasks, EveryCell) {
   }
 }
 
+TEST(LabelMasks, ALoopBesideAnotherStaysNearerToItsSquares) {
+  const Eigen::Vector3d corner(0.5, 0.5, 0.5), far(1.95, 1.95, 1.95);
+  SurfaceNet::Home home{{1, 1, 1}, 1U << 0 | 1U << 4 | 1U << 8, 1};  // round the cell's first corner
+  const Eigen::Vector3d at(1, 1, 1);
+  EXPECT_NEAR((hold(far, home) - at - corner).norm(), 0.45, 1e-12);
+  EXPECT_EQ(hold(at + corner, home), at + corner);
+  home.alone = 0;
+  EXPECT_NEAR((hold(far, home) - at - corner).norm(), 0.2, 1e-12);
+}
+
 TEST(LabelMasks, SidesSplitAtThePlane) {
   ImageGrid grid = cube_grid(20);
   grid.origin = {19, 0, 0};
@@ -121,6 +133,9 @@ TEST(LabelMasks, SidesSplitAtThePlane) {
   EXPECT_NEAR(volume(r), 6 * 400, 60);
   EXPECT_GT(l.V.col(0).minCoeff(), 13);
   EXPECT_LT(r.V.col(0).maxCoeff(), 8);
+  left.plane_mm = right.plane_mm = 15;  // a voxel's centre: it is left
+  EXPECT_NEAR(volume(extract(labels, left, {})), 3 * 400, 60);
+  EXPECT_NEAR(volume(extract(labels, right, {})), 7 * 400, 60);
 }
 
 TEST(LabelMasks, WithinAnotherImage) {
@@ -168,6 +183,33 @@ TEST(LabelMasks, TheOutsideOfEverythingHasNoHollowsAndNoSpecks) {
   expect_solid(mesh, "body");
   EXPECT_EQ(components(mesh), 1);
   EXPECT_NEAR(volume(mesh), 4.0 / 3 * 3.14159265 * 1000, 100);
+}
+
+TEST(LabelMasks, AFortiethOfTheBodyIsNoSpeck) {
+  const CaseLabels labels = draw(cube_grid(24), [](int i, int j, int k) {
+    const bool body = i < 16 && j < 16 && k < 16, apart = i >= 19 && i < 24 && j >= 19 && k >= 20;
+    return body || apart;
+  });
+  EXPECT_EQ(components(extract(labels, ids({}), {})), 2);
+}
+
+TEST(LabelMasks, SpecksHaveFewerVoxelsThanTheShare) {
+  Mask mask;
+  mask.size = {9, 7, 7};
+  mask.inside.assign(mask.offset(0, 0, 7), 0);
+  for (int k = 1; k < 6; ++k) {
+    for (int j = 1; j < 6; ++j) mask.inside[mask.offset(1, j, k)] = 1;  // 25
+  }
+  mask.inside[mask.offset(4, 3, 3)] = 1;
+  mask.inside[mask.offset(7, 3, 3)] = mask.inside[mask.offset(7, 4, 3)] = 1;
+  const auto left = [&](double share) {
+    Mask out = mask;
+    drop_specks(out, share);
+    return std::count(out.inside.begin(), out.inside.end(), 1);
+  };
+  EXPECT_EQ(left(0.04), 28) << "one of 25 is not fewer than a 25th";
+  EXPECT_EQ(left(0.05), 27);
+  EXPECT_EQ(left(0.09), 25);
 }
 
 TEST(LabelMasks, ClosingFillsGapsAndNothingElse) {
