@@ -7,12 +7,18 @@ sampling there and back moves a value by one voxel along each axis at the most, 
 changes no label off the boundary. Beyond the image all is background.
 """
 import gzip
+import re
 import typing
 
 import numpy as np
 
 TYPES = {"unsigned char": "u1", "uint8": "u1", "signed char": "i1", "int8": "i1", "short": "i2", "int16": "i2", "unsigned short": "u2",
          "uint16": "u2", "int": "i4", "int32": "i4", "unsigned int": "u4", "uint32": "u4", "float": "f4", "double": "f8"}
+
+
+def identifier(name):
+    """A label's name as a tissue's: what docs/case.md says of names out of files."""
+    return re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")[:48].strip("_") or "label"
 
 
 class Volume(typing.NamedTuple):
