@@ -91,7 +91,7 @@ TEST(Lbfgs, FindsTheLeastOfAValley) {
   };
   Eigen::VectorXd x(2);
   x << -1.2, 1;
-  EXPECT_LT(lbfgs(f, x, 200, 0.1), 200);
+  EXPECT_LT(lbfgs(f, x, 200, 0.1), 44);  // 42; 45 where its first guess of the curvature is 1
   EXPECT_NEAR(x[0], 1, 1e-6);
   EXPECT_NEAR(x[1], 1, 1e-6);
 }
@@ -138,8 +138,8 @@ TEST(Unfold, LeavesNoTetInvertedThatIsFree) {
   EXPECT_EQ(bent.inverted(), 0u);
   EXPECT_EQ(done.rest_mm3_after, 0);
   EXPECT_GT(done.moved_nodes, 0u);
-  EXPECT_GT(done.largest_move_mm, 0.1);
-  EXPECT_LT(done.largest_move_mm, 40);
+  // Where shapes and ties balance: 12.01 without the ties' pull, 11.71 where shapes had no last round.
+  EXPECT_NEAR(done.largest_move_mm, 11.78, 0.05);
 }
 
 TEST(Unfold, BonesStayAndTissuesHangOnTheirTets) {
