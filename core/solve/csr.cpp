@@ -1,60 +1,102 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/solve/csr.hpp"
 
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 
+#include "core/solve/counting_sort.hpp"
+
 namespace ecorche::solve {
 
+namespace {
+
+template <class T>
+Csr<T> transposed(const Csr<T>& A) {
+  Csr<T> out;
+  out.rows = A.columns;
+  out.columns = A.rows;
+  CountingSort<std::int64_t> sort(static_cast<std::size_t>(A.columns), static_cast<std::size_t>(A.rows),
+                                  [&](std::size_t row, auto&& add) {
+                                    A.for_row(static_cast<std::int32_t>(row), [&](std::int32_t column, T) {
+                                      add(static_cast<std::size_t>(column));
+                                    });
+                                  });
+  out.column.resize(sort.places());
+  out.value.resize(sort.places());
+  sort.fill([&](std::size_t row, auto&& take) {
+    A.for_row(static_cast<std::int32_t>(row), [&](std::int32_t column, T value) {
+      const std::size_t at = take(static_cast<std::size_t>(column));
+      out.column[at] = static_cast<std::int32_t>(row);
+      out.value[at] = value;
+    });
+  });
+  out.first = sort.take_offsets();
+  return out;
+}
+
+template <class F>
+void for_rows(std::int32_t rows, F&& f) {
+  tbb::parallel_for(tbb::blocked_range<std::int32_t>(0, rows, RowsPart::rows), [&](const auto& range) {
+    for (std::int32_t row = range.begin(); row < range.end(); ++row) f(row);
+  });
+}
+
+}  // namespace
+
+// A row begins with what lies left of its diagonal, columns of the lower triangle in their order, and goes on
+// with its own column.
 Csr<double> both_triangles(const SparseMatrix& A) {
   Csr<double> out;
   out.rows = out.columns = static_cast<std::int32_t>(A.rows());
-  out.first.assign(static_cast<std::size_t>(A.rows()) + 1, 0);
-  const auto for_entries = [&](auto&& f) {
-    for (Eigen::Index c = 0; c < A.outerSize(); ++c) {
-      for (SparseMatrix::InnerIterator entry(A, c); entry; ++entry) {
-        if (entry.row() < c) continue;
-        const auto row = static_cast<std::int32_t>(entry.row()), column = static_cast<std::int32_t>(c);
-        f(row, column, entry.value());
-        if (row != column) f(column, row, entry.value());
-      }
+  const auto unknowns = static_cast<std::size_t>(A.rows());
+  const auto for_column = [&](std::size_t c, auto&& f) {
+    for (SparseMatrix::InnerIterator entry(A, static_cast<Eigen::Index>(c)); entry; ++entry) {
+      if (entry.row() >= entry.col()) f(static_cast<std::size_t>(entry.row()), entry.value());
     }
   };
-  for_entries(
-      [&](std::int32_t row, std::int32_t, double) { ++out.first[static_cast<std::size_t>(row) + 1]; });
-  for (std::size_t r = 1; r < out.first.size(); ++r) out.first[r] += out.first[r - 1];
-  out.column.resize(static_cast<std::size_t>(out.first.back()));
-  out.value.resize(out.column.size());
-  // Columns come in order, so that those below the diagonal of a row come ascending, and then those above.
-  std::vector<std::int64_t> at(out.first.begin(), out.first.end() - 1);
-  for_entries([&](std::int32_t row, std::int32_t column, double value) {
-    const auto slot = static_cast<std::size_t>(at[static_cast<std::size_t>(row)]++);
-    out.column[slot] = column;
-    out.value[slot] = value;
+  CountingSort<std::int64_t> sort(
+      unknowns, unknowns,
+      [&](std::size_t c, auto&& add) {
+        for_column(c, [&](std::size_t row, double) {
+          if (row != c) add(row);
+        });
+      },
+      [&](std::size_t c) {
+        std::int64_t own = 0;
+        for_column(c, [&](std::size_t, double) { ++own; });
+        return own;
+      });
+  out.column.resize(sort.places());
+  out.value.resize(sort.places());
+  sort.fill([&](std::size_t c, auto&& take) {
+    for_column(c, [&](std::size_t row, double value) {
+      if (row == c) return;
+      const std::size_t at = take(row);
+      out.column[at] = static_cast<std::int32_t>(c);
+      out.value[at] = value;
+    });
+  });
+  out.first = sort.take_offsets();
+  for_rows(out.rows, [&](std::int32_t c) {
+    auto at = static_cast<std::size_t>(out.first[static_cast<std::size_t>(c) + 1]);
+    for_column(static_cast<std::size_t>(c), [&](std::size_t, double) { --at; });
+    for_column(static_cast<std::size_t>(c), [&](std::size_t row, double value) {
+      out.column[at] = static_cast<std::int32_t>(row);
+      out.value[at++] = value;
+    });
   });
   return out;
 }
 
 Csr<double> transpose(const Csr<double>& A) {
-  Csr<double> out;
-  out.rows = A.columns;
-  out.columns = A.rows;
-  out.first.assign(static_cast<std::size_t>(A.columns) + 1, 0);
-  for (const std::int32_t c : A.column) ++out.first[static_cast<std::size_t>(c) + 1];
-  for (std::size_t r = 1; r < out.first.size(); ++r) out.first[r] += out.first[r - 1];
-  out.column.resize(A.column.size());
-  out.value.resize(A.value.size());
-  std::vector<std::int64_t> at(out.first.begin(), out.first.end() - 1);
-  for (std::int32_t row = 0; row < A.rows; ++row) {
-    A.for_row(row, [&](std::int32_t column, double value) {
-      const auto slot = static_cast<std::size_t>(at[static_cast<std::size_t>(column)]++);
-      out.column[slot] = row;
-      out.value[slot] = value;
-    });
-  }
-  return out;
+  return transposed(A);
+}
+
+Csr<float> transpose(const Csr<float>& A) {
+  return transposed(A);
 }
 
 Csr<double> join(std::int32_t rows, std::int32_t columns, std::vector<RowsPart>& parts) {
@@ -116,17 +158,26 @@ Csr<double> multiply(const Csr<double>& A, const Csr<double>& B) {
   return join(A.rows, B.columns, parts);
 }
 
-Csr<float> narrow(const Csr<double>& A) {
-  return {A.rows, A.columns, A.first, A.column, std::vector<float>(A.value.begin(), A.value.end())};
+Csr<float> scaled(const Csr<double>& A, const std::vector<double>& left, const std::vector<double>& right) {
+  Csr<float> out{A.rows, A.columns, A.first, A.column, {}};
+  out.value.resize(A.value.size());
+  for_rows(A.rows, [&](std::int32_t row) {
+    auto at = static_cast<std::size_t>(A.first[static_cast<std::size_t>(row)]);
+    A.for_row(row, [&](std::int32_t column, double value) {
+      out.value[at++] = static_cast<float>(
+          value * (left[static_cast<std::size_t>(row)] * right[static_cast<std::size_t>(column)]));
+    });
+  });
+  return out;
 }
 
 std::vector<double> diagonal(const Csr<double>& A) {
   std::vector<double> out(static_cast<std::size_t>(A.rows), 0);
-  for (std::int32_t row = 0; row < A.rows; ++row) {
+  for_rows(A.rows, [&](std::int32_t row) {
     A.for_row(row, [&](std::int32_t column, double value) {
       if (column == row) out[static_cast<std::size_t>(row)] = value;
     });
-  }
+  });
   return out;
 }
 

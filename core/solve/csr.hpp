@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/solve/raw_vector.hpp"
 #include "core/solve/spd_solver.hpp"
 
 namespace ecorche::solve {
@@ -14,9 +15,9 @@ namespace ecorche::solve {
 template <class T>
 struct Csr {
   std::int32_t rows = 0, columns = 0;
-  std::vector<std::int64_t> first{0};  ///< rows + 1
-  std::vector<std::int32_t> column;
-  std::vector<T> value;
+  RawVector<std::int64_t> first{0};  ///< rows + 1
+  RawVector<std::int32_t> column;
+  RawVector<T> value;
 
   /// Calls f(column, value) for every entry of the row.
   template <class F>
@@ -31,11 +32,13 @@ struct Csr {
 Csr<double> both_triangles(const SparseMatrix& A);
 
 Csr<double> transpose(const Csr<double>& A);
+Csr<float> transpose(const Csr<float>& A);
 
 /// A B, row by row (Gustavson 1978). Parallel, the same for any number of threads.
 Csr<double> multiply(const Csr<double>& A, const Csr<double>& B);
 
-Csr<float> narrow(const Csr<double>& A);
+/// left_i a_ij right_j, in float.
+Csr<float> scaled(const Csr<double>& A, const std::vector<double>& left, const std::vector<double>& right);
 
 /// The entries of so many rows of a matrix under construction: parts are made in parallel and joined.
 struct RowsPart {

@@ -39,9 +39,11 @@ struct NarrowLevel {
   float first = 0, second = 0, step = 0, momentum = 0, damping = 0;
 };
 
+using Space = RawVector<float>;  // a block, touched first by whoever fills it
+
 // What a cycle writes, by level.
 struct Scratch {
-  std::vector<Wide> x, b, r;
+  std::vector<Space> x, b, r;
 };
 
 using Columns = std::array<double, kMostColumns>;
@@ -58,37 +60,41 @@ class MultigridSolver final : public SpdSolver {
     for (const double own : own_) {
       if (!(own > 0)) not_definite(A_.rows);
     }
-    std::vector<Level> levels = hierarchy(A_, kCoarsest, context);
-    std::vector<double> fine = own_;
+    const std::int32_t unknowns = A_.rows;
+    std::vector<Level> levels = hierarchy(std::move(A_), kCoarsest, context);
+    std::vector<double> fine = roots(own_);
     for (std::size_t at = 0; at < levels.size(); ++at) {
       Level& level = levels[at];
       NarrowLevel out;
-      scale(fine, fine, level.A);
+      const std::vector<double> left = inverses(fine);
+      out.A = scaled(level.A, left, left);
       if (at + 1 < levels.size()) {
-        std::vector<double> coarse = diagonal(levels[at + 1].A);
+        const std::vector<double> coarse = diagonal(levels[at + 1].A);
         for (const double own : coarse) {
-          if (!(own > 0)) not_definite(A_.rows);
+          if (!(own > 0)) not_definite(unknowns);
         }
-        for (double& own : fine) own = 1 / own;  // P takes the scaled coarse to the scaled fine
-        scale(fine, coarse, level.P);
-        out.R = narrow(transpose(level.P));
-        out.P = narrow(level.P);
+        std::vector<double> next = roots(coarse);
+        out.P = scaled(level.P, fine, inverses(next));  // the scaled coarse to the scaled fine
+        out.R = transpose(out.P);
         smooth_by(level.largest, out);
-        fine = std::move(coarse);
+        fine = std::move(next);
       } else {
-        coarsest_.compute(lower(level.A));
+        coarsest_.compute(lower(level.A, left));
       }
-      out.A = narrow(level.A);
       levels_.push_back(std::move(out));
+      if (at == 0) A_ = std::move(level.A);
       level = {};
     }
-    if (coarsest_.info() != Eigen::Success) not_definite(A_.rows);
+    if (coarsest_.info() != Eigen::Success) not_definite(unknowns);
     ready_ = true;
   }
 
   Block solve(const Block& B, const Context& context) const override {
     if (!ready_) throw Error(ErrorKind::internal, "solver amg", "solve before factor", "report it");
-    Block X = Block::Zero(B.rows(), B.cols());
+    Block X(B.rows(), B.cols());
+    for_parts(static_cast<std::size_t>(B.rows()), [&](std::size_t, std::size_t first, std::size_t past) {
+      X.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(past - first)).setZero();
+    });
     const auto columns = static_cast<std::size_t>(B.cols());
     const std::size_t blocks = (columns + kMostColumns - 1) / kMostColumns;
     for (std::size_t block = 0; block < blocks; ++block) {
@@ -99,17 +105,15 @@ class MultigridSolver final : public SpdSolver {
   }
 
  private:
-  // a_ij / sqrt(rows_i columns_j)
-  static void scale(const std::vector<double>& rows, const std::vector<double>& columns, Csr<double>& A) {
-    std::vector<double> right(columns.size());
-    for (std::size_t c = 0; c < right.size(); ++c) right[c] = 1 / std::sqrt(columns[c]);
-    tbb::parallel_for(std::size_t{0}, static_cast<std::size_t>(A.rows), [&](std::size_t row) {
-      const double left = 1 / std::sqrt(rows[row]);
-      for (auto at = static_cast<std::size_t>(A.first[row]); at < static_cast<std::size_t>(A.first[row + 1]);
-           ++at) {
-        A.value[at] *= left * right[static_cast<std::size_t>(A.column[at])];
-      }
-    });
+  static std::vector<double> roots(const std::vector<double>& of) {
+    std::vector<double> out(of.size());
+    std::transform(of.begin(), of.end(), out.begin(), [](double x) { return std::sqrt(x); });
+    return out;
+  }
+  static std::vector<double> inverses(const std::vector<double>& of) {
+    std::vector<double> out(of.size());
+    std::transform(of.begin(), of.end(), out.begin(), [](double x) { return 1 / x; });
+    return out;
   }
 
   static void smooth_by(double largest, NarrowLevel& out) {
@@ -124,11 +128,13 @@ class MultigridSolver final : public SpdSolver {
     out.second = static_cast<float>(damping / middle);
   }
 
-  static SparseMatrix lower(const Csr<double>& A) {
+  // left_i a_ij left_j of the lower triangle.
+  static SparseMatrix lower(const Csr<double>& A, const std::vector<double>& left) {
     std::vector<Eigen::Triplet<double, std::int32_t>> entries;
     for (std::int32_t row = 0; row < A.rows; ++row) {
       A.for_row(row, [&](std::int32_t column, double value) {
-        if (column <= row) entries.emplace_back(row, column, value);
+        const double factor = left[static_cast<std::size_t>(row)] * left[static_cast<std::size_t>(column)];
+        if (column <= row) entries.emplace_back(row, column, factor * value);
       });
     }
     SparseMatrix out(A.rows, A.rows);
@@ -149,11 +155,16 @@ class MultigridSolver final : public SpdSolver {
     Eigen::Map<Rows>(x, rows, columns) = Eigen::MatrixXd(coarsest_.solve(wide)).cast<float>();
   }
 
-  // x = about A^-1 b of the level.
-  void cycle(std::size_t at, const float* b, float* x, std::size_t width, Scratch& s) const {
+  // x = about A^-1 b of the level; with the parts of x . b where they are asked for.
+  void cycle(std::size_t at, const float* b, float* x, std::size_t width, Scratch& s,
+             std::vector<Columns>* dots = nullptr) const {
     const NarrowLevel& level = levels_[at];
     if (at + 1 == levels_.size()) {
       solve_coarsest(b, x, width);
+      for_parts(dots == nullptr ? 0 : static_cast<std::size_t>(level.A.rows),
+                [&](std::size_t part, std::size_t begin, std::size_t end) {
+                  add_dots(x, b, width, begin, end, (*dots)[part].data());
+                });
       return;
     }
     float* const r = s.r[at].data();
@@ -163,12 +174,14 @@ class MultigridSolver final : public SpdSolver {
     cycle(at + 1, s.b[at + 1].data(), s.x[at + 1].data(), width, s);
     combine_all({&level.P, s.x[at + 1].data(), 1, {{{x, 1}}}, x, width});
     combine_all({&level.A, x, -level.step, {{{x, 1}, {b, level.step}}}, r, width});
-    combine_all({&level.A,
-                 r,
-                 -level.damping,
-                 {{{r, 1 + level.momentum}, {x, -level.momentum}, {b, level.damping}}},
-                 x,
-                 width});
+    const Combination last{
+        &level.A, r,    -level.damping, {{{r, 1 + level.momentum}, {x, -level.momentum}, {b, level.damping}}},
+        x,        width};
+    for_parts(static_cast<std::size_t>(level.A.rows),
+              [&](std::size_t part, std::size_t begin, std::size_t end) {
+                combine(last, begin, end);
+                if (dots != nullptr) add_dots(x, b, width, begin, end, (*dots)[part].data());
+              });
   }
 
   // Sums that parts of the rows left, in one order.
@@ -183,7 +196,7 @@ class MultigridSolver final : public SpdSolver {
   // r = D^-1/2 (B - A X) of columns begin .. end, each scaled to unit length; returns the squared lengths of
   // the unscaled.
   Columns residual(const Block& B, const Block& X, std::size_t begin, std::size_t end, std::size_t width,
-                   Wide& r) const {
+                   Space& r) const {
     const auto rows = static_cast<std::size_t>(A_.rows), all = static_cast<std::size_t>(B.cols());
     std::vector<Columns> parts((rows + kRowsAtOnce - 1) / kRowsAtOnce);
     for_parts(rows, [&](std::size_t part, std::size_t first, std::size_t last) {
@@ -206,64 +219,57 @@ class MultigridSolver final : public SpdSolver {
   }
 
   // Conjugate gradients for A x = r, until every column's squared length is below its goal; r is used up.
-  void correct(Wide& r, const Columns& goal, std::size_t width, Wide& x, Wide& p, Wide& q, Wide& z,
-               Scratch& s, const Context& context) const {
+  void correct(Space& r, const Columns& goal, std::size_t width, Space& x, Space& p, Space& z, Scratch& s,
+               const Context& context) const {
     const auto rows = static_cast<std::size_t>(A_.rows);
-    std::vector<Columns> one((rows + kRowsAtOnce - 1) / kRowsAtOnce), two = one;
-    const auto clear = [](std::vector<Columns>& parts) { std::fill(parts.begin(), parts.end(), Columns{}); };
+    float* const q = s.r[0].data();  // the cycle is done with it when the product begins
+    std::vector<Columns> sums((rows + kRowsAtOnce - 1) / kRowsAtOnce);
+    const auto clear = [&] { std::fill(sums.begin(), sums.end(), Columns{}); };
     const auto met = [&](const Columns& r2) {
       bool all = true;
       for (std::size_t c = 0; c < width; ++c) all = all && r2[c] <= goal[c];
       return all;
     };
     for_parts(rows, [&](std::size_t part, std::size_t begin, std::size_t end) {
-      add_dots(r.data(), r.data(), width, begin, end, one[part].data());
+      add_dots(r.data(), r.data(), width, begin, end, sums[part].data());
       std::fill(x.begin() + static_cast<std::ptrdiff_t>(begin * width),
                 x.begin() + static_cast<std::ptrdiff_t>(end * width), 0.0F);
       std::fill(p.begin() + static_cast<std::ptrdiff_t>(begin * width),
                 p.begin() + static_cast<std::ptrdiff_t>(end * width), 0.0F);
     });
-    Columns r2 = total(one), rz{}, alpha{};
+    Columns r2 = total(sums), rz{};
     for (int i = 0; !met(r2); ++i) {
       context.check_stop();
       if (i == kMostIterations) not_definite(A_.rows);
-      cycle(0, r.data(), z.data(), width, s);
-      clear(one);
-      clear(two);
-      for_parts(rows, [&](std::size_t part, std::size_t begin, std::size_t end) {
-        add_dots(z.data(), r.data(), width, begin, end, one[part].data());
-        if (i > 0) add_dots(z.data(), q.data(), width, begin, end, two[part].data());
-      });
-      // Polak-Ribiere: a cycle in float is not quite the same operator each time.
-      const Columns now = total(one), mixed = total(two);
+      clear();
+      cycle(0, r.data(), z.data(), width, s, &sums);
+      const Columns now = total(sums);
       std::array<float, kMostColumns> beta{}, step{};
       for (std::size_t c = 0; c < width; ++c) {
-        if (rz[c] != 0) beta[c] = static_cast<float>(-alpha[c] * mixed[c] / rz[c]);
+        if (rz[c] != 0) beta[c] = static_cast<float>(now[c] / rz[c]);
       }
       for_parts(rows, [&](std::size_t, std::size_t begin, std::size_t end) {
         turn(beta.data(), z.data(), p.data(), width, begin, end);
       });
-      clear(one);
-      const Combination product{&levels_[0].A, p.data(), 1, {}, q.data(), width};
+      clear();
+      const Combination product{&levels_[0].A, p.data(), 1, {}, q, width};
       for_parts(rows, [&](std::size_t part, std::size_t begin, std::size_t end) {
         combine(product, begin, end);
-        add_dots(p.data(), q.data(), width, begin, end, one[part].data());
+        add_dots(p.data(), q, width, begin, end, sums[part].data());
       });
-      const Columns pq = total(one);
+      const Columns pq = total(sums);
       for (std::size_t c = 0; c < width; ++c) {
-        alpha[c] = 0;
         if (r2[c] <= goal[c]) continue;
         if (!(pq[c] > 0)) not_definite(A_.rows);
-        alpha[c] = now[c] / pq[c];
-        step[c] = static_cast<float>(alpha[c]);
+        step[c] = static_cast<float>(now[c] / pq[c]);
       }
-      clear(one);
+      clear();
       for_parts(rows, [&](std::size_t part, std::size_t begin, std::size_t end) {
-        advance(step.data(), p.data(), q.data(), x.data(), r.data(), width, begin, end);
-        add_dots(r.data(), r.data(), width, begin, end, one[part].data());
+        advance(step.data(), p.data(), q, x.data(), r.data(), width, begin, end);
+        add_dots(r.data(), r.data(), width, begin, end, sums[part].data());
       });
       rz = now;
-      r2 = total(one);
+      r2 = total(sums);
     }
   }
 
@@ -278,7 +284,11 @@ class MultigridSolver final : public SpdSolver {
       for (auto* each : {&s.x, &s.b}) each->emplace_back(s.r.empty() ? 0 : size);  // the finest are CG's own
       s.r.emplace_back(size);
     }
-    Wide x(rows * width), r(rows * width), p(rows * width), q(rows * width), z(rows * width);
+    Space x(rows * width), r(rows * width), p(rows * width), z(rows * width);
+    for_parts(rows, [&](std::size_t, std::size_t first, std::size_t past) {  // columns beyond B's stay so
+      std::fill(r.begin() + static_cast<std::ptrdiff_t>(first * width),
+                r.begin() + static_cast<std::ptrdiff_t>(past * width), 0.0F);
+    });
     const double tolerance = A_.rows <= kSmall ? kSmallTolerance : kTolerance;
     Columns asked{}, last{};
     for (int correction = 0;; ++correction) {
@@ -306,7 +316,7 @@ class MultigridSolver final : public SpdSolver {
           }
         }
       });
-      correct(r, goal, width, x, p, q, z, s, context);
+      correct(r, goal, width, x, p, z, s, context);
       for_parts(rows, [&](std::size_t, std::size_t first, std::size_t past) {
         for (std::size_t row = first; row < past; ++row) {
           const double left = 1 / std::sqrt(own_[row]);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
 
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -68,7 +70,7 @@ std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
     if (only[n] >= 0) owner[n] = bone_segment[static_cast<std::size_t>(only[n])];
   }
   std::vector<std::pair<std::size_t, std::size_t>> contested;  // ranges of `all`
-  std::map<std::int32_t, geometry::FaceTree> surfaces;
+  std::map<std::int32_t, std::optional<geometry::FaceTree>> surfaces;
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
     bool several = false;
     for (end = begin; end < all.size() && all[end].node == all[begin].node; ++end) {
@@ -78,15 +80,18 @@ std::vector<std::int32_t> bone_nodes(const TetMesh& mesh, const Case& patient,
     if (!several) continue;
     contested.emplace_back(begin, end);
     for (std::size_t i = begin; i < end; ++i) {
-      surfaces.try_emplace(all[i].bone, patient.bones[static_cast<std::size_t>(all[i].bone)].surface);
+      surfaces.try_emplace(all[i].bone);
     }
   }
+  tbb::parallel_for_each(surfaces, [&](auto& surface) {
+    surface.second.emplace(patient.bones[static_cast<std::size_t>(surface.first)].surface);
+  });
   tbb::parallel_for(std::size_t{0}, contested.size(), [&](std::size_t c) {
     const auto [begin, end] = contested[c];
     const std::int32_t node = all[begin].node;
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = begin; i < end; ++i) {
-      const double d = surfaces.at(all[i].bone).nearest(mesh.V.row(node)).squared;
+      const double d = surfaces.at(all[i].bone)->nearest(mesh.V.row(node)).squared;
       if (d >= best) continue;  // ties to the lower bone, which comes first
       best = d;
       owner[static_cast<std::size_t>(node)] = segment(all[i]);

@@ -2,10 +2,12 @@
 // Laplace's equation with the fixed nodes eliminated: L_ff X_f = -L_fb B, only the free block is factored.
 #include "preprocess/weights/harmonic.hpp"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace ecorche::weights {
@@ -22,11 +24,20 @@ bool vanishes(const solve::SparseMatrix::InnerIterator& entry) {
   return entry.value() == 0 && entry.row() != entry.col();
 }
 
+/// Calls f(first, count) for pieces of the rows.
+template <class F>
+void for_pieces(Eigen::Index rows, F&& f) {
+  tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, rows, 4096),
+                    [&](const auto& range) { f(range.begin(), range.end() - range.begin()); });
+}
+
 FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_t>& free_row,
                      std::int32_t free_count, const solve::Block& boundary) {
   FreeSystem system;
   system.A.resize(free_count, free_count);
-  system.rhs.setZero(free_count, boundary.cols());
+  system.rhs.resize(free_count, boundary.cols());
+  for_pieces(free_count,
+             [&](Eigen::Index first, Eigen::Index count) { system.rhs.middleRows(first, count).setZero(); });
   std::int32_t* offsets = system.A.outerIndexPtr();
   const auto row_of = [&](Eigen::Index n) { return free_row[static_cast<std::size_t>(n)]; };
 
@@ -78,29 +89,31 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
 }  // namespace
 
 HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
-                              const solve::Block& boundary, solve::SpdSolver& solver,
-                              const Context& context) {
+                              solve::Block boundary, solve::SpdSolver& solver, const Context& context) {
   std::vector<std::int32_t> free_row(fixed.size(), -1);
   std::int32_t free_count = 0;
   for (std::size_t n = 0; n < fixed.size(); ++n) {
     if (!fixed[n]) free_row[n] = free_count++;
   }
   HarmonicResult result;
-  result.values = boundary;
+  result.values = std::move(boundary);
   if (free_count == 0) return result;
   if (free_count == static_cast<std::int32_t>(fixed.size())) {
     throw Error(ErrorKind::data, "weights", "no node is fixed", "the mesh must touch at least one bone");
   }
-  const FreeSystem system = eliminate(L, free_row, free_count, boundary);
+  const FreeSystem system = eliminate(L, free_row, free_count, result.values);
   context.check_stop();
   solver.factor(system.A, context);
   context.report(0.6);
   const solve::Block X = solver.solve(system.rhs, context);
   context.report(0.9);
   result.residual = solve::relative_residual(system.A, X, system.rhs);
-  for (std::size_t n = 0; n < fixed.size(); ++n) {
-    if (free_row[n] >= 0) result.values.row(static_cast<Eigen::Index>(n)) = X.row(free_row[n]);
-  }
+  for_pieces(result.values.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    for (Eigen::Index n = first; n < first + count; ++n) {
+      const std::int32_t row = free_row[static_cast<std::size_t>(n)];
+      if (row >= 0) result.values.row(n) = X.row(row);
+    }
+  });
   return result;
 }
 

@@ -28,13 +28,14 @@ solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<
 double positive_offdiagonal_share(const solve::SparseMatrix& L);
 
 /// Laplace's equation with fixed nodes: value[n] = B(n, c) on nodes with fixed[n], zero flux elsewhere.
-/// Every connected part must hold a fixed node. Returns #nodes by #columns, and the relative residual.
+/// Every connected part must hold a fixed node. Returns #nodes by #columns, in the memory of `boundary` (of
+/// whose other rows nothing is read), and the relative residual.
 struct HarmonicResult {
   solve::Block values;
   double residual = 0;
 };
 HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
-                              const solve::Block& boundary, solve::SpdSolver& solver, const Context& context);
+                              solve::Block boundary, solve::SpdSolver& solver, const Context& context);
 
 /// The owning segment of every node that touches a bone, else -1. A node that touches several bones belongs
 /// to the bone whose surface is nearest, ties to the lower index.

@@ -10,6 +10,7 @@
 #include <array>
 #include <string>
 
+#include "core/solve/counting_sort.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::weights {
@@ -17,37 +18,18 @@ namespace {
 
 /// Tet and corner, packed: 4 * tet + corner.
 struct Incidence {
-  std::vector<std::uint32_t> offsets;  ///< #nodes + 1
-  std::vector<std::uint32_t> corners;  ///< ascending within a node
+  solve::RawVector<std::uint32_t> corners;  ///< ascending within a node
+  solve::RawVector<std::uint32_t> offsets;  ///< #nodes + 1
 
-  /// Every part of the tets counts for itself, so that it knows where its own begin.
-  Incidence(Eigen::Index nodes, const Tets& T)
-      : offsets(static_cast<std::size_t>(nodes) + 1, 0), corners(static_cast<std::size_t>(T.size())) {
-    constexpr std::size_t kParts = 4;
+  Incidence(Eigen::Index nodes, const Tets& T) : corners(static_cast<std::size_t>(T.size())) {
     const std::int32_t* node = T.data();
-    std::array<std::vector<std::uint32_t>, kParts> next;
-    const auto for_corners = [&](std::size_t part, auto&& f) {
-      for (std::size_t i = corners.size() * part / kParts; i < corners.size() * (part + 1) / kParts; ++i)
-        f(i, next[part][static_cast<std::size_t>(node[i])]);
-    };
-    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
-      next[part].assign(static_cast<std::size_t>(nodes), 0);
-      for_corners(part, [](std::size_t, std::uint32_t& count) { ++count; });
+    const auto group = [&](std::size_t corner) { return static_cast<std::size_t>(node[corner]); };
+    solve::CountingSort<std::uint32_t> sort(static_cast<std::size_t>(nodes), corners.size(),
+                                            [&](std::size_t corner, auto&& add) { add(group(corner)); });
+    sort.fill([&](std::size_t corner, auto&& take) {
+      corners[take(group(corner))] = static_cast<std::uint32_t>(corner);
     });
-    std::uint32_t at = 0;
-    for (std::size_t n = 0; n + 1 < offsets.size(); ++n) {
-      for (auto& counts : next) {
-        const std::uint32_t count = counts[n];
-        counts[n] = at;
-        at += count;
-      }
-      offsets[n + 1] = at;
-    }
-    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
-      for_corners(part, [&](std::size_t i, std::uint32_t& place) {
-        corners[place++] = static_cast<std::uint32_t>(i);
-      });
-    });
+    offsets = sort.take_offsets();
   }
 };
 
@@ -87,7 +69,7 @@ struct Gatherer {
   explicit Gatherer(std::int32_t nodes) : place(static_cast<std::size_t>(nodes), -1) {}
 
   /// The neighbours of `node`, ascending, with the sums over its tets.
-  void gather(const Tets& T, const Incidence& incidence, const std::vector<EdgeTerms>& terms,
+  void gather(const Tets& T, const Incidence& incidence, const solve::RawVector<EdgeTerms>& terms,
               std::int32_t node) {
     row.clear();
     const auto n = static_cast<std::size_t>(node);
@@ -154,7 +136,7 @@ solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_s
 solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<double>& conductivity,
                               double* positive_share) {
   const auto nodes = static_cast<std::int32_t>(V.rows());
-  std::vector<EdgeTerms> terms(static_cast<std::size_t>(T.rows()));
+  solve::RawVector<EdgeTerms> terms(static_cast<std::size_t>(T.rows()));
   tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, T.rows(), 4096), [&](const auto& range) {
     for (Eigen::Index t = range.begin(); t < range.end(); ++t) {
       EdgeTerms& own = terms[static_cast<std::size_t>(t)];

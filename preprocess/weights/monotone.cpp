@@ -2,6 +2,7 @@
 #include "preprocess/weights/monotone.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace ecorche::weights {
 namespace {
@@ -42,10 +43,9 @@ void drop_positive_ties(solve::SparseMatrix& L, const std::vector<std::uint8_t>&
 }  // namespace
 
 MonotoneResult solve_monotone(solve::SparseMatrix L, const std::vector<std::uint8_t>& fixed,
-                              const solve::Block& boundary, solve::SpdSolver& solver,
-                              const Context& context) {
+                              solve::Block boundary, solve::SpdSolver& solver, const Context& context) {
   MonotoneResult result;
-  result.harmonic = solve_harmonic(L, fixed, boundary, solver, context);
+  result.harmonic = solve_harmonic(L, fixed, std::move(boundary), solver, context);
   std::vector<double> left = violations(fixed, result);
   result.first_violation = result.violation;
   const auto most = static_cast<std::int64_t>(kMostMended * static_cast<double>(fixed.size()));
@@ -61,7 +61,7 @@ MonotoneResult solve_monotone(solve::SparseMatrix L, const std::vector<std::uint
     }
     if (result.mended_nodes > most || result.mended_nodes == before) break;
     drop_positive_ties(L, marked);
-    result.harmonic = solve_harmonic(L, fixed, boundary, solver, quiet);
+    result.harmonic = solve_harmonic(L, fixed, std::move(result.harmonic.values), solver, quiet);
     left = violations(fixed, result);
   }
   return result;

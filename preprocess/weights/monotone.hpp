@@ -30,6 +30,6 @@ struct MonotoneResult {
 /// untouched. Dropping every positive off-diagonal would move weights by up to 0.14 all over the body, so for
 /// a mesh that asks for more than kMostMended of its nodes this gives up.
 MonotoneResult solve_monotone(solve::SparseMatrix L, const std::vector<std::uint8_t>& fixed,
-                              const solve::Block& boundary, solve::SpdSolver& solver, const Context& context);
+                              solve::Block boundary, solve::SpdSolver& solver, const Context& context);
 
 }  // namespace ecorche::weights

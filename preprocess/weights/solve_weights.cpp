@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -142,13 +146,15 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   Certificate& certificate = result.certificate;
 
   warn_of_untouched_bones(mesh, patient, context);
-  const std::vector<std::int32_t> owner = bone_nodes(mesh, patient, bone_segment);
+  std::vector<std::int32_t> owner;
+  Parts parts;
+  tbb::parallel_invoke([&] { owner = bone_nodes(mesh, patient, bone_segment); },
+                       [&] { parts = connected_parts(mesh.V.rows(), mesh.T); });
   const std::vector<std::int32_t> columns = live_segments(owner, segments);
   if (columns.empty()) {
     throw Error(ErrorKind::data, "weights", "no tet lies in a bone",
                 "use a finer --voxel, or check where the bones lie");
   }
-  const Parts parts = connected_parts(mesh.V.rows(), mesh.T);
   std::vector<std::uint8_t> boned(static_cast<std::size_t>(parts.count), 0);
   for (std::size_t n = 0; n < nodes; ++n) {
     if (owner[n] >= 0) boned[static_cast<std::size_t>(parts.of_node[n])] = 1;
@@ -166,29 +172,32 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   std::vector<Eigen::Index> column_of(segments, -1);
   for (std::size_t c = 0; c < columns.size(); ++c)
     column_of[static_cast<std::size_t>(columns[c])] = static_cast<Eigen::Index>(c);
-  solve::Block boundary = solve::Block::Zero(mesh.V.rows(), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t n = 0; n < nodes; ++n) {
-    fixed[n] = owner[n] >= 0 || source[n] >= 0;
-    if (owner[n] >= 0)
-      boundary(static_cast<Eigen::Index>(n), column_of[static_cast<std::size_t>(owner[n])]) = 1;
-  }
+  solve::Block boundary(mesh.V.rows(), static_cast<Eigen::Index>(columns.size()));
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes, 4096), [&](const auto& range) {
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      fixed[n] = owner[n] >= 0 || source[n] >= 0;
+      auto row = boundary.row(static_cast<Eigen::Index>(n));
+      row.setZero();
+      if (owner[n] >= 0) row[column_of[static_cast<std::size_t>(owner[n])]] = 1;
+    }
+  });
   const auto unknowns = std::count(fixed.begin(), fixed.end(), std::uint8_t{0});
   result.solver = options.solver == "auto" ? solver_for(unknowns) : options.solver;
   const auto solver = make_solver(result.solver);
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
-  MonotoneResult monotone = solve_monotone(std::move(L), fixed, boundary, *solver, scaled);
+  MonotoneResult monotone = solve_monotone(std::move(L), fixed, std::move(boundary), *solver, scaled);
   if (options.kind == Kind::quasi_harmonic && monotone.violation <= kSmallViolation) {
     context.check_stop();
     L = laplacian(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
-    monotone = solve_monotone(std::move(L), fixed, boundary, *solver, stop_only(context));
+    monotone =
+        solve_monotone(std::move(L), fixed, std::move(monotone.harmonic.values), *solver, stop_only(context));
   }
   if (monotone.violation > kSmallViolation) {
     refuse(mesh, monotone.worst_node, monotone.violation, monotone.mended_nodes);
   }
   warn_of_mended_nodes(monotone, context);
   HarmonicResult& solved = monotone.harmonic;
-  boundary.resize(0, 0);
   certificate.solver_residual = solved.residual;
   measure_solved(solved.values, source, certificate);
   if (options.keep_solved) {
