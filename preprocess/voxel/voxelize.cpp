@@ -3,12 +3,16 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <mutex>
+#include <optional>
 #include <string>
 
 #include "preprocess/geometry/face_tree.hpp"
@@ -98,35 +102,38 @@ ImageGrid make_grid(const Bounds& bounds, const Options& options) {
   return grid;
 }
 
-VoxelMask solid(const SurfaceMesh& surface, const std::string& name, const ImageGrid& grid,
-                const Context& context) {
+/// The voxels of one surface, and what is to be said of it.
+struct Solid {
+  VoxelMask mask;
+  std::string warning;
+};
+
+Solid solid(const SurfaceMesh& surface, const std::string& name, const ImageGrid& grid,
+            const Context& context) {
+  if (surface.F.rows() == 0) return {{}, name + ": the bone has no triangle"};
   const SnappedSurface snapped = snap(surface, grid);
   const bool closed = is_closed(snapped);
-  VoxelMask mask = rasterize(snapped, closed, closed ? 0 : 1, context);
+  Solid out{rasterize(snapped, closed, closed ? 0 : 1, context), {}};
   if (!closed) {
-    const std::size_t inside = mark_inside_open(surface, grid, mask, context);
-    context.warn(name + ": the surface has open edges; " +
-                 (inside > 0
-                      ? "what it encloses was found by flooding"
-                      : "it encloses nothing at this voxel size, so that only the voxels it touches count"));
+    const std::size_t inside = mark_inside_open(surface, grid, out.mask, context);
+    out.warning =
+        name + ": the surface has open edges; " +
+        (inside > 0 ? "what it encloses was found by flooding"
+                    : "it encloses nothing at this voxel size, so that only the voxels it touches count");
   }
-  return mask;
+  return out;
 }
 
-/// Calls `visit(voxel of the image)` for every voxel of the mask, or of its layer k, that is not empty.
+/// Calls `visit(voxel of the image)` for every voxel of the mask in layer k of the image that is not empty.
 template <class Visit>
 void for_layer(int k, const VoxelMask& mask, const ImageGrid& grid, Visit&& visit) {
-  std::size_t n = mask.offset(mask.low[0], mask.low[1], mask.low[2] + k);
+  if (k < mask.low[2] || k >= mask.low[2] + mask.size[2]) return;
+  std::size_t n = mask.offset(mask.low[0], mask.low[1], k);
   for (int j = 0; j < mask.size[1]; ++j) {
-    const std::size_t row = grid.offset(mask.low[0], mask.low[1] + j, mask.low[2] + k);
+    const std::size_t row = grid.offset(mask.low[0], mask.low[1] + j, k);
     for (int i = 0; i < mask.size[0]; ++i, ++n)
       if (mask.bytes[n] != 0) visit(row + static_cast<std::size_t>(i));
   }
-}
-
-template <class Visit>
-void for_each_voxel(const VoxelMask& mask, const ImageGrid& grid, Visit&& visit) {
-  for (int k = 0; k < mask.size[2]; ++k) for_layer(k, mask, grid, visit);
 }
 
 /// Voxels that more than one bone claims, and all that do, lower index first.
@@ -135,11 +142,12 @@ using Contested = std::map<std::size_t, std::vector<std::uint16_t>>;
 /// The claimant whose surface is nearest to the voxel's centre. Bones that share a wall lie at the same
 /// distance but for rounding: the lower index keeps the voxel unless another is nearer by more than that.
 void settle(const Contested& contested, const Case& patient, Image& labels, const Context& context) {
-  std::map<std::uint16_t, geometry::FaceTree> surfaces;
+  std::map<std::uint16_t, std::optional<geometry::FaceTree>> surfaces;
   for (const auto& [voxel, claimants] : contested)
-    for (const std::uint16_t label : claimants)
-      if (!surfaces.contains(label))
-        surfaces.emplace(label, patient.bones[static_cast<std::size_t>(label - first_bone)].surface);
+    for (const std::uint16_t label : claimants) surfaces.try_emplace(label);
+  tbb::parallel_for_each(surfaces, [&](auto& surface) {
+    surface.second.emplace(patient.bones[static_cast<std::size_t>(surface.first - first_bone)].surface);
+  });
   const std::vector<Contested::value_type> all(contested.begin(), contested.end());
   const ImageGrid& grid = labels.grid;
   const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
@@ -153,7 +161,7 @@ void settle(const Contested& contested, const Case& patient, Image& labels, cons
                    static_cast<double>(voxel / (nx * ny)));
     double best = std::numeric_limits<double>::infinity();
     for (const std::uint16_t label : all[n].second) {
-      const double d = surfaces.at(label).nearest({p[0], p[1], p[2]}).squared;
+      const double d = surfaces.at(label)->nearest({p[0], p[1], p[2]}).squared;
       if (d < best - tolerance) {
         best = d;
         out[voxel] = label;
@@ -172,42 +180,55 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
     throw Error(ErrorKind::data, patient.name, "more bones than 16-bit labels", "merge bones");
   Bounds bounds;
   grow(bounds, patient.skin, patient.skin_name);
-  std::size_t triangles = static_cast<std::size_t>(patient.skin.F.rows()), done = triangles;
+  auto triangles = static_cast<std::size_t>(patient.skin.F.rows());
   for (const CaseBone& bone : patient.bones) {
     grow(bounds, bone.surface, bone.name);
     triangles += static_cast<std::size_t>(bone.surface.F.rows());
   }
-  Image labels(make_grid(bounds, options), ScalarType::u16);
-  const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
-  const auto share = [&] { return static_cast<double>(done) / static_cast<double>(triangles); };
-
-  const VoxelMask body = solid(patient.skin, patient.skin_name, labels.grid, context);
-  tbb::parallel_for(0, body.size[2], [&](int k) {
-    for_layer(k, body, labels.grid, [&](std::size_t voxel) { out[voxel] = soft; });
-  });
-  context.report(share());
-  Contested contested;
-  for (std::size_t b = 0; b < patient.bones.size(); ++b) {
+  const ImageGrid grid = make_grid(bounds, options);
+  std::vector<Solid> solids(patient.bones.size() + 1);  // of the skin, then of the bones
+  std::mutex mutex;                                     // of progress
+  std::size_t done = 0;
+  const auto make = [&](std::size_t at, const SurfaceMesh& surface, const std::string& name) {
     context.check_stop();
-    const CaseBone& bone = patient.bones[b];
-    if (bone.surface.F.rows() == 0) {
-      context.warn(bone.name + ": the bone has no triangle");
-      continue;
-    }
-    const auto label = static_cast<std::uint16_t>(first_bone + b);
-    for_each_voxel(solid(bone.surface, bone.name, labels.grid, context), labels.grid, [&](std::size_t voxel) {
-      if (out[voxel] < first_bone) {
-        out[voxel] = label;
-      } else {
-        std::vector<std::uint16_t>& claimants = contested[voxel];
+    solids[at] = solid(surface, name, grid, context);
+    const std::lock_guard lock(mutex);
+    done += static_cast<std::size_t>(surface.F.rows());
+    context.report(0.9 * static_cast<double>(done) / static_cast<double>(triangles));
+  };
+  Image labels;
+  tbb::parallel_invoke([&] { labels = Image(grid, ScalarType::u16); },
+                       [&] { make(0, patient.skin, patient.skin_name); },
+                       [&] {
+                         tbb::parallel_for(std::size_t{0}, patient.bones.size(), [&](std::size_t b) {
+                           make(b + 1, patient.bones[b].surface, patient.bones[b].name);
+                         });
+                       });
+  for (const Solid& each : solids) {
+    if (!each.warning.empty()) context.warn(each.warning);
+  }
+
+  // Bones after the skin, in their order; a layer of the image is one thread's.
+  const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
+  std::vector<Contested> contested(static_cast<std::size_t>(grid.size[2]));
+  tbb::parallel_for(0, grid.size[2], [&](int k) {
+    for_layer(k, solids[0].mask, grid, [&](std::size_t voxel) { out[voxel] = soft; });
+    Contested& own = contested[static_cast<std::size_t>(k)];
+    for (std::size_t b = 0; b < patient.bones.size(); ++b) {
+      const auto label = static_cast<std::uint16_t>(first_bone + b);
+      for_layer(k, solids[b + 1].mask, grid, [&](std::size_t voxel) {
+        if (out[voxel] < first_bone) {
+          out[voxel] = label;
+          return;
+        }
+        std::vector<std::uint16_t>& claimants = own[voxel];
         if (claimants.empty()) claimants.push_back(out[voxel]);
         claimants.push_back(label);
-      }
-    });
-    done += static_cast<std::size_t>(bone.surface.F.rows());
-    context.report(share());
-  }
-  settle(contested, patient, labels, context);
+      });
+    }
+  });
+  for (Contested& layer : contested) contested.front().merge(layer);
+  settle(contested.front(), patient, labels, context);
   return labels;
 }
 
