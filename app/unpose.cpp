@@ -113,7 +113,7 @@ class WayBack {
       : settings_(settings), body_(std::move(body)), context_(context) {}
 
   void surface(const fs::path& from, const fs::path& to) {
-    if (!locator_) locator_ = std::make_unique<mapping::Locator>(body_.posed, body_.tets, context_);
+    if (!locator_) locator_ = std::make_unique<mapping::Locator>(body_.posed, body_.tets);
     SurfaceMesh mesh = io::read_surface(from);
     const mapping::Binding held = locator_->bind(mesh.V, context_);
     for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {

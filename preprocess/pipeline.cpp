@@ -8,8 +8,10 @@
 #include <fstream>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <sstream>
 
+#include "core/model_file/model_file.hpp"
 #include "preprocess/bounds.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/cor/centres.hpp"
@@ -153,16 +155,16 @@ std::vector<Tissue> gather_tissues(const Case& patient, const std::vector<std::i
   return tissues;
 }
 
-void warn_far(const Tissue& tissue, const mapping::Binding& binding, double voxel_mm,
+void warn_far(const Tissue& tissue, std::span<const float> outside_mm, double voxel_mm,
               const Context& context) {
   const auto far = static_cast<float>(kFarVoxels * voxel_mm);
-  const auto count =
-      std::count_if(binding.outside_mm.begin(), binding.outside_mm.end(), [&](float d) { return d > far; });
+  const auto count = std::count_if(outside_mm.begin(), outside_mm.end(), [&](float d) { return d > far; });
   if (count == 0) return;
   std::ostringstream line;
   line.precision(3);
   line << "tissue " << tissue.name << ": " << count << " of " << tissue.V.rows() << " vertices lie more than "
-       << far << " mm outside the body, the farthest " << binding.max_outside_mm
+       << far << " mm outside the body, the farthest "
+       << double{*std::max_element(outside_mm.begin(), outside_mm.end())}
        << " mm; they follow their nearest tet (is the frame right?)";
   context.warn(line.str());
 }
@@ -171,16 +173,30 @@ void warn_far(const Tissue& tissue, const mapping::Binding& binding, double voxe
 // stored.
 std::vector<Tissue> bind_tissues(std::vector<Tissue> tissues, const Model& model, double voxel_mm,
                                  const Context& context) {
-  const mapping::Locator locator(model.nodes, model.tets, context);
-  for (std::size_t i = 0; i < tissues.size(); ++i) {
-    Tissue& tissue = tissues[i];
-    if (tissue.segment == Tissue::by_tets) {
-      mapping::Binding binding = locator.bind(tissue.V.cast<double>(), context);
-      warn_far(tissue, binding, voxel_mm, context);
-      tissue.tet = std::move(binding.tet);
-      tissue.barycentric = std::move(binding.barycentric);
-    }
-    context.report(static_cast<double>(i + 1) / static_cast<double>(tissues.size()));
+  std::vector<Tissue*> bound;
+  Eigen::Index rows = 0;
+  for (Tissue& tissue : tissues) {
+    if (tissue.segment != Tissue::by_tets) continue;
+    bound.push_back(&tissue);
+    rows += tissue.V.rows();
+  }
+  Points points(rows, 3);
+  rows = 0;
+  for (const Tissue* tissue : bound) {
+    points.middleRows(rows, tissue->V.rows()) = tissue->V.cast<double>();
+    rows += tissue->V.rows();
+  }
+  const mapping::Locator locator(model.nodes, model.tets);
+  context.report(0.4);
+  const mapping::Binding all = locator.bind(points, context);
+  context.report(0.9);
+  rows = 0;
+  for (Tissue* tissue : bound) {
+    const Eigen::Index own = tissue->V.rows();
+    tissue->tet.assign(all.tet.begin() + rows, all.tet.begin() + rows + own);
+    tissue->barycentric = all.barycentric.middleRows(rows, own);
+    warn_far(*tissue, {all.outside_mm.data() + rows, static_cast<std::size_t>(own)}, voxel_mm, context);
+    rows += own;
   }
   return tissues;
 }
@@ -255,8 +271,11 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
       patient, options.voxel_mm);
   const double voxel_mm = labels->grid.spacing[0];
   if (options.spheres_tp) {
-    model.spheres.push_back(
-        stage([&] { return thin::body_spheres(*labels, model.rig.skeleton, *options.spheres_tp, context); }));
+    model.spheres.push_back(stage.kept(
+        [&](const Context& inner) {
+          return thin::body_spheres(*labels, model.rig.skeleton, *options.spheres_tp, inner);
+        },
+        *labels, model_file::rig_digest(model.rig), *options.spheres_tp));
   }
 
   std::optional<TetMesh> mesh = stage.kept(

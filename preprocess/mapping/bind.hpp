@@ -23,12 +23,12 @@ struct Binding {
 
 /// The tet that holds each point; on shared faces the lowest index of those that hold it. A point outside
 /// gets the tet behind the exact nearest boundary face, with signed barycentrics. Nothing is assumed of the
-/// body's shape: a point is outside only when no tet at all holds it. Time about constant per point,
-/// parallel, the same for any number of threads. Keeps references: `nodes` and `tets` must outlive the
-/// locator. Throws Error{data} for a mesh without tets.
+/// body's shape: a point is outside only when no tet at all holds it. Parallel, the same for any number of
+/// threads; all tets are gone through once a call, so that points are best bound all together. Keeps
+/// references: `nodes` and `tets` must outlive the locator. Throws Error{data} for a mesh without tets.
 class Locator {
  public:
-  Locator(const PointsF& nodes, const Tets& tets, const Context& context = {});
+  Locator(const PointsF& nodes, const Tets& tets);
   ~Locator();
   Locator(const Locator&) = delete;
   Locator& operator=(const Locator&) = delete;

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/mapping/boundary.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 
@@ -18,85 +21,75 @@ std::array<std::int32_t, 4> sorted(const Tets& tets, std::int64_t tet) {
   return n;
 }
 
-// Every face is met at its lowest node. Of a tet's four faces three have its lowest node and one its second
-// lowest: each tet is listed at those two.
-struct TetsOfNodes {
-  std::vector<std::int32_t> begin, tet;
+std::uint64_t mix(std::uint64_t x) {  // splitmix64's finaliser
+  x ^= x >> 30;
+  x *= 0xbf58476d1ce4e5b9ULL;
+  x ^= x >> 27;
+  x *= 0x94d049bb133111ebULL;
+  return x ^ (x >> 31);
+}
 
-  TetsOfNodes(std::int64_t nodes, const Tets& tets)
-      : begin(static_cast<std::size_t>(nodes) + 1), tet(static_cast<std::size_t>(2 * tets.rows())) {
-    // Every part of the tets counts for itself, so that it knows where its own begin.
-    constexpr std::int64_t kParts = 4;
-    std::array<std::vector<std::int32_t>, kParts> next;
-    const auto for_tets = [&](std::int64_t part, auto&& f) {
-      std::vector<std::int32_t>& own = next[static_cast<std::size_t>(part)];
-      for (std::int64_t t = tets.rows() * part / kParts; t < tets.rows() * (part + 1) / kParts; ++t) {
-        const auto n = sorted(tets, t);
-        f(t, own[static_cast<std::size_t>(n[0])]);
-        f(t, own[static_cast<std::size_t>(n[1])]);
-      }
-    };
-    tbb::parallel_for(std::int64_t{0}, kParts, [&](std::int64_t part) {
-      next[static_cast<std::size_t>(part)].assign(static_cast<std::size_t>(nodes), 0);
-      for_tets(part, [](std::int64_t, std::int32_t& count) { ++count; });
-    });
-    std::int32_t at = 0;
-    for (std::size_t n = 0; n + 1 < begin.size(); ++n) {
-      for (auto& counts : next) {
-        const std::int32_t count = counts[n];
-        counts[n] = at;
-        at += count;
-      }
-      begin[n + 1] = at;
-    }
-    tbb::parallel_for(std::int64_t{0}, kParts, [&](std::int64_t part) {
-      for_tets(part, [&](std::int64_t t, std::int32_t& place) {
-        tet[static_cast<std::size_t>(place++)] = static_cast<std::int32_t>(t);
-      });
-    });
-  }
-};
+std::uint64_t edge(std::int32_t a, std::int32_t b) {
+  return mix(static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b));
+}
 
-// Faces whose lowest node is `node` and that occur once among the tets around it.
-void faces_from(std::int32_t node, const TetsOfNodes& around, const Tets& tets,
-                std::vector<BoundaryFace>& scratch, std::vector<BoundaryFace>& out) {
-  scratch.clear();
-  const auto at = static_cast<std::size_t>(node);
-  for (std::int32_t i = around.begin[at]; i < around.begin[at + 1]; ++i) {
-    const std::int32_t tet = around.tet[static_cast<std::size_t>(i)];
-    const auto n = sorted(tets, tet);
-    if (n[0] == node) {
-      scratch.push_back({{n[0], n[1], n[2]}, tet});
-      scratch.push_back({{n[0], n[1], n[3]}, tet});
-      scratch.push_back({{n[0], n[2], n[3]}, tet});
-    } else {
-      scratch.push_back({{n[1], n[2], n[3]}, tet});
+// Nodes that are the lowest of a face which an odd number of tets have: at its lowest node a face adds the
+// hash of its other two, modulo 2, so that those within the body, met twice, leave nothing.
+std::vector<std::uint8_t> odd_nodes(std::int64_t nodes, const Tets& tets) {
+  const auto count = static_cast<std::size_t>(nodes);
+  tbb::enumerable_thread_specific<std::vector<std::uint64_t>> sums(
+      [&] { return std::vector<std::uint64_t>(count, 0); });
+  tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, tets.rows(), 4096), [&](const auto& range) {
+    std::vector<std::uint64_t>& sum = sums.local();
+    for (std::int64_t t = range.begin(); t < range.end(); ++t) {
+      const auto n = sorted(tets, t);
+      const std::uint64_t last = edge(n[2], n[3]);
+      sum[static_cast<std::size_t>(n[0])] ^= edge(n[1], n[2]) ^ edge(n[1], n[3]) ^ last;
+      sum[static_cast<std::size_t>(n[1])] ^= last;
     }
-  }
-  std::sort(scratch.begin(), scratch.end(), [](const auto& x, const auto& y) { return x.node < y.node; });
-  for (std::size_t i = 0; i < scratch.size();) {
-    std::size_t j = i + 1;
-    while (j < scratch.size() && scratch[j].node == scratch[i].node) ++j;
-    if (j == i + 1) out.push_back(scratch[i]);
-    i = j;
-  }
+  });
+  std::vector<std::uint8_t> odd(count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1 << 14), [&](const auto& range) {
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      std::uint64_t all = 0;
+      for (const std::vector<std::uint64_t>& sum : sums) all ^= sum[n];
+      odd[n] = all != 0;
+    }
+  });
+  return odd;
 }
 
 }  // namespace
 
 std::vector<BoundaryFace> boundary_faces(std::int64_t nodes, const Tets& tets) {
-  const TetsOfNodes around(nodes, tets);
-  constexpr std::int64_t kChunk = 4096;  // fixed, so that the order does not depend on the threads
-  std::vector<std::vector<BoundaryFace>> found(static_cast<std::size_t>((nodes + kChunk - 1) / kChunk));
-  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t chunk) {
-    std::vector<BoundaryFace> scratch;
-    const std::int64_t first = static_cast<std::int64_t>(chunk) * kChunk;
-    for (std::int64_t n = first; n < std::min(first + kChunk, nodes); ++n) {
-      faces_from(static_cast<std::int32_t>(n), around, tets, scratch, found[chunk]);
+  const std::vector<std::uint8_t> odd = odd_nodes(nodes, tets);
+  constexpr std::int64_t kTets = 1 << 15;
+  std::vector<std::vector<BoundaryFace>> found(static_cast<std::size_t>((tets.rows() + kTets - 1) / kTets));
+  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t part) {
+    const std::int64_t first = static_cast<std::int64_t>(part) * kTets;
+    for (std::int64_t t = first; t < std::min(first + kTets, std::int64_t{tets.rows()}); ++t) {
+      const auto n = sorted(tets, t);
+      const auto tet = static_cast<std::int32_t>(t);
+      if (odd[static_cast<std::size_t>(n[0])] != 0) {
+        found[part].push_back({{n[0], n[1], n[2]}, tet});
+        found[part].push_back({{n[0], n[1], n[3]}, tet});
+        found[part].push_back({{n[0], n[2], n[3]}, tet});
+      }
+      if (odd[static_cast<std::size_t>(n[1])] != 0) found[part].push_back({{n[1], n[2], n[3]}, tet});
     }
   });
   std::vector<BoundaryFace> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  tbb::parallel_sort(all.begin(), all.end(), [](const BoundaryFace& a, const BoundaryFace& b) {
+    return a.node != b.node ? a.node < b.node : a.tet < b.tet;
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0, end = 0; i < all.size(); i = end) {
+    end = i + 1;
+    while (end < all.size() && all[end].node == all[i].node) ++end;
+    if (end == i + 1) all[kept++] = all[i];
+  }
+  all.resize(kept);
   return all;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "preprocess/geometry/closest_point.hpp"
+#include "preprocess/mapping/tet_corners.hpp"
 #include "preprocess/mapping/tet_grid.hpp"
 
 namespace ecorche::mapping {
@@ -17,13 +18,6 @@ using Eigen::Vector3d;
 using Range = tbb::blocked_range<Eigen::Index>;
 
 constexpr Eigen::Index kBlock = 4096;
-
-std::array<Vector3d, 4> corners_of(const PointsF& nodes, const Tets& tets, Eigen::Index t) {
-  std::array<Vector3d, 4> out;
-  for (int c = 0; c < 4; ++c)
-    out[static_cast<std::size_t>(c)] = nodes.row(tets(t, c)).transpose().cast<double>();
-  return out;
-}
 
 Vector3d centroid(const std::array<Vector3d, 4>& x) {
   return (x[0] + x[1] + x[2] + x[3]) / 4;
@@ -52,7 +46,7 @@ RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets
       const std::int32_t holder = grid.find(at);
       sums.volume += volume;
       if (holder < 0 || holder == t) continue;
-      const Eigen::Vector4d share = geometry::barycentric(at, grid.corners(holder));
+      const Eigen::Vector4d share = geometry::barycentric(at, corners_of(posed, tets, holder));
       const std::array<Vector3d, 4> there = corners_of(rest, tets, holder);
       Vector3d back = Vector3d::Zero();
       for (std::size_t c = 0; c < 4; ++c) back += share[static_cast<Eigen::Index>(c)] * there[c];

@@ -12,6 +12,11 @@
 
 namespace ecorche::mapping {
 
+Eigen::AlignedBox3d box_of(const PointsF& nodes);  ///< of at least one node
+
+/// The longest edge of a tet's own box, in the mean over all of at least one, mm.
+double mean_width(const PointsF& nodes, const Tets& tets);
+
 /// A grid of cells of about a tet's size, each with the tets whose bounding box meets it, in ascending order:
 /// the tet that holds a point is the first of its cell that does, exactly as a search through all tets would
 /// answer. No walk, hence nothing to go wrong where the body is not convex. Refers to `nodes` and `tets`,
@@ -20,16 +25,11 @@ class TetGrid {
  public:
   TetGrid(const PointsF& nodes, const Tets& tets, const Context& context);
 
-  /// The tet of lowest index that holds p, faces included; -1 outside of all. `hint`: a tet to try first, or
-  /// -1; it is the answer only where p is well inside it, so that it saves time and changes nothing.
-  std::int32_t find(const Eigen::Vector3d& p, std::int32_t hint = -1) const;
-
-  std::array<Eigen::Vector3d, 4> corners(std::int32_t tet) const;
-  const Eigen::AlignedBox3d& box() const { return box_; }
+  /// The tet of lowest index that holds p, faces included; -1 outside of all.
+  std::int32_t find(const Eigen::Vector3d& p) const;
 
  private:
   std::array<std::int64_t, 3> cell_of(const Eigen::Vector3d& p) const;
-  bool holds(std::int32_t tet, const Eigen::Vector3d& p, double least) const;
   template <class F>
   void for_cells(std::int64_t tet, F&& f) const;
 

@@ -18,7 +18,7 @@ std::vector<std::int32_t> attach_by_weights(const VolumetricSkeleton& skeleton, 
     const auto at = skeleton.grid.point(ijk[0], ijk[1], ijk[2]);
     centres.row(static_cast<Eigen::Index>(v)) << at[0], at[1], at[2];
   }
-  const mapping::Locator locator(model.nodes, model.tets, context);
+  const mapping::Locator locator(model.nodes, model.tets);
   const mapping::Binding bound = locator.bind(centres, context);
   std::vector<std::int32_t> out(skeleton.size());
   const auto rows = static_cast<std::size_t>(model.segment_count());

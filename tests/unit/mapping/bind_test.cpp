@@ -109,6 +109,20 @@ TEST(Bind, a_node_belongs_to_the_lowest_tet_around_it) {
   EXPECT_EQ(binding.outside, 0U);
 }
 
+TEST(Bind, where_tets_overlap_the_lowest_holds) {
+  FloatTets mesh{PointsF(12, 3), Tets(3, 4)};  // the first is inverted: it holds nothing
+  for (int t = 0; t < 3; ++t) {
+    mesh.nodes.middleRows(4 * t, 4) << 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4;
+    mesh.tets.row(t) << 4 * t, 4 * t + 1, 4 * t + 2, 4 * t + 3;
+  }
+  std::swap(mesh.tets(0, 0), mesh.tets(0, 1));
+  mesh.nodes.bottomRows(4).array() += 1;
+  Points points(3, 3);
+  points << 1.1, 1.1, 1.1, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5;
+  const Binding binding = Locator(mesh.nodes, mesh.tets).bind(points, {});
+  EXPECT_EQ(binding.tet, (std::vector<std::int32_t>{1, 1, 2}));
+}
+
 TEST(Bind, rest_comes_back_in_float_two_metres_from_the_origin) {
   const FloatTets mesh = test::letter_c({1990, -2000, 1985});
   const Points points = probes(mesh, 6000);

@@ -57,6 +57,25 @@ TEST(KeptStages, a_second_run_takes_all_and_gives_the_same_model) {
   EXPECT_EQ(again.warnings, plain.warnings);
 }
 
+TEST(KeptStages, spheres_are_kept_too) {
+  MemoryStore store;
+  Options options = coarse();
+  options.spheres_tp = 0.3;
+  const Result first = run(test::two_bones(), options, {}, {.store = &store});
+  EXPECT_EQ(store.held.size(), 6U);
+  const Result again = run(test::two_bones(), options, {}, {.store = &store});
+  EXPECT_EQ(taken(again), "voxelize spheres mesh weights cor mapping ");
+  EXPECT_EQ(model_file::identity(again.model), model_file::identity(first.model));
+  EXPECT_EQ(again.warnings, first.warnings);
+  options.spheres_tp = 0.2;
+  EXPECT_EQ(taken(run(test::two_bones(), options, {}, {.store = &store})),
+            "voxelize mesh weights cor mapping ");
+  Case other = test::two_bones();
+  other.skeleton.segments[1].joint.center.x() += 1;  // they hang on the rig
+  const std::string moved = taken(run(other, options, {}, {.store = &store}));
+  EXPECT_EQ(moved.find("spheres"), std::string::npos) << moved;
+}
+
 TEST(KeptStages, only_what_reads_the_change_is_made_again) {
   MemoryStore store;
   const auto after = [&](const Case& patient, const Options& options) {
