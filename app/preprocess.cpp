@@ -171,7 +171,9 @@ int run(const Program& program, const Settings& settings) {
   stages.insert(stages.end(), made.stages.begin(), made.stages.end());
   timed(stages, "write", [&] { model_file::write(made.model, settings.output, program.context("write")); });
 
-  const auto digests = model_file::check_digests(settings.output, program.context("digests"));
+  std::vector<model_file::DigestCheck> digests;  // of what is on the disk now
+  timed(stages, "verify",
+        [&] { digests = model_file::check_digests(settings.output, program.context("verify")); });
   const auto bad = static_cast<std::size_t>(std::count_if(
       digests.begin(), digests.end(), [](const model_file::DigestCheck& d) { return !d.good; }));
   if (bad > 0) {
