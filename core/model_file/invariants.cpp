@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <set>
 #include <span>
 
+#include "core/model_file/in_turn.hpp"
 #include "core/values/volumetric_skeleton_check.hpp"
 
 namespace ecorche::model_file {
@@ -17,6 +19,7 @@ constexpr double kBarycentric = 1e-4;     // float32, per unit of the largest co
 constexpr double kFrame = 1e-6;           // of joint frames, which ecorche makes itself
 constexpr double kDirection = 1e-4;       // of images, which come from scanners' files
 constexpr std::size_t kStride = 1 << 18;  // rows between two looks at the stop token
+constexpr Eigen::Index kTetsPerPart = 1 << 18;
 
 // Says no in the name of one dataset.
 class Checker {
@@ -25,17 +28,24 @@ class Checker {
       : model_(model), where_(where), kind_(kind), context_(context) {}
 
   void run() {
-    check_rig();
-    check_mesh();
-    check_labels();
-    check_weights();
-    check_centres();
-    check_names(model_.tissues, "/ecorche/tissues");
-    for (const Tissue& tissue : model_.tissues) check_tissue(tissue);
-    check_names(model_.volumes, "/ecorche/volumes");
-    for (const ModelVolume& volume : model_.volumes) check_volume(volume);
-    check_names(model_.spheres, "/ecorche/spheres");
-    for (const VolumetricSkeleton& skeleton : model_.spheres) check_spheres(skeleton);
+    std::vector<std::function<void()>> parts;
+    const auto part = [&](auto check) { parts.emplace_back(std::move(check)); };
+    part([this] { check_rig(); });
+    part([this] { check_sizes(); });
+    part([this] { require_finite(model_.nodes, "/VTKHDF/Points"); });
+    for (Eigen::Index t = 0; t < model_.tets.rows(); t += kTetsPerPart)
+      part([this, t] { check_tets(t, std::min(model_.tets.rows(), t + kTetsPerPart)); });
+    part([this] { check_labels(); });
+    part([this] { check_weights(); });
+    part([this] { check_centres(); });
+    part([this] { check_names(model_.tissues, "/ecorche/tissues"); });
+    for (const Tissue& tissue : model_.tissues) part([this, &tissue] { check_tissue(tissue); });
+    part([this] { check_names(model_.volumes, "/ecorche/volumes"); });
+    for (const ModelVolume& volume : model_.volumes) part([this, &volume] { check_volume(volume); });
+    part([this] { check_names(model_.spheres, "/ecorche/spheres"); });
+    for (const VolumetricSkeleton& skeleton : model_.spheres)
+      part([this, &skeleton] { check_spheres(skeleton); });
+    run_as_in_turn(parts);
   }
 
  private:
@@ -147,18 +157,24 @@ class Checker {
     }
   }
 
-  void check_mesh() const {
+  void check_sizes() const {
     require(model_.nodes.rows() > 0 && model_.nodes.rows() <= std::numeric_limits<std::int32_t>::max(),
             "/VTKHDF/Points", "has no rows, or too many for 32-bit indices");
     require(model_.tets.rows() > 0 && model_.tets.size() < std::numeric_limits<std::int32_t>::max(),
             "/VTKHDF/Connectivity", "has no tets, or too many for 32-bit offsets");
-    require_finite(model_.nodes, "/VTKHDF/Points");
-    require_indices(model_.tets, model_.nodes.rows(), "/VTKHDF/Connectivity");
-    for (Eigen::Index t = 0; t < model_.tets.rows(); ++t) {
-      look(static_cast<std::size_t>(t));
+  }
+  void check_tets(Eigen::Index begin, Eigen::Index end) const {
+    context_.check_stop();
+    for (Eigen::Index t = begin; t < end; ++t) {
+      const auto row = static_cast<std::size_t>(t);
+      for (int c = 0; c < 4; ++c) {
+        const auto node = model_.tets(t, c);
+        require_row(node >= 0 && node < model_.nodes.rows(), "/VTKHDF/Connectivity",
+                    "names a row that does not exist", row);
+      }
       const auto corner = [&](int c) { return model_.nodes.row(model_.tets(t, c)); };
       require_row(tet_det(corner(0), corner(1), corner(2), corner(3)) > 0, "/VTKHDF/Connectivity",
-                  "is a tet without positive volume", static_cast<std::size_t>(t));
+                  "is a tet without positive volume", row);
     }
   }
   void check_labels() const {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <functional>
 
 #include "core/model_file/figures.hpp"
 #include "core/model_file/guard.hpp"
+#include "core/model_file/in_turn.hpp"
 #include "core/model_file/invariants.hpp"
 #include "core/model_file/layout.hpp"
 #include "core/model_file/model_file.hpp"
@@ -137,16 +139,21 @@ void check_vtk(const Source& source, const Model& model) {
   same("/VTKHDF/NumberOfPoints", model.node_count());
   same("/VTKHDF/NumberOfCells", tets);
   same("/VTKHDF/NumberOfConnectivityIds", 4 * tets);
-  const auto offsets = source.vector<std::int32_t>("/VTKHDF/Offsets", {tets + 1});
-  for (std::size_t t = 0; t < offsets.size(); ++t) {
-    if (offsets[t] < 0 || static_cast<std::size_t>(offsets[t]) != 4 * t) {
-      source.refuse("/VTKHDF/Offsets", "row " + std::to_string(t) + " is not " + std::to_string(4 * t));
+  const auto offsets_good = [&] {
+    const auto offsets = source.vector<std::int32_t>("/VTKHDF/Offsets", {tets + 1});
+    for (std::size_t t = 0; t < offsets.size(); ++t) {
+      if (offsets[t] < 0 || static_cast<std::size_t>(offsets[t]) != 4 * t) {
+        source.refuse("/VTKHDF/Offsets", "row " + std::to_string(t) + " is not " + std::to_string(4 * t));
+      }
     }
-  }
-  const auto types = source.vector<std::uint8_t>("/VTKHDF/Types", {tets});
-  if (std::any_of(types.begin(), types.end(), [](std::uint8_t type) { return type != kVtkTetra; })) {
-    source.refuse("/VTKHDF/Types", "holds a cell that is not a tetrahedron");
-  }
+  };
+  const auto types_good = [&] {
+    const auto types = source.vector<std::uint8_t>("/VTKHDF/Types", {tets});
+    if (std::any_of(types.begin(), types.end(), [](std::uint8_t type) { return type != kVtkTetra; })) {
+      source.refuse("/VTKHDF/Types", "holds a cell that is not a tetrahedron");
+    }
+  };
+  run_as_in_turn({offsets_good, types_good});
 }
 
 Tissue read_tissue(const Source& source, const std::string& name) {
@@ -215,7 +222,7 @@ ModelVolume read_volume(const Source& source, const std::string& name) {
   if (volume.image.components > 1) shape.push_back(static_cast<std::uint64_t>(volume.image.components));
   volume.image.type = scalar_type(source, voxels, source.find(voxels).type);
   const StoredDataset& dataset = source.find(voxels, element_type(volume.image.type), shape);
-  volume.image.bytes.resize(dataset.bytes);
+  volume.image.bytes = Source::room<std::byte>(dataset.bytes);
   source.read(voxels, dataset, volume.image.bytes);
   return volume;
 }
@@ -239,31 +246,39 @@ VolumetricSkeleton read_spheres(const Source& source, const std::string& name) {
   return skeleton;
 }
 
+// The large arrays; files of hundreds of megabytes are read by several threads at once.
+void read_arrays(const Source& source, Model& model) {
+  std::vector<std::function<void()>> parts;
+  const auto part = [&](auto read) { parts.emplace_back(std::move(read)); };
+  part([&] { model.nodes = source.matrix<PointsF>("/VTKHDF/Points"); });
+  part([&] { model.tets = source.matrix<Tets>("/VTKHDF/Connectivity", true); });
+  part([&] { model.tet_label = source.vector<std::uint16_t>("/VTKHDF/CellData/label"); });
+  part([&] { model.weights.offsets = source.vector<std::uint64_t>("/ecorche/weights/offsets"); });
+  part([&] { model.weights.segment = source.vector<std::uint16_t>("/ecorche/weights/segment"); });
+  part([&] { model.weights.weight = source.vector<float>("/ecorche/weights/weight"); });
+  part([&] { model.cor.centre = source.matrix<PointsF>("/ecorche/cor/centre"); });
+  part([&] { model.cor.has_centre = source.vector<std::uint8_t>("/ecorche/cor/has_centre"); });
+  const auto all = [&](const std::string& group, auto& rows, auto read) {
+    const std::vector<std::string> names = source.ordered_members(group);
+    rows.resize(names.size());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      part([&source, &row = rows[i], name = names[i], read] { row = read(source, name); });
+  };
+  all("/ecorche/tissues", model.tissues, read_tissue);
+  all("/ecorche/volumes", model.volumes, read_volume);
+  all("/ecorche/spheres", model.spheres, read_spheres);
+  run_as_in_turn(parts);
+}
+
 Model read_model(const Source& source) {
   Model model;
   model.name = source.text("/ecorche/name");
   model.rig = read_rig(source);
-  model.nodes = source.matrix<PointsF>("/VTKHDF/Points");
-  model.tets = source.matrix<Tets>("/VTKHDF/Connectivity", true);
-  model.tet_label = source.vector<std::uint16_t>("/VTKHDF/CellData/label");
-  check_vtk(source, model);
   model.bone_names = source.texts("/ecorche/labels/bone");
   model.bone_segment = source.vector<std::int32_t>("/ecorche/labels/segment");
-  model.weights.offsets = source.vector<std::uint64_t>("/ecorche/weights/offsets");
-  model.weights.segment = source.vector<std::uint16_t>("/ecorche/weights/segment");
-  model.weights.weight = source.vector<float>("/ecorche/weights/weight");
-  model.cor.centre = source.matrix<PointsF>("/ecorche/cor/centre");
-  model.cor.has_centre = source.vector<std::uint8_t>("/ecorche/cor/has_centre");
   model.cor.sigma = source.scalar<double>("/ecorche/cor/sigma");
-  for (const std::string& name : source.ordered_members("/ecorche/tissues")) {
-    model.tissues.push_back(read_tissue(source, name));
-  }
-  for (const std::string& name : source.ordered_members("/ecorche/volumes")) {
-    model.volumes.push_back(read_volume(source, name));
-  }
-  for (const std::string& name : source.ordered_members("/ecorche/spheres")) {
-    model.spheres.push_back(read_spheres(source, name));
-  }
+  read_arrays(source, model);
+  check_vtk(source, model);
   for_each_figure(model.certificate, [&](std::string_view name, auto& value) {
     value = source.scalar<std::decay_t<decltype(value)>>("/ecorche/quality/" + std::string(name));
   });

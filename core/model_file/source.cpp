@@ -107,6 +107,7 @@ std::uint64_t Source::read_and_digest(const StoredDataset& dataset, std::span<st
     const std::span<std::byte> block = out.empty() ? std::span(passing).first(size) : out.subspan(at, size);
     catalogue_.file.read(dataset.offset + at, block);
     digest.bytes(block);
+    const std::lock_guard lock(mutex_);
     read_bytes_ += size;
     if (total_bytes_ > 0)
       context_.report(static_cast<double>(read_bytes_) / static_cast<double>(total_bytes_));

@@ -3,14 +3,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <mutex>
 #include <string>
 #include <vector>
 
 #include "core/model_file/guard.hpp"
+#include "core/model_file/huge_pages.hpp"
 #include "core/values/context.hpp"
 
 namespace ecorche::model_file {
 
+/// Any number of threads may read from one.
 class Source {
  public:
   using Shape = std::vector<std::uint64_t>;
@@ -35,8 +38,17 @@ class Source {
   template <class T>
   std::vector<T> vector(const std::string& path, Shape shape = {any}) const {
     const StoredDataset& dataset = find(path, element_type_of<T>, shape);
-    std::vector<T> values(dataset.bytes / sizeof(T));
+    std::vector<T> values = room<T>(dataset.bytes / sizeof(T));
     read(path, dataset, std::as_writable_bytes(std::span(values)));
+    return values;
+  }
+  /// So many zeros, to be read into.
+  template <class T>
+  static std::vector<T> room(std::size_t count) {
+    std::vector<T> values;
+    values.reserve(count);
+    wish_for_huge_pages(values.data(), count * sizeof(T));
+    values.resize(count);
     return values;
   }
   template <class T>
@@ -51,6 +63,7 @@ class Source {
         find(path, element_type_of<typename M::Scalar>, flat ? Shape{any} : Shape{any, columns});
     if (flat && dataset.shape[0] % columns != 0) refuse(path, "does not fill its last row");
     M values(static_cast<Eigen::Index>(dataset.bytes / sizeof(typename M::Scalar) / columns), columns);
+    wish_for_huge_pages(values.data(), dataset.bytes);
     read(path, dataset,
          std::as_writable_bytes(std::span(values.data(), static_cast<std::size_t>(values.size()))));
     return values;
@@ -70,6 +83,7 @@ class Source {
   const Catalogue& catalogue_;
   const Context& context_;
   std::uint64_t total_bytes_ = 0;
+  mutable std::mutex mutex_;
   mutable std::uint64_t read_bytes_ = 0;  // for the progress
 };
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <unordered_map>
 
 namespace ecorche::runtime {
 namespace {
@@ -53,20 +54,44 @@ std::vector<std::uint64_t> cells(const PointsF& V, float edge) {
   return out;
 }
 
+// The vertices of one cell after those of another, by cell and within one in their own order.
+struct ByCell {
+  std::vector<std::uint32_t> begin, order;  // #cells + 1, #V
+};
+
+// Cells are few, so they alone are sorted.
+ByCell by_cell(const std::vector<std::uint64_t>& cell) {
+  std::unordered_map<std::uint64_t, std::uint32_t> row;
+  for (std::size_t v = 0; v < cell.size(); ++v) {
+    if (v == 0 || cell[v] != cell[v - 1]) row.try_emplace(cell[v], 0U);
+  }
+  std::vector<std::uint64_t> all;
+  for (const auto& [one, unused] : row) all.push_back(one);
+  std::sort(all.begin(), all.end());
+  for (std::uint32_t r = 0; r < all.size(); ++r) row[all[r]] = r;
+  std::vector<std::uint32_t> of(cell.size());
+  ByCell out{std::vector<std::uint32_t>(all.size() + 2, 0), std::vector<std::uint32_t>(cell.size())};
+  for (std::size_t v = 0; v < cell.size(); ++v) {
+    of[v] = v > 0 && cell[v] == cell[v - 1] ? of[v - 1] : row.find(cell[v])->second;
+    ++out.begin[of[v] + 2];
+  }
+  std::partial_sum(out.begin.begin(), out.begin.end(), out.begin.begin());
+  for (std::uint32_t v = 0; v < of.size(); ++v) out.order[out.begin[of[v] + 1]++] = v;
+  out.begin.pop_back();
+  return out;
+}
+
 }  // namespace
 
 CoarseSurface cluster_vertices(const PointsF& V, const Triangles& F, float edge) {
-  const std::vector<std::uint64_t> cell = cells(V, edge);
-  std::vector<std::uint32_t> order(cell.size()), drawn(cell.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return cell[a] != cell[b] ? cell[a] < cell[b] : a < b; });
+  const ByCell cells_of = by_cell(cells(V, edge));
+  const std::vector<std::uint32_t>& order = cells_of.order;
+  std::vector<std::uint32_t> drawn(order.size());
   CoarseSurface out;
-  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+  for (std::size_t cell = 0; cell + 1 < cells_of.begin.size(); ++cell) {
+    const std::size_t begin = cells_of.begin[cell], end = cells_of.begin[cell + 1];
     Eigen::RowVector3f mean = Eigen::RowVector3f::Zero();
-    for (end = begin; end < order.size() && cell[order[end]] == cell[order[begin]]; ++end) {
-      mean += V.row(order[end]);
-    }
+    for (std::size_t i = begin; i < end; ++i) mean += V.row(order[i]);
     mean /= static_cast<float>(end - begin);
     std::uint32_t nearest = order[begin];
     float least = std::numeric_limits<float>::infinity();

@@ -196,15 +196,42 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   if (const Status status = read_want(request.subscribe(), session_->model()->model(), want); !status.ok()) {
     return answer_status(id, status);
   }
-  if (subscriptions_.size() >= house_.limits().subscriptions) {
+  if (subscriptions_.size() + coarsening_ >= house_.limits().subscriptions) {
     house_.metrics().hit("subscriptions");
     return answer_status(
         id, {StatusCode::resource_exhausted, "subscribe: " + std::to_string(subscriptions_.size()) +
                                                  " subscriptions already (Unsubscribe one first)"});
   }
+  const auto* mesh = std::get_if<MeshWant>(&want);
+  const bool coarse = mesh && (mesh->level > 0 || mesh->adaptive);
+  if (!coarse || session_->model()->has_levels(mesh->tissues))
+    return subscribe(id, want, request.subscribe());
+  // The first who wants them waits for the levels of detail, and nobody else does.
+  ++coarsening_;
+  const auto made = std::make_shared<Status>();
+  house_.offload(
+      [made, model = session_->model(), tissues = mesh->tissues] {
+        try {
+          model->make_levels(tissues);
+        } catch (const std::bad_alloc&) {
+          *made = {StatusCode::resource_exhausted, "subscribe: the server is out of memory (ask for less)"};
+        }
+      },
+      [weak = weak_from_this(), made, id, want, session = session_, request = request.subscribe()] {
+        const auto self = weak.lock();
+        if (!self) return;
+        --self->coarsening_;
+        if (self->closed_ || self->ending_) return;
+        if (made->ok() && self->session_ != session)
+          *made = {StatusCode::failed_precondition, "subscribe: another model was opened (ask again)"};
+        if (!made->ok()) return self->answer_status(id, *made);
+        self->subscribe(id, want, request);
+      });
+}
+
+void Connection::subscribe(std::uint64_t id, const Want& want, const v1::Subscribe& request) {
   v1::Envelope envelope;
-  const Subscription& subscription =
-      session_->subscribe(*this, {.id = 0, .want = want, .request = request.subscribe()});
+  const Subscription& subscription = session_->subscribe(*this, {.id = 0, .want = want, .request = request});
   subscriptions_.insert(subscription.id);
   envelope.mutable_subscribed()->set_subscription(subscription.id);
   auto payload = describe(*session_->model(), subscription.streams, *envelope.mutable_subscribed());

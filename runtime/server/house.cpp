@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <new>
 #include <utility>
 
 namespace ecorche::server {
@@ -19,6 +20,14 @@ bool identifier(const std::string& name) {
   return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
   });
+}
+
+// Throws nothing: what could not be made is tried again by who wants it.
+void warm_up(const ServedModel& model) {
+  try {
+    model.meter();
+  } catch (const std::bad_alloc&) {
+  }
 }
 
 }  // namespace
@@ -40,6 +49,8 @@ House::House(net::io_context& io, Workers& workers, Options options, std::vector
       throw Error(ErrorKind::config, model.name, "two models have this name", "rename one of the files");
     models_.push_back(
         std::make_shared<const ServedModel>(model.name, std::move(model.model), std::move(model.clips)));
+    // The first frame of all will want it.
+    workers_.submit([served = models_.back()] { warm_up(*served); });
   }
 }
 
@@ -227,6 +238,7 @@ void House::reload(const std::string& name, std::function<void(const Status&)> d
     try {
       ModelParts parts = read();
       reading->model = std::make_shared<const ServedModel>(name, parts.model, std::move(parts.clips));
+      warm_up(*reading->model);
     } catch (const Error& error) {
       reading->status = to_status(error);
     } catch (const std::bad_alloc&) {

@@ -65,7 +65,7 @@ v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<
 
 void run(JudgeJob& job) {
   const auto judge = [&job] {
-    const runtime::BodyPoser& poser = job.model->poser;
+    const runtime::BodyPoser& poser = job.model->poser();
     const BodyPool::Lease body = job.model->bodies.take();
     std::vector<std::uint32_t> tissues;
     for (std::size_t t = 0; t < body->tissues.size(); ++t) {
@@ -81,7 +81,7 @@ void run(JudgeJob& job) {
       return;
     for (JudgeJob::Row& row : job.rows) {
       row.quality = std::make_shared<const v1::PoseQuality>(describe(
-          job.model->meter.measure(*body, row.tissues, job.thresholds), row.tissues, job.request.sequence));
+          job.model->meter().measure(*body, row.tissues, job.thresholds), row.tissues, job.request.sequence));
     }
   };
   try {

@@ -2,7 +2,6 @@
 #include "runtime/server/mesh_rows.hpp"
 
 #include <meshoptimizer.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <limits>
@@ -35,23 +34,20 @@ std::vector<std::uint32_t> all_corners(const Tissue& tissue) {
 
 }  // namespace
 
-std::vector<MeshParts> make_levels(const Model& model) {
-  std::vector<MeshParts> levels(coarsest_level, MeshParts(model.tissues.size()));
-  tbb::parallel_for(std::size_t{0}, model.tissues.size(), [&](std::size_t t) {
-    const Tissue& tissue = model.tissues[t];
-    const auto vertices = static_cast<std::size_t>(tissue.V.rows());
-    std::vector<std::uint32_t> corners = all_corners(tissue), coarser(corners.size());
-    for (MeshParts& level : levels) {
-      const std::size_t target = std::max(corners.size() / 12, kFewestTriangles) * 3;
-      if (corners.size() > target) {
-        coarser.resize(corners.size());
-        coarser.resize(meshopt_simplify(coarser.data(), corners.data(), corners.size(), tissue.V.data(),
-                                        vertices, 3 * sizeof(float), target, kMostError));
-        if (!coarser.empty()) corners.swap(coarser);
-      }
-      level[t] = rows_of(corners, vertices);
+MeshLevels make_levels(const Tissue& tissue) {
+  MeshLevels levels;
+  const auto vertices = static_cast<std::size_t>(tissue.V.rows());
+  std::vector<std::uint32_t> corners = all_corners(tissue), coarser(corners.size());
+  for (MeshRows& level : levels) {
+    const std::size_t target = std::max(corners.size() / 12, kFewestTriangles) * 3;
+    if (corners.size() > target) {
+      coarser.resize(corners.size());
+      coarser.resize(meshopt_simplify(coarser.data(), corners.data(), corners.size(), tissue.V.data(),
+                                      vertices, 3 * sizeof(float), target, kMostError));
+      if (!coarser.empty()) corners.swap(coarser);
     }
-  });
+    level = rows_of(corners, vertices);
+  }
   return levels;
 }
 

@@ -2,6 +2,7 @@
 // Parts of tissues: levels of detail, and what lies in a box.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -23,10 +24,12 @@ struct MeshRows {
 /// One per tissue.
 using MeshParts = std::vector<MeshRows>;
 
-/// Levels 1 to `coarsest_level` of every tissue, each with about a quarter of the triangles of the one
-/// before, by collapsing edges (meshoptimizer): vertices only go, none moves. A tissue that cannot be made
-/// coarser keeps what it has.
-std::vector<MeshParts> make_levels(const Model& model);
+/// Levels 1 to `coarsest_level` of a tissue.
+using MeshLevels = std::array<MeshRows, coarsest_level>;
+
+/// Each has about a quarter of the triangles of the one before, by collapsing edges (meshoptimizer):
+/// vertices only go, none moves. A tissue that cannot be made coarser keeps what it has.
+MeshLevels make_levels(const Tissue& tissue);
 
 /// Of `from` (null: the whole tissue) what lies in the box in the scan, both ends included; triangles with
 /// all corners inside.

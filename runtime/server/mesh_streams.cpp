@@ -66,7 +66,7 @@ std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, 
     }
     auto parts = std::make_shared<MeshParts>();
     for (const std::uint32_t t : want.tissues) {
-      const MeshRows* rows = level > 0 ? &model.levels[level - 1][t] : nullptr;
+      const MeshRows* rows = level > 0 ? &model.level(level, t) : nullptr;
       parts->push_back(want.region ? cut(model.model().tissues[t], rows, *want.region) : *rows);
     }
     streams.push_back(std::make_shared<MeshStream>(want, level, std::move(parts)));

@@ -107,7 +107,7 @@ Judged judge(const PoseJob& job, const Subscription& subscription, const runtime
   const auto start = Clock::now();
   const std::vector<std::uint32_t>& tissues = std::get<MeshWant>(subscription.want).tissues;
   auto quality = std::make_shared<const v1::PoseQuality>(server::describe(
-      job.model->meter.measure(body, tissues, job.thresholds), tissues, job.request.sequence));
+      job.model->meter().measure(body, tissues, job.thresholds), tissues, job.request.sequence));
   return {std::move(quality), true, microseconds(Clock::now() - start)};
 }
 
@@ -167,7 +167,7 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
 }
 
 Status pose(const PoseJob& job, runtime::PosedBody& body, bool& fits) {
-  const runtime::BodyPoser& poser = job.model->poser;
+  const runtime::BodyPoser& poser = job.model->poser();
   Wanted wanted(poser.model().tissues.size());
   for (const Subscription& subscription : job.subscriptions) {
     if (!subscription.streams.empty()) wanted.add(*subscription.streams[0], measured(job, subscription));

@@ -2,6 +2,7 @@
 // A model made ready for clients: its poser, its digests, and its description encoded once.
 #pragma once
 
+#include <atomic>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -21,30 +22,45 @@
 
 namespace ecorche::server {
 
-/// Does not change after construction; shared by every thread.
+/// Shared by every thread. Does not change after construction, but for what takes long to make and not every
+/// client wants, which is made when it is first asked for.
 struct ServedModel {
   /// `name` is what OpenModel asks for; `clips` are of the model's rig.
   ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> clips = {});
 
-  const Model& model() const { return poser.model(); }
-  /// Made when somebody first probes, on a worker.
+  const runtime::BodyPoser& poser() const { return *poser_; }
+  const Model& model() const { return poser_->model(); }
+  /// Whether the levels of detail of these tissues are at hand.
+  bool has_levels(const std::vector<std::uint32_t>& tissues) const;
+  /// Makes them, on the calling thread alone; throws bad_alloc.
+  void make_levels(const std::vector<std::uint32_t>& tissues) const;
+  /// Of a tissue whose levels are at hand; `level`: 1 to `coarsest_level`.
+  const MeshRows& level(std::uint32_t level, std::uint32_t tissue) const {
+    return levels_[tissue].levels[level - 1];
+  }
+  /// On a worker, as those below; they throw bad_alloc.
+  const runtime::QualityMeter& meter() const;
+  const runtime::VolumePoser& volumes() const;
   const runtime::Probe& probe() const;
-  /// Of a row of Model::volumes, bridged. Made when somebody first asks, on a worker; throws as VolumeBalls.
+  /// Of a row of Model::volumes, bridged; throws as VolumeBalls, too.
   const runtime::VolumeBalls& balls(std::size_t volume) const;
 
-  runtime::BodyPoser poser;
-  /// For the frames of meshes.
-  std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);
-  mutable BodyPool bodies{poser};  ///< for jobs to pose into
-  runtime::VolumePoser volumes;
-  runtime::QualityMeter meter;
-  std::vector<MeshParts> levels;  ///< of detail, from 1 on
-  float step = 0;                 ///< mm, of the u16 encodings
-  std::vector<std::shared_ptr<const Clip>> clips;
   v1::ModelSummary summary;
   v1::ModelOpened opened;                         ///< without session, role and triangles
   std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`
   std::shared_ptr<const wire::Payload> topology;  ///< the triangles of every tissue
+  float step = 0;                                 ///< mm, of the u16 encodings
+  std::vector<std::shared_ptr<const Clip>> clips;
+
+ private:
+  struct Made;
+  explicit ServedModel(Made made);
+  std::unique_ptr<const runtime::BodyPoser> poser_;
+
+ public:
+  mutable BodyPool bodies;  ///< for jobs to pose into
+  /// For the frames of meshes.
+  std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);
 
  private:
   struct Balls {
@@ -52,7 +68,17 @@ struct ServedModel {
     std::unique_ptr<const runtime::VolumeBalls> balls;
   };
 
-  mutable std::deque<Balls> balls_;  // of every volume
+  struct Levels {
+    std::once_flag once;
+    std::atomic<bool> made = false;
+    MeshLevels levels;
+  };
+
+  mutable std::deque<Levels> levels_;  // of every tissue
+  mutable std::deque<Balls> balls_;    // of every volume
+  mutable std::once_flag meter_made_, volumes_made_;
+  mutable std::unique_ptr<const runtime::QualityMeter> meter_;
+  mutable std::unique_ptr<const runtime::VolumePoser> volumes_;
   mutable std::once_flag probe_made_;
   mutable std::unique_ptr<const runtime::Probe> probe_;
 };

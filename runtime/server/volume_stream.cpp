@@ -67,7 +67,7 @@ Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody
                              ? grid_of(rest, runtime::box_within(rest, want_.region->low, want_.region->high))
                              : runtime::grow_to(rest, body.nodes);
   if (Status status = check_size(grid, most_voxels); !status.ok()) return status;
-  served.volumes.follow(body.nodes, volume, want_.sampling, grid, kept_, scratch_);
+  served.volumes().follow(body.nodes, volume, want_.sampling, grid, kept_, scratch_);
   posed_ = {&kept_.image, &kept_.bricks, &kept_.moved};
   return {};
 }
@@ -93,7 +93,7 @@ void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedB
       slice_ = Image(plane, volume.image.type, volume.image.components);
       runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice_);
     } else {
-      served.volumes.pose(body.nodes, volume, want_.sampling, plane, slice_, scratch_);
+      served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice_, scratch_);
     }
     pixels.insert(pixels.end(), slice_.bytes.begin(), slice_.bytes.end());
   }

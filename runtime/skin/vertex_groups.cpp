@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -40,21 +41,65 @@ Order morton_order(const PointsF& V) {
   return order;
 }
 
-std::vector<std::uint32_t> palette_of(const Model& model, const Tissue& tissue,
-                                      std::span<const std::uint32_t> vertices) {
-  std::vector<std::uint32_t> nodes;
-  for (const std::uint32_t v : vertices) {
-    for (int c = 0; c < 4; ++c) nodes.push_back(static_cast<std::uint32_t>(model.tets(tissue.tet[v], c)));
-  }
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  return nodes;
-}
+// The nodes that up to 16 vertices hang on, each once. A hash table of four times as many places as nodes,
+// which a stamp empties: models are grouped while somebody waits for them.
+class Palette {
+ public:
+  Palette(const Model& model, const Tissue& tissue) : model_(model), tissue_(tissue) {}
 
-std::size_t palettes_of(const Model& model, const Tissue& tissue, const Order& order) {
-  std::size_t sum = 0;
+  void gather(std::span<const std::uint32_t> vertices) {
+    ++stamp_;
+    nodes_.clear();
+    for (const std::uint32_t v : vertices) {
+      for (int c = 0; c < 4; ++c) add(static_cast<std::uint32_t>(model_.tets(tissue_.tet[v], c)));
+    }
+  }
+  void sort() {
+    std::sort(nodes_.begin(), nodes_.end());
+    for (std::size_t i = 0; i < nodes_.size(); ++i) slot_of(nodes_[i]).place = static_cast<std::uint8_t>(i);
+  }
+  const std::vector<std::uint32_t>& nodes() const { return nodes_; }
+  /// Of a node of it, once sorted.
+  std::uint8_t place(std::int32_t node) { return slot_of(static_cast<std::uint32_t>(node)).place; }
+
+ private:
+  struct Slot {
+    std::uint32_t stamp = 0, node = 0;
+    std::uint8_t place = 0;
+  };
+  // The node's own, or the free one where it would stand.
+  Slot& slot_of(std::uint32_t node) {
+    for (std::size_t at = node * 0x9e3779b1U >> 24U;; at = (at + 1) % slots_.size()) {
+      if (slots_[at].stamp != stamp_ || slots_[at].node == node) return slots_[at];
+    }
+  }
+  void add(std::uint32_t node) {
+    Slot& slot = slot_of(node);
+    if (slot.stamp == stamp_) return;
+    slot.stamp = stamp_;
+    slot.node = node;
+    nodes_.push_back(node);
+  }
+
+  const Model& model_;
+  const Tissue& tissue_;
+  std::array<Slot, 256> slots_{};
+  std::uint32_t stamp_ = 0;
+  std::vector<std::uint32_t> nodes_;
+};
+
+// Of all groups together: nodes of palettes, and rows that these take (VertexGroups::rows).
+struct Palettes {
+  std::size_t nodes = 0, rows = 0;
+};
+
+Palettes palettes_of(const Model& model, const Tissue& tissue, const Order& order) {
+  Palettes sum;
+  Palette palette(model, tissue);
   for (std::size_t v = 0; v < order.size(); v += kSize) {
-    sum += palette_of(model, tissue, std::span(order).subspan(v, std::min(kSize, order.size() - v))).size();
+    palette.gather(std::span(order).subspan(v, std::min(kSize, order.size() - v)));
+    sum.nodes += palette.nodes().size();
+    sum.rows += (palette.nodes().size() + 7) / 8 * 8;
   }
   return sum;
 }
@@ -68,9 +113,12 @@ Eigen::Matrix3f edges(const Model& model, std::int32_t tet) {
 }
 
 void add_group(const Model& model, const Tissue& tissue, std::span<const std::uint32_t> lane,
-               std::span<const std::uint32_t> vertices, const PointsF& normals, VertexGroups& out) {
+               std::span<const std::uint32_t> vertices, const PointsF& normals, Palette& nodes,
+               VertexGroups& out) {
   VertexGroups::Group group{};
-  const std::vector<std::uint32_t> palette = palette_of(model, tissue, vertices);
+  nodes.gather(vertices);
+  nodes.sort();
+  const std::vector<std::uint32_t>& palette = nodes.nodes();
   group.palette = static_cast<std::uint32_t>(out.rows.size());
   group.count = static_cast<std::uint32_t>((palette.size() + 7) / 8 * 8);
   for (std::size_t i = 0; i < group.count; ++i)
@@ -81,10 +129,7 @@ void add_group(const Model& model, const Tissue& tissue, std::span<const std::ui
   };
   for (int c = 0; c < 4; ++c) {
     for (std::size_t i = 0; i < kSize; ++i) {
-      const int node = model.tets(tissue.tet[static_cast<std::size_t>(at(i))], c);
-      out.corner.push_back(static_cast<std::uint8_t>(
-          std::lower_bound(palette.begin(), palette.end(), static_cast<std::uint32_t>(node)) -
-          palette.begin()));
+      out.corner.push_back(nodes.place(model.tets(tissue.tet[static_cast<std::size_t>(at(i))], c)));
     }
   }
 
@@ -153,14 +198,21 @@ VertexGroups group_vertices(const Model& model, const Tissue& tissue, std::span<
   Order order(out.vertices);
   std::iota(order.begin(), order.end(), 0U);
   const Order morton = morton_order(tissue.V);
-  out.in_order = static_cast<double>(palettes_of(model, tissue, order)) <=
-                 kLocalEnough * static_cast<double>(palettes_of(model, tissue, morton));
+  const Palettes own = palettes_of(model, tissue, order), along = palettes_of(model, tissue, morton);
+  out.in_order = static_cast<double>(own.nodes) <= kLocalEnough * static_cast<double>(along.nodes);
   if (!out.in_order) order = morton;
 
   const PointsF normals = rest_normals(tissue);
+  const std::size_t groups = (order.size() + kSize - 1) / kSize;
+  out.groups.reserve(groups);
+  out.rows.reserve(out.in_order ? own.rows : along.rows);
+  out.corner.reserve(4 * kSize * groups);
+  out.narrow.reserve(3 * kSize * groups);
+  out.normal.reserve(3 * kSize * groups);
+  Palette nodes(model, tissue);
   for (std::size_t v = 0; v < order.size(); v += kSize) {
     add_group(model, tissue, lane, std::span(order).subspan(v, std::min(kSize, order.size() - v)), normals,
-              out);
+              nodes, out);
   }
   if (!out.in_order) {
     out.vertex = std::move(order);

@@ -3,6 +3,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
+#include <map>
 #include <memory>
 #include <random>
 
@@ -170,6 +172,41 @@ TEST(IsClosed, EveryEdgeOnceEachWay) {
   Triangles none(1, 3);
   none << 1, 1, 1;
   EXPECT_FALSE(is_closed(none));
+}
+
+// As is_closed says it: every edge that has two different ends once each way.
+bool is_closed_slowly(const Triangles& F) {
+  std::map<std::pair<int, int>, int> uses;
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    if (F(f, 0) == F(f, 1) || F(f, 1) == F(f, 2) || F(f, 2) == F(f, 0)) continue;
+    for (int c = 0; c < 3; ++c) ++uses[{F(f, c), F(f, (c + 1) % 3)}];
+  }
+  return !uses.empty() && std::all_of(uses.begin(), uses.end(), [&](const auto& use) {
+    const auto back = uses.find({use.first.second, use.first.first});
+    return use.second == 1 && back != uses.end() && back->second == 1;
+  });
+}
+
+TEST(IsClosed, AgreesWithItsSlowTwinOnSurfacesThatWereSpoilt) {
+  std::mt19937 random(3);
+  const Model model = test::toy_model();
+  int closed = 0, open = 0;
+  for (const Tissue& tissue : model.tissues) {
+    for (int trial = 0; trial < 60; ++trial) {
+      Triangles F = tissue.F;
+      const auto row = [&] { return static_cast<Eigen::Index>(random() % static_cast<unsigned>(F.rows())); };
+      if (trial % 6 == 1) F(row(), 1) = F(row(), 0);
+      if (trial % 6 == 2) F.row(row()) = Eigen::RowVector3i(F.row(row()));
+      if (trial % 6 == 3) F.row(row()) = Eigen::RowVector3i(F.row(0).reverse());
+      if (trial % 6 == 4) F.row(0).swap(F.row(row()));
+      if (trial % 6 == 5) std::swap(F(0, 0), F(row(), 2));
+      const bool expected = is_closed_slowly(F);
+      ++(expected ? closed : open);
+      ASSERT_EQ(is_closed(F), expected) << tissue.name << " " << trial;
+    }
+  }
+  EXPECT_GT(closed, 20);
+  EXPECT_GT(open, 20);
 }
 
 // What an open surface encloses depends on where it lies: nothing is said of it.

@@ -2,10 +2,12 @@
 // Levels of detail, regions, control nodes and rates against offline posing.
 #include <cmath>
 #include <memory>
+#include <thread>
 
 #include "proto/arrays.hpp"
 #include "proto/mesh_decoder.hpp"
 #include "runtime/server/mesh_rows.hpp"
+#include "runtime/server/served_model.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
@@ -48,20 +50,61 @@ void expect_parts(const MeshRows& rows, std::size_t vertices) {
 }
 
 TEST(Parts, EachLevelHasAboutAQuarterOfTheTrianglesBefore) {
-  Model model;
-  model.tissues.push_back(sheet(60));
-  const std::vector<MeshParts> levels = make_levels(model);
-  ASSERT_EQ(levels.size(), coarsest_level);
-  auto before = static_cast<double>(model.tissues[0].F.size());
-  for (const MeshParts& level : levels) {
-    expect_parts(level[0], 3600);
-    const auto now = static_cast<double>(level[0].triangles.size());
+  const Tissue tissue = sheet(60);
+  auto before = static_cast<double>(tissue.F.size());
+  for (const MeshRows& level : make_levels(tissue)) {
+    expect_parts(level, 3600);
+    const auto now = static_cast<double>(level.triangles.size());
     if (before / 12 > 64) {
       EXPECT_NEAR(now / before, 0.25, 0.05);
     }
     EXPECT_GT(now, 0);
     before = now;
   }
+}
+
+TEST(Parts, LevelsAreMadeForTheTissuesThatSomebodyWants) {
+  const ServedModel served("toy", std::make_shared<const Model>(test::toy_model()));
+  EXPECT_FALSE(served.has_levels({1}));
+  EXPECT_TRUE(served.has_levels({}));
+  std::thread other([&] { served.make_levels({0, 1}); });
+  served.make_levels({1, 2});
+  other.join();
+  EXPECT_TRUE(served.has_levels({0, 1, 2}));
+  EXPECT_FALSE(served.has_levels({2, 3}));
+  const MeshLevels whole = make_levels(served.model().tissues[1]);
+  for (std::uint32_t level = 1; level <= coarsest_level; ++level) {
+    EXPECT_EQ(served.level(level, 1).vertices, whole[level - 1].vertices);
+    EXPECT_EQ(served.level(level, 1).triangles, whole[level - 1].triangles);
+  }
+}
+
+// A worker makes them: whoever asks first may be gone by then, or ask for more than it may.
+TEST(Parts, WhoAsksForLevelsFirstMayLeaveBeforeTheyAreMade) {
+  Limits limits;
+  limits.subscriptions = 2;
+  const TestServer server(limits);
+  v1::Envelope request;
+  request.mutable_subscribe()->mutable_mesh()->set_level(2);
+  {
+    TestClient gone(server);
+    request.set_request_id(77);
+    gone.client().send(request);
+  }
+  TestClient client(server);
+  for (std::uint64_t id = 101; id <= 103; ++id) {
+    request.set_request_id(id);
+    request.mutable_subscribe()->mutable_mesh()->set_level(static_cast<std::uint32_t>(id - 100));
+    client.client().send(request);
+  }
+  int good = 0, refused = 0;
+  for (int i = 0; i < 3; ++i) {
+    const wire::Frame answer = client.next([](const v1::Envelope& e) { return e.request_id() > 100; });
+    if (answer.envelope.has_subscribed()) ++good;
+    if (answer.envelope.has_status()) ++refused;
+  }
+  EXPECT_EQ(good, 2);
+  EXPECT_EQ(refused, 1);
 }
 
 TEST(Parts, ABoxCutsVerticesAndTheTrianglesBetweenThem) {
