@@ -28,4 +28,10 @@ void use_big_heap() {
 #endif
 }
 
+void use_one_heap() {
+#ifdef __GLIBC__
+  mallopt(M_ARENA_MAX, 1);
+#endif
+}
+
 }  // namespace ecorche::app

@@ -9,6 +9,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "app/big_heap.hpp"
 #include "app/command.hpp"
 #include "app/served_clips.hpp"
 #include "app/token_file.hpp"
@@ -62,6 +63,7 @@ server::Endpoint endpoint(const std::string& text) {
 }
 
 int run_serve(const Settings& settings, const Program& program) {
+  use_one_heap();
   // stdout is for the result.
   spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
