@@ -28,9 +28,10 @@ void use_big_heap() {
 #endif
 }
 
-void use_one_heap() {
+void use_tidy_heap() {
 #ifdef __GLIBC__
   mallopt(M_ARENA_MAX, 1);
+  mallopt(M_MMAP_THRESHOLD, 1 << 18);  // does not grow by itself any more
 #endif
 }
 

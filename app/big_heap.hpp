@@ -12,9 +12,11 @@ namespace ecorche::app {
 /// done. Does nothing where the C library is not glibc.
 void use_big_heap();
 
-/// From now on all threads share one heap. By default each has its own, and what one took and another gave
-/// back stays where it was: a server's memory creeps up for hours until every heap has seen every load. To be
-/// called before other threads start. Does nothing where the C library is not glibc.
-void use_one_heap();
+/// From now on all threads share one heap, and every array of 256 KiB or more is mapped when it is made and
+/// unmapped when it is dropped. By default each thread has a heap of its own, and what one took and another
+/// gave back stays where it was, and arrays of megabytes come to lie between small things that stay: a
+/// server's memory creeps up for hours until every heap has seen every load. To be called before other
+/// threads start. Does nothing where the C library is not glibc.
+void use_tidy_heap();
 
 }  // namespace ecorche::app

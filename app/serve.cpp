@@ -63,7 +63,7 @@ server::Endpoint endpoint(const std::string& text) {
 }
 
 int run_serve(const Settings& settings, const Program& program) {
-  use_one_heap();
+  use_tidy_heap();
   // stdout is for the result.
   spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
