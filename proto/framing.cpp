@@ -77,6 +77,7 @@ Status FrameReader::finish_envelope() {
             "frame: the envelope is no ecorche.v1.Envelope (see proto/ecorche/v1)"};
   }
   filled_ = 0;
+  if (payload_bytes_ > 0) frame_.payload = std::exchange(spent_, {});
   frame_.payload.resize(payload_bytes_);
   part_ = payload_bytes_ > 0 ? Part::payload : Part::done;
   return {};

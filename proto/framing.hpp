@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/values/error.hpp"
@@ -65,6 +66,8 @@ class FrameReader {
   bool between_frames() const { return part_ == Part::header && filled_ == 0; }
   /// The complete frame; the reader then waits for the next.
   Frame take();
+  /// Memory for the next payload, which need not be cleared then: at 16 MB that takes as long as reading it.
+  void reuse(Payload spent) { spent_ = std::move(spent); }
 
  private:
   enum class Part : std::uint8_t { header, envelope, payload, done };
@@ -79,6 +82,7 @@ class FrameReader {
   std::uint32_t envelope_bytes_ = 0, payload_bytes_ = 0;
   std::vector<std::byte> envelope_;  ///< and its padding
   Frame frame_;
+  Payload spent_;
 };
 
 /// A frame ready for any number of sockets: header, envelope and padding in one piece, the payload shared.

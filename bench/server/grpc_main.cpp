@@ -2,8 +2,8 @@
 // The whole body in float32 through gRPC, and as Protobuf over plain TCP: bench_grpc MODEL.hdf SECONDS RATE.
 //
 // Server and client are threads of this program. Both poses and both send as the bench does with ours: a pose
-// goes out at RATE, a latency ends when the client holds the parsed message. Prints `name p50 p99` in ms, a
-// line each.
+// goes out at RATE, a latency ends when the client holds the parsed message. Prints `name p50 p99 bytes
+// cpu`, a line each: ms, and ms of processor a frame.
 #include <arpa/inet.h>
 #include <grpcpp/grpcpp.h>
 #include <netinet/in.h>
@@ -68,11 +68,13 @@ void measure(const char* name, double seconds, double rate,
   std::vector<double> ms;
   Ask ask;
   std::size_t bytes = 0;
+  double cpu = 0;
   const auto start = Clock::now();
   const auto since = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   for (std::uint64_t i = 1; since() < kWarmUp + seconds; ++i) {
     std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(
                                               std::chrono::duration<double>(static_cast<double>(i) / rate)));
+    if (ms.empty()) cpu = cpu_seconds();
     ask.set_sequence(i);
     ask.set_seconds(static_cast<double>(i) / rate);
     const auto sent = Clock::now();
@@ -80,7 +82,8 @@ void measure(const char* name, double seconds, double rate,
     if (since() > kWarmUp)
       ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - sent).count());
   }
-  std::printf("%s %.3f %.3f %zu\n", name, quantile(ms, 0.5), quantile(ms, 0.99), bytes);
+  cpu = 1e3 * (cpu_seconds() - cpu) / static_cast<double>(ms.size());
+  std::printf("%s %.3f %.3f %zu %.3f\n", name, quantile(ms, 0.5), quantile(ms, 0.99), bytes, cpu);
   std::fflush(stdout);
 }
 

@@ -18,6 +18,7 @@
 
 #include "bench/server/crowd.hpp"
 #include "bench/server/peers.hpp"
+#include "bench/server/ready.hpp"
 #include "bench/server/region.hpp"
 #include "bench/server/served.hpp"
 #include "bench/server/soak.hpp"
@@ -172,6 +173,7 @@ int run(const Settings& settings) {
   std::printf("%-58s %8s %9s %7s %8s %8s %7s %6s  %s\n", "load", "vertices", "kB/frame", "fps", "p50 ms",
               "p99 ms", "MiB", "cores", "must");
   const auto chosen = [&](const char* row) { return settings.only.empty() || settings.only.contains(row); };
+  if (chosen("ready")) ready(settings.program, settings.model);
   if (chosen("body"))
     posing(settings, "1 client, the whole body, delta u16, 90 Hz", 0, v1::ENCODING_U16_DELTA, 1,
            "90 fps, p50 6, p99 11");
@@ -221,7 +223,7 @@ int main(int argc, char** argv) {
   if (words.size() < 2) {
     std::fprintf(stderr,
                  "usage: bench_server ECORCHE MODEL.hdf [--seconds 30] [--soak-minutes 30] [--only ROW,...]\n"
-                 "rows: body f32 organ posers observers stalled idle dripping wire region soak\n");
+                 "rows: ready body f32 organ posers observers stalled idle dripping wire region soak\n");
     return 64;
   }
   settings.program = words[0];

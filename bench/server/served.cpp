@@ -42,7 +42,7 @@ Served::Served(const std::string& program, const std::string& model, const std::
       pid_ = -1;
       throw lost();
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   std::ifstream(port_file_) >> address_.port;
   address_.host = "127.0.0.1";

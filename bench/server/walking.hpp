@@ -15,4 +15,7 @@ Pose walking(const Rig& rig, double seconds);
 /// The `share` quantile, nearest rank; NaN of none.
 double quantile(std::vector<double> values, double share);
 
+/// Of this process, all threads.
+double cpu_seconds();
+
 }  // namespace ecorche::bench

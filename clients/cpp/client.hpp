@@ -5,6 +5,7 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "clients/cpp/socket.hpp"
 #include "proto/framing.hpp"
@@ -51,6 +52,9 @@ class Client {
   /// The next message; nothing when none came whole until `until`. Throws when the server ends the
   /// connection.
   std::optional<wire::Frame> receive(Clock::time_point until);
+
+  /// A frame that was read to its end: its memory serves a later payload.
+  void reuse(wire::Frame spent) { reader_.reuse(std::move(spent.payload)); }
 
   /// All read so far, framing included.
   std::uint64_t bytes_received() const { return bytes_received_; }

@@ -88,6 +88,24 @@ TEST(Framing, FramesFollowEachOtherInAnyPieces) {
   }
 }
 
+TEST(Framing, MemoryThatIsGivenBackServesTheNextPayloadWhateverItsSize) {
+  const std::string ping = bytes_of(encode(a_ping(), sixteen_bytes()));
+  for (const std::size_t size : {std::size_t{0}, std::size_t{16}, std::size_t{4096}}) {
+    FrameReader reader(kLimits);
+    Payload spent(size, std::byte{0xff});
+    const std::byte* const memory = spent.data();
+    reader.reuse(std::move(spent));
+    ASSERT_TRUE(feed(reader, bytes_of(encode(a_ping()))).ok());
+    EXPECT_TRUE(reader.take().payload.empty()) << "memory for none";
+    ASSERT_TRUE(feed(reader, ping, 5).ok());
+    const Frame frame = reader.take();
+    EXPECT_EQ(frame.payload, *sixteen_bytes());
+    if (size > 0) {
+      EXPECT_EQ(frame.payload.data(), memory);
+    }
+  }
+}
+
 TEST(Framing, EveryPrefixWaits) {
   const std::string bytes = bytes_of(encode(a_ping(), sixteen_bytes()));
   for (std::size_t length = 0; length < bytes.size(); ++length) {
