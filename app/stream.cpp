@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche stream`: a client that plays a clip against a server, checks what comes back, and measures.
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "app/motion_source.hpp"
 #include "app/replay.hpp"
 #include "app/stream_check.hpp"
+#include "app/stream_text.hpp"
 #include "app/token_file.hpp"
 #include "clients/cpp/client.hpp"
 #include "core/model_file/model_file.hpp"
@@ -298,39 +298,10 @@ class Stream {
       json["checked"] = checked.checked;
       json["mismatches"] = checked.mismatches;
     }
-    program_.result(to_text(json), json);
+    program_.result(stream_text(json, settings_.model), json);
     if (meshes_.frames == 0)
       throw Error(ErrorKind::protocol, settings_.address, "no frame came", "see the server's log");
     return checked.mismatches > 0 || !same_model_ ? 1 : 0;
-  }
-
-  std::string to_text(const nlohmann::json& json) const {
-    const auto latency = [](const char* what, const nlohmann::json& ms) {
-      if (ms.is_null()) return std::string(what) + ": no frame came\n";
-      char line[160];
-      std::snprintf(line, sizeof line, "%s: p50 %.2f ms, p90 %.2f ms, p99 %.2f ms, max %.2f ms\n", what,
-                    ms["p50"].get<double>(), ms["p90"].get<double>(), ms["p99"].get<double>(),
-                    ms["max"].get<double>());
-      return std::string(line);
-    };
-    char line[256];
-    std::snprintf(
-        line, sizeof line,
-        "%llu poses, %llu mesh frames, %.1f per second, %.1f MB; %llu poses skipped, %llu clamped\n",
-        static_cast<unsigned long long>(sequence_), static_cast<unsigned long long>(meshes_.frames),
-        json["frames_per_second"].get<double>(), static_cast<double>(client_.bytes_received()) / 1e6,
-        static_cast<unsigned long long>(skipped_), static_cast<unsigned long long>(clamped_));
-    std::string text = line + latency("pose to mesh", json["latency_ms"]);
-    if (json.contains("volume_latency_ms")) {
-      text += std::to_string(volumes_.frames) + " volumes; " +
-              latency("pose to volume", json["volume_latency_ms"]);
-    }
-    if (settings_.quality) text += "quality: " + std::to_string(warned_) + " frames with a warning\n";
-    if (check_) {
-      text += "checked " + json["checked"].dump() + " frames against " + settings_.model + ": " +
-              json["mismatches"].dump() + " mismatches\n";
-    }
-    return text;
   }
 
   struct Sent {

@@ -31,12 +31,8 @@ from ecorche.v1 import common_pb2, envelope_pb2, stream_pb2
 
 ALIGNMENT = 16
 ENCODINGS = {"f32": common_pb2.ENCODING_F32, "u16": common_pb2.ENCODING_U16, "u16-delta": common_pb2.ENCODING_U16_DELTA}
-SCALARS = {
-    common_pb2.SCALAR_TYPE_U8: np.dtype("<u1"), common_pb2.SCALAR_TYPE_I8: np.dtype("<i1"),
-    common_pb2.SCALAR_TYPE_U16: np.dtype("<u2"), common_pb2.SCALAR_TYPE_I16: np.dtype("<i2"),
-    common_pb2.SCALAR_TYPE_U32: np.dtype("<u4"), common_pb2.SCALAR_TYPE_I32: np.dtype("<i4"),
-    common_pb2.SCALAR_TYPE_F32: np.dtype("<f4"), common_pb2.SCALAR_TYPE_F64: np.dtype("<f8"),
-}
+SCALARS = {getattr(common_pb2, "SCALAR_TYPE_" + name): np.dtype(code) for name, code in (
+    ("U8", "<u1"), ("I8", "<i1"), ("U16", "<u2"), ("I16", "<i2"), ("U32", "<u4"), ("I32", "<i4"), ("F32", "<f4"), ("F64", "<f8"))}
 
 
 class ServerError(Exception):
