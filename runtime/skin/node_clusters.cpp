@@ -2,6 +2,7 @@
 #include "runtime/skin/node_clusters.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -34,7 +35,7 @@ void check(const Model& model) {
   }
 }
 
-// What is kept of the weights of one node; reused from node to node.
+// What is kept of the weights of one node.
 struct Row {
   std::vector<std::uint16_t> segment;
   std::vector<double> weight;
@@ -57,10 +58,13 @@ struct Row {
   }
 };
 
-void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, Row& row, NodeClusters& out) {
+// `rows`: of the cluster's nodes, to be filled.
+void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, std::array<Row, kSize>& rows,
+                 NodeClusters& out) {
   const std::size_t first = out.palette.size();
-  for (const std::uint32_t node : nodes) {
-    row.read(model, node);
+  for (std::size_t i = 0; i < kSize; ++i) {
+    Row& row = rows[i];
+    row.read(model, nodes[i]);
     out.palette.insert(out.palette.end(), row.segment.begin(), row.segment.end());
     // Kept short: a node has few segments, but a cluster of many nodes would hold each of them 64 times.
     std::sort(out.palette.begin() + static_cast<std::ptrdiff_t>(first), out.palette.end());
@@ -71,7 +75,7 @@ void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, Row& 
   out.begin.push_back(static_cast<std::uint32_t>(out.palette.size()));
   out.weight.resize(kSize * out.palette.size());
   for (std::size_t i = 0; i < kSize; ++i) {
-    row.read(model, nodes[i]);
+    const Row& row = rows[i];
     for (std::size_t e = 0; e < row.segment.size(); ++e) {
       const auto place = std::lower_bound(out.palette.begin() + static_cast<std::ptrdiff_t>(first),
                                           out.palette.end(), row.segment[e]) -
@@ -155,9 +159,9 @@ NodeClusters cluster_nodes(const Model& model, std::span<const std::uint8_t> nee
   out.begin.push_back(0);
   out.rest.reserve(3 * out.node.size());
   out.centre.reserve(3 * out.node.size());
-  Row row;
+  std::array<Row, kSize> rows;
   for (std::size_t c = 0; c < out.clusters(); ++c) {
-    add_cluster(model, std::span(out.node).subspan(kSize * c, kSize), row, out);
+    add_cluster(model, std::span(out.node).subspan(kSize * c, kSize), rows, out);
   }
   return out;
 }

@@ -107,6 +107,41 @@ TEST(Parts, WhoAsksForLevelsFirstMayLeaveBeforeTheyAreMade) {
   EXPECT_EQ(refused, 1);
 }
 
+// The levels are of the model that was open; the subscription would be of another.
+TEST(Parts, LevelsOfAModelThatMadeWayAreNotSubscribedTo) {
+  TestServer server;
+  RawClient client(server);
+  client.send_hello();
+  v1::Envelope open, subscribe, reload;
+  open.mutable_open_model()->set_model("toy");
+  open.mutable_open_model()->set_without_triangles(true);
+  open.set_request_id(1);
+  client.send(open);
+  const auto next = [&](auto&& wanted) {
+    auto frame = client.receive();
+    while (frame && !wanted(frame->envelope)) frame = client.receive();
+    return frame ? frame->envelope : v1::Envelope();
+  };
+  ASSERT_TRUE(next([](const v1::Envelope& e) { return e.has_model_opened(); }).has_model_opened());
+  auto changed = std::make_shared<Model>(test::toy_model());
+  changed->tissues[0].V.array() += 1e-3;
+  server.reads([changed] { return ModelParts{changed}; });
+  reload.mutable_reload_model()->set_model("toy");
+  TestClient(server).client().call(reload);
+  ASSERT_TRUE(next([](const v1::Envelope& e) { return e.has_model_changed(); }).has_model_changed());
+  // Both in one go: the second is handled before a worker can have answered the first.
+  subscribe.set_request_id(2);
+  subscribe.mutable_subscribe()->mutable_mesh()->set_level(1);
+  open.set_request_id(3);
+  client.send(wire::encode(subscribe).head + wire::encode(open).head);
+  const v1::Envelope answer = next([](const v1::Envelope& e) { return e.request_id() == 2; });
+  EXPECT_NE(answer.status().message().find("another model was opened"), std::string::npos)
+      << answer.status().message();
+  subscribe.set_request_id(4);
+  client.send(subscribe);
+  EXPECT_TRUE(next([](const v1::Envelope& e) { return e.request_id() == 4; }).has_subscribed());
+}
+
 TEST(Parts, ABoxCutsVerticesAndTheTrianglesBetweenThem) {
   const Tissue tissue = sheet(10);
   const MeshRows rows = cut(tissue, nullptr, {.low = {2, 3, -1}, .high = {4, 5, 1}});

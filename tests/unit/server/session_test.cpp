@@ -20,10 +20,12 @@ using std::chrono::milliseconds;
 class Watcher final : public Member {
  public:
   const std::vector<bool>& judged() const { return judged_; }
+  Clock::time_point last() const { return last_; }
 
  private:
   bool deliver(const PosedFrame& frame) override {
     judged_.push_back(frame.judged != nullptr);
+    last_ = Clock::now();
     return true;
   }
   std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
@@ -34,6 +36,7 @@ class Watcher final : public Member {
   void model_changed(std::uint64_t) override {}
 
   std::vector<bool> judged_;
+  Clock::time_point last_{};
 };
 
 // A worker that can be kept from its jobs.
@@ -104,6 +107,9 @@ struct Stage {
     return watcher.judged()[seen++];
   }
 
+  // So short after the last frame that nothing is a rest yet, however busy the machine is.
+  bool in_time() const { return Clock::now() - watcher.last() < milliseconds(100); }
+
   net::io_context io;
   Limits limits;
   FrameMemory memory{std::uint64_t{1} << 30};
@@ -118,16 +124,33 @@ struct Stage {
 };
 
 constexpr milliseconds kLong{250}, kShort{5};
+constexpr int kTrials = 10;
+
+// Poses after a rest, which takes so long on its way, and again right behind that frame: whether the second
+// pose is taken to come after a rest.
+std::optional<bool> right_behind(milliseconds on_its_way) {
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Stage stage;
+    EXPECT_EQ(stage.next_is_judged(), true) << "the first frame of a subscription";
+    stage.wait(kLong);
+    stage.gate.close();
+    stage.pose(1);
+    stage.wait(on_its_way);
+    stage.gate.open();
+    EXPECT_EQ(stage.next_is_judged(), true) << "after a rest";
+    stage.wait(kShort);
+    stage.pose(2);
+    if (stage.in_time()) return stage.next_is_judged();
+  }
+  return std::nullopt;
+}
 
 TEST(Session, APoseAfterARestIsJudgedOnItsWayAndOneInAStreamIsNot) {
-  Stage stage;
-  EXPECT_EQ(stage.next_is_judged(), true) << "the first frame of a subscription";
-  stage.wait(kLong);
-  stage.pose(1);
-  EXPECT_EQ(stage.next_is_judged(), true) << "after a rest";
-  stage.wait(kShort);
-  stage.pose(2);
-  EXPECT_EQ(stage.next_is_judged(), false) << "right behind another";
+  EXPECT_EQ(right_behind(kShort), false);
+}
+
+TEST(Session, ARestBeginsWithTheEndOfTheLastFrameNotWithItsPose) {
+  EXPECT_EQ(right_behind(kLong), false);
 }
 
 // Behind a crowd a pose waits long for its turn: no rest, however late its frame is.
@@ -141,21 +164,6 @@ TEST(Session, APoseBehindOneThatIsStillBeingMadeComesAfterNoRest) {
   stage.pose(2);  // the first is on its way for longer than a rest
   stage.gate.open();
   EXPECT_EQ(stage.next_is_judged(), true);
-  EXPECT_EQ(stage.next_is_judged(), false);
-}
-
-// Nor does one that comes when the last frame has only just been made, long after its pose was sent.
-TEST(Session, ARestBeginsWithTheEndOfTheLastFrame) {
-  Stage stage;
-  ASSERT_EQ(stage.next_is_judged(), true);
-  stage.wait(kLong);
-  stage.gate.close();
-  stage.pose(1);
-  stage.wait(kLong);
-  stage.gate.open();
-  EXPECT_EQ(stage.next_is_judged(), true);
-  stage.wait(kShort);
-  stage.pose(2);
   EXPECT_EQ(stage.next_is_judged(), false);
 }
 
