@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/probe/probe.hpp"
 
+#include <hwy/cache_control.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
@@ -8,25 +9,28 @@
 #include <limits>
 #include <string>
 
+#include "runtime/probe/space_order.hpp"
 #include "runtime/volume/grid_affine.hpp"
 #include "runtime/volume/sampler.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::size_t kPointsPerTask = 128;
+constexpr std::size_t kPointsPerTask = 256;
 constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
 
 using EdgeVectors = Eigen::Matrix3d;  // columns: from corner 0 to the others
 
-Eigen::Vector3d corner(const Tets& tets, const PaddedNodes& nodes, std::int32_t t, int c) {
-  return Eigen::Map<const Eigen::Vector3f>(&nodes[4 * static_cast<std::size_t>(tets(t, c))]).cast<double>();
+Eigen::Vector3d corner(const PaddedNodes& nodes, const TetPlace& place, std::size_t c) {
+  return Eigen::Map<const Eigen::Vector3f>(&nodes[std::size_t{TetRuns::stride} * place.nodes[c]])
+      .cast<double>();
 }
 
-EdgeVectors edges(const Tets& tets, const PaddedNodes& nodes, std::int32_t t) {
+EdgeVectors edges(const PaddedNodes& nodes, const TetPlace& place) {
   EdgeVectors out;
-  const Eigen::Vector3d from = corner(tets, nodes, t, 0);
-  for (int c = 1; c < 4; ++c) out.col(c - 1) = corner(tets, nodes, t, c) - from;
+  const Eigen::Vector3d from = corner(nodes, place, 0);
+  for (std::size_t c = 1; c < 4; ++c)
+    out.col(static_cast<Eigen::Index>(c - 1)) = corner(nodes, place, c) - from;
   return out;
 }
 
@@ -56,35 +60,17 @@ struct Values {
   }
 };
 
-// Points in Morton order of 1/1024ths of the box of the tree: those that are asked one after the other then
-// find the same nodes and tets in the caches. A radix sort by ten bits three times.
+// Points that are asked one after the other then find the same nodes and tets in the caches.
 std::vector<std::uint32_t> near_order(std::span<const float> points, const BoxNode& top) {
-  const std::size_t count = points.size() / 3;
-  std::array<float, 3> low, scale;
+  std::array<float, 3> low, high;
   for (std::size_t a = 0; a < 3; ++a) {
     low[a] = *std::min_element(top.low[a].begin(), top.low[a].end());
-    scale[a] = 1023 / std::max(1e-6F, *std::max_element(top.high[a].begin(), top.high[a].end()) - low[a]);
+    high[a] = *std::max_element(top.high[a].begin(), top.high[a].end());
   }
-  const auto spread = [](float x) {  // ten bits, two zeros between
-    auto bits = static_cast<std::uint32_t>(x >= 0 ? std::min(x, 1023.0F) : 0.0F);
-    bits = (bits | bits << 16U) & 0x030000ffU;
-    bits = (bits | bits << 8U) & 0x0300f00fU;
-    bits = (bits | bits << 4U) & 0x030c30c3U;
-    return (bits | bits << 2U) & 0x09249249U;
-  };
-  std::vector<std::uint32_t> key(count), order(count), other(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t a = 0; a < 3; ++a) key[i] |= spread((points[3 * i + a] - low[a]) * scale[a]) << a;
-    order[i] = static_cast<std::uint32_t>(i);
-  }
-  for (const unsigned shift : {0U, 10U, 20U}) {
-    std::array<std::uint32_t, 1025> begin{};
-    for (const std::uint32_t k : key) ++begin[(k >> shift & 1023U) + 1];
-    for (std::size_t b = 0; b < 1024; ++b) begin[b + 1] += begin[b];
-    for (const std::uint32_t i : order) other[begin[key[i] >> shift & 1023U]++] = i;
-    order.swap(other);
-  }
-  return order;
+  const SpaceOrder order(low, high);
+  std::vector<std::uint32_t> places(points.size() / 3);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = morton_place(order.cell(&points[3 * i]));
+  return SpaceOrder::sorted(places);
 }
 
 }  // namespace
@@ -94,10 +80,17 @@ struct Probe::Way {
   FindTets here;
   const PaddedNodes &there, &rest, &posed;
   bool from_rest;
+
+  // What is said of a point lies in places of its own: all of them are asked for before the first is said.
+  void ask_for(const Model& model, const TetPlace& place) const {
+    if (place.tet == TetPlace::none) return;
+    hwy::Prefetch(&model.tet_label[static_cast<std::size_t>(place.tet)]);
+    for (const std::uint32_t node : place.nodes) hwy::Prefetch(&there[std::size_t{TetRuns::stride} * node]);
+  }
 };
 
 Probe::Probe(std::shared_ptr<const Model> model)
-    : model_(std::move(model)), runs_(model_->tets), tissues_(*model_) {
+    : model_(std::move(model)), runs_(model_->tets, model_->nodes), tissues_(*model_) {
   pad_nodes({model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_);
   fit_boxes(runs_, rest_nodes_, rest_);
 }
@@ -109,14 +102,12 @@ void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
 
 void Probe::posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                           Probed& out) const {
-  run({{runs_, model_->tets, tree.nodes, tree.boxes}, rest_nodes_, rest_nodes_, tree.nodes, false}, points,
-      wants, out);
+  run({{runs_, tree.nodes, tree.boxes}, rest_nodes_, rest_nodes_, tree.nodes, false}, points, wants, out);
 }
 
 void Probe::rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                           Probed& out) const {
-  run({{runs_, model_->tets, rest_nodes_, rest_}, tree.nodes, rest_nodes_, tree.nodes, true}, points, wants,
-      out);
+  run({{runs_, rest_nodes_, rest_}, tree.nodes, rest_nodes_, tree.nodes, true}, points, wants, out);
 }
 
 void Probe::run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const {
@@ -139,21 +130,26 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
     volumes.push_back({volume, to_index(volume.image.grid),
                        volume.labels || wanted.sampling == Sampling::nearest, out.values[v]});
   }
-  const Tets& tets = model_->tets;
   const std::vector<std::uint32_t> order = near_order(points, way.here.tree.back());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kPointsPerTask), [&](const auto& range) {
-    for (std::size_t turn = range.begin(); turn < range.end(); ++turn) {
-      const std::size_t i = order[turn];
+  const std::size_t tasks = (count + kPointsPerTask - 1) / kPointsPerTask;
+  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+    const std::size_t first = kPointsPerTask * task;
+    const std::span which =
+        std::span<const std::uint32_t>(order).subspan(first, std::min(kPointsPerTask, count - first));
+    std::array<TetPlace, kPointsPerTask> places;
+    kernels::find_tets(way.here, points, which, places);
+    for (std::size_t turn = 0; turn < which.size(); ++turn) way.ask_for(*model_, places[turn]);
+    for (std::size_t turn = 0; turn < which.size(); ++turn) {
+      const std::size_t i = which[turn];
       const std::array<float, 3> point{points[3 * i], points[3 * i + 1], points[3 * i + 2]};
-      const TetPlace place = find_tet(way.here, point);
+      const TetPlace& place = places[turn];
       const bool held = place.tet != TetPlace::none;
       out.tet[i] = place.tet;
       out.label[i] = held ? model_->tet_label[static_cast<std::size_t>(place.tet)] : TetMesh::soft;
       Eigen::Vector3d other = Eigen::Vector3d::Constant(kNowhere);
       if (held) {
         other.setZero();
-        for (int c = 0; c < 4; ++c)
-          other += place.barycentric[static_cast<std::size_t>(c)] * corner(tets, way.there, place.tet, c);
+        for (std::size_t c = 0; c < 4; ++c) other += place.barycentric[c] * corner(way.there, place, c);
       }
       for (std::size_t c = 0; c < 4; ++c)
         out.barycentric[4 * i + c] = static_cast<float>(held ? place.barycentric[c] : 0);
@@ -162,8 +158,7 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
       if (wants.gradient) {
         Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> F(&out.gradient[9 * i]);
         F.setConstant(kNowhere);
-        if (held)
-          F = (edges(tets, way.posed, place.tet) * edges(tets, way.rest, place.tet).inverse()).cast<float>();
+        if (held) F = (edges(way.posed, place) * edges(way.rest, place).inverse()).cast<float>();
       }
       const Eigen::Vector3d rest =
           way.from_rest ? Eigen::Vector3d(static_cast<double>(point[0]), static_cast<double>(point[1]),

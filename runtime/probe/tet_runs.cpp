@@ -6,10 +6,27 @@
 #include <algorithm>
 #include <limits>
 
+#include "runtime/probe/space_order.hpp"
+
 namespace ecorche::runtime {
 namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
+
+std::vector<std::uint32_t> curve_order(const Tets& tets, const PointsF& nodes) {
+  if (tets.rows() == 0) return {};
+  const Eigen::RowVector3f low = nodes.colwise().minCoeff(), high = nodes.colwise().maxCoeff();
+  const SpaceOrder order({low[0], low[1], low[2]}, {high[0], high[1], high[2]});
+  std::vector<std::uint32_t> places(static_cast<std::size_t>(tets.rows()));
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 16384), [&](const auto& range) {
+    for (std::size_t t = range.begin(); t < range.end(); ++t) {
+      Eigen::RowVector3f middle = Eigen::RowVector3f::Zero();
+      for (int c = 0; c < 4; ++c) middle += nodes.row(tets(static_cast<Eigen::Index>(t), c)) / 4;
+      places[t] = hilbert_place(order.cell(middle.data()));
+    }
+  });
+  return SpaceOrder::sorted(places);
+}
 
 BoxNode empty_node() {
   BoxNode node;
@@ -20,29 +37,15 @@ BoxNode empty_node() {
 
 }  // namespace
 
-TetRuns::TetRuns(const Tets& tets) {
-  const auto count = static_cast<std::size_t>(tets.rows());
-  const std::size_t runs = (count + width - 1) / width;
-  begin_.reserve(runs + 1);
-  begin_.push_back(0);
-  for (std::size_t r = 0; r < runs; ++r) {
-    std::array<std::uint32_t, 4 * width> nodes;
-    std::size_t used = 0;
-    for (std::size_t t = width * r; t < std::min(count, width * (r + 1)); ++t) {
-      for (int c = 0; c < 4; ++c)
-        nodes[used++] = static_cast<std::uint32_t>(tets(static_cast<Eigen::Index>(t), c));
-    }
-    std::sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(used));
-    node_.insert(node_.end(), nodes.begin(),
-                 std::unique(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(used)));
-    begin_.push_back(static_cast<std::uint32_t>(node_.size()));
-  }
-  std::size_t level = runs;
+TetRuns::TetRuns(const Tets& tets, const PointsF& nodes)
+    : tet_(curve_order(tets, nodes)), palettes_(tets, tet_, stride) {
+  std::size_t level = runs();
   do {
     level = std::max<std::size_t>(1, (level + width - 1) / width);
     first_[levels_ + 1] = first_[levels_] + level;
     ++levels_;
   } while (level > 1 || levels_ < 2);  // what is fitted in parallel always has a node above it
+  if (!tet_.empty()) tet_.resize(width * runs(), tet_.back());
 }
 
 void pad_nodes(std::span<const float> nodes, PaddedNodes& out) {
@@ -70,12 +73,6 @@ void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree) {
       }
     }
   }
-}
-
-TetPlace find_tet(const FindTets& where, const std::array<float, 3>& point) {
-  TetPlace place;
-  place.tet = kernels::find_tet(where, point.data(), place.barycentric.data());
-  return place;
 }
 
 }  // namespace ecorche::runtime

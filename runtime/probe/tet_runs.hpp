@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which tet holds a point: a tree of boxes over runs of tets, refitted to every pose.
+// Which tets hold points: a tree of boxes over runs of tets, refitted to every pose.
 #pragma once
 
 #include <array>
@@ -9,34 +9,36 @@
 
 #include "core/values/mesh.hpp"
 #include "runtime/skin/aligned.hpp"
+#include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
 
-/// Made once per mesh. Sixteen tets that follow each other are a run (models keep their tets in Morton order,
-/// so that a run is small in space), sixteen runs a node of the tree, sixteen nodes one of the next level.
+/// Made once per mesh. Sixteen tets that follow each other on a Hilbert curve through the rest body are a
+/// run, sixteen runs a node of the tree, sixteen nodes one of the next level. (In the model's own order, a
+/// Morton curve, twice as many runs' boxes hold a point.)
 class TetRuns {
  public:
-  static constexpr std::size_t width = 16;
+  static constexpr std::size_t width = TetPalettes::width;
   static constexpr std::size_t most_levels = 8;  ///< 16^8 tets: beyond 32 bits
+  static constexpr std::uint32_t stride = 4;     ///< of PaddedNodes
 
-  explicit TetRuns(const Tets& tets);
+  TetRuns(const Tets& tets, const PointsF& nodes);
 
-  std::size_t runs() const { return begin_.size() - 1; }
+  std::size_t runs() const { return palettes_.runs(); }
   std::size_t levels() const { return levels_; }
   /// Nodes of the tree of all levels together; those of level l are first(l) .. first(l + 1). The last level
   /// is one node.
   std::size_t tree_nodes() const { return first_[levels_]; }
   std::size_t first(std::size_t level) const { return first_[level]; }
-  /// The mesh's nodes that the tets of run `r` hang on, each once.
-  std::span<const std::uint32_t> nodes_of(std::size_t r) const {
-    return std::span(node_).subspan(begin_[r], begin_[r + 1] - begin_[r]);
-  }
+  const TetPalettes& palettes() const { return palettes_; }
+  /// The tets of run `r`, sixteen; the last run is filled up with its last tet.
+  const std::uint32_t* tets(std::size_t r) const { return tet_.data() + width * r; }
 
  private:
+  std::vector<std::uint32_t> tet_;
+  TetPalettes palettes_;
   std::size_t levels_ = 0;
   std::array<std::size_t, most_levels + 1> first_{};
-  std::vector<std::uint32_t> begin_;  // #runs + 1
-  std::vector<std::uint32_t> node_;
 };
 
 /// The boxes of sixteen children, planar.
@@ -54,7 +56,6 @@ using PaddedNodes = Aligned<float>;
 /// Where to look. `tree` is what fit_boxes made of `nodes`.
 struct FindTets {
   const TetRuns& runs;
-  const Tets& tets;
   const PaddedNodes& nodes;
   const BoxTree& tree;
 };
@@ -69,20 +70,23 @@ void pad_nodes(std::span<const float> nodes, PaddedNodes& out);
 /// Where a point lies in a mesh.
 struct TetPlace {
   static constexpr std::int32_t none = -1;
-  std::int32_t tet = none;              ///< `none`: in none
-  std::array<double, 4> barycentric{};  ///< of its corners; they sum to 1
+  std::int32_t tet = none;               ///< `none`: in none
+  bool inverted = false;                 ///< the tet is: no positive one holds the point
+  std::array<std::uint32_t, 4> nodes{};  ///< its corners
+  std::array<double, 4> barycentric{};   ///< of its corners; they sum to 1
 };
-
-/// The tet that holds `point`. Where several do: those of positive volume before inverted ones, then the
-/// lowest index, as volumes are posed (resample.hpp). Faces belong to both their tets, with a margin of 1e-10
-/// of the tet's longest edge that absorbs rounding; a tet flatter than 1e-12 of its edge cubed holds nothing.
-TetPlace find_tet(const FindTets& where, const std::array<float, 3>& point);
 
 namespace kernels {
 /// The boxes of the runs under nodes [begin, end) of level 1 of the tree, and of those nodes.
 void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end);
-std::int32_t find_tet(const FindTets& where, const float* point, double* barycentric);
+
+/// `out`: #which; the tet that holds each of the points `which` (rows of `points`, 3 each). Where several do:
+/// those of positive volume before inverted ones, then the lowest index, as volumes are posed (resample.hpp).
+/// Faces belong to both their tets, with a margin of 1e-10 of the tet's longest edge that absorbs rounding; a
+/// tet flatter than 1e-12 of its edge cubed holds nothing. Points that follow each other should lie together.
+void find_tets(const FindTets& where, std::span<const float> points, std::span<const std::uint32_t> which,
+               std::span<TetPlace> out);
 }  // namespace kernels
 
 }  // namespace ecorche::runtime

@@ -4,98 +4,21 @@
 #define HWY_TARGET_INCLUDE "runtime/skin/move_tissue.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as Highway asks.
-#include <hwy/cache_control.h>
+#include <hwy/highway.h>
 
+#include "runtime/skin/palette-inl.hpp"
 #include "runtime/skin/sink-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
-using U8 = hn::Rebind<std::uint8_t, F>;
 constexpr std::size_t kSize = VertexGroups::size;
-
-// The palette of a group, one coordinate after another.
-struct Table {
-  HWY_ALIGN float x[VertexGroups::most_lanes], y[VertexGroups::most_lanes], z[VertexGroups::most_lanes];
-};
-
-// Rows of three floats turned into columns, four or eight at a time; the fourth float that is loaded of a row
-// is its neighbour's.
-HWY_INLINE void fetch(const float* posed, const std::uint32_t* rows, std::size_t count, Table& table) {
-#if HWY_TARGET == HWY_SCALAR
-  for (std::size_t i = 0; i < count; ++i) {
-    const float* x = posed + rows[i];
-    table.x[i] = x[0];
-    table.y[i] = x[1];
-    table.z[i] = x[2];
-  }
-#else
-#if HWY_TARGET <= HWY_AVX2
-  const hn::FixedTag<float, 8> d;
-  const hn::FixedTag<float, 4> half;
-  const auto load = [&](std::size_t i) HWY_ATTR {
-    return hn::Combine(d, hn::LoadU(half, posed + rows[i + 4]), hn::LoadU(half, posed + rows[i]));
-  };
-#else
-  const hn::FixedTag<float, 4> d;
-  const auto load = [&](std::size_t i) HWY_ATTR { return hn::LoadU(d, posed + rows[i]); };
-#endif
-  const hn::RepartitionToWide<decltype(d)> pairs;
-  const auto low = [&](auto a, auto b) HWY_ATTR {
-    return hn::BitCast(d, hn::InterleaveLower(pairs, hn::BitCast(pairs, a), hn::BitCast(pairs, b)));
-  };
-  const auto high = [&](auto a, auto b) HWY_ATTR {
-    return hn::BitCast(d, hn::InterleaveUpper(pairs, hn::BitCast(pairs, a), hn::BitCast(pairs, b)));
-  };
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto a = load(i), b = load(i + 1), e = load(i + 2), f = load(i + 3);
-    const auto xy_ab = hn::InterleaveLower(d, a, b), xy_ef = hn::InterleaveLower(d, e, f);
-    const auto z_ab = hn::InterleaveUpper(d, a, b), z_ef = hn::InterleaveUpper(d, e, f);
-    hn::Store(low(xy_ab, xy_ef), d, table.x + i);
-    hn::Store(high(xy_ab, xy_ef), d, table.y + i);
-    hn::Store(low(z_ab, z_ef), d, table.z + i);
-  }
-#endif
-}
-
-// The corners of a vector of vertices, by their bytes in the palette. A gather costs sixteen loads: tables in
-// registers answer 32 entries at once, and the high bit chooses between two of them.
-#if HWY_TARGET <= HWY_AVX3
-struct Corner {
-  hn::Vec<I> at;
-  hn::Mask<F> beyond;
-
-  explicit HWY_INLINE Corner(const std::uint8_t* corners)
-      : at(hn::PromoteTo(I(), hn::LoadU(U8(), corners))),
-        beyond(hn::RebindMask(F(), hn::Gt(at, hn::Set(I(), 31)))) {}
-
-  template <bool kLong>
-  HWY_INLINE V of(const float* column) const {
-    const V low{_mm512_permutex2var_ps(hn::Load(F(), column).raw, at.raw, hn::Load(F(), column + 16).raw)};
-    if constexpr (!kLong) return low;
-    const V high{
-        _mm512_permutex2var_ps(hn::Load(F(), column + 32).raw, at.raw, hn::Load(F(), column + 48).raw)};
-    return hn::IfThenElse(beyond, high, low);
-  }
-};
-#else
-struct Corner {
-  hn::Vec<I> at;
-
-  explicit HWY_INLINE Corner(const std::uint8_t* corners)
-      : at(hn::PromoteTo(I(), hn::LoadU(U8(), corners))) {}
-
-  template <bool kLong>
-  HWY_INLINE V of(const float* column) const {
-    return hn::GatherIndex(F(), column, at);
-  }
-};
-#endif
+static_assert(kMostPalette == VertexGroups::most_lanes);
 
 template <bool kLong>
-HWY_INLINE V3 corner(const Table& table, const std::uint8_t* corners) {
+HWY_INLINE V3 corner(const Table<float>& table, const std::uint8_t* corners) {
   const Corner at(corners);
-  return {at.of<kLong>(table.x), at.of<kLong>(table.y), at.of<kLong>(table.z)};
+  return {at.template of<kLong>(table.x), at.template of<kLong>(table.y), at.template of<kLong>(table.z)};
 }
 
 struct Numbers {
@@ -117,7 +40,8 @@ HWY_INLINE V share(const std::int16_t* from) {
 }
 
 template <bool kLong>
-HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::size_t g, const Table& table) {
+HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::size_t g,
+                           const Table<float>& table) {
   const VertexGroups::Group& group = groups.groups[g];
   const std::size_t count = groups.group_vertices(g);
   for (std::size_t i = 0; i < count; i += hn::Lanes(F())) {
@@ -138,30 +62,27 @@ HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::si
   }
 }
 
-// Posed nodes lie in the cache that the cores share: what a group needs is asked for some groups ahead. Rows
-// are sorted, so that every second one meets nearly every line.
+// Posed nodes lie in the cache that the cores share: what a group needs is asked for some groups ahead.
 constexpr std::size_t kAhead = 8;
-
-HWY_INLINE void ask_for(const TissueVertices& job, std::size_t g) {
-  const VertexGroups::Group& group = job.groups.groups[g];
-  const std::uint32_t* rows = &job.groups.rows[group.palette];
-  for (std::size_t i = 0; i < group.count; i += 2) hwy::Prefetch(job.posed.data() + rows[i]);
-}
 
 void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
   const VertexGroups& groups = job.groups;
   const Sink sink(job.out);
   // The next group's palette is fetched before a group is moved: wide loads of what was just stored narrowly
   // would wait for the stores.
-  Table tables[2];
+  Table<float> tables[2];
+  const auto ask_for_group = [&](std::size_t g) HWY_ATTR {
+    const VertexGroups::Group& group = groups.groups[g];
+    ask_for(job.posed.data(), &groups.rows[group.palette], group.count, 2);
+  };
   const auto fetch_group = [&](std::size_t g) HWY_ATTR {
     const VertexGroups::Group& group = groups.groups[g];
     fetch(job.posed.data(), &groups.rows[group.palette], group.count, tables[g % 2]);
   };
-  for (std::size_t g = begin; g < std::min(end, begin + kAhead); ++g) ask_for(job, g);
+  for (std::size_t g = begin; g < std::min(end, begin + kAhead); ++g) ask_for_group(g);
   if (begin < end) fetch_group(begin);
   for (std::size_t g = begin; g < end; ++g) {
-    if (g + kAhead < end) ask_for(job, g + kAhead);
+    if (g + kAhead < end) ask_for_group(g + kAhead);
     if (g + 1 < end) fetch_group(g + 1);
     if (groups.groups[g].count <= 32) {
       move_group<false>(groups, sink, g, tables[g % 2]);

@@ -156,6 +156,39 @@ TEST_F(ProbeTest, FindsTheTetsOfAnExhaustiveSearchOnEveryInstructionSet) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
+TEST_F(ProbeTest, FindsThemWhereEveryPointLiesInThousandsOfBoxes) {
+  // Tets at random, half of them inverted, so that runs are as wide as the mesh, hang on up to 64 nodes each
+  // and are more than wait at once; and a tree whose lowest level has more nodes than are looked at at once.
+  Model heap;
+  heap.nodes.resize(600, 3);
+  for (Eigen::Index i = 0; i < heap.nodes.size(); ++i)
+    heap.nodes.data()[i] = std::uniform_real_distribution(0.0F, 100.0F)(random);
+  heap.tets.resize(17003, 4);
+  for (Eigen::Index i = 0; i < heap.tets.size(); ++i)
+    heap.tets.data()[i] = std::uniform_int_distribution(0, 599)(random);
+  heap.tet_label.assign(17003, 1);
+  const Probe of(std::make_shared<const Model>(heap));
+  const std::vector<float> rest = rest_nodes(heap);
+  of.follow(rest, tree);
+  std::vector<float> points;
+  for (int i = 0; i < 3 * 70; ++i) points.push_back(std::uniform_real_distribution(-20.0F, 120.0F)(random));
+  std::vector<std::int32_t> slow;
+  std::size_t twice = 0, outside = 0;
+  for (std::size_t i = 0; i < points.size() / 3; ++i) {
+    slow.push_back(exhaustive(heap.tets, rest, at(points, i), twice));
+    outside += slow.back() == -1;
+  }
+  EXPECT_GT(twice, 1000U);
+  EXPECT_GT(outside, 5U);
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    of.posed_to_rest(tree, points, {}, out);
+    for (std::size_t i = 0; i < slow.size(); ++i) EXPECT_TRUE(slow[i] == -2 || out.tet[i] == slow[i]) << i;
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
 TEST_F(ProbeTest, ThereAndBackAgain) {
   bend(1.0);
   const std::vector<float> points = random_points(rest_nodes(*model), 2000);
