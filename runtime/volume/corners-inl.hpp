@@ -11,14 +11,13 @@
 #include <hwy/highway.h>
 
 #include "core/values/mesh.hpp"
+#include "runtime/skin/palette-inl.hpp"
+#include "runtime/volume/tet_palettes.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using F = hn::CappedTag<float, 16>;
-using I = hn::Rebind<std::int32_t, F>;
-using V = hn::Vec<F>;
 using VI = hn::Vec<I>;
 
 constexpr std::size_t kMostLanes = 16;
@@ -43,6 +42,36 @@ HWY_INLINE Corners load_corners(const std::int32_t* points, const VI (&node)[4])
   }
   return out;
 }
+
+// The same of tets i .. i + lanes of a run, whose palette lies in `table`.
+template <bool kLong>
+HWY_INLINE Corners corners_of(const Table<std::int32_t>& table, const std::uint8_t* corners) {
+  Corners out;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const Corner at(corners + TetPalettes::width * c);
+    out.x[c][0] = at.template of<kLong>(table.x);
+    out.x[c][1] = at.template of<kLong>(table.y);
+    out.x[c][2] = at.template of<kLong>(table.z);
+  }
+  return out;
+}
+
+// One run of sixteen tets, its nodes fetched from one set of places.
+class Run {
+ public:
+  HWY_INLINE Run(const TetPalettes& palettes, std::size_t run, const std::int32_t* places)
+      : corners_(palettes.corners(run)), long_(palettes.filled(run) > 32) {
+    fetch(places, palettes.rows(run), palettes.filled(run), table_);
+  }
+  HWY_INLINE Corners corners(std::size_t i) const {
+    return long_ ? corners_of<true>(table_, corners_ + i) : corners_of<false>(table_, corners_ + i);
+  }
+
+ private:
+  Table<std::int32_t> table_;
+  const std::uint8_t* corners_;
+  bool long_;
+};
 
 // First and last voxel of the boxes along an axis, within [low, high].
 struct Span {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 
+#include "runtime/skin/vectors-inl.hpp"
 #include "runtime/volume/corners-inl.hpp"
 #include "runtime/volume/draw_tets.hpp"
 
@@ -17,22 +18,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // Rounding moves a plane's value, edge x edge x distance, by about 4e-7 of the longest edge cubed.
 constexpr float kMargin = 2e-6F;
-struct V3 {
-  V x, y, z;
-};
 
-HWY_INLINE V3 minus(const V3& a, const V3& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
 HWY_INLINE V dot(const V3& a, const V3& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-HWY_INLINE V3 cross(const V3& a, const V3& b) {
-  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
-HWY_INLINE V3 scaled(const V3& a, V s) {
-  return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)};
 }
 
 HWY_INLINE V3 edge(const Corners& c, int to, V one) {
@@ -70,13 +58,8 @@ std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis
   const V one = hn::Set(F(), 1.0F / static_cast<float>(1 << job.bits));
   const auto along = static_cast<std::size_t>(axis);
   std::size_t found = 0;
-  for (std::size_t t = begin; t < end; t += lanes) {
+  const auto classify = [&](const Corners& corners, std::size_t t) HWY_ATTR {
     const std::size_t count = std::min(lanes, end - t);
-    const VI ids = hn::Min(hn::Iota(I(), static_cast<std::int32_t>(t)),
-                           hn::Set(I(), static_cast<std::int32_t>(end - 1)));
-    VI node[4];
-    load_nodes(job.tets, ids, node);
-    const Corners corners = load_corners(job.posed.data(), node);
     HWY_ALIGN std::int32_t first[3][kMostLanes], last[3][kMostLanes];
     HWY_ALIGN float det[kMostLanes], cube[kMostLanes];
     for (std::size_t a = 0; a < 3; ++a) {
@@ -104,6 +87,11 @@ std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis
         inverted[found++] = id;
       }
     }
+  };
+  for (std::size_t t = begin; t < end; t += TetPalettes::width) {
+    const Run posed(job.palettes, t / TetPalettes::width, job.posed.data());
+    for (std::size_t i = 0; i < std::min(TetPalettes::width, end - t); i += lanes)
+      classify(posed.corners(i), t + i);
   }
   return found;
 }
@@ -132,11 +120,9 @@ HWY_INLINE void set_plane(Setup& out, int p, const V3& n, const V3& origin, V be
   hn::Store(slope, F(), out.side[p]);
 }
 
-HWY_INLINE void set_up(const DrawTets& job, const VoxelRange& range, VI ids, Setup& out) {
+HWY_INLINE void set_up(const DrawTets& job, const VoxelRange& range, const Corners& posed,
+                       const Corners& rest, Setup& out) {
   const V one = hn::Set(F(), 1.0F / static_cast<float>(1 << job.bits));
-  VI node[4];
-  load_nodes(job.tets, ids, node);
-  const Corners posed = load_corners(job.posed.data(), node);
   VI first[3];
   V3 origin;  // corner 0, from the first voxel
   V* const origin_of[3] = {&origin.x, &origin.y, &origin.z};
@@ -153,7 +139,7 @@ HWY_INLINE void set_up(const DrawTets& job, const VoxelRange& range, VI ids, Set
   hn::Store(hn::Sub(size, hn::Mul(hn::Set(F(), kFlatTet), edges.cube)), F(), out.flat);
   // Inward, whichever way round the tet lies: barycentric coordinate c is n_c . (x - corner 0) / |det|.
   const V sign = hn::CopySign(hn::Set(F(), 1.0F), edges.det);
-  const V3 n[3] = {scaled(edges.n1, sign), scaled(edges.n2, sign), scaled(edges.n3, sign)};
+  const V3 n[3] = {times(edges.n1, sign), times(edges.n2, sign), times(edges.n3, sign)};
   const V3 n0 = {hn::Neg(hn::Add(n[0].x, hn::Add(n[1].x, n[2].x))),
                  hn::Neg(hn::Add(n[0].y, hn::Add(n[1].y, n[2].y))),
                  hn::Neg(hn::Add(n[0].z, hn::Add(n[1].z, n[2].z)))};
@@ -161,14 +147,13 @@ HWY_INLINE void set_up(const DrawTets& job, const VoxelRange& range, VI ids, Set
   set_plane(out, 0, n0, origin, size, margin);
   for (int p = 1; p < 4; ++p) set_plane(out, p, n[p - 1], origin, hn::Zero(F()), margin);
 
-  const Corners rest = load_corners(job.rest.data(), node);
   const V inverse = hn::Div(hn::Set(F(), 1.0F), size);
   const VI mask = hn::Set(I(), (1 << job.bits) - 1);
   for (int a = 0; a < 3; ++a) {
     // The shift of corner 0 in whole voxels and a part, both exact.
     const VI shift = job.same_lattice ? hn::Sub(rest.x[0][a], posed.x[0][a]) : rest.x[0][a];
-    const VI whole = hn::ShiftRightSame(shift, job.bits);
-    hn::Store(job.same_lattice ? hn::Add(whole, first[a]) : whole, I(), out.base[a]);
+    const VI voxels = hn::ShiftRightSame(shift, job.bits);
+    hn::Store(job.same_lattice ? hn::Add(voxels, first[a]) : voxels, I(), out.base[a]);
     V3 row{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};
     for (int c = 1; c < 4; ++c) {
       VI moved = hn::Sub(rest.x[c][a], rest.x[0][a]);
@@ -233,13 +218,14 @@ HWY_INLINE void cut_rows(const DrawTets& job, const Setup& tet, std::size_t t, V
   }
 }
 
+// Voxels of some bricks, one by one.
 HWY_INLINE void put_rows(const DrawTets& job, const Rows& rows, const Setup& tet, std::size_t t,
                          VoxelBatch& batch, const BatchSink& sink) {
   const std::array<std::int32_t, 3> base{tet.base[0][t], tet.base[1][t], tet.base[2][t]};
   const std::array<float, 3> step{tet.to[0][0][t], tet.to[1][0][t], tet.to[2][0][t]};
   for (std::size_t r = 0; r < hn::Lanes(F()); ++r) {
     for (std::int32_t x = rows.low[r]; x <= rows.high[r]; ++x) {
-      if (job.only && job.only.moved[rows.brick[r] + (tet.first[0][t] + x) / Bricks::edge] == 0) continue;
+      if (job.only.moved[rows.brick[r] + (tet.first[0][t] + x) / Bricks::edge] == 0) continue;
       if (batch.count == VoxelBatch::capacity) {
         sink.sample(sink.to, batch);
         batch.count = 0;
@@ -254,11 +240,44 @@ HWY_INLINE void put_rows(const DrawTets& job, const Rows& rows, const Setup& tet
   }
 }
 
+// The same where all bricks are drawn: one voxel of every row at a time, those that are held pushed together.
+HWY_INLINE void put_all_rows(const Rows& rows, const Setup& tet, std::size_t t, VoxelBatch& batch,
+                             const BatchSink& sink) {
+  const hn::RebindToUnsigned<F> u;
+  VI x = hn::Load(I(), rows.low);
+  const VI last = hn::Load(I(), rows.high), first = hn::Load(I(), rows.offset);
+  for (;; x = hn::Add(x, hn::Set(I(), 1))) {
+    const auto held = hn::Not(hn::Gt(x, last));
+    const std::size_t count = hn::CountTrue(I(), held);
+    if (count == 0) return;
+    if (batch.count + count > VoxelBatch::capacity) {
+      sink.sample(sink.to, batch);
+      batch.count = 0;
+    }
+    hn::StoreU(hn::Compress(hn::BitCast(u, hn::Add(first, x)), hn::RebindMask(u, held)), u,
+               batch.offset.data() + batch.count);
+    const V along = hn::ConvertTo(F(), x);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const V part = hn::MulAdd(hn::Set(F(), tet.to[a][0][t]), along, hn::Load(F(), rows.part[a]));
+      hn::StoreU(hn::Compress(part, hn::RebindMask(F(), held)), F(), batch.part[a].data() + batch.count);
+      hn::StoreU(hn::Set(I(), tet.base[a][t]), I(), batch.base[a].data() + batch.count);
+    }
+    batch.count += count;
+  }
+}
+
 void draw_box(const DrawTets& job, const Setup& tet, std::size_t t, VoxelBatch& batch,
               const BatchSink& sink) {
   const auto lanes = static_cast<std::int32_t>(hn::Lanes(F()));
   const std::int32_t ny = tet.count[1][t], nz = tet.count[2][t];
   Rows rows;
+  const auto put = [&]() HWY_ATTR {
+    if (job.only) {
+      put_rows(job, rows, tet, t, batch, sink);
+    } else {
+      put_all_rows(rows, tet, t, batch, sink);
+    }
+  };
   if (ny < lanes) {
     const V inverse = hn::Set(F(), 1.0F / static_cast<float>(ny));
     for (std::int32_t row = 0; row < ny * nz; row += lanes) {
@@ -266,7 +285,7 @@ void draw_box(const DrawTets& job, const Setup& tet, std::size_t t, VoxelBatch& 
       const V z = hn::Floor(hn::Mul(hn::Add(lane, hn::Set(F(), 0.5F)), inverse));
       const V y = hn::Sub(lane, hn::Mul(z, hn::Set(F(), static_cast<float>(ny))));
       cut_rows(job, tet, t, y, z, ny * nz, row, rows);
-      put_rows(job, rows, tet, t, batch, sink);
+      put();
     }
     return;
   }
@@ -274,8 +293,18 @@ void draw_box(const DrawTets& job, const Setup& tet, std::size_t t, VoxelBatch& 
     for (std::int32_t row = 0; row < ny; row += lanes) {
       const V y = hn::ConvertTo(F(), hn::Iota(I(), row));
       cut_rows(job, tet, t, y, hn::Set(F(), static_cast<float>(k)), ny, row, rows);
-      put_rows(job, rows, tet, t, batch, sink);
+      put();
     }
+  }
+}
+
+HWY_INLINE void draw_one(const DrawTets& job, const VoxelRange& range, const Setup& setup, std::size_t t,
+                         std::size_t id, VoxelBatch& batch, const BatchSink& sink) {
+  if (setup.count[0][t] <= 0 || setup.count[1][t] <= 0 || setup.count[2][t] <= 0) return;
+  if (setup.flat[t] >= 0) {
+    draw_box(job, setup, t, batch, sink);
+  } else {
+    draw_flat_tet(job, range, static_cast<std::uint32_t>(id), batch, sink);
   }
 }
 
@@ -288,13 +317,30 @@ void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std
     HWY_ALIGN std::int32_t id[kMostLanes];
     for (std::size_t l = 0; l < lanes; ++l)
       id[l] = static_cast<std::int32_t>(ids[i + std::min(l, count - 1)]);
-    set_up(job, range, hn::Load(I(), id), setup);
-    for (std::size_t t = 0; t < count; ++t) {
-      if (setup.count[0][t] <= 0 || setup.count[1][t] <= 0 || setup.count[2][t] <= 0) continue;
-      if (setup.flat[t] >= 0) {
-        draw_box(job, setup, t, batch, sink);
-      } else {
-        draw_flat_tet(job, range, ids[i + t], batch, sink);
+    VI node[4];
+    load_nodes(job.tets, hn::Load(I(), id), node);
+    set_up(job, range, load_corners(job.posed.data(), node), load_corners(job.rest.data(), node), setup);
+    for (std::size_t t = 0; t < count; ++t) draw_one(job, range, setup, t, ids[i + t], batch, sink);
+  }
+}
+
+void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
+               std::span<const std::uint16_t> wanted, VoxelBatch& batch, const BatchSink& sink) {
+  const std::size_t lanes = hn::Lanes(F());
+  const std::uint32_t of_vector = (1U << lanes) - 1;
+  Setup setup;
+  for (std::size_t r = wanted.size(); r-- > 0;) {
+    if (wanted[r] == 0) continue;
+    const Run posed(job.palettes, first + r, job.posed.data()),
+        rest(job.palettes, first + r, job.rest.data());
+    for (std::size_t i = TetPalettes::width; i > 0;) {
+      i -= lanes;
+      const std::uint32_t bits = wanted[r] >> i & of_vector;
+      if (bits == 0) continue;
+      set_up(job, range, posed.corners(i), rest.corners(i), setup);
+      for (std::size_t t = lanes; t-- > 0;) {
+        if ((bits >> t & 1U) != 0)
+          draw_one(job, range, setup, t, TetPalettes::width * (first + r) + i + t, batch, sink);
       }
     }
   }
@@ -308,6 +354,7 @@ namespace ecorche::runtime::kernels {
 
 HWY_EXPORT(classify_tets);
 HWY_EXPORT(draw_tets);
+HWY_EXPORT(draw_runs);
 
 std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis, std::int32_t band,
                           std::size_t begin, std::size_t end, std::span<TetExtent> extents,
@@ -318,6 +365,11 @@ std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis
 void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std::uint32_t> ids,
                VoxelBatch& batch, const BatchSink& sink) {
   HWY_DYNAMIC_DISPATCH(draw_tets)(job, range, ids, batch, sink);
+}
+
+void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
+               std::span<const std::uint16_t> wanted, VoxelBatch& batch, const BatchSink& sink) {
+  HWY_DYNAMIC_DISPATCH(draw_runs)(job, range, first, wanted, batch, sink);
 }
 
 }  // namespace ecorche::runtime::kernels

@@ -9,6 +9,7 @@
 
 #include "core/values/mesh.hpp"
 #include "runtime/volume/bricks.hpp"
+#include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
 
@@ -16,9 +17,11 @@ namespace ecorche::runtime {
 struct VoxelBatch {
   static constexpr std::size_t capacity = 1024;
   std::size_t count = 0;
-  alignas(64) std::array<std::uint32_t, capacity> offset;              ///< in the posed grid
-  alignas(64) std::array<std::array<std::int32_t, capacity>, 3> base;  ///< of the place: base + part, in
-  alignas(64) std::array<std::array<float, capacity>, 3> part;         ///< continuous indices of the volume
+  static constexpr std::size_t most_lanes = 16;  ///< a vector may be stored at `count`, whatever it is
+  static constexpr std::size_t held = capacity + most_lanes;
+  alignas(64) std::array<std::uint32_t, held> offset;              ///< in the posed grid
+  alignas(64) std::array<std::array<std::int32_t, held>, 3> base;  ///< of the place: base + part, in
+  alignas(64) std::array<std::array<float, held>, 3> part;         ///< continuous indices of the volume
 };
 
 /// What a full batch is handed to; `to` is the sampler's own.
@@ -37,8 +40,9 @@ struct TetExtent {
 /// 2^-bits voxels (fixed_points.hpp).
 struct DrawTets {
   const Tets& tets;
-  std::span<const std::int32_t> posed;  ///< 3 * #nodes, indices of the posed grid
-  std::span<const std::int32_t> rest;   ///< 3 * #nodes, indices of the volume
+  const TetPalettes& palettes;          ///< of `tets` in their own order, 3 numbers a node
+  std::span<const std::int32_t> posed;  ///< 3 * #nodes and one more, indices of the posed grid
+  std::span<const std::int32_t> rest;   ///< 3 * #nodes and one more, indices of the volume
   int bits = 20;
   /// Both grids are one lattice (spacing and direction): the map is then made as what it differs from a
   /// shift, so that a body at rest gives every voxel back exactly.
@@ -53,17 +57,17 @@ inline constexpr float kFlatTet = 1e-3F;
 
 namespace kernels {
 
-/// For tets [begin, end): the bands of `band` slices along `axis` (from range.first on) of the voxel centres
-/// that its box holds. Returns how many of them lie the wrong way round (posed volume zero or less) and hold
-/// some; those are written to `inverted`, ascending, and left out of `extents` (which has end - begin
-/// entries).
+/// For tets [begin, end), where `begin` begins a run: the bands of `band` slices along `axis` (from
+/// range.first on) of the voxel centres that its box holds. Returns how many of them lie the wrong way round
+/// (posed volume zero or less) and hold some; those are written to `inverted`, ascending, and left out of
+/// `extents` (which has end - begin entries).
 std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis, std::int32_t band,
                           std::size_t begin, std::size_t end, std::span<TetExtent> extents,
                           std::span<std::uint32_t> inverted);
 
-/// Sets `moved` of every brick of `bricks` that a tet of [begin, end) may hold voxels of at `before` or at
-/// `job.posed`, where a corner of it differs between the two. `range`: the whole grid. Several may run at
-/// once.
+/// Sets `moved` of every brick of `bricks` that a tet of [begin, end), where `begin` begins a run, may hold
+/// voxels of at `before` or at `job.posed`, where a corner of it differs between the two. `range`: the whole
+/// grid. Several may run at once.
 void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const VoxelRange& range,
                 const Bricks& bricks, std::size_t begin, std::size_t end, std::uint8_t* moved);
 
@@ -72,6 +76,10 @@ void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const
 /// lies outside by less than about 1e-5 of the tet's size may be.
 void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std::uint32_t> ids,
                VoxelBatch& batch, const BatchSink& sink);
+
+/// The same for tets of the runs from `first` on, a bit of `wanted` each, the last first.
+void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
+               std::span<const std::uint16_t> wanted, VoxelBatch& batch, const BatchSink& sink);
 
 }  // namespace kernels
 

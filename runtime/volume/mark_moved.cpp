@@ -35,18 +35,12 @@ HWY_INLINE void mark(const Bricks& bricks, const std::int32_t (&first)[3], const
 void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const VoxelRange& range,
                 const Bricks& bricks, std::size_t begin, std::size_t end, std::uint8_t* moved) {
   const std::size_t lanes = hn::Lanes(F());
-  for (std::size_t t = begin; t < end; t += lanes) {
-    const std::size_t count = std::min(lanes, end - t);
-    const VI ids = hn::Min(hn::Iota(I(), static_cast<std::int32_t>(t)),
-                           hn::Set(I(), static_cast<std::int32_t>(end - 1)));
-    VI node[4];
-    load_nodes(job.tets, ids, node);
-    const Corners corners[2] = {load_corners(before.data(), node), load_corners(job.posed.data(), node)};
+  const auto mark_vector = [&](const Corners(&corners)[2], std::size_t count) HWY_ATTR {
     VI differ = hn::Zero(I());
     for (int c = 0; c < 4; ++c) {
       for (int a = 0; a < 3; ++a) differ = hn::Or(differ, hn::Xor(corners[0].x[c][a], corners[1].x[c][a]));
     }
-    if (hn::AllTrue(I(), hn::Eq(differ, hn::Zero(I())))) continue;
+    if (hn::AllTrue(I(), hn::Eq(differ, hn::Zero(I())))) return;
     HWY_ALIGN std::int32_t different[kMostLanes];
     hn::Store(differ, I(), different);
     for (const Corners& at : corners) {
@@ -61,6 +55,12 @@ void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const
         mark(bricks, {first[0][i], first[1][i], first[2][i]}, {last[0][i], last[1][i], last[2][i]}, moved);
       }
     }
+  };
+  for (std::size_t t = begin; t < end; t += TetPalettes::width) {
+    const std::size_t run = t / TetPalettes::width;
+    const Run was(job.palettes, run, before.data()), is(job.palettes, run, job.posed.data());
+    for (std::size_t i = 0; i < std::min(TetPalettes::width, end - t); i += lanes)
+      mark_vector({was.corners(i), is.corners(i)}, std::min(lanes, end - t - i));
   }
 }
 

@@ -2,6 +2,7 @@
 #include "runtime/volume/volume_poser.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -145,6 +146,16 @@ VolumePoser::VolumePoser(std::shared_ptr<const Model> model) : model_(std::move(
   }
 }
 
+const TetPalettes& VolumePoser::palettes() const {
+  std::call_once(palettes_made_, [&] {
+    // A thread that waits here must not begin another volume of this poser: it would wait for itself.
+    tbb::this_task_arena::isolate([&] {
+      palettes_ = std::make_unique<const TetPalettes>(model_->tets, std::span<const std::uint32_t>(), 3);
+    });
+  });
+  return *palettes_;
+}
+
 // Which blocks reach into the grid, and their nodes in fixed points.
 DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
   const ImageGrid& rest_grid = job.volume.image.grid;
@@ -166,17 +177,18 @@ DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
       }
     }
   });
-  scratch.posed.resize(job.nodes.size());
+  scratch.posed.resize(job.nodes.size() + 1);
   to_fixed(job.grid, bits, job.nodes, scratch.groups, scratch.posed);
   if (scratch.of_rest.model != model_.get() || scratch.of_rest.bits != bits ||
       !(scratch.of_rest.grid == rest_grid)) {
-    scratch.rest.resize(job.nodes.size());
+    scratch.rest.resize(job.nodes.size() + 1);
     to_fixed(rest_grid, bits, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())},
              scratch.rest);
     scratch.of_rest = {model_.get(), rest_grid, bits};
   }
   job.context.check_stop();
   return {model_->tets,
+          palettes(),
           scratch.posed,
           scratch.rest,
           bits,
@@ -199,7 +211,7 @@ void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume
                          const Context& context) const {
   check_grid(grid);
   const bool same = kept.drawn.volume == &volume && kept.drawn.sampling == sampling &&
-                    kept.image.grid == grid && kept.drawn.posed.size() == nodes.size();
+                    kept.image.grid == grid && kept.drawn.posed.size() == nodes.size() + 1;
   kept.drawn.volume = nullptr;
   fit_image(grid, volume, kept.image);
   const Job job{nodes, volume, sampling, grid, true, context};
@@ -216,7 +228,7 @@ void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume
     if (kept.moved[b] != 0) kept.rewritten.push_back(static_cast<std::uint32_t>(b));
   }
   if (!kept.rewritten.empty()) draw(job, tets, kept.image, scratch);
-  kept.drawn.posed.resize(nodes.size());
+  kept.drawn.posed.resize(nodes.size() + 1);
   std::swap(kept.drawn.posed, scratch.posed);
   kept.drawn.bits = tets.bits;
   kept.drawn.sampling = sampling;
@@ -302,15 +314,17 @@ void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratc
     VoxelBatch batch;
     kernels::draw_tets(drawn, range, std::span<const std::uint32_t>(scratch.inverted).first(inverted), batch,
                        sink);
-    std::array<std::uint32_t, TetBlocks::size> ids;
+    std::array<std::uint16_t, TetBlocks::size / TetPalettes::width> wanted;
     for (std::size_t b = all; b-- > 0;) {
       if (band < scratch.block_first[b] || band > scratch.block_last[b]) continue;
-      std::size_t count = 0;
-      for (std::size_t t = std::min(tets, (b + 1) * TetBlocks::size); t-- > b * TetBlocks::size;) {
-        const TetExtent& extent = scratch.extents[t];
-        if (band >= extent.first && band <= extent.last) ids[count++] = static_cast<std::uint32_t>(t);
+      wanted.fill(0);
+      for (std::size_t i = 0; i < std::min(TetBlocks::size, tets - b * TetBlocks::size); ++i) {
+        const TetExtent& extent = scratch.extents[b * TetBlocks::size + i];
+        const bool there = band >= extent.first && band <= extent.last;
+        wanted[i / TetPalettes::width] |=
+            static_cast<std::uint16_t>(static_cast<unsigned>(there) << i % TetPalettes::width);
       }
-      kernels::draw_tets(drawn, range, std::span<const std::uint32_t>(ids).first(count), batch, sink);
+      kernels::draw_runs(drawn, range, b * wanted.size(), wanted, batch, sink);
     }
     if (batch.count > 0) sink.sample(sink.to, batch);
   });

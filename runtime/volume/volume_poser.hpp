@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "runtime/volume/draw_tets.hpp"
 #include "runtime/volume/resample.hpp"
 #include "runtime/volume/tet_blocks.hpp"
+#include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
 
@@ -81,8 +83,12 @@ class VolumePoser {
   void draw(const Job& job, const DrawTets& tets, Image& out, Scratch& scratch) const;
   void find_moved(const Job& job, const DrawTets& tets, PosedVolume& kept, Scratch& scratch) const;
 
+  const TetPalettes& palettes() const;
+
   std::shared_ptr<const Model> model_;
   TetBlocks blocks_;
+  mutable std::once_flag palettes_made_;  // with the first volume: many a poser never poses one
+  mutable std::unique_ptr<const TetPalettes> palettes_;
   std::array<float, 6> rest_box_{};
 };
 
