@@ -136,4 +136,33 @@ Complex complex_of_lattice(const TetMesh& mesh, double side) {
   return complex;
 }
 
+std::size_t label_by_seeds(TetMesh& mesh, const std::vector<int>& regions,
+                           const std::vector<Complex::Seed>& seeds) {
+  int highest = 0;
+  for (const Complex::Seed& seed : seeds) highest = std::max(highest, 1 + seed.label);
+  const auto hollow = [&](int region) { return region < 1 || region > highest; };
+  std::map<int, std::set<std::uint16_t>> around;  // labels at the faces of each hollow
+  mesh.label.resize(regions.size());
+  for (std::size_t t = 0; t < regions.size(); ++t) {
+    if (hollow(regions[t])) around.try_emplace(regions[t]);
+    mesh.label[t] = static_cast<std::uint16_t>(hollow(regions[t]) ? 0 : regions[t] - 1);
+  }
+  if (around.empty()) return 0;
+  const std::vector<Face> faces = sorted_faces(mesh);
+  const auto region = [&](const Face& f) { return regions[static_cast<std::size_t>(f.tet)]; };
+  for (std::size_t f = 0; f + 1 < faces.size(); ++f) {
+    if (faces[f].nodes != faces[f + 1].nodes) continue;
+    const int a = region(faces[f]), b = region(faces[f + 1]);
+    if (a == b) continue;
+    if (hollow(a)) around[a].insert(mesh.label[static_cast<std::size_t>(faces[f + 1].tet)]);
+    if (hollow(b)) around[b].insert(mesh.label[static_cast<std::size_t>(faces[f].tet)]);
+  }
+  for (std::size_t t = 0; t < regions.size(); ++t) {
+    if (!hollow(regions[t])) continue;
+    const std::set<std::uint16_t>& touched = around[regions[t]];
+    if (touched.size() == 1) mesh.label[t] = *touched.begin();
+  }
+  return around.size();
+}
+
 }  // namespace ecorche::tet

@@ -32,4 +32,11 @@ Complex complex_of_surfaces(const Case& patient);
 /// over and no two faces cross.
 Complex complex_of_lattice(const TetMesh& mesh, double side);
 
+/// Labels the tets between the triangles. `regions`: 1 + the seed's label for each tet whose region has a
+/// seed, any higher number of its own for one without. That is a hollow which the tets of the complex went
+/// round: it takes the label of the bone that it lies in where it touches nothing else, and is soft tissue
+/// otherwise. Returns how many such hollows there are.
+std::size_t label_by_seeds(TetMesh& mesh, const std::vector<int>& regions,
+                           const std::vector<Complex::Seed>& seeds);
+
 }  // namespace ecorche::tet

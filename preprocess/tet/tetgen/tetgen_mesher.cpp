@@ -163,17 +163,6 @@ void label_by_image(TetMesh& mesh, const std::vector<int>& regions, const Image&
     mesh.label[t] = static_cast<std::uint16_t>(label[regions[t]] - voxel::soft);
 }
 
-/// Regions that were seeded carry label + 1.
-void label_by_seeds(TetMesh& mesh, const std::vector<int>& regions, std::size_t bones) {
-  mesh.label.resize(regions.size());
-  for (std::size_t t = 0; t < regions.size(); ++t) {
-    if (regions[t] < 1 || static_cast<std::size_t>(regions[t]) > bones + 1)
-      throw Error(ErrorKind::internal, "tetgen", "a region without a seed",
-                  "use --mesher cgal, and report it");
-    mesh.label[t] = static_cast<std::uint16_t>(regions[t] - 1);
-  }
-}
-
 double body_volume(const Image& labels) {
   const std::span<const std::uint16_t> voxels = labels.scalars<std::uint16_t>();
   const auto outside = std::count(voxels.begin(), voxels.end(), voxel::outside);
@@ -223,8 +212,9 @@ class TetgenMesher : public Mesher {
       if (excess <= 1) {
         if (complex.seeds.empty()) {
           label_by_image(mesh, regions, input.labels);
-        } else {
-          label_by_seeds(mesh, regions, input.patient.bones.size());
+        } else if (const std::size_t hollows = label_by_seeds(mesh, regions, complex.seeds); hollows > 0) {
+          context.info("tetgen: " + std::to_string(hollows) +
+                       " hollows between the voxels' surfaces are filled");
         }
         context.report(1);
         return mesh;

@@ -217,6 +217,37 @@ TEST(Tetgen, SurfacesThatCrossAreTakenFromTheVoxels) {
   EXPECT_GT(measures::dihedral_angles(mesh)[0], 4);
 }
 
+TEST(Tetgen, HollowsOfTheVoxelsAreFilled) {
+  Prepared p(
+      shapes::body(shapes::ellipsoid({0, 0, 0}, {20, 20, 20}, 8), {shapes::box({0, -7, -7}, {30, 7, 7})}), 1);
+  const ImageGrid& grid = p.labels.grid;
+  for (int k = 0; k < grid.size[2]; ++k)
+    for (int j = 0; j < grid.size[1]; ++j)
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const auto x = grid.point(i, j, k);
+        const bool within = std::abs(x[1]) < 3 && std::abs(x[2]) < 3;
+        if (within && std::abs(std::abs(x[0]) - 9) < 3)
+          p.labels.scalars<std::uint16_t>()[grid.offset(i, j, k)] = voxel::outside;
+      }
+  Options few;
+  few.max_tets = 100'000;
+  const TetMesh lattice = p.mesh("lattice", few), mesh = p.mesh("tetgen", few);
+  const auto volume_at = [](const TetMesh& m, double x, std::uint16_t label) {
+    double sum = 0;
+    for (Eigen::Index t = 0; t < m.T.rows(); ++t) {
+      Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
+      for (int c = 0; c < 4; ++c) centre += 0.25 * m.V.row(m.T(t, c));
+      if (m.label[static_cast<std::size_t>(t)] == label && (centre - Eigen::RowVector3d(x, 0, 0)).norm() < 2)
+        sum += measures::volume(m, t);
+    }
+    return sum;
+  };
+  for (const auto& [x, label] : {std::pair{-9.0, std::uint16_t{0}}, std::pair{9.0, std::uint16_t{1}}}) {
+    EXPECT_EQ(volume_at(lattice, x, label), 0) << "a hollow to begin with";
+    EXPECT_GT(volume_at(mesh, x, label), 15) << "soft tissue amid it, bone amid bone";
+  }
+}
+
 TEST(Tetgen, TimeIsLimited) {
   const Prepared p(trunk(), 2);
   Options hurried;
