@@ -115,6 +115,7 @@ Complex complex_of_lattice(const TetMesh& mesh, double side) {
   }
   const Points V = smoothed(mesh.V, triangles, 0.2 * side);
   Complex complex;
+  complex.speck = side * side * side;
   std::vector<int> number(static_cast<std::size_t>(V.rows()), -1);
   for (std::array<std::int32_t, 3> t : triangles) {
     for (std::int32_t& node : t) {
@@ -136,33 +137,71 @@ Complex complex_of_lattice(const TetMesh& mesh, double side) {
   return complex;
 }
 
-std::size_t label_by_seeds(TetMesh& mesh, const std::vector<int>& regions,
-                           const std::vector<Complex::Seed>& seeds) {
+Hollows label_by_seeds(TetMesh& mesh, const std::vector<int>& regions, const Complex& complex) {
   int highest = 0;
-  for (const Complex::Seed& seed : seeds) highest = std::max(highest, 1 + seed.label);
-  const auto hollow = [&](int region) { return region < 1 || region > highest; };
-  std::map<int, std::set<std::uint16_t>> around;  // labels at the faces of each hollow
+  for (const Complex::Seed& seed : complex.seeds) highest = std::max(highest, 1 + seed.label);
+  const auto seeded = [&](int region) { return region >= 1 && region <= highest; };
+  struct Hollow {
+    double volume = 0;
+    std::set<std::uint16_t> around;  // labels at its faces
+  };
+  std::map<int, Hollow> hollows;
   mesh.label.resize(regions.size());
   for (std::size_t t = 0; t < regions.size(); ++t) {
-    if (hollow(regions[t])) around.try_emplace(regions[t]);
-    mesh.label[t] = static_cast<std::uint16_t>(hollow(regions[t]) ? 0 : regions[t] - 1);
+    mesh.label[t] = static_cast<std::uint16_t>(seeded(regions[t]) ? regions[t] - 1 : 0);
+    if (seeded(regions[t])) continue;
+    const auto row = static_cast<Eigen::Index>(t);
+    hollows[regions[t]].volume += tet_det(mesh.V.row(mesh.T(row, 0)), mesh.V.row(mesh.T(row, 1)),
+                                          mesh.V.row(mesh.T(row, 2)), mesh.V.row(mesh.T(row, 3))) /
+                                  6;
   }
-  if (around.empty()) return 0;
+  if (hollows.empty()) return {};
   const std::vector<Face> faces = sorted_faces(mesh);
-  const auto region = [&](const Face& f) { return regions[static_cast<std::size_t>(f.tet)]; };
   for (std::size_t f = 0; f + 1 < faces.size(); ++f) {
     if (faces[f].nodes != faces[f + 1].nodes) continue;
-    const int a = region(faces[f]), b = region(faces[f + 1]);
-    if (a == b) continue;
-    if (hollow(a)) around[a].insert(mesh.label[static_cast<std::size_t>(faces[f + 1].tet)]);
-    if (hollow(b)) around[b].insert(mesh.label[static_cast<std::size_t>(faces[f].tet)]);
+    const auto a = static_cast<std::size_t>(faces[f].tet), b = static_cast<std::size_t>(faces[f + 1].tet);
+    if (regions[a] == regions[b]) continue;
+    if (!seeded(regions[a])) hollows[regions[a]].around.insert(mesh.label[b]);
+    if (!seeded(regions[b])) hollows[regions[b]].around.insert(mesh.label[a]);
   }
+  Hollows out;
+  std::map<int, std::uint16_t> filled;
+  for (const auto& [region, hollow] : hollows) {
+    const bool amid_one = hollow.around.size() == 1 && *hollow.around.begin() > 0;
+    if (amid_one || hollow.volume <= complex.speck)
+      filled[region] = amid_one ? *hollow.around.begin() : std::uint16_t{0};
+    else
+      ++out.left;
+  }
+  out.filled = filled.size();
+  std::vector<Eigen::Index> kept;
+  std::vector<std::uint16_t> label;
   for (std::size_t t = 0; t < regions.size(); ++t) {
-    if (!hollow(regions[t])) continue;
-    const std::set<std::uint16_t>& touched = around[regions[t]];
-    if (touched.size() == 1) mesh.label[t] = *touched.begin();
+    const auto found = filled.find(regions[t]);
+    if (!seeded(regions[t]) && found == filled.end()) continue;
+    kept.push_back(static_cast<Eigen::Index>(t));
+    label.push_back(found == filled.end() ? mesh.label[t] : found->second);
   }
-  return around.size();
+  mesh.label = std::move(label);
+  if (out.left == 0) return out;
+  std::vector<std::int32_t> number(static_cast<std::size_t>(mesh.V.rows()), -1);
+  std::vector<std::int32_t> nodes;
+  Tets tets(static_cast<Eigen::Index>(kept.size()), 4);
+  for (std::size_t t = 0; t < kept.size(); ++t)
+    for (Eigen::Index c = 0; c < 4; ++c) {
+      std::int32_t& n = number[static_cast<std::size_t>(mesh.T(kept[t], c))];
+      if (n < 0) {
+        n = static_cast<std::int32_t>(nodes.size());
+        nodes.push_back(mesh.T(kept[t], c));
+      }
+      tets(static_cast<Eigen::Index>(t), c) = n;
+    }
+  Points places(static_cast<Eigen::Index>(nodes.size()), 3);
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+    places.row(static_cast<Eigen::Index>(n)) = mesh.V.row(nodes[n]);
+  mesh.T = std::move(tets);
+  mesh.V = std::move(places);
+  return out;
 }
 
 }  // namespace ecorche::tet

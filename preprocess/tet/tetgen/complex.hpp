@@ -20,6 +20,7 @@ struct Complex {
   std::vector<double> points;  ///< 3 a vertex, mm
   std::vector<std::array<int, 3>> triangles;
   std::vector<Seed> seeds;  ///< one a region; or none where nobody knows the regions
+  double speck = 0;         ///< mm^3 that a hollow of a lattice has by chance: one cube
   std::size_t vertices() const { return points.size() / 3; }
 };
 
@@ -32,11 +33,15 @@ Complex complex_of_surfaces(const Case& patient);
 /// over and no two faces cross.
 Complex complex_of_lattice(const TetMesh& mesh, double side);
 
+/// What became of regions without a seed: hollows that the tets of the complex went round.
+struct Hollows {
+  std::size_t filled = 0, left = 0;
+};
+
 /// Labels the tets between the triangles. `regions`: 1 + the seed's label for each tet whose region has a
-/// seed, any higher number of its own for one without. That is a hollow which the tets of the complex went
-/// round: it takes the label of the bone that it lies in where it touches nothing else, and is soft tissue
-/// otherwise. Returns how many such hollows there are.
-std::size_t label_by_seeds(TetMesh& mesh, const std::vector<int>& regions,
-                           const std::vector<Complex::Seed>& seeds);
+/// seed, any higher number of its own for one without. Such a hollow takes the label of the bone that it lies
+/// in where it touches nothing else; elsewhere it becomes soft tissue where it is a speck, and its tets go
+/// where it is larger: the skin has an inside there that is not of the body.
+Hollows label_by_seeds(TetMesh& mesh, const std::vector<int>& regions, const Complex& complex);
 
 }  // namespace ecorche::tet

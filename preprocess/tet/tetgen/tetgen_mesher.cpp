@@ -212,9 +212,11 @@ class TetgenMesher : public Mesher {
       if (excess <= 1) {
         if (complex.seeds.empty()) {
           label_by_image(mesh, regions, input.labels);
-        } else if (const std::size_t hollows = label_by_seeds(mesh, regions, complex.seeds); hollows > 0) {
-          context.info("tetgen: " + std::to_string(hollows) +
-                       " hollows between the voxels' surfaces are filled");
+        } else if (const Hollows hollows = label_by_seeds(mesh, regions, complex);
+                   hollows.filled + hollows.left > 0) {
+          context.info("tetgen: of the hollows between the voxels' surfaces " +
+                       std::to_string(hollows.filled) + " are filled, " + std::to_string(hollows.left) +
+                       " are not of the body");
         }
         context.report(1);
         return mesh;

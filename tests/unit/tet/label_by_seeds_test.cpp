@@ -42,18 +42,38 @@ TEST(LabelBySeeds, AHollowIsOfTheBoneAroundItElseSoft) {
       }
     }
   }
-  const std::vector<Complex::Seed> seeds{{{}, 0}, {{}, 1}, {{}, 3}};
-  EXPECT_EQ(label_by_seeds(mesh, regions, seeds), 0U);
+  Complex complex;
+  complex.seeds = {{{}, 0}, {{}, 1}, {{}, 3}};
+  complex.speck = 1;
+  EXPECT_EQ(label_by_seeds(mesh, regions, complex).filled, 0U);
   for (std::size_t t = 0; t < tets.size(); ++t) EXPECT_EQ(mesh.label[t] + 1, regions[t]);
   const std::vector<std::uint16_t> before = mesh.label;
   for (std::size_t h = 0; h < at.size(); ++h) regions[hollow[h]] = 5 + static_cast<int>(h);
-  EXPECT_EQ(label_by_seeds(mesh, regions, seeds), 5U);
+  const Hollows all = label_by_seeds(mesh, regions, complex);
+  EXPECT_EQ(all.filled, 5U);
+  EXPECT_EQ(all.left, 0U);
   const std::array<std::uint16_t, 5> expected{0, 1, 0, 3, 0};
   for (std::size_t h = 0; h < at.size(); ++h) EXPECT_EQ(mesh.label[hollow[h]], expected[h]) << h;
   for (std::size_t t = 0; t < tets.size(); ++t)
     if (std::find(hollow.begin(), hollow.end(), t) == hollow.end()) {
       EXPECT_EQ(mesh.label[t], before[t]);
     }
+  complex.speck = 0.08;  // a tet has a twelfth
+  const Hollows some = label_by_seeds(mesh, regions, complex);
+  EXPECT_EQ(some.filled, 2U) << "those amid one bone";
+  EXPECT_EQ(some.left, 3U);
+  ASSERT_EQ(mesh.T.rows(), static_cast<Eigen::Index>(tets.size()) - 3);
+  ASSERT_EQ(mesh.label.size(), tets.size() - 3);
+  std::size_t row = 0;
+  for (std::size_t t = 0; t < tets.size(); ++t) {
+    if (t == hollow[0] || t == hollow[2] || t == hollow[4]) continue;
+    EXPECT_EQ(mesh.label[row], before[t]);
+    for (std::size_t c = 0; c < 4; ++c) {
+      const auto n = mesh.T(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c));
+      EXPECT_TRUE(mesh.V.row(n).transpose() == lattice.position(tets[t][c]));
+    }
+    ++row;
+  }
 }
 
 }  // namespace
