@@ -8,6 +8,8 @@
 
 #include <algorithm>
 
+#include "core/solve/mix.hpp"
+
 namespace ecorche::mapping {
 namespace {
 
@@ -21,16 +23,8 @@ std::array<std::int32_t, 4> sorted(const Tets& tets, std::int64_t tet) {
   return n;
 }
 
-std::uint64_t mix(std::uint64_t x) {  // splitmix64's finaliser
-  x ^= x >> 30;
-  x *= 0xbf58476d1ce4e5b9ULL;
-  x ^= x >> 27;
-  x *= 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
-}
-
 std::uint64_t edge(std::int32_t a, std::int32_t b) {
-  return mix(static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b));
+  return solve::mix(static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b));
 }
 
 // Nodes that are the lowest of a face which an odd number of tets have: at its lowest node a face adds the

@@ -8,16 +8,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/solve/mix.hpp"
+
 namespace ecorche::voxel {
 namespace {
-
-std::uint64_t mix(std::uint64_t x) {  // splitmix64's finaliser
-  x ^= x >> 30;
-  x *= 0xbf58476d1ce4e5b9ULL;
-  x ^= x >> 27;
-  x *= 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
-}
 
 std::uint64_t place(const Vec3i& p) {
   return static_cast<std::uint64_t>(p[0]) | static_cast<std::uint64_t>(p[1]) << 21 |
@@ -27,7 +21,7 @@ std::uint64_t place(const Vec3i& p) {
 /// Antisymmetric: the two ways through an edge cancel.
 std::uint64_t directed_edge(std::uint64_t a, std::uint64_t b) {
   if (a == b) return 0;
-  const std::uint64_t hash = mix(mix(std::min(a, b)) + std::max(a, b));
+  const std::uint64_t hash = solve::mix(solve::mix(std::min(a, b)) + std::max(a, b));
   return a < b ? hash : 0 - hash;
 }
 

@@ -24,21 +24,11 @@ using Eigen::Vector3d;
 // A trunk with two arms that hang: collar (short), upper arm, forearm, hand.
 Rig hanging_arms() {
   Rig rig;
-  const auto add = [&](const char* name, int parent, const Vector3d& center) {
-    Segment segment;
-    segment.name = name;
-    segment.parent = parent;
-    segment.joint.name = std::string("joint_") + name;
-    segment.joint.center = center;
-    segment.joint.sequence = test::sequence({0, 1, 2});
-    rig.skeleton.segments.push_back(segment);
-    rig.fits.push_back({segment.joint.name, CenterRule::given, 0, 0, 1, 0});
-  };
-  add("trunk", -1, {0, 0, 0});
-  add("collar_left", 0, {20, 0, 500});
-  add("arm_left", 1, {80, 0, 500});
-  add("forearm_left", 2, {100, 0, 220});
-  add("hand_left", 3, {110, -40, -30});
+  test::add_segment(rig, "trunk", -1, {0, 0, 0});
+  test::add_segment(rig, "collar_left", 0, {20, 0, 500});
+  test::add_segment(rig, "arm_left", 1, {80, 0, 500});
+  test::add_segment(rig, "forearm_left", 2, {100, 0, 220});
+  test::add_segment(rig, "hand_left", 3, {110, -40, -30});
   return rig;
 }
 

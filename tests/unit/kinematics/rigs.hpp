@@ -51,26 +51,28 @@ inline Rig chain(int count) {
   return rig;
 }
 
+/// Adds a ball without limits.
+inline void add_segment(Rig& rig, const char* name, int parent, const Eigen::Vector3d& center) {
+  Segment segment;
+  segment.name = name;
+  segment.parent = parent;
+  segment.joint.name = std::string(name) + "_joint";
+  segment.joint.center = center;
+  segment.joint.sequence = sequence({0, 1, 2});
+  rig.skeleton.segments.push_back(segment);
+  rig.fits.push_back({segment.joint.name, CenterRule::given, 0, 0, 1, 0});
+}
+
 /// A body with trunk and two legs.
 inline Rig legs() {
   Rig rig;
-  const auto add = [&](const char* name, int parent, const Eigen::Vector3d& center) {
-    Segment segment;
-    segment.name = name;
-    segment.parent = parent;
-    segment.joint.name = std::string(name) + "_joint";
-    segment.joint.center = center;
-    segment.joint.sequence = sequence({0, 1, 2});
-    rig.skeleton.segments.push_back(segment);
-    rig.fits.push_back({segment.joint.name, CenterRule::given, 0, 0, 1, 0});
-  };
-  add("pelvis", -1, {0, 0, 900});
-  add("thigh_left", 0, {90, 0, 880});
-  add("shank_left", 1, {90, 10, 480});
-  add("foot_left", 2, {90, 20, 80});
-  add("thigh_right", 0, {-90, 0, 880});
-  add("shank_right", 4, {-90, 10, 480});
-  add("foot_right", 5, {-90, 20, 80});
+  add_segment(rig, "pelvis", -1, {0, 0, 900});
+  add_segment(rig, "thigh_left", 0, {90, 0, 880});
+  add_segment(rig, "shank_left", 1, {90, 10, 480});
+  add_segment(rig, "foot_left", 2, {90, 20, 80});
+  add_segment(rig, "thigh_right", 0, {-90, 0, 880});
+  add_segment(rig, "shank_right", 4, {-90, 10, 480});
+  add_segment(rig, "foot_right", 5, {-90, 20, 80});
   return rig;
 }
 
