@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "runtime/skin/vectors-inl.hpp"
 #include "runtime/volume/corners-inl.hpp"
@@ -89,7 +90,10 @@ std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis
     }
   };
   for (std::size_t t = begin; t < end; t += TetPalettes::width) {
-    const Run posed(job.palettes, t / TetPalettes::width, job.posed.data());
+    const std::size_t run = t / TetPalettes::width, next = run + 2;
+    if (next < job.palettes.runs())
+      ask_for(job.posed.data(), job.palettes.rows(next), job.palettes.filled(next), 2);
+    const Run posed(job.palettes, run, job.posed.data());
     for (std::size_t i = 0; i < std::min(TetPalettes::width, end - t); i += lanes)
       classify(posed.corners(i), t + i);
   }
@@ -324,23 +328,39 @@ void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std
   }
 }
 
+HWY_INLINE bool any_of(const std::uint8_t* wanted) {
+  std::uint64_t eight[2];
+  static_assert(sizeof eight == TetPalettes::width);
+  std::memcpy(eight, wanted, sizeof eight);
+  return (eight[0] | eight[1]) != 0;
+}
+
 void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
-               std::span<const std::uint16_t> wanted, VoxelBatch& batch, const BatchSink& sink) {
-  const std::size_t lanes = hn::Lanes(F());
-  const std::uint32_t of_vector = (1U << lanes) - 1;
+               std::span<const std::uint8_t> wanted, VoxelBatch& batch, const BatchSink& sink) {
+  constexpr std::size_t width = TetPalettes::width;
+  const std::size_t lanes = hn::Lanes(F()), runs = wanted.size() / width;
+  const TetPalettes& palettes = job.palettes;
+  // What the next call will probably want, and what this one will.
+  if (first >= runs) {
+    for (const std::uint8_t* line = palettes.corners(first - runs); line < palettes.corners(first);
+         line += 64)
+      hwy::Prefetch(line);
+  }
+  for (std::size_t r = runs; r-- > 0;) {
+    if (!any_of(&wanted[width * r])) continue;
+    ask_for(job.posed.data(), palettes.rows(first + r), palettes.filled(first + r), 2);
+    ask_for(job.rest.data(), palettes.rows(first + r), palettes.filled(first + r), 2);
+  }
   Setup setup;
-  for (std::size_t r = wanted.size(); r-- > 0;) {
-    if (wanted[r] == 0) continue;
-    const Run posed(job.palettes, first + r, job.posed.data()),
-        rest(job.palettes, first + r, job.rest.data());
-    for (std::size_t i = TetPalettes::width; i > 0;) {
+  for (std::size_t r = runs; r-- > 0;) {
+    if (!any_of(&wanted[width * r])) continue;
+    const Run posed(palettes, first + r, job.posed.data()), rest(palettes, first + r, job.rest.data());
+    for (std::size_t i = width; i > 0;) {
       i -= lanes;
-      const std::uint32_t bits = wanted[r] >> i & of_vector;
-      if (bits == 0) continue;
       set_up(job, range, posed.corners(i), rest.corners(i), setup);
       for (std::size_t t = lanes; t-- > 0;) {
-        if ((bits >> t & 1U) != 0)
-          draw_one(job, range, setup, t, TetPalettes::width * (first + r) + i + t, batch, sink);
+        if (wanted[width * r + i + t] != 0)
+          draw_one(job, range, setup, t, width * (first + r) + i + t, batch, sink);
       }
     }
   }
@@ -368,7 +388,7 @@ void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std
 }
 
 void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
-               std::span<const std::uint16_t> wanted, VoxelBatch& batch, const BatchSink& sink) {
+               std::span<const std::uint8_t> wanted, VoxelBatch& batch, const BatchSink& sink) {
   HWY_DYNAMIC_DISPATCH(draw_runs)(job, range, first, wanted, batch, sink);
 }
 

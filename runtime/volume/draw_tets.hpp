@@ -77,9 +77,10 @@ void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const
 void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std::uint32_t> ids,
                VoxelBatch& batch, const BatchSink& sink);
 
-/// The same for tets of the runs from `first` on, a bit of `wanted` each, the last first.
+/// The same for tets of the runs from `first` on, the last first: those whose entry of `wanted`, sixteen a
+/// run, is not zero.
 void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
-               std::span<const std::uint16_t> wanted, VoxelBatch& batch, const BatchSink& sink);
+               std::span<const std::uint8_t> wanted, VoxelBatch& batch, const BatchSink& sink);
 
 }  // namespace kernels
 

@@ -307,24 +307,24 @@ void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratc
   // From the least to the greatest claim on a voxel, each writing over the last.
   const SampleJob samples{job.volume.image, job.volume.background, out};
   const BatchSink sink = sink_for(samples, job.volume.labels ? Sampling::nearest : job.sampling);
-  tbb::parallel_for(std::size_t{0}, bands.count, [&](std::size_t band) {
+  tbb::parallel_for(std::size_t{0}, bands.count, [&](std::size_t number) {
+    const auto band = static_cast<std::uint16_t>(number);
     if (context.stop.stop_requested()) return;
     const VoxelRange range = bands.of(band, grid);
     fill_band(samples, drawn.only, range);
     VoxelBatch batch;
     kernels::draw_tets(drawn, range, std::span<const std::uint32_t>(scratch.inverted).first(inverted), batch,
                        sink);
-    std::array<std::uint16_t, TetBlocks::size / TetPalettes::width> wanted;
+    std::array<std::uint8_t, TetBlocks::size> wanted{};
     for (std::size_t b = all; b-- > 0;) {
       if (band < scratch.block_first[b] || band > scratch.block_last[b]) continue;
-      wanted.fill(0);
-      for (std::size_t i = 0; i < std::min(TetBlocks::size, tets - b * TetBlocks::size); ++i) {
-        const TetExtent& extent = scratch.extents[b * TetBlocks::size + i];
-        const bool there = band >= extent.first && band <= extent.last;
-        wanted[i / TetPalettes::width] |=
-            static_cast<std::uint16_t>(static_cast<unsigned>(there) << i % TetPalettes::width);
-      }
-      kernels::draw_runs(drawn, range, b * wanted.size(), wanted, batch, sink);
+      const std::size_t count = std::min(TetBlocks::size, tets - b * TetBlocks::size);
+      const TetExtent* extents = &scratch.extents[b * TetBlocks::size];
+      for (std::size_t i = 0; i < count; ++i)
+        wanted[i] = static_cast<std::uint8_t>(band >= extents[i].first) &
+                    static_cast<std::uint8_t>(band <= extents[i].last);
+      std::fill(wanted.begin() + static_cast<std::ptrdiff_t>(count), wanted.end(), std::uint8_t{0});
+      kernels::draw_runs(drawn, range, b * TetBlocks::size / TetPalettes::width, wanted, batch, sink);
     }
     if (batch.count > 0) sink.sample(sink.to, batch);
   });
