@@ -62,6 +62,14 @@ TEST(QualityMeter, ASubsetIsWithinItsError) {
   }
 }
 
+TEST(QualityMeter, WhatIsCrushedToNothingIsInverted) {
+  Bent bent(0.0);
+  for (std::size_t n = 2; n < bent.body.nodes.size(); n += 3) bent.body.nodes[n] = 0;
+  const PoseQuality quick = QualityMeter(bent.model).measure(bent.body, {});
+  EXPECT_EQ(quick.inverted_tets, bent.model->tet_count());
+  EXPECT_EQ(quick.inverted_tets, measure(*bent.model, bent.body, {}).inverted_tets);
+}
+
 TEST(QualityMeter, ABoneThatBendsIsSeen) {
   Bent bent(0.3);
   for (std::size_t t = 0; t < bent.model->tissues.size(); ++t) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders of points and palettes of tets, which the tree of a probe is made of.
+// What a probe is made of: orders of points, palettes of tets, columns of tissues.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +9,8 @@
 #include <random>
 
 #include "runtime/probe/space_order.hpp"
-#include "runtime/probe/tet_runs.hpp"
+#include "runtime/probe/tissue_columns.hpp"
+#include "runtime/quality/pose_quality.hpp"
 #include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
@@ -94,6 +95,32 @@ TEST(TetPalettes, BytesFindTheCornersOfEveryTet) {
     }
   }
   EXPECT_EQ(TetPalettes(Tets(0, 4), {}, 3).runs(), 0U);
+}
+
+TEST(TissueColumns, ColumnsThroughVerticesAndEdgesCrossOnce) {
+  // A cube about the origin, corners on whole numbers, asked along every vertex, edge and diagonal.
+  Model cube;
+  cube.tissues.resize(1);
+  Tissue& box = cube.tissues[0];
+  box.V.resize(8, 3);
+  for (int v = 0; v < 8; ++v)
+    box.V.row(v) << (v & 1 ? 2.0F : -2.0F), (v & 2 ? 2.0F : -2.0F), (v & 4 ? 2.0F : -2.0F);
+  box.F.resize(12, 3);
+  box.F << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7,
+      1, 7, 5;
+  ASSERT_TRUE(is_closed(box.F));
+  const TissueColumns columns(cube);
+  for (int i = -3; i <= 3; ++i) {
+    for (int j = -3; j <= 3; ++j) {
+      for (int k = -3; k <= 3; ++k) {
+        const int far = std::max({std::abs(i), std::abs(j), std::abs(k)});
+        const std::int32_t row =
+            columns.at({static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)});
+        if (far == 2) continue;  // on the surface: either side
+        EXPECT_EQ(row, far < 2 ? 0 : TissueColumns::none) << i << j << k;
+      }
+    }
+  }
 }
 
 }  // namespace

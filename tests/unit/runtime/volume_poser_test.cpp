@@ -229,6 +229,43 @@ TEST_F(PosedInOnePass, WhereTetsFoldTheLowestPositiveOneWins) {
   EXPECT_EQ(posed(15, 15, 15), 1);
 }
 
+TEST_F(PosedInOnePass, WhereManyTetsPileUpTheLowestPositiveOneWins) {
+  // More than a block of them on one place, each from values of its own: within a vector, a run and a block.
+  constexpr int count = 130;
+  Model pile;
+  pile.nodes.resize(4 * count, 3);
+  pile.tets.resize(count, 4);
+  ModelVolume volume;
+  volume.image = Image({{10 * count, 9, 9}}, ScalarType::i16);
+  const std::span<std::int16_t> values = volume.image.scalars<std::int16_t>();
+  for (std::size_t v = 0; v < values.size(); ++v) values[v] = static_cast<std::int16_t>(v % 1300 / 10 + 1);
+  for (int t = 0; t < count; ++t) {
+    const auto x = static_cast<float>(10 * t);
+    pile.nodes.middleRows(4 * t, 4) << x, 0, 0, x + 8, 0, 0, x, 8, 0, x, 0, 8;
+    pile.tets.row(t) << 4 * t, 4 * t + 1, 4 * t + 2, 4 * t + 3;
+  }
+  pile.tet_label.assign(count, 1);
+  const VolumePoser of(std::make_shared<const Model>(pile));
+  const ImageGrid grid{{9, 9, 9}};
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    for (const std::size_t positive : {0U, 3U, 19U, 70U, 129U}) {
+      std::vector<float> nodes = rest_nodes(pile);
+      for (std::size_t n = 0; n < 4 * count; ++n) nodes[3 * n] -= static_cast<float>(10 * (n / 4));
+      for (std::size_t t = 0; t < positive; ++t)
+        std::swap_ranges(&nodes[12 * t], &nodes[12 * t + 3], &nodes[12 * t + 3]);
+      Image posed;
+      VolumePoser::Scratch own;
+      of.pose(nodes, volume, Sampling::nearest, grid, posed, own);
+      const std::span<const std::int16_t> got = std::as_const(posed).scalars<std::int16_t>();
+      const auto held = std::count(got.begin(), got.end(), static_cast<std::int16_t>(positive + 1));
+      EXPECT_GT(held, 100) << hwy::TargetName(target) << " " << positive;
+      EXPECT_EQ(held + std::count(got.begin(), got.end(), std::int16_t{0}), 729) << positive;
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
 TEST_F(PosedInOnePass, FlatTetsAndNodesThatAreNoNumbersDoNoHarm) {
   const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
   // A sheet a hundredth of a millimetre thick, on voxel centres.
