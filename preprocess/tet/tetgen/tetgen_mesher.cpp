@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -97,7 +98,7 @@ std::vector<std::byte> count_crossings(const Complex& complex) {
   return bytes;
 }
 
-std::vector<std::byte> fill(const Complex& complex, double largest_volume) {
+std::vector<std::byte> fill_in_child(const Complex& complex, double largest_volume) {
   // p: of a complex; Y: surfaces stay as they are; q: radius-edge ratio / smallest dihedral angle, where the
   // surfaces allow it; A: regions are numbered; z: from 0; Q: quiet; a: largest volume.
   tetgenio out;
@@ -170,8 +171,12 @@ double body_volume(const Image& labels) {
          std::pow(labels.grid.spacing[0], 3);
 }
 
-Error refusal(std::string what) {
-  return {ErrorKind::data, "tetgen", std::move(what), "use --mesher cgal, which works from the voxels"};
+double volume_of(const TetMesh& mesh) {
+  double six = 0;
+  for (Eigen::Index t = 0; t < mesh.T.rows(); ++t)
+    six += tet_det(mesh.V.row(mesh.T(t, 0)), mesh.V.row(mesh.T(t, 1)), mesh.V.row(mesh.T(t, 2)),
+                   mesh.V.row(mesh.T(t, 3)));
+  return six / 6;
 }
 
 class TetgenMesher : public Mesher {
@@ -179,33 +184,66 @@ class TetgenMesher : public Mesher {
   std::string_view name() const override { return "tetgen"; }
 
   TetMesh mesh(const Input& input, const Options& options, const Context& context) const override {
+    const Deadline deadline(options.seconds);
+    const double voxel = input.labels.grid.spacing[0];
     Complex complex = complex_of_surfaces(input.patient);
-    const std::string obstacle = obstacle_of(complex, options, context);
-    if (!obstacle.empty()) {
-      context.warn(obstacle + ": TetGen fills the surfaces of the voxels instead");
-      complex = complex_from_voxels(input, options, context);
-    } else {
+    std::string obstacle = obstacle_of(complex, options, deadline, context);
+    if (obstacle.empty()) {
       // Surfaces coarser than the gaps between them leave slivers there.
-      split_long_edges(complex, kLongestEdgeInVoxels * input.labels.grid.spacing[0],
+      split_long_edges(complex, kLongestEdgeInVoxels * voxel,
                        static_cast<std::size_t>(
                            std::min(options.max_tets / kTetsPerSurfaceVertex, options.max_nodes / 4)));
+      Filled filled = fill(complex, input, options, deadline.half(), context);
+      if (filled.obstacle.empty()) return std::move(filled.mesh);
+      obstacle = std::move(filled.obstacle);
     }
+    context.warn(obstacle + ": TetGen fills the surfaces of the voxels instead");
+    complex = complex_from_voxels(input, options, context);
+    Filled filled = fill(complex, input, options, deadline, context);
+    if (!filled.obstacle.empty())
+      throw Error(ErrorKind::data, "tetgen", filled.obstacle,
+                  "use --mesher cgal, which works from the voxels");
+    return std::move(filled.mesh);
+  }
+
+ private:
+  /// What is left of the time that was allowed.
+  class Deadline {
+   public:
+    explicit Deadline(double seconds) : end_(Clock::now() + std::chrono::duration<double>(seconds)) {}
+    double seconds() const { return std::max(0.0, (end_ - Clock::now()).count()); }
+    Deadline half() const { return Deadline(0.5 * seconds()); }
+
+   private:
+    using Clock = std::chrono::steady_clock;
+    std::chrono::time_point<Clock, std::chrono::duration<double>> end_;
+  };
+
+  struct Filled {
+    TetMesh mesh;
+    std::string obstacle;  ///< why there is none; else empty
+  };
+
+  static Filled fill(const Complex& complex, const Input& input, const Options& options,
+                     const Deadline& deadline, const Context& context) {
     const double body = body_volume(input.labels);
     // Refined tets have about half the largest volume; the other half of the budget is for those at surfaces.
     double volume = std::max(kFinestVolumeInVoxels * std::pow(input.labels.grid.spacing[0], 3),
                              4 * body / static_cast<double>(options.max_tets));
     for (;;) {
+      const double seconds = deadline.seconds();
       const ChildResult result =
-          run_in_child([&] { return fill(complex, volume); }, {.seconds = options.seconds}, context);
+          run_in_child([&] { return fill_in_child(complex, volume); }, {.seconds = seconds}, context);
       if (result.end == ChildResult::End::timed_out)
-        throw refusal("TetGen did not come back within " + std::to_string(static_cast<int>(options.seconds)) +
-                      " s");
+        return {{}, "TetGen did not come back within " + std::to_string(std::lround(seconds)) + " s"};
       if (result.end == ChildResult::End::failed)
-        throw refusal("TetGen could not fill the surfaces" +
-                      (result.said.empty() ? "" : " (" + result.said + ")"));
+        return {{},
+                "TetGen could not fill the surfaces" + (result.said.empty() ? "" : " (" + result.said + ")")};
       std::vector<int> regions;
-      TetMesh mesh = unpack(result.bytes, regions);
-      if (mesh.T.rows() == 0) throw refusal("the skin does not close, so that TetGen found no inside");
+      Filled out{unpack(result.bytes, regions), ""};
+      TetMesh& mesh = out.mesh;
+      if (volume_of(mesh) < 0.5 * body)  // the bones alone, or nothing
+        return {{}, "the skin does not close, so that TetGen found no inside"};
       const double excess =
           std::max(static_cast<double>(mesh.T.rows()) / static_cast<double>(options.max_tets),
                    static_cast<double>(mesh.V.rows()) / static_cast<double>(options.max_nodes));
@@ -219,26 +257,26 @@ class TetgenMesher : public Mesher {
                        " are not of the body");
         }
         context.report(1);
-        return mesh;
+        return out;
       }
       const std::string made = "TetGen made " + std::to_string(mesh.T.rows()) + " tets and " +
                                std::to_string(mesh.V.rows()) + " nodes, more than allowed";
-      if (volume > body) throw refusal(made + ", even without a limit on their volume");
+      if (volume > body) return {{}, made + ", even without a limit on their volume"};
       volume *= 2 * excess * excess;
       context.warn(made + ": again with tets up to " + std::to_string(volume) + " mm^3");
     }
   }
 
- private:
   /// Why TetGen cannot fill the surfaces themselves; empty where it can.
-  static std::string obstacle_of(const Complex& complex, const Options& options, const Context& context) {
+  static std::string obstacle_of(const Complex& complex, const Options& options, const Deadline& deadline,
+                                 const Context& context) {
     if (5 * static_cast<std::int64_t>(complex.vertices()) > 4 * options.max_nodes ||
         7 * static_cast<std::int64_t>(complex.vertices()) >
             options.max_tets)  // at least about 7 tets a vertex, measured
       return "skin and bones have " + std::to_string(complex.vertices()) +
              " vertices, too many for the allowed tets";
-    const ChildResult check =
-        run_in_child([&] { return count_crossings(complex); }, {.seconds = options.seconds}, context);
+    const ChildResult check = run_in_child([&] { return count_crossings(complex); },
+                                           {.seconds = deadline.half().seconds()}, context);
     if (check.end == ChildResult::End::timed_out) return "looking for crossing surfaces took too long";
     if (check.end == ChildResult::End::failed) return "skin and bones cannot be checked for crossings";
     std::size_t at = 0;

@@ -253,17 +253,39 @@ TEST(Tetgen, AHollowInABoneIsFilledAndOneInTheBodyStays) {
   EXPECT_EQ(std::count(used.begin(), used.end(), false), 0);
 }
 
+TEST(Tetgen, ASkinThatDoesNotCloseIsTakenFromTheVoxels) {
+  Case open = trunk();
+  open.skin.F.conservativeResize(open.skin.F.rows() - 1, 3);
+  const Prepared p(std::move(open), 2);
+  std::vector<std::string> said;
+  Context context;
+  context.log = [&](LogLevel level, std::string_view line) {
+    if (level == LogLevel::warning) said.emplace_back(line);
+  };
+  Options few;
+  few.max_tets = 100'000;
+  const TetMesh mesh = p.mesh("tetgen", few, context);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(
+      said[0].substr(0, said[0].find(" instead")),
+      "the skin does not close, so that TetGen found no inside: TetGen fills the surfaces of the voxels");
+  EXPECT_EQ(measures::volumes(mesh).size(), 4U);
+  EXPECT_EQ(measures::faults_of_boundary(mesh), 0U);
+}
+
 TEST(Tetgen, TimeIsLimited) {
   const Prepared p(trunk(), 2);
   Options hurried;
   hurried.seconds = 0;
-  try {
-    p.mesh("tetgen", hurried);
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.kind(), ErrorKind::data);
-    EXPECT_NE(std::string(e.what()).find("did not come back"), std::string::npos) << e.what();
-  }
+  std::vector<std::string> said;
+  Context context;
+  context.log = [&](LogLevel, std::string_view line) { said.emplace_back(line); };
+  expect_error(ErrorKind::data,
+               "tetgen: TetGen did not come back within 0 s (use --mesher cgal, which works from the voxels)",
+               [&] { p.mesh("tetgen", hurried, context); });
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0],
+            "looking for crossing surfaces took too long: TetGen fills the surfaces of the voxels instead");
 }
 
 TEST(Cgal, SmallestAngleIsLifted) {
