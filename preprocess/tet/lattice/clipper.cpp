@@ -8,10 +8,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <string>
 
+#include "preprocess/tet/lattice/claims.hpp"
 #include "preprocess/tet/lattice/manifold_fill.hpp"
 #include "preprocess/tet/lattice/star_sets.hpp"
 #include "preprocess/voxel/voxelize.hpp"
@@ -241,11 +241,6 @@ void Clipper::sample(Clipped& out) const {
 /// it claims that tet. Of several claims the bone with most voxels wins, ties to the lower label; a tet
 /// that already is of another bone is left to it, unless a bone would have no tet at all.
 void Clipper::keep_thin_bones(Clipped& out) const {
-  struct Claim {
-    std::int64_t slot;
-    std::uint16_t label;
-    auto operator<=>(const Claim&) const = default;
-  };
   std::vector<std::vector<Claim>> claims_of(static_cast<std::size_t>(grid_.size[2]));
   tbb::parallel_for(0, grid_.size[2], [&](int k) {
     context_.check_stop();
@@ -259,44 +254,21 @@ void Clipper::keep_thin_bones(Clipped& out) const {
         if (!represented(out, slot, label)) claims_of[static_cast<std::size_t>(k)].push_back({slot, label});
       }
   });
-  std::vector<Claim> claims;
-  for (const std::vector<Claim>& some : claims_of) claims.insert(claims.end(), some.begin(), some.end());
-  if (claims.empty()) return;
-  std::sort(claims.begin(), claims.end());
+  const CountedClaims claims = count_claims(claims_of);
+  if (claims.winners.empty()) return;
   std::vector<std::int64_t> tets_of(1 << 16, 0);
   for (const std::uint16_t label : out.kept) ++tets_of[label];
-  struct Winner {
-    std::ptrdiff_t votes = 0;
-    std::int64_t slot = 0;
-  };
-  std::map<std::uint16_t, Winner> strongest;  // per bone
-  std::vector<Claim> won;
-  for (auto first = claims.begin(); first != claims.end();) {
-    const std::int64_t slot = first->slot;
-    Claim best = *first;
-    std::ptrdiff_t most = 0;
-    while (first != claims.end() && first->slot == slot) {
-      const auto last = std::upper_bound(first, claims.end(), *first);
-      if (last - first > most) {
-        most = last - first;
-        best = *first;
-      }
-      Winner& bone = strongest[first->label];
-      if (last - first > bone.votes) bone = {last - first, slot};
-      first = last;
-    }
-    if (out.kept[static_cast<std::size_t>(slot)] < voxel::first_bone) won.push_back(best);
-  }
   const auto give = [&](const Claim& claim) {
-    std::uint16_t& label = out.kept[static_cast<std::size_t>(claim.slot)];
+    std::uint16_t& label = out.kept[static_cast<std::size_t>(claim.place)];
     --tets_of[label];
     label = claim.label;
     ++tets_of[label];
   };
-  for (const Claim& claim : won) give(claim);
-  for (const auto& [label, bone] : strongest)
-    if (tets_of[label] == 0) give({bone.slot, label});
-  for (const auto& [label, bone] : strongest)
+  for (const Claim& claim : claims.winners)
+    if (out.kept[static_cast<std::size_t>(claim.place)] < voxel::first_bone) give(claim);
+  for (const auto& [label, slot] : claims.favourite)
+    if (tets_of[label] == 0) give({slot, label});
+  for (const auto& [label, slot] : claims.favourite)
     if (tets_of[label] == 0)
       throw Error(ErrorKind::data, "bone " + std::to_string(label - voxel::first_bone + 1),
                   "it shares its only tet with another bone",

@@ -6,6 +6,7 @@
 
 #include "preprocess/tet/lattice/clipper.hpp"
 #include "preprocess/tet/lattice/cut_lattice.hpp"
+#include "preprocess/tet/lattice/fit_points.hpp"
 #include "preprocess/tet/mesher.hpp"
 
 namespace ecorche::tet {
@@ -13,7 +14,8 @@ namespace {
 
 /// Finer than this many voxels a cube shows the image's steps and nothing else.
 constexpr double kFinestInVoxels = 1.5;
-constexpr int kCutMargin = 6;  // empty cubes around the body
+constexpr int kCutMargin = 6;           // empty cubes around the body
+constexpr double kReachInVoxels = 0.2;  // that a bone's border may leave it where the skin is near
 constexpr double kTetsPower =
     2.4;  // tets of a graded lattice go by this power of 1 / side, between surface and volume
 
@@ -43,7 +45,7 @@ class LatticeMesher : public Mesher {
     };
     TetMesh mesh = make();
     if (const double used = share_of(mesh); cut_ && used < 0.8 && side > finest) {  // large tets made room
-      side = std::max(finest, side * std::pow(used / 0.9, 1 / kTetsPower));
+      side = std::max(finest, side * std::pow(used / 0.95, 1 / kTetsPower));
       mesh = make();
     }
     for (double excess = share_of(mesh); excess > 1; excess = share_of(mesh)) {
@@ -52,6 +54,11 @@ class LatticeMesher : public Mesher {
                    std::to_string(mesh.V.rows()) + " nodes, more than allowed: cubes of " +
                    std::to_string(side) + " mm are tried");
       mesh = make();
+    }
+    if (cut_) {
+      const FitReport fit = fit_points(mesh, input.patient, kReachInVoxels * clipper.voxel(), context);
+      context.info(std::to_string(fit.moved) + " of " + std::to_string(fit.points) +
+                   " points between materials moved to the surfaces");
     }
     context.report(1);
     return mesh;

@@ -4,8 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <numeric>
 
+#include "preprocess/tet/lattice/incidence.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 
 namespace ecorche::tet {
@@ -13,22 +13,6 @@ namespace {
 
 using Quad = std::array<std::int32_t, 4>;
 constexpr int kGentleVisits = 4;  // of a node, before its neighbourhood turns soft
-
-/// Tets by node.
-struct Incidence {
-  std::vector<std::size_t> first;
-  std::vector<std::int32_t> tets;
-
-  Incidence(const std::vector<Quad>& quads, std::size_t nodes) : first(nodes + 1, 0), tets(4 * quads.size()) {
-    for (const Quad& quad : quads)
-      for (const std::int32_t n : quad) ++first[static_cast<std::size_t>(n) + 1];
-    std::partial_sum(first.begin(), first.end(), first.begin());
-    std::vector<std::size_t> next(first.begin(), first.end() - 1);
-    for (std::size_t t = 0; t < quads.size(); ++t)
-      for (const std::int32_t n : quads[t])
-        tets[next[static_cast<std::size_t>(n)]++] = static_cast<std::int32_t>(t);
-  }
-};
 
 /// The tets around one node and which of them share faces.
 class Star {
@@ -109,7 +93,10 @@ class Star {
 class Mender {
  public:
   Mender(const std::vector<Quad>& quads, std::size_t nodes, std::vector<std::uint16_t>& label)
-      : quads_(quads), label_(label), at_(quads, nodes), visits_(nodes, 0) {}
+      : quads_(quads),
+        label_(label),
+        at_(quads.size(), nodes, [&](std::size_t t, std::size_t c) { return quads[t][c]; }),
+        visits_(nodes, 0) {}
 
   /// Whether labels differ around a node.
   bool mixed(std::int32_t node) const {

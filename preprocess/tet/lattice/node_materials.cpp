@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "preprocess/tet/lattice/claims.hpp"
 #include "preprocess/voxel/rasterize.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 
@@ -109,13 +110,6 @@ std::vector<double> LatticeSurfaces::signed_distances(const std::vector<Place>& 
 
 namespace {
 
-/// A node and a label that it might take.
-struct Claim {
-  std::int64_t node;
-  std::uint16_t label;
-  auto operator<=>(const Claim&) const = default;
-};
-
 /// Nodes in several bones go to the one that they are deepest in.
 void settle(const LatticeSurfaces& surfaces, std::vector<LatticeSurfaces::Place> contested,
             std::vector<std::uint16_t>& label, const Context& context) {
@@ -192,43 +186,23 @@ void lend_to_thin_parts(NodeMaterials& out, const Image& labels, const BccLattic
         found[static_cast<std::size_t>(k)].push_back({nearest, label});
       }
   });
-  std::vector<Claim> claims;
-  for (const std::vector<Claim>& some : found) claims.insert(claims.end(), some.begin(), some.end());
-  if (claims.empty()) return;
-  std::sort(claims.begin(), claims.end());
+  const CountedClaims claims = count_claims(found);
+  if (claims.winners.empty()) return;
   std::vector<std::int64_t> nodes_of(1 << 16, 0);
   for (const std::uint16_t label : out.label) ++nodes_of[label];
   const auto lend = [&](const Claim& claim) {
-    std::uint16_t& label = out.label[static_cast<std::size_t>(claim.node)];
+    std::uint16_t& label = out.label[static_cast<std::size_t>(claim.place)];
     --nodes_of[label];
     ++nodes_of[label = claim.label];
-    std::uint8_t& flag = out.lent[static_cast<std::size_t>(claim.node)];
+    std::uint8_t& flag = out.lent[static_cast<std::size_t>(claim.place)];
     out.lent_count += flag == 0 ? 1 : 0;
     flag = 1;
   };
-  struct Strongest {
-    std::ptrdiff_t votes = 0;
-    std::int64_t node = 0;
-  };
-  std::map<std::uint16_t, Strongest> strongest;
-  for (auto first = claims.begin(); first != claims.end();) {  // one node at a time: most voxels win
-    const std::int64_t node = first->node;
-    Claim best = *first;
-    std::ptrdiff_t most = 0;
-    while (first != claims.end() && first->node == node) {
-      const auto last = std::upper_bound(first, claims.end(), *first);
-      if (last - first > most) {
-        most = last - first;
-        best = *first;
-      }
-      Strongest& bone = strongest[first->label];
-      if (last - first > bone.votes) bone = {last - first, node};
-      first = last;
-    }
-    if (out.label[static_cast<std::size_t>(node)] < std::min(best.label, voxel::first_bone)) lend(best);
-  }
-  for (const auto& [label, bone] : strongest)
-    if (nodes_of[label] == 0) lend({bone.node, label});
+  for (const Claim& claim : claims.winners)
+    if (out.label[static_cast<std::size_t>(claim.place)] < std::min(claim.label, voxel::first_bone))
+      lend(claim);
+  for (const auto& [label, node] : claims.favourite)
+    if (nodes_of[label] == 0) lend({node, label});
 }
 
 }  // namespace
