@@ -60,6 +60,7 @@ const std::vector<Break> kBreaks{
     {"/VTKHDF/Connectivity", [](Model& m) { m.tets(7, 3) = -1; }},
     {"/VTKHDF/Connectivity", [](Model& m) { std::swap(m.tets(7, 2), m.tets(7, 3)); }},
     {"/VTKHDF/Connectivity", [](Model& m) { m.tets(7, 3) = m.tets(7, 2); }},
+    {"/VTKHDF/Connectivity", [](Model& m) { std::swap(m.tets(0, 2), m.tets(0, 3)); }},
     {"/VTKHDF/Connectivity", [](Model& m) { m.tets.resize(0, 4), m.tet_label.clear(); }},
     {"/VTKHDF/CellData/label", [](Model& m) { m.tet_label[9] = 4; }},
     {"/VTKHDF/CellData/label", [](Model& m) { m.tet_label.pop_back(); }},
@@ -139,6 +140,15 @@ TEST(Invariants, AreEachNoticed) {
     EXPECT_EQ(error.where(), std::string("model:") + kBreaks[i].dataset) << i << ": " << error.what();
     EXPECT_EQ(error.kind(), ErrorKind::data);
   }
+}
+
+// Before anything is read by it.
+TEST(Invariants, ACornerBehindTheLastNodeIsSaidToBeOne) {
+  Model model = full_model();
+  model.tets(0, 3) = static_cast<std::int32_t>(model.nodes.rows());
+  const Error error = error_of([&] { model_file::check_invariants(model, "model", ErrorKind::data, {}); });
+  EXPECT_NE(std::string(error.what()).find("row 0 names a row that does not exist"), std::string::npos)
+      << error.what();
 }
 
 }  // namespace
