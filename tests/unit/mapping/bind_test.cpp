@@ -109,6 +109,11 @@ TEST(Bind, a_node_belongs_to_the_lowest_tet_around_it) {
   EXPECT_EQ(binding.outside, 0U);
 }
 
+TEST(Bind, the_corners_of_the_box_are_inside) {
+  const FloatTets mesh = test::block(3, {0, 0, 0}, 0, [](int, int, int) { return true; });
+  EXPECT_EQ(Locator(mesh.nodes, mesh.tets).bind(mesh.nodes.cast<double>(), {}).outside, 0U);
+}
+
 TEST(Bind, where_tets_overlap_the_lowest_holds) {
   FloatTets mesh{PointsF(12, 3), Tets(3, 4)};  // the first is inverted: it holds nothing
   for (int t = 0; t < 3; ++t) {
@@ -133,6 +138,7 @@ TEST(Bind, rest_comes_back_in_float_two_metres_from_the_origin) {
     const auto back = test::rebuilt(mesh.nodes, mesh.tets, binding.tet[static_cast<std::size_t>(i)], bary);
     worst = std::max(worst, (back.cast<double>() - points.row(i)).norm());
     worst_sum = std::max(worst_sum, std::abs(bary.cast<double>().sum() - 1));
+    EXPECT_EQ(bary[0], static_cast<float>(1.0 - (double{bary[1]} + double{bary[2]} + double{bary[3]})));
   }
   EXPECT_LT(worst, 1e-3);
   EXPECT_LT(worst_sum, 1e-6);

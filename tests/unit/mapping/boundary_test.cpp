@@ -18,8 +18,7 @@ TEST(Boundary, one_tet_has_four_faces) {
   EXPECT_EQ(faces[3].node, (std::array<std::int32_t, 3>{1, 2, 3}));
 }
 
-TEST(Boundary, equals_a_count_of_all_faces) {
-  const auto mesh = test::letter_c();
+void expect_equal_to_a_count(const test::FloatTets& mesh) {
   const auto expected = test::outer_faces(mesh.tets);
   const auto faces = boundary_faces(mesh.nodes.rows(), mesh.tets);
   ASSERT_EQ(faces.size(), expected.size());
@@ -29,6 +28,15 @@ TEST(Boundary, equals_a_count_of_all_faces) {
     EXPECT_EQ(face.tet, want->second);
     ++want;
   }
+}
+
+TEST(Boundary, equals_a_count_of_all_faces) {
+  expect_equal_to_a_count(test::letter_c());
+  // Several pieces of work: what threads have summed comes together.
+  const auto large =
+      test::block(14, {0, 0, 0}, 0, [](int i, int j, int k) { return (i + 2 * j + 3 * k) % 5 != 0; });
+  EXPECT_GT(large.tets.rows(), 2 * 4096);
+  expect_equal_to_a_count(large);
 }
 
 }  // namespace
