@@ -11,11 +11,6 @@ std::vector<std::string_view> mesher_names() {
 #endif
 }
 
-void check_budget(double tets) {
-  if (tets < 100)
-    throw Error(ErrorKind::usage, "--max-tets", "fewer than 100 tets", "allow more tets and nodes");
-}
-
 std::unique_ptr<Mesher> make_mesher(std::string_view name) {
 #ifdef ECORCHE_GPL
   if (name == "cgal") return make_cgal_mesher();
