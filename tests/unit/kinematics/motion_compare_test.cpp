@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/kinematics/mean_turn.hpp"
 #include "core/kinematics/motion_compare.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 
@@ -83,6 +84,32 @@ TEST(MotionCompare, ATakeThatBeginsAFrameLaterIsFound) {
                       [&](std::size_t f) { return swinging(static_cast<double>(f) / 60 - 0.2); }};
   EXPECT_LE(std::abs(compare(rig, one, far).shift_seconds), 2.0 / 60 + 1e-9);
   EXPECT_GT(compare(rig, one, far).joints[2].mean, 0.2);
+}
+
+// Another joint that only one of them moves hides nothing, and no shift makes it better.
+TEST(MotionCompare, AShiftThatMendsNothingIsNotTaken) {
+  const Rig rig = test::legs();
+  const PoseTrack one{60, 1.0 / 60, [&](std::size_t f) {
+                        Pose p = swinging(static_cast<double>(f) / 60);
+                        p.rotation[2] = Quaterniond::Identity().slerp(0.02, p.rotation[2]);
+                        return p;
+                      }};
+  const PoseTrack other{60, 1.0 / 60, [&](std::size_t f) {
+                          Pose p = one.pose(f);
+                          p.rotation[4] =
+                              test::turn(Vector3d::UnitX(), 0.3 * std::sin(0.1 * static_cast<double>(f)));
+                          return p;
+                        }};
+  EXPECT_EQ(compare(rig, one, other).shift_seconds, 0);
+}
+
+TEST(MeanTurn, TheSignOfAQuaternionIsNoTurn) {
+  const Quaterniond q = test::turn(Vector3d(1, 2, 3), 1.2);
+  MeanTurn mean;
+  mean.add(q);
+  mean.add(Quaterniond(-q.coeffs()), 3);
+  EXPECT_LT(mean.mean().angularDistance(q), 1e-7);
+  EXPECT_EQ(MeanTurn().mean().coeffs(), Quaterniond::Identity().coeffs());
 }
 
 TEST(MotionCompare, OnlyFramesThatBothHaveCount) {

@@ -220,12 +220,15 @@ TEST(RestAlignment, OverSeveralFramesWhatIsOpenIsMeant) {
 
 // A T-pose with its palm down, played with the hand swinging about straight: the patient's hand does so too.
 TEST(RestAlignment, AHandOfATPoseHangsAsOverTheClip) {
-  const Rig rig = hanging_arms();
+  Rig rig = hanging_arms();
+  test::add_segment(rig, "finger_left", 4, {110, -45, -80});
   Clip clip = stretched_arms();
+  clip.joints.push_back({"finger_left", 4, {60, 0, 0}});
+  clip.rotation.emplace_back(Quaterniond::Identity());
   const auto frames_of = [&](double down, double off) {
     std::vector<ClipFrame> frames;
     for (const double swing : {-0.3, 0.3}) {
-      ClipFrame frame{Vector3d::Zero(), std::vector<Quaterniond>(5, Quaterniond::Identity())};
+      ClipFrame frame{Vector3d::Zero(), std::vector<Quaterniond>(6, Quaterniond::Identity())};
       frame.rotation[2] = test::turn(Vector3d::UnitY(), down);
       frame.rotation[4] = test::turn(Vector3d::UnitX(), off) * test::turn(Vector3d::UnitZ(), swing);
       frames.push_back(frame);
@@ -242,6 +245,7 @@ TEST(RestAlignment, AHandOfATPoseHangsAsOverTheClip) {
     find_bends(rig, made, frames, retarget);
     const Pose pose = pose_at(rig, made, retarget, frames[0]);
     EXPECT_LT(retarget.rest_turn[4].angularDistance(retarget.alignment[4]), 1e-7) << "the zero pose's turn";
+    EXPECT_LT(pose.rotation[5].angularDistance(Quaterniond::Identity()), 1e-6) << "fingers follow";
     return pose.rotation[4].angularDistance(Quaterniond::Identity());
   };
   EXPECT_NEAR(hand(0, 1.4), 0.3, 1e-6);
