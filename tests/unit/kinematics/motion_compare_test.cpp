@@ -104,11 +104,11 @@ TEST(MotionCompare, AShiftThatMendsNothingIsNotTaken) {
 }
 
 TEST(MeanTurn, TheSignOfAQuaternionIsNoTurn) {
-  const Quaterniond q = test::turn(Vector3d(1, 2, 3), 1.2);
+  const auto q = [](double angle) { return test::turn(Vector3d(1, 2, 3), angle); };
   MeanTurn mean;
-  mean.add(q);
-  mean.add(Quaterniond(-q.coeffs()), 3);
-  EXPECT_LT(mean.mean().angularDistance(q), 1e-7);
+  mean.add(q(1.0));
+  mean.add(Quaterniond(-q(1.2).coeffs()));
+  EXPECT_LT(mean.mean().angularDistance(q(1.1)), 1e-7);
   EXPECT_EQ(MeanTurn().mean().coeffs(), Quaterniond::Identity().coeffs());
 }
 
