@@ -79,8 +79,7 @@ Quaterniond facing(const Skeleton& skeleton, const std::vector<int>& child, cons
 Quaterniond aligned(const Rig& rig, const Limb& limb, const ClipPlaces& reference,
                     const std::vector<int>& clip_joint, const std::vector<int>& child,
                     const std::vector<LimbBend>& bends, std::size_t s, const Quaterniond& above) {
-  const Quaterniond turn =
-      (Quaterniond::FromTwoVectors(above * limb.scanned, limb.drawn) * above).normalized();
+  Quaterniond turn = (Quaterniond::FromTwoVectors(above * limb.scanned, limb.drawn) * above).normalized();
   if (bends.empty()) return turn;
   // Its own hinge and the one at its end: a shank has the knee alone, a thigh too; the knee tells both.
   const std::size_t hinge = bends[s].known ? s : static_cast<std::size_t>(child[s]);

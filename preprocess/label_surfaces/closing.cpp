@@ -17,7 +17,7 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 // The lower envelope of parabolas over one line (SaitoToriwaki94 in the form of Felzenszwalb and Huttenlocher
 // 2012): f(q) becomes min over p of f(p) + (spacing (q - p))^2.
 void transform_line(float* line, std::size_t stride, int n, double spacing, std::vector<double>& scratch) {
-  scratch.resize(static_cast<std::size_t>(3 * n + 1));
+  scratch.resize(3 * static_cast<std::size_t>(n) + 1);
   double* const value = scratch.data();
   double* const centre = value + n;
   double* const from = centre + n;  // n + 1

@@ -66,6 +66,7 @@ ByCell by_cell(const std::vector<std::uint64_t>& cell) {
     if (v == 0 || cell[v] != cell[v - 1]) row.try_emplace(cell[v], 0U);
   }
   std::vector<std::uint64_t> all;
+  all.reserve(row.size());
   for (const auto& [one, unused] : row) all.push_back(one);
   std::sort(all.begin(), all.end());
   for (std::uint32_t r = 0; r < all.size(); ++r) row[all[r]] = r;

@@ -47,7 +47,7 @@ class Surfaces {
     if (b.low == kSoft) return nearest(b.high, p);
     const bool low_first =
         b.low > kSoft && area_[static_cast<std::size_t>(b.low)] < area_[static_cast<std::size_t>(b.high)];
-    const Vector3d first = nearest(low_first ? b.low : b.high, p);
+    Vector3d first = nearest(low_first ? b.low : b.high, p);
     if (b.low == kOutside && out_of_skin(first)) return first;
     const int other = low_first ? b.high : std::max(b.low, 0);
     const Vector3d way = 0.5 * (nearest(other, p) - first);
