@@ -180,7 +180,7 @@ Certificate measure(const Model& model, const Context& context) {
 
   out.positive_offdiagonal_share = 1;  // the worst, where a tet has no gradients at all
   if (tets.inverted + tets.degenerate == 0) {
-    weights::laplacian(model.nodes.cast<double>(), model.tets, &out.positive_offdiagonal_share);
+    weights::stiffness(model.nodes.cast<double>(), model.tets, {}, &out.positive_offdiagonal_share);
   }
   context.check_stop();
   context.report(0.8);

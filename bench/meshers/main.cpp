@@ -71,8 +71,9 @@ Settings parse(int argc, char** argv) {
 
 /// Off-diagonals, and with --weights how far harmonic weights leave [0, 1].
 void print_weights(const Case& patient, const TetMesh& mesh, bool solve) {
-  std::printf(" %9.4f",
-              100 * weights::positive_offdiagonal_share(weights::laplacian(mesh.V, mesh.T, nullptr)));
+  double share = 0;
+  weights::stiffness(mesh.V, mesh.T, {}, &share);
+  std::printf(" %9.4f", 100 * share);
   if (!solve) return;
   std::map<std::string, std::int32_t> rows;
   std::vector<std::int32_t> owner;

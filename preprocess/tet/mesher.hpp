@@ -36,7 +36,9 @@ class Mesher {
   virtual TetMesh mesh(const Input& input, const Options& options, const Context& context) const = 0;
 };
 
-std::unique_ptr<Mesher> make_lattice_mesher();      ///< tet/lattice, Apache-2.0; uncut
+std::unique_ptr<Mesher> make_lattice_mesher();  ///< tet/lattice, Apache-2.0; uncut
+std::unique_ptr<Mesher>
+make_lattice_graded_mesher();  ///< tet/lattice, Apache-2.0; uncut, larger away from borders
 std::unique_ptr<Mesher> make_lattice_cut_mesher();  ///< tet/lattice, Apache-2.0; cut at the surfaces
 std::unique_ptr<Mesher> make_cgal_mesher();         ///< tet/cgal, GPL
 std::unique_ptr<Mesher> make_tetgen_mesher();       ///< tet/tetgen, AGPL

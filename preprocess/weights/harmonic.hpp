@@ -23,6 +23,19 @@ solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_s
 solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<double>& conductivity,
                               double* positive_share);
 
+/// Finite volumes on the nodes' Voronoi cells (the box method): -L_ab is the area between the cells of a and
+/// b over the length of the edge, signed where a circumcentre lies beyond its tet; linear functions are
+/// harmonic inside, as by linear elements. No off-diagonal is positive where all tets are Delaunay and the
+/// circumcentres of those at the boundary lie within the body. Along an edge the conductivity is the mean of
+/// its tets'. All tets must have a positive volume.
+solve::SparseMatrix finite_volumes(const Points& V, const Tets& T, const std::vector<double>& conductivity,
+                                   double* positive_share);
+
+/// What weights are solved with: linear elements, or, where those have positive off-diagonals and finite
+/// volumes have none, finite volumes. So weights keep their bounds by construction on graded lattices too.
+solve::SparseMatrix stiffness(const Points& V, const Tets& T, const std::vector<double>& conductivity,
+                              double* positive_share);
+
 /// Share of the off-diagonals of a lower triangle that are positive (beyond rounding: 1e-12 of their
 /// diagonals). With none the matrix is an M-matrix, and weights stay in [0, 1] by construction.
 double positive_offdiagonal_share(const solve::SparseMatrix& L);

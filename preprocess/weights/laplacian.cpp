@@ -11,6 +11,7 @@
 #include <string>
 
 #include "core/solve/counting_sort.hpp"
+#include "preprocess/weights/edge_terms.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::weights {
@@ -32,11 +33,6 @@ struct Incidence {
     offsets = sort.take_offsets();
   }
 };
-
-/// Place of the entry of corners a != b among a tet's six: 01 02 03 12 13 23.
-constexpr std::array<std::array<int, 4>, 4> kEdge{
-    {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}}};
-using EdgeTerms = std::array<double, 6>;
 
 /// V grad_a . grad_b of one tet: with n_a the inward normal of the face opposite a, twice its area long,
 /// grad_a is n_a / 6V, hence n_a . n_b / 36V.
@@ -81,7 +77,7 @@ struct Gatherer {
         if (other == corner) continue;
         const std::int32_t b = T(t, static_cast<Eigen::Index>(other));
         const double value =
-            terms[static_cast<std::size_t>(t)][static_cast<std::size_t>(kEdge[corner][other])];
+            terms[static_cast<std::size_t>(t)][static_cast<std::size_t>(edge_of[corner][other])];
         std::int32_t& at = place[static_cast<std::size_t>(b)];
         if (at < 0) {
           at = static_cast<std::int32_t>(row.size());
@@ -129,23 +125,9 @@ double positive_offdiagonal_share(const solve::SparseMatrix& L) {
   return all == 0 ? 0.0 : static_cast<double>(positive) / static_cast<double>(all);
 }
 
-solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_share) {
-  return laplacian(V, T, {}, positive_share);
-}
-
-solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<double>& conductivity,
-                              double* positive_share) {
-  const auto nodes = static_cast<std::int32_t>(V.rows());
-  solve::RawVector<EdgeTerms> terms(static_cast<std::size_t>(T.rows()));
-  tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, T.rows(), 4096), [&](const auto& range) {
-    for (Eigen::Index t = range.begin(); t < range.end(); ++t) {
-      EdgeTerms& own = terms[static_cast<std::size_t>(t)];
-      own = edge_terms(V, T, t);
-      if (conductivity.empty()) continue;
-      for (double& term : own) term *= conductivity[static_cast<std::size_t>(t)];
-    }
-  });
-  const Incidence incidence(V.rows(), T);
+solve::SparseMatrix assemble(Eigen::Index count, const Tets& T, const solve::RawVector<EdgeTerms>& terms) {
+  const auto nodes = static_cast<std::int32_t>(count);
+  const Incidence incidence(count, T);
 
   solve::SparseMatrix L(nodes, nodes);
   std::int32_t* offsets = L.outerIndexPtr();
@@ -182,6 +164,25 @@ solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<
     std::copy(piece.value.begin(), piece.value.end(), L.valuePtr() + at);
     piece = {};
   });
+  return L;
+}
+
+solve::SparseMatrix laplacian(const Points& V, const Tets& T, double* positive_share) {
+  return laplacian(V, T, {}, positive_share);
+}
+
+solve::SparseMatrix laplacian(const Points& V, const Tets& T, const std::vector<double>& conductivity,
+                              double* positive_share) {
+  solve::RawVector<EdgeTerms> terms(static_cast<std::size_t>(T.rows()));
+  tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, T.rows(), 4096), [&](const auto& range) {
+    for (Eigen::Index t = range.begin(); t < range.end(); ++t) {
+      EdgeTerms& own = terms[static_cast<std::size_t>(t)];
+      own = edge_terms(V, T, t);
+      if (conductivity.empty()) continue;
+      for (double& term : own) term *= conductivity[static_cast<std::size_t>(t)];
+    }
+  });
+  solve::SparseMatrix L = assemble(V.rows(), T, terms);
   if (positive_share != nullptr) *positive_share = positive_offdiagonal_share(L);
   return L;
 }

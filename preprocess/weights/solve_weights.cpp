@@ -163,7 +163,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   context.report(0.1);
   context.check_stop();
 
-  solve::SparseMatrix L = laplacian(mesh.V, mesh.T, &certificate.positive_offdiagonal_share);
+  solve::SparseMatrix L = stiffness(mesh.V, mesh.T, {}, &certificate.positive_offdiagonal_share);
   context.report(0.2);
   context.check_stop();
 
@@ -189,7 +189,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   MonotoneResult monotone = solve_monotone(std::move(L), fixed, std::move(boundary), *solver, scaled);
   if (options.kind == Kind::quasi_harmonic && monotone.violation <= kSmallViolation) {
     context.check_stop();
-    L = laplacian(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
+    L = stiffness(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
     monotone =
         solve_monotone(std::move(L), fixed, std::move(monotone.harmonic.values), *solver, stop_only(context));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The meshers without a library: a uniform body-centred cubic lattice, clipped to the body or cut.
+// The meshers without a library: a body-centred cubic lattice, clipped to the body, graded or not, or cut.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -7,6 +7,7 @@
 #include "preprocess/tet/lattice/clipper.hpp"
 #include "preprocess/tet/lattice/cut_lattice.hpp"
 #include "preprocess/tet/lattice/fit_points.hpp"
+#include "preprocess/tet/lattice/octree.hpp"
 #include "preprocess/tet/mesher.hpp"
 
 namespace ecorche::tet {
@@ -19,11 +20,15 @@ constexpr double kReachInVoxels = 0.2;  // that a bone's border may leave it whe
 constexpr double kTetsPower =
     2.4;  // tets of a graded lattice go by this power of 1 / side, between surface and volume
 
+enum class Kind { uniform, graded, cut };
+
 class LatticeMesher : public Mesher {
  public:
-  explicit LatticeMesher(bool cut) : cut_(cut) {}
+  explicit LatticeMesher(Kind kind) : kind_(kind) {}
 
-  std::string_view name() const override { return cut_ ? "lattice_cut" : "lattice"; }
+  std::string_view name() const override {
+    return kind_ == Kind::cut ? "lattice_cut" : kind_ == Kind::graded ? "lattice_graded" : "lattice";
+  }
 
   TetMesh mesh(const Input& input, const Options& options, const Context& context) const override {
     const Clipper clipper(input.labels, context);
@@ -41,21 +46,30 @@ class LatticeMesher : public Mesher {
                       static_cast<double>(mesh.V.rows()) / static_cast<double>(options.max_nodes));
     };
     const auto make = [&] {
-      return cut_ ? cut(clipper.lay(side, kCutMargin, true), input, context) : gather(clipper.clip(side));
+      switch (kind_) {
+        case Kind::cut:
+          return cut(clipper.lay(side, kCutMargin, true), input, context);
+        case Kind::graded:
+          return grade(clipper.clip(side), context);
+        case Kind::uniform:
+          break;
+      }
+      return gather(clipper.clip(side));
     };
+    const bool graded = kind_ != Kind::uniform;
     TetMesh mesh = make();
-    if (const double used = share_of(mesh); cut_ && used < 0.8 && side > finest) {  // large tets made room
+    if (const double used = share_of(mesh); graded && used < 0.8 && side > finest) {  // large tets made room
       side = std::max(finest, side * std::pow(used / 0.95, 1 / kTetsPower));
       mesh = make();
     }
     for (double excess = share_of(mesh); excess > 1; excess = share_of(mesh)) {
-      side *= 1.01 * std::pow(excess, 1 / (cut_ ? kTetsPower : 3));
+      side *= 1.01 * std::pow(excess, 1 / (graded ? kTetsPower : 3));
       context.warn("the lattice has " + std::to_string(mesh.T.rows()) + " tets and " +
                    std::to_string(mesh.V.rows()) + " nodes, more than allowed: cubes of " +
                    std::to_string(side) + " mm are tried");
       mesh = make();
     }
-    if (cut_) {
+    if (kind_ == Kind::cut) {
       const FitReport fit = fit_points(mesh, input.patient, kReachInVoxels * clipper.voxel(), context);
       context.info(std::to_string(fit.moved) + " of " + std::to_string(fit.points) +
                    " points between materials moved to the surfaces");
@@ -77,16 +91,31 @@ class LatticeMesher : public Mesher {
     return std::move(made.mesh);
   }
 
-  bool cut_;
+  static TetMesh grade(const Clipped& clipped, const Context& context) {
+    const Octree octree(clipped);
+    TetMesh mesh = gather(clipped, octree);
+    std::string line = "lattice of " + std::to_string(clipped.lattice.side()) + " mm:";
+    const std::vector<std::int64_t> cubes = octree.cubes_by_level();
+    for (std::size_t level = 1; level < cubes.size() && cubes[level] > 0; ++level)
+      line += (level == 1 ? " " : ", ") + std::to_string(cubes[level] >> (3 * level)) + " cubes " +
+              std::to_string(1 << level) + " times as wide";
+    context.info(line);
+    return mesh;
+  }
+
+  Kind kind_;
 };
 
 }  // namespace
 
 std::unique_ptr<Mesher> make_lattice_mesher() {
-  return std::make_unique<LatticeMesher>(false);
+  return std::make_unique<LatticeMesher>(Kind::uniform);
+}
+std::unique_ptr<Mesher> make_lattice_graded_mesher() {
+  return std::make_unique<LatticeMesher>(Kind::graded);
 }
 std::unique_ptr<Mesher> make_lattice_cut_mesher() {
-  return std::make_unique<LatticeMesher>(true);
+  return std::make_unique<LatticeMesher>(Kind::cut);
 }
 
 }  // namespace ecorche::tet
