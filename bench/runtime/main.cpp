@@ -79,8 +79,10 @@ Bytes bytes_of(const Model& model, const runtime::BodyParts& parts) {
       continue;
     }
     const auto& g = parts.groups(t);
-    out.tissues += size_of(g.rows.size(), 4) + size_of(g.corner.size(), 1) + size_of(g.narrow.size(), 2) +
-                   size_of(g.wide.size(), 4) + size_of(g.vertex.size(), 4) + size_of(g.groups.size(), 20);
+    out.tissues += size_of(g.rows.size(), 4) + size_of(g.corners.size(), 4) + size_of(g.narrow.size(), 2) +
+                   size_of(g.wide.size(), 4) + size_of(g.vertex.size(), 4) +
+                   size_of(g.groups.size(), sizeof(g.groups[0])) +
+                   size_of(g.cells.size(), sizeof(g.cells[0]));
     out.normals += size_of(g.normal.size(), 2);
   }
   out.tissues += size_of(clusters.needed, 12);  // the posed nodes, once

@@ -12,7 +12,7 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::size_t kGroupsPerBlock = 64;          // 1024 vertices
+constexpr std::size_t kCellsPerBlock = 12;           // some 1000 vertices
 constexpr std::size_t kBoneVerticesPerBlock = 2048;  // a multiple of any vector
 
 std::span<const float> floats(const PointsF& points) {
@@ -72,8 +72,8 @@ BodyParts::BodyParts(const Model& model)
   for (std::size_t t = 0; t < tissues_.size(); ++t) {
     const bool bone = model.tissues[t].segment != Tissue::by_tets;
     const auto count =
-        bone ? static_cast<std::size_t>(model.tissues[t].V.rows()) : tissues_[t].groups.groups.size();
-    const std::size_t most = bone ? kBoneVerticesPerBlock : kGroupsPerBlock;
+        bone ? static_cast<std::size_t>(model.tissues[t].V.rows()) : tissues_[t].groups.cells.size();
+    const std::size_t most = bone ? kBoneVerticesPerBlock : kCellsPerBlock;
     tissues_[t].first = static_cast<std::uint32_t>(blocks_.size());
     for (std::size_t i = 0; i < count; i += most) {
       blocks_.push_back({static_cast<std::uint32_t>(t), static_cast<std::uint32_t>(i),

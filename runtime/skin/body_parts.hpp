@@ -39,7 +39,7 @@ class BodyParts {
     std::uint32_t first = 0, end = 0;  // its blocks
   };
   struct Block {
-    std::uint32_t tissue, begin, end;  // groups, or vertices of a bone
+    std::uint32_t tissue, begin, end;  // cells, or vertices of a bone
   };
 
   void move_block(const Model& model, const Block& block, PosedBody& out) const;

@@ -30,9 +30,9 @@ void move_bone(const BoneVertices& job, std::size_t begin, std::size_t end) {
     const Places places{v, std::min(end - v, hn::Lanes(F())), nullptr};
     const V3 x = load_rows(job.rest.data(), v, places.count);
     sink.put_position(places, way.carry(x, matrix_times(job.motion.turn.data(), minus(x, origin))));
-    if (!sink.wants_normals()) continue;
+    if (job.out.normals == nullptr) continue;
     const V3 n = load_rows(job.normals.data(), v, places.count);
-    sink.put_normal(places, plus(n, matrix_times(job.motion.turn.data(), n)));
+    sink.put_normal(places, plus(n, matrix_times(job.motion.turn.data(), n)), hn::Eq(n.x, n.x));
   }
 }
 

@@ -6,7 +6,7 @@
 // After foreach_target.h, as Highway asks.
 #include <hwy/highway.h>
 
-#include "runtime/skin/palette-inl.hpp"
+#include "runtime/skin/cell_nodes-inl.hpp"
 #include "runtime/skin/sink-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -14,12 +14,6 @@ namespace ecorche::runtime::HWY_NAMESPACE {
 
 constexpr std::size_t kSize = VertexGroups::size;
 static_assert(kMostPalette == VertexGroups::most_lanes);
-
-template <bool kLong>
-HWY_INLINE V3 corner(const Table<float>& table, const std::uint8_t* corners) {
-  const Corner at(corners);
-  return {at.template of<kLong>(table.x), at.template of<kLong>(table.y), at.template of<kLong>(table.z)};
-}
 
 struct Numbers {
   V b[3];
@@ -39,56 +33,78 @@ HWY_INLINE V share(const std::int16_t* from) {
   return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(I16(), from)));
 }
 
-template <bool kLong>
-HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::size_t g,
-                           const Table<float>& table) {
+template <bool kNormals, class Nodes>
+HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::size_t g, const Nodes& nodes) {
   const VertexGroups::Group& group = groups.groups[g];
-  const std::size_t count = groups.group_vertices(g);
+  const std::size_t count = groups.group_vertices(group);
   for (std::size_t i = 0; i < count; i += hn::Lanes(F())) {
-    const std::uint8_t* corners = &groups.corner[4 * kSize * g + i];
-    const V3 x0 = corner<kLong>(table, corners);
-    const V3 e1 = minus(corner<kLong>(table, corners + kSize), x0);
-    const V3 e2 = minus(corner<kLong>(table, corners + 2 * kSize), x0);
-    const V3 e3 = minus(corner<kLong>(table, corners + 3 * kSize), x0);
+    const Corners corners = hn::LoadU(hn::Rebind<std::uint32_t, F>(), &groups.corners[kSize * g + i]);
+    const V3 x0 = nodes.template corner<0>(corners);
+    const V3 e1 = minus(nodes.template corner<1>(corners), x0);
+    const V3 e2 = minus(nodes.template corner<2>(corners), x0);
+    const V3 e3 = minus(nodes.template corner<3>(corners), x0);
     const Numbers n = barycentric(groups, group, i);
-    const Places places{kSize * g + i, std::min(count - i, hn::Lanes(F())),
-                        groups.in_order ? nullptr : &groups.vertex[kSize * g + i]};
-    sink.put_position(places, plus(x0, plus(times(e1, n.b[0]), plus(times(e2, n.b[1]), times(e3, n.b[2])))));
-    if (!sink.wants_normals()) continue;
-    const std::int16_t* shares = &groups.normal[3 * kSize * g + i];
-    sink.put_normal(places, plus(times(cross(e2, e3), share(shares)),
-                                 plus(times(cross(e3, e1), share(shares + kSize)),
-                                      times(cross(e1, e2), share(shares + 2 * kSize)))));
+    const std::size_t first = group.first + i;
+    const Places places{first, std::min(count - i, hn::Lanes(F())),
+                        groups.in_order ? nullptr : &groups.vertex[first]};
+    sink.put_position(places, plus_times(plus_times(plus_times(x0, n.b[0], e1), n.b[1], e2), n.b[2], e3));
+    if constexpr (!kNormals) continue;
+    // g1 e2 x e3 + g2 e3 x e1 + g3 e1 x e2 = g1 (e2 - g2 / g1 e1) x (e3 - g3 / g1 e1)
+    const std::int16_t* shares = &groups.normal[2 * kSize * g + i];
+    const V second = share(shares), unit = all(-1 / 32767.0F);
+    const V3 normal = cross(plus_times(e2, hn::Mul(second, unit), e1),
+                            plus_times(e3, hn::Mul(share(shares + kSize), unit), e1));
+    sink.put_normal(places, normal, hn::Gt(second, all(VertexGroups::no_normal)));
   }
 }
 
-// Posed nodes lie in the cache that the cores share: what a group needs is asked for some groups ahead.
-constexpr std::size_t kAhead = 8;
+// Posed nodes lie in the cache that the cores share: what a cell needs is asked for some cells ahead.
+constexpr std::size_t kAhead = 2;
 
-void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
+template <bool kNormals, std::size_t kBlocks>
+HWY_INLINE void move_cell(const TissueVertices& job, const Sink& sink, std::size_t c) {
+  const VertexGroups::Cell& cell = job.groups.cells[c];
+  const CellNodes<kBlocks> nodes(job.posed.data(), &job.groups.rows[cell.palette]);
+  for (std::size_t g = job.groups.first_group(c); g < cell.end; ++g) {
+    move_group<kNormals>(job.groups, sink, g, nodes);
+  }
+}
+
+template <bool kNormals>
+HWY_INLINE void move_cells(const TissueVertices& job, std::size_t begin, std::size_t end) {
   const VertexGroups& groups = job.groups;
   const Sink sink(job.out);
-  // The next group's palette is fetched before a group is moved: wide loads of what was just stored narrowly
-  // would wait for the stores.
-  Table<float> tables[2];
-  const auto ask_for_group = [&](std::size_t g) HWY_ATTR {
-    const VertexGroups::Group& group = groups.groups[g];
-    ask_for(job.posed.data(), &groups.rows[group.palette], group.count, 2);
-  };
-  const auto fetch_group = [&](std::size_t g) HWY_ATTR {
-    const VertexGroups::Group& group = groups.groups[g];
-    fetch(job.posed.data(), &groups.rows[group.palette], group.count, tables[g % 2]);
-  };
-  for (std::size_t g = begin; g < std::min(end, begin + kAhead); ++g) ask_for_group(g);
-  if (begin < end) fetch_group(begin);
-  for (std::size_t g = begin; g < end; ++g) {
-    if (g + kAhead < end) ask_for_group(g + kAhead);
-    if (g + 1 < end) fetch_group(g + 1);
-    if (groups.groups[g].count <= 32) {
-      move_group<false>(groups, sink, g, tables[g % 2]);
-    } else {
-      move_group<true>(groups, sink, g, tables[g % 2]);
+  const auto ask_for_cell = [&](std::size_t c) HWY_ATTR {
+    ask_for(job.posed.data(), &groups.rows[groups.cells[c].palette], groups.cells[c].count, 2);
+    if (!groups.in_order) return;
+    for (std::size_t g = groups.first_group(c); g < groups.cells[c].end; ++g) {
+      sink.ask_for(groups.groups[g].first, kSize);
     }
+  };
+  for (std::size_t c = begin; c < std::min(end, begin + kAhead); ++c) ask_for_cell(c);
+  for (std::size_t c = begin; c < end; ++c) {
+    if (c + kAhead < end) ask_for_cell(c + kAhead);
+    switch (groups.cells[c].count / kSize) {
+      case 1:
+        move_cell<kNormals, 1>(job, sink, c);
+        break;
+      case 2:
+        move_cell<kNormals, 2>(job, sink, c);
+        break;
+      case 3:
+        move_cell<kNormals, 3>(job, sink, c);
+        break;
+      default:
+        move_cell<kNormals, 4>(job, sink, c);
+    }
+  }
+}
+
+void move_tissue(const TissueVertices& job, std::size_t begin, std::size_t end) {
+  if (job.out.normals != nullptr) {
+    move_cells<true>(job, begin, end);
+  } else {
+    move_cells<false>(job, begin, end);
   }
 }
 

@@ -46,7 +46,7 @@ struct BoneVertices {
 
 /// Both on the calling thread; allocate nothing. The instruction set is chosen at run time.
 namespace kernels {
-/// The groups [begin, end).
+/// The cells [begin, end).
 void tissue(const TissueVertices& job, std::size_t begin, std::size_t end);
 /// The vertices [begin, end).
 void bone(const BoneVertices& job, std::size_t begin, std::size_t end);

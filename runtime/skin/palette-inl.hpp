@@ -9,19 +9,13 @@
 #endif
 
 #include <hwy/cache_control.h>
-#include <hwy/highway.h>
 
 #include <cstddef>
-#include <cstdint>
+
+#include "runtime/skin/lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using F = hn::CappedTag<float, 16>;
-using I = hn::Rebind<std::int32_t, F>;
-using U8 = hn::Rebind<std::uint8_t, F>;
-using V = hn::Vec<F>;
 
 constexpr std::size_t kMostPalette = 64;
 

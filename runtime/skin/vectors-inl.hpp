@@ -8,18 +8,11 @@
 #define ECORCHE_RUNTIME_SKIN_VECTORS_INL
 #endif
 
-#include <hwy/highway.h>
-
+#include "runtime/skin/lanes-inl.hpp"
 #include "runtime/skin/skin_clusters.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using F = hn::CappedTag<float, 16>;
-using I = hn::Rebind<std::int32_t, F>;
-using U16 = hn::Rebind<std::uint16_t, F>;
-using V = hn::Vec<F>;
 
 struct V3 {
   V x, y, z;
@@ -43,6 +36,11 @@ HWY_INLINE V3 plus(const V3& a, const V3& b) {
 
 HWY_INLINE V3 times(const V3& a, V b) {
   return {hn::Mul(a.x, b), hn::Mul(a.y, b), hn::Mul(a.z, b)};
+}
+
+/// a + b c
+HWY_INLINE V3 plus_times(const V3& a, V b, const V3& c) {
+  return {hn::MulAdd(b, c.x, a.x), hn::MulAdd(b, c.y, a.y), hn::MulAdd(b, c.z, a.z)};
 }
 
 HWY_INLINE V3 cross(const V3& a, const V3& b) {

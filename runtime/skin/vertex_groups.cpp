@@ -7,12 +7,15 @@
 #include <cmath>
 #include <numeric>
 
+#include "runtime/skin/group_cells.hpp"
+
 namespace ecorche::runtime {
 namespace {
 
 constexpr std::size_t kSize = VertexGroups::size;
-constexpr float kNarrowed = 2e-4F;    // mm that narrowing may move a vertex at rest
-constexpr double kLocalEnough = 1.7;  // palettes of the own order over those of Morton's, where it is kept
+constexpr float kNarrowed = 2e-4F;  // mm that narrowing may move a vertex at rest
+constexpr double kLocalEnough =
+    2.5;  // nodes of groups in the own order over those in Morton's, where it is kept
 
 using Order = std::vector<std::uint32_t>;
 
@@ -41,67 +44,74 @@ Order morton_order(const PointsF& V) {
   return order;
 }
 
-// The nodes that up to 16 vertices hang on, each once. A hash table of four times as many places as nodes,
-// which a stamp empties: models are grouped while somebody waits for them.
+// The nodes that the vertices of a cell hang on, each once, by lane. A hash table of four times as many
+// places as nodes, which a stamp empties: models are grouped while somebody waits for them.
 class Palette {
  public:
-  Palette(const Model& model, const Tissue& tissue) : model_(model), tissue_(tissue) {}
+  Palette(const Model& model, const Tissue& tissue, std::span<const std::uint32_t> lane)
+      : model_(model), tissue_(tissue), lane_(lane) {}
 
-  void gather(std::span<const std::uint32_t> vertices) {
+  void clear() {
     ++stamp_;
-    nodes_.clear();
+    lanes_.clear();
+  }
+  void gather(std::span<const std::uint32_t> vertices) {
     for (const std::uint32_t v : vertices) {
-      for (int c = 0; c < 4; ++c) add(static_cast<std::uint32_t>(model_.tets(tissue_.tet[v], c)));
+      for (int c = 0; c < 4; ++c) add(corner(v, c));
     }
   }
   void sort() {
-    std::sort(nodes_.begin(), nodes_.end());
-    for (std::size_t i = 0; i < nodes_.size(); ++i) slot_of(nodes_[i]).place = static_cast<std::uint8_t>(i);
+    std::sort(lanes_.begin(), lanes_.end());
+    for (std::size_t i = 0; i < lanes_.size(); ++i) slot_of(lanes_[i]).place = static_cast<std::uint8_t>(i);
   }
-  const std::vector<std::uint32_t>& nodes() const { return nodes_; }
-  /// Of a node of it, once sorted.
-  std::uint8_t place(std::int32_t node) { return slot_of(static_cast<std::uint32_t>(node)).place; }
+  const std::vector<std::uint32_t>& lanes() const { return lanes_; }
+  /// Of a corner of a vertex' tet, once sorted.
+  std::uint8_t place(std::uint32_t vertex, int c) { return slot_of(corner(vertex, c)).place; }
 
  private:
   struct Slot {
-    std::uint32_t stamp = 0, node = 0;
+    std::uint32_t stamp = 0, lane = 0;
     std::uint8_t place = 0;
   };
-  // The node's own, or the free one where it would stand.
-  Slot& slot_of(std::uint32_t node) {
-    for (std::size_t at = node * 0x9e3779b1U >> 24U;; at = (at + 1) % slots_.size()) {
-      if (slots_[at].stamp != stamp_ || slots_[at].node == node) return slots_[at];
+  std::uint32_t corner(std::uint32_t vertex, int c) const {
+    return lane_[static_cast<std::size_t>(model_.tets(tissue_.tet[vertex], c))];
+  }
+  // The lane's own, or the free one where it would stand.
+  Slot& slot_of(std::uint32_t lane) {
+    for (std::size_t at = lane * 0x9e3779b1U >> 24U;; at = (at + 1) % slots_.size()) {
+      if (slots_[at].stamp != stamp_ || slots_[at].lane == lane) return slots_[at];
     }
   }
-  void add(std::uint32_t node) {
-    Slot& slot = slot_of(node);
+  void add(std::uint32_t lane) {
+    Slot& slot = slot_of(lane);
     if (slot.stamp == stamp_) return;
     slot.stamp = stamp_;
-    slot.node = node;
-    nodes_.push_back(node);
+    slot.lane = lane;
+    lanes_.push_back(lane);
   }
 
   const Model& model_;
   const Tissue& tissue_;
+  std::span<const std::uint32_t> lane_;
   std::array<Slot, 256> slots_{};
   std::uint32_t stamp_ = 0;
-  std::vector<std::uint32_t> nodes_;
+  std::vector<std::uint32_t> lanes_;
 };
 
-// Of all groups together: nodes of palettes, and rows that these take (VertexGroups::rows).
-struct Palettes {
-  std::size_t nodes = 0, rows = 0;
-};
+// The 16 vertices of a group, fewer in the last.
+std::span<const std::uint32_t> vertices_of(const Order& order, std::size_t group) {
+  return std::span(order).subspan(kSize * group, std::min(kSize, order.size() - kSize * group));
+}
 
-Palettes palettes_of(const Model& model, const Tissue& tissue, const Order& order) {
-  Palettes sum;
-  Palette palette(model, tissue);
-  for (std::size_t v = 0; v < order.size(); v += kSize) {
-    palette.gather(std::span(order).subspan(v, std::min(kSize, order.size() - v)));
-    sum.nodes += palette.nodes().size();
-    sum.rows += (palette.nodes().size() + 7) / 8 * 8;
+GroupNodes nodes_of(const Order& order, Palette& palette) {
+  GroupNodes out;
+  for (std::size_t g = 0; kSize * g < order.size(); ++g) {
+    palette.clear();
+    palette.gather(vertices_of(order, g));
+    out.node.insert(out.node.end(), palette.lanes().begin(), palette.lanes().end());
+    out.begin.push_back(static_cast<std::uint32_t>(out.node.size()));
   }
-  return sum;
+  return out;
 }
 
 Eigen::Matrix3f edges(const Model& model, std::int32_t tet) {
@@ -112,62 +122,127 @@ Eigen::Matrix3f edges(const Model& model, std::int32_t tet) {
   return out;
 }
 
-void add_group(const Model& model, const Tissue& tissue, std::span<const std::uint32_t> lane,
-               std::span<const std::uint32_t> vertices, const PointsF& normals, Palette& nodes,
-               VertexGroups& out) {
-  VertexGroups::Group group{};
-  nodes.gather(vertices);
-  nodes.sort();
-  const std::vector<std::uint32_t>& palette = nodes.nodes();
-  group.palette = static_cast<std::uint32_t>(out.rows.size());
-  group.count = static_cast<std::uint32_t>((palette.size() + 7) / 8 * 8);
-  for (std::size_t i = 0; i < group.count; ++i)
-    out.rows.push_back(3 * lane[palette[std::min(i, palette.size() - 1)]]);
+// Corners 1 to 3 of a tet turned so that the first share of the normal is the largest and positive, and the
+// others over it (VertexGroups::normal). To exchange two corners is to change the sign of every cross
+// product.
+struct Turned {
+  std::array<int, 3> corner{1, 2, 3};
+  std::int16_t second = VertexGroups::no_normal, third = 0;
+};
 
-  const auto at = [&](std::size_t i) {
-    return static_cast<Eigen::Index>(vertices[std::min(i, vertices.size() - 1)]);
+Turned turn(const Eigen::Vector3f& shares) {
+  Eigen::Index first = 0;
+  if (!(shares.cwiseAbs().maxCoeff(&first) > 0)) return {};
+  Eigen::Index second = (first + 1) % 3, third = (first + 2) % 3;
+  if (shares[first] < 0) std::swap(second, third);
+  const auto narrowed = [&](Eigen::Index i) {
+    return static_cast<std::int16_t>(std::lround(32767 * shares[i] / shares[first]));
   };
-  for (int c = 0; c < 4; ++c) {
-    for (std::size_t i = 0; i < kSize; ++i) {
-      out.corner.push_back(nodes.place(model.tets(tissue.tet[static_cast<std::size_t>(at(i))], c)));
+  return {{static_cast<int>(first) + 1, static_cast<int>(second) + 1, static_cast<int>(third) + 1},
+          narrowed(second),
+          narrowed(third)};
+}
+
+class Builder {
+ public:
+  Builder(const Model& model, const Tissue& tissue, std::span<const std::uint32_t> lane)
+      : model_(model), tissue_(tissue), palette_(model, tissue, lane), normals_(rest_normals(tissue)) {}
+
+  VertexGroups build() {
+    out_.vertices = static_cast<std::size_t>(tissue_.V.rows());
+    if (out_.vertices == 0) return std::move(out_);
+    Order order(out_.vertices);
+    std::iota(order.begin(), order.end(), 0U);
+    Order morton = morton_order(tissue_.V);
+    GroupNodes nodes = nodes_of(order, palette_), along = nodes_of(morton, palette_);
+    out_.in_order =
+        static_cast<double>(nodes.node.size()) <= kLocalEnough * static_cast<double>(along.node.size());
+    if (!out_.in_order) {
+      order.swap(morton);
+      nodes = std::move(along);
     }
+    out_.groups.reserve(nodes.groups());
+    out_.corners.reserve(kSize * nodes.groups());
+    out_.narrow.reserve(3 * kSize * nodes.groups());
+    out_.normal.reserve(2 * kSize * nodes.groups());
+    const GroupCells cells = share_palettes(nodes, VertexGroups::most_lanes, VertexGroups::most_groups);
+    for (std::size_t c = 0, first = 0; c < cells.end.size(); first = cells.end[c++]) {
+      add_cell(order, std::span(cells.group).subspan(first, cells.end[c] - first));
+    }
+    if (!out_.in_order) {
+      out_.vertex = std::move(order);
+      out_.vertex.resize(kSize * out_.groups.size(), out_.vertex.back());
+    }
+    return std::move(out_);
   }
 
-  float low = 0, high = 0, reach = 0;
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const auto b = tissue.barycentric.row(at(i)).tail<3>();
-    low = std::min(low, b.minCoeff());
-    high = std::max(high, b.maxCoeff());
-    reach = std::max(reach, edges(model, tissue.tet[vertices[i]]).colwise().norm().sum());
+ private:
+  void add_cell(const Order& order, std::span<const std::uint32_t> groups) {
+    palette_.clear();
+    for (const std::uint32_t g : groups) palette_.gather(vertices_of(order, g));
+    palette_.sort();
+    const std::vector<std::uint32_t>& lanes = palette_.lanes();
+    VertexGroups::Cell cell{};
+    cell.palette = static_cast<std::uint32_t>(out_.rows.size());
+    cell.count = static_cast<std::uint32_t>((lanes.size() + kSize - 1) / kSize * kSize);
+    for (std::size_t i = 0; i < cell.count; ++i)
+      out_.rows.push_back(3 * lanes[std::min(i, lanes.size() - 1)]);
+    for (const std::uint32_t g : groups) {
+      add_group(static_cast<std::uint32_t>(kSize * g), vertices_of(order, g));
+    }
+    cell.end = static_cast<std::uint32_t>(out_.groups.size());
+    out_.cells.push_back(cell);
   }
-  const float step = (high - low) / 65535;
-  const bool narrow = step > 0 && step / 2 * reach <= kNarrowed;
-  group.low = low;
-  group.step = narrow ? step : 0;
-  group.data = static_cast<std::uint32_t>(narrow ? out.narrow.size() : out.wide.size());
-  for (int c = 1; c < 4; ++c) {
+
+  void add_group(std::uint32_t first, std::span<const std::uint32_t> vertices) {
+    VertexGroups::Group group{};
+    group.first = first;
+    float low = 0, high = 0, reach = 0;
+    for (const std::uint32_t v : vertices) {
+      const auto b = tissue_.barycentric.row(static_cast<Eigen::Index>(v)).tail<3>();
+      low = std::min(low, b.minCoeff());
+      high = std::max(high, b.maxCoeff());
+      reach = std::max(reach, edges(model_, tissue_.tet[v]).colwise().norm().sum());
+    }
+    const float step = (high - low) / 65535;
+    const bool narrow = step > 0 && step / 2 * reach <= kNarrowed;
+    group.low = low;
+    group.step = narrow ? step : 0;
+    group.data = static_cast<std::uint32_t>(narrow ? out_.narrow.size() : out_.wide.size());
+
+    std::array<Turned, kSize> turned;
+    const auto at = [&](std::size_t i) { return vertices[std::min(i, vertices.size() - 1)]; };
     for (std::size_t i = 0; i < kSize; ++i) {
-      const float b = tissue.barycentric(at(i), c);
-      if (narrow) {
-        out.narrow.push_back(
-            static_cast<std::uint16_t>(std::clamp(std::round((b - low) / step), 0.0F, 65535.0F)));
-      } else {
-        out.wide.push_back(b);
+      const std::uint32_t v = at(i);
+      turned[i] = turn(normal_shares(model_, tissue_.tet[v], normals_.row(static_cast<Eigen::Index>(v))));
+      std::uint32_t corners = palette_.place(v, 0);
+      for (unsigned c = 0; c < 3; ++c) {
+        corners |= std::uint32_t{palette_.place(v, turned[i].corner[c])} << (8 * (c + 1));
+      }
+      out_.corners.push_back(corners);
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t i = 0; i < kSize; ++i) {
+        const float b = tissue_.barycentric(static_cast<Eigen::Index>(at(i)), turned[i].corner[c]);
+        if (narrow) {
+          out_.narrow.push_back(
+              static_cast<std::uint16_t>(std::clamp(std::round((b - low) / step), 0.0F, 65535.0F)));
+        } else {
+          out_.wide.push_back(b);
+        }
       }
     }
+    for (const Turned& t : turned) out_.normal.push_back(t.second);
+    for (const Turned& t : turned) out_.normal.push_back(t.third);
+    out_.groups.push_back(group);
   }
 
-  std::array<Eigen::Vector3f, kSize> shares;
-  for (std::size_t i = 0; i < kSize; ++i) {
-    shares[i] = normal_shares(model, tissue.tet[static_cast<std::size_t>(at(i))], normals.row(at(i)));
-  }
-  for (int c = 0; c < 3; ++c) {
-    for (const Eigen::Vector3f& share : shares) {
-      out.normal.push_back(static_cast<std::int16_t>(std::lround(32767 * share[c])));
-    }
-  }
-  out.groups.push_back(group);
-}
+  const Model& model_;
+  const Tissue& tissue_;
+  Palette palette_;
+  PointsF normals_;
+  VertexGroups out_;
+};
 
 }  // namespace
 
@@ -192,33 +267,7 @@ Eigen::Vector3f normal_shares(const Model& model, std::int32_t tet, const Eigen:
 }
 
 VertexGroups group_vertices(const Model& model, const Tissue& tissue, std::span<const std::uint32_t> lane) {
-  VertexGroups out;
-  out.vertices = static_cast<std::size_t>(tissue.V.rows());
-  if (out.vertices == 0) return out;
-  Order order(out.vertices);
-  std::iota(order.begin(), order.end(), 0U);
-  const Order morton = morton_order(tissue.V);
-  const Palettes own = palettes_of(model, tissue, order), along = palettes_of(model, tissue, morton);
-  out.in_order = static_cast<double>(own.nodes) <= kLocalEnough * static_cast<double>(along.nodes);
-  if (!out.in_order) order = morton;
-
-  const PointsF normals = rest_normals(tissue);
-  const std::size_t groups = (order.size() + kSize - 1) / kSize;
-  out.groups.reserve(groups);
-  out.rows.reserve(out.in_order ? own.rows : along.rows);
-  out.corner.reserve(4 * kSize * groups);
-  out.narrow.reserve(3 * kSize * groups);
-  out.normal.reserve(3 * kSize * groups);
-  Palette nodes(model, tissue);
-  for (std::size_t v = 0; v < order.size(); v += kSize) {
-    add_group(model, tissue, lane, std::span(order).subspan(v, std::min(kSize, order.size() - v)), normals,
-              nodes, out);
-  }
-  if (!out.in_order) {
-    out.vertex = std::move(order);
-    out.vertex.resize(kSize * out.groups.size(), out.vertex.back());
-  }
-  return out;
+  return Builder(model, tissue, lane).build();
 }
 
 }  // namespace ecorche::runtime

@@ -11,34 +11,45 @@
 
 namespace ecorche::runtime {
 
-/// Vertices in groups of 16, each over one palette of nodes, so that a node is fetched once for all its
-/// vertices and found again by a byte. In the tissue's own order where that is local, and then written in
-/// one go; else along a Morton curve, and then each vertex to its place.
+/// Vertices in groups of 16, and groups that lie near each other in cells, each over one palette of nodes: a
+/// node is fetched once for all vertices of a cell and found again by a byte. A group's vertices follow each
+/// other in the tissue's own order where that is local, and are then written in one go; else along a Morton
+/// curve, and then each vertex to its place.
 struct VertexGroups {
   static constexpr std::size_t size = 16;
-  static constexpr std::size_t most_lanes = 4 * size;
+  static constexpr std::size_t most_lanes = 4 * size;  ///< of a palette
+  static constexpr std::size_t most_groups = 8;        ///< of a cell
 
-  struct Group {
+  struct Cell {
     std::uint32_t palette;  ///< first of its palette in `rows`
-    std::uint32_t count;    ///< of its palette: 8, 16 .. 64
-    std::uint32_t data;     ///< first of its 3 * 16 numbers, in `narrow` or in `wide`
-    float low, step;        ///< narrow: b = low + step * number; step 0: the numbers are in `wide`
+    std::uint32_t count;    ///< of its palette: 16, 32, 48 or 64
+    std::uint32_t end;      ///< after its last group; its first is where the cell before ends
+  };
+  struct Group {
+    std::uint32_t first;  ///< place of its first vertex
+    std::uint32_t data;   ///< first of its 3 * 16 numbers, in `narrow` or in `wide`
+    float low, step;      ///< narrow: b = low + step * number; step 0: the numbers are in `wide`
   };
 
   std::size_t vertices = 0;
-  bool in_order = true;  ///< group g holds the vertices from 16 g
+  bool in_order = true;  ///< places are the tissue's own
+  std::vector<Cell> cells;
   std::vector<Group> groups;
-  std::vector<std::uint32_t> vertex;  ///< 16 * #groups, place of each; empty when in order
+  std::vector<std::uint32_t> vertex;  ///< 16 * #groups, the vertex at each place; empty when in order
   Aligned<std::uint32_t> rows;        ///< palettes, filled up with their last entry: 3 * lane of NodeClusters
-  Aligned<std::uint8_t> corner;       ///< 4 x 16 a group: the corners of the vertices' tets in the palette
-  Aligned<std::uint16_t> narrow;      ///< 3 x 16 a group: barycentric coordinates of corners 1, 2, 3
-  Aligned<float> wide;                ///< the same, where 16 bits would move a vertex by more than 2e-4 mm
-  Aligned<std::int16_t> normal;       ///< 3 x 16 a group: see `normal_shares`
+  /// 16 a group: the corners of a vertex' tet in the palette, a byte each, corner 0 lowest. Corners 1 to 3
+  /// are turned so that the normal's first share is the largest and positive.
+  Aligned<std::uint32_t> corners;
+  Aligned<std::uint16_t> narrow;  ///< 3 x 16 a group: barycentric coordinates of corners 1, 2, 3
+  Aligned<float> wide;            ///< the same, where 16 bits would move a vertex by more than 2e-4 mm
+  /// 2 x 16 a group, 32767ths: shares 2 and 3 of `normal_shares` over share 1; `no_normal` where n is zero.
+  Aligned<std::int16_t> normal;
+  static constexpr std::int16_t no_normal = -32768;
 
-  std::size_t group_vertices(std::size_t group) const {
-    return group + 1 < groups.size() ? size : vertices - size * group;
+  std::size_t group_vertices(const Group& group) const {
+    return group.first + size <= vertices ? size : vertices - group.first;
   }
-  std::size_t vertex_at(std::size_t place) const { return in_order ? place : vertex[place]; }
+  std::size_t first_group(std::size_t cell) const { return cell == 0 ? 0 : cells[cell - 1].end; }
 };
 
 /// `lane`: of NodeClusters. The tissue hangs on tets (`tet`, `barycentric` as Tissue says).

@@ -212,7 +212,7 @@ TEST(Kernels, PalettesAtTheirLimit) {
   const Model model = cloud({5000, 20, 4, 160}, 3);
   const BodyParts parts(model);
   std::uint32_t most = 0;
-  for (const auto& group : parts.groups(0).groups) most = std::max(most, group.count);
+  for (const auto& cell : parts.groups(0).cells) most = std::max(most, cell.count);
   EXPECT_EQ(most, VertexGroups::most_lanes);
   expect_right({5000, 20, 4, 160}, 1);
   // A cluster whose palette is longer than it has nodes: 64 nodes with up to 50 of 3000 segments each.

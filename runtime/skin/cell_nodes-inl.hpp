@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The posed nodes of a cell of groups, and the corners of a vector of vertices among them. Included once per
+// instruction set.
+#if defined(ECORCHE_RUNTIME_SKIN_CELL_NODES_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef ECORCHE_RUNTIME_SKIN_CELL_NODES_INL
+#undef ECORCHE_RUNTIME_SKIN_CELL_NODES_INL
+#else
+#define ECORCHE_RUNTIME_SKIN_CELL_NODES_INL
+#endif
+
+#include "runtime/skin/palette-inl.hpp"
+#include "runtime/skin/vectors-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ecorche::runtime::HWY_NAMESPACE {
+
+/// Four bytes each, corner 0 lowest.
+using Corners = hn::Vec<hn::Rebind<std::uint32_t, F>>;
+
+#if HWY_TARGET <= HWY_AVX3
+
+/// 16 kBlocks nodes, which stay in registers while the groups of the cell are moved: a vector of corners is
+/// then one permutation of up to 32 of them, or two of 64.
+template <std::size_t kBlocks>
+class CellNodes {
+ public:
+  /// `rows`: where each node begins in `places`. The fourth number that is loaded of a node is its
+  /// neighbour's.
+  HWY_INLINE CellNodes(const float* places, const std::uint32_t* rows) {
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      // Rows 0, 4, 8, 12, and so on, since pairs are taken within quarters of a vector.
+      const auto quarters = [&](std::size_t first) HWY_ATTR {
+        const auto row = [&](std::size_t i)
+                             HWY_ATTR { return _mm_loadu_ps(places + rows[16 * b + first + i]); };
+        const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(row(0)), row(4), 1);
+        const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(row(8)), row(12), 1);
+        return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+      };
+      const __m512 r0 = quarters(0), r1 = quarters(1), r2 = quarters(2), r3 = quarters(3);
+      const __m512d xy01 = _mm512_castps_pd(_mm512_unpacklo_ps(r0, r1));
+      const __m512d xy23 = _mm512_castps_pd(_mm512_unpacklo_ps(r2, r3));
+      const __m512d z01 = _mm512_castps_pd(_mm512_unpackhi_ps(r0, r1));
+      const __m512d z23 = _mm512_castps_pd(_mm512_unpackhi_ps(r2, r3));
+      x_[b] = _mm512_castpd_ps(_mm512_unpacklo_pd(xy01, xy23));
+      y_[b] = _mm512_castpd_ps(_mm512_unpackhi_pd(xy01, xy23));
+      z_[b] = _mm512_castpd_ps(_mm512_unpacklo_pd(z01, z23));
+    }
+  }
+
+  template <int kCorner>
+  HWY_INLINE V3 corner(Corners corners) const {
+    // Permutations take as many bits as they need: there is nothing to mask.
+    const __m512i at = hn::ShiftRight<8 * kCorner>(corners).raw;
+    return {V{of(x_, at)}, V{of(y_, at)}, V{of(z_, at)}};
+  }
+
+ private:
+  static HWY_INLINE __m512 of(const __m512* nodes, __m512i at) {
+    if constexpr (kBlocks == 1) {
+      return _mm512_permutexvar_ps(at, nodes[0]);
+    } else if constexpr (kBlocks == 2) {
+      return _mm512_permutex2var_ps(nodes[0], at, nodes[1]);
+    } else {
+      // Lanes that are not among the first 32 keep their number for the second permutation.
+      const __mmask16 beyond = _mm512_test_epi32_mask(at, _mm512_set1_epi32(32));
+      const __m512 low = _mm512_mask2_permutex2var_ps(nodes[0], at, _knot_mask16(beyond), nodes[1]);
+      return _mm512_mask2_permutex2var_ps(nodes[2], _mm512_castps_si512(low), beyond, nodes[kBlocks - 1]);
+    }
+  }
+
+  __m512 x_[kBlocks], y_[kBlocks], z_[kBlocks];
+};
+
+#else
+
+template <std::size_t kBlocks>
+class CellNodes {
+ public:
+  HWY_INLINE CellNodes(const float* places, const std::uint32_t* rows) {
+    fetch(places, rows, 16 * kBlocks, nodes_);
+  }
+
+  template <int kCorner>
+  HWY_INLINE V3 corner(Corners corners) const {
+    const hn::Vec<I> at = hn::And(hn::BitCast(I(), hn::ShiftRight<8 * kCorner>(corners)), hn::Set(I(), 255));
+    return {hn::GatherIndex(F(), nodes_.x, at), hn::GatherIndex(F(), nodes_.y, at),
+            hn::GatherIndex(F(), nodes_.z, at)};
+  }
+
+ private:
+  Table<float> nodes_;
+};
+
+#endif
+
+}  // namespace ecorche::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
