@@ -52,14 +52,6 @@ class Rows {
   std::array<std::uint16_t, 3 * block_vertices> copy_;  // written only where needed
 };
 
-// Into the caches, ahead of its use: the rows of the fit lie too far apart for the processor to see what
-// comes next, and its loads would wait for memory most of the time.
-void fetch(const void* data, std::size_t bytes) {
-  constexpr std::size_t line = 64;
-  const auto* at = static_cast<const char*>(data);
-  for (std::size_t i = 0; i < bytes; i += line) __builtin_prefetch(at + i);
-}
-
 std::int16_t wrap(std::int64_t value) {
   return static_cast<std::int16_t>(static_cast<std::uint16_t>(value));
 }
@@ -130,27 +122,20 @@ void DeltaKey::prepare(std::span<const std::uint16_t> numbers, std::size_t first
     const std::size_t rows = rows_of(count);
     const Rows padded(numbers.data() + 3 * first, count);
     Block& block = blocks_[b];
+    std::array<std::uint16_t, 3> least{}, largest{};
+    kernels::extent(padded.data(), rows, least.data(), largest.data());
     int reach = 0;
     for (std::size_t c = 0; c < 3; ++c) {
-      std::uint16_t low = 65535, high = 0;
-      for (std::size_t v = 0; v < count; ++v) {
-        low = std::min(low, padded.data()[3 * v + c]);
-        high = std::max(high, padded.data()[3 * v + c]);
-      }
-      block.centre[c] = static_cast<std::uint16_t>((low + high) / 2);
-      reach = std::max(reach, high - block.centre[c]);
+      block.centre[c] = static_cast<std::uint16_t>((least[c] + largest[c]) / 2);
+      reach = std::max(reach, largest[c] - block.centre[c]);
     }
     // reach << (digits + 2) stays within 15 bits.
     const int spare = 15 - static_cast<int>(std::bit_width(static_cast<unsigned>(reach)));
     const bool fits = count >= kFewestFitted && spare >= 2;
     block.digits =
         fits ? static_cast<std::uint8_t>(std::min(spare - 2, delta::most_digits)) : delta::moved_only;
-    const int scale = fits ? 1 << (block.digits + 2) : 1;
     std::int16_t* planes = &scaled_[3 * block_vertices * b];
-    for (std::size_t v = 0; v < lanes * rows; ++v) {
-      for (std::size_t c = 0; c < 3; ++c)
-        planes[c * block_vertices + v] = wrap((padded.data()[3 * v + c] - block.centre[c]) * scale);
-    }
+    kernels::scale(padded.data(), rows, block.centre.data(), fits ? block.digits + 2 : 0, planes);
     if (!fits) continue;
 
     std::array<double, 3> sum{};
@@ -176,8 +161,9 @@ void DeltaKey::prepare(std::span<const std::uint16_t> numbers, std::size_t first
   }
 }
 
-void DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block,
-                      std::vector<std::byte>& out) const {
+std::size_t DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t first_block,
+                             std::size_t end_block, std::span<std::byte> out) const {
+  std::size_t at = 0;
   for (std::size_t b = first_block; b < end_block; ++b) {
     const std::size_t first = b * block_vertices;
     const std::size_t count = std::min(block_vertices, vertices_ - first);
@@ -185,44 +171,45 @@ void DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t first_
     const Rows padded(numbers.data() + 3 * first, count);
     const Block& block = blocks_[b];
     const std::int16_t* key = &scaled_[3 * block_vertices * b];
-    if (const std::size_t ahead = b + kBlocksAhead; ahead < blocks_.size()) {
-      const std::size_t next = ahead * block_vertices;
-      fetch(&numbers[3 * next], 3 * sizeof(std::uint16_t) * std::min(block_vertices, vertices_ - next));
-      fetch(&scaled_[3 * next], 3 * sizeof(std::int16_t) * block_vertices);
-    }
+    kernels::Ahead ahead;
+    if (const std::size_t next = first + kBlocksAhead * block_vertices; next + block_vertices <= vertices_)
+      ahead = {.key = &scaled_[3 * next], .numbers = &numbers[3 * next]};
     Header header{.digits = block.digits, .width = {}, .matrix = {}, .centre = block.centre, .base = {}};
-    if (header.digits != delta::moved_only) {
-      std::array<float, 12> sums{};
-      kernels::fit_sums(key, padded.data(), rows, fit_step(rows), header.digits + 2, sums.data());
-      for (std::size_t a = 0; a < 3; ++a) {
-        std::array<float, 3> moment{};
-        for (std::size_t k = 0; k < 3; ++k) moment[k] = sums[3 * a + k] - sums[9 + a] * block.mean[k];
-        for (std::size_t c = 0; c < 3; ++c) {
-          float turn = a == c ? 1.0F : 0.0F;
-          for (std::size_t k = 0; k < 3; ++k) turn += moment[k] * block.inverse[3 * k + c];
-          const float number = std::clamp(kMatrixOne * turn, -32767.0F, 32767.0F);
-          header.matrix[3 * a + c] = static_cast<std::int16_t>(number < 0 ? number - 0.5F : number + 0.5F);
-        }
-      }
-    }
+    if (header.digits != delta::moved_only) fit(block, key, padded.data(), rows, header);
     for (std::size_t c = 0; c < 3; ++c)
       header.base[c] = static_cast<std::uint16_t>(padded.data()[c] - mapped(header, key, c));
     alignas(64) std::array<std::int16_t, 3 * block_vertices> left;
     std::array<std::int16_t, 3> least{}, largest{};
-    kernels::residuals(header, key, padded.data(), rows, left.data(), least.data(), largest.data());
+    kernels::residuals(header, key, padded.data(), rows, ahead, left.data(), least.data(), largest.data());
     for (std::size_t c = 0; c < 3; ++c) {
       header.base[c] = static_cast<std::uint16_t>(header.base[c] + least[c]);
       header.width[c] =
           static_cast<std::uint8_t>(std::bit_width(static_cast<unsigned>(largest[c] - least[c])));
     }
-    const std::size_t at = out.size();
-    out.resize(at + delta::header_bytes + header.data_bytes(rows));
     header.store(&out[at]);
-    std::size_t to = at + delta::header_bytes;
+    at += delta::header_bytes;
     for (std::size_t c = 0; c < 3; ++c) {
       if (header.width[c] == 0) continue;
-      kernels::pack(&left[c * block_vertices], least[c], rows, header.width[c], &out[to]);
-      to += 2 * lanes * Header::words(rows, header.width[c]);
+      kernels::pack(&left[c * block_vertices], least[c], rows, header.width[c], &out[at]);
+      at += 2 * lanes * Header::words(rows, header.width[c]);
+    }
+  }
+  return at;
+}
+
+// The affine map by least squares over some rows.
+void DeltaKey::fit(const Block& block, const std::int16_t* key, const std::uint16_t* numbers,
+                   std::size_t rows, Header& header) {
+  std::array<float, 12> sums{};
+  kernels::fit_sums(key, numbers, rows, fit_step(rows), header.digits + 2, sums.data());
+  for (std::size_t a = 0; a < 3; ++a) {
+    std::array<float, 3> moment{};
+    for (std::size_t k = 0; k < 3; ++k) moment[k] = sums[3 * a + k] - sums[9 + a] * block.mean[k];
+    for (std::size_t c = 0; c < 3; ++c) {
+      float turn = a == c ? 1.0F : 0.0F;
+      for (std::size_t k = 0; k < 3; ++k) turn += moment[k] * block.inverse[3 * k + c];
+      const float number = std::clamp(kMatrixOne * turn, -32767.0F, 32767.0F);
+      header.matrix[3 * a + c] = static_cast<std::int16_t>(number < 0 ? number - 0.5F : number + 0.5F);
     }
   }
 }

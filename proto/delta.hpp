@@ -34,6 +34,11 @@ constexpr std::size_t blocks_of(std::size_t vertices) {
   return (vertices + block_vertices - 1) / block_vertices;
 }
 
+/// What `blocks` blocks take at most: every number in 16 bits.
+constexpr std::size_t most_bytes(std::size_t blocks) {
+  return blocks * (header_bytes + 3 * sizeof(std::uint16_t) * block_vertices);
+}
+
 struct Header {
   std::uint8_t digits = moved_only;  ///< d: coordinates are multiplied as x << (d + 2)
   std::array<std::uint8_t, 3> width{};
@@ -62,10 +67,11 @@ class DeltaKey {
   std::size_t blocks() const { return delta::blocks_of(vertices_); }
   void prepare(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block);
 
-  /// Appends the blocks [first, end) of `numbers` (3 * #V). Deterministic; blocks are independent, so their
-  /// bytes may be made in pieces and put together.
-  void encode(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block,
-              std::vector<std::byte>& out) const;
+  /// Writes the blocks [first, end) of `numbers` (3 * #V) to the front of `out`, which has room for
+  /// delta::most_bytes(end - first), and returns how many bytes they took. Deterministic; blocks are
+  /// independent, so their bytes may be made in pieces and put together.
+  std::size_t encode(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block,
+                     std::span<std::byte> out) const;
 
  private:
   struct Block {
@@ -74,6 +80,9 @@ class DeltaKey {
     std::array<float, 9> inverse{};  ///< of the regularised covariance of the fitted vertices
     std::array<float, 3> mean{};     ///< of the fitted vertices' scaled coordinates
   };
+
+  static void fit(const Block& block, const std::int16_t* key, const std::uint16_t* numbers, std::size_t rows,
+                  delta::Header& header);
 
   std::size_t vertices_ = 0;
   std::vector<Block> blocks_;

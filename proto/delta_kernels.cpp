@@ -3,20 +3,21 @@
 #define HWY_TARGET_INCLUDE "proto/delta_kernels.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as Highway asks.
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <cstring>
 
 #include "proto/delta_kernels.hpp"
+#include "proto/triples-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::wire::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using I16 = hn::CappedTag<std::int16_t, delta::lanes>;
-using U16 = hn::Rebind<std::uint16_t, I16>;
 using V = hn::Vec<I16>;
+using kernels::Ahead;
 
 constexpr std::size_t kPlane = delta::block_vertices;
 
@@ -43,33 +44,83 @@ struct Map {
   }
 };
 
-// Down to eight lanes as vectors: one by one, 32 lanes would cost as much as a quarter of a block's map.
-HWY_INLINE void extremes(V low, V high, std::int16_t& least, std::int16_t& largest) {
-  using Few = hn::CappedTag<std::int16_t, 8>;
-  const Few few;
-  HWY_ALIGN std::int16_t lows[delta::lanes], highs[delta::lanes];
-  hn::Store(low, I16(), lows);
-  hn::Store(high, I16(), highs);
-  auto l = hn::Load(few, lows), h = hn::Load(few, highs);
-  for (std::size_t i = hn::Lanes(few); i < hn::Lanes(I16()); i += hn::Lanes(few)) {
-    l = hn::Min(l, hn::Load(few, lows + i));
-    h = hn::Max(h, hn::Load(few, highs + i));
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE void extremes(const V* low, const V* high, std::int16_t* least, std::int16_t* largest) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    least[c] = hn::GetLane(low[c]);
+    largest[c] = hn::GetLane(high[c]);
   }
-  hn::Store(l, few, lows);
-  hn::Store(h, few, highs);
-  least = *std::min_element(lows, lows + hn::Lanes(few));
-  largest = *std::max_element(highs, highs + hn::Lanes(few));
 }
 
+template <class F>
+HWY_INLINE void sum_up(F, const hn::Vec<F>* v, float* sums) {
+  for (std::size_t s = 0; s < 4; ++s) sums[s] = hn::GetLane(v[s]);
+}
+#else
+// Halves of a vector combined until 128 bits are left.
+template <class D, class Both>
+HWY_INLINE auto folded(D, hn::Vec<D> v, Both both) {
+  if constexpr (hn::MaxLanes(D()) * sizeof(hn::TFromD<D>) > 16) {
+    const hn::Half<D> half;
+    return folded(half, both(hn::LowerHalf(half, v), hn::UpperHalf(half, v)), both);
+  } else {
+    return v;
+  }
+}
+
+// Neighbours of `Lane`s side by side, combined: a and b then alternate in the result, half of each left.
+template <class Lane, class D, class Both>
+HWY_INLINE hn::Vec<D> zipped(D d, hn::Vec<D> a, hn::Vec<D> b, Both both) {
+  const hn::Repartition<Lane, D> wide;
+  const auto wa = hn::BitCast(wide, a), wb = hn::BitCast(wide, b);
+  return both(hn::BitCast(d, hn::InterleaveLower(wide, wa, wb)),
+              hn::BitCast(d, hn::InterleaveUpper(wide, wa, wb)));
+}
+
+// Of three axes: one by one, lane by lane, that would cost as much as a quarter of a block's map.
+HWY_INLINE void extremes(const V* low, const V* high, std::int16_t* least, std::int16_t* largest) {
+  using Few = hn::CappedTag<std::int16_t, 8>;
+  const Few few;
+  const auto min = [](auto a, auto b) HWY_ATTR { return hn::Min(a, b); };
+  hn::Vec<Few> v[6];
+  for (std::size_t c = 0; c < 3; ++c) {
+    v[c] = folded(I16(), low[c], min);
+    v[3 + c] = folded(I16(), hn::Not(high[c]), min);  // the larger, the less its complement
+  }
+  const auto first = zipped<std::int16_t>(few, v[0], v[1], min),
+             then = zipped<std::int16_t>(few, v[2], v[3], min),
+             last = zipped<std::int16_t>(few, v[4], v[5], min);
+  const auto all = zipped<std::int64_t>(few, zipped<std::int32_t>(few, first, then, min),
+                                        zipped<std::int32_t>(few, last, last, min), min);
+  HWY_ALIGN std::int16_t six[8];
+  hn::Store(all, few, six);
+  for (std::size_t c = 0; c < 3; ++c) {
+    least[c] = six[c];
+    largest[c] = static_cast<std::int16_t>(~six[3 + c]);
+  }
+}
+
+// Of four vectors.
+template <class F>
+HWY_INLINE void sum_up(F f, const hn::Vec<F>* v, float* sums) {
+  const auto add = [](auto a, auto b) HWY_ATTR { return hn::Add(a, b); };
+  const auto four =
+      zipped<double>(f, zipped<float>(f, v[0], v[1], add), zipped<float>(f, v[2], v[3], add), add);
+  hn::StoreU(folded(f, four, add), hn::CappedTag<float, 4>(), sums);
+}
+#endif
+
 // What is left of a block's coordinates after its map, in three planes, and the least and the largest of
-// each.
+// each. Meanwhile the block `ahead` comes into the cache: otherwise memory's latency is most of the time.
 void residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
-               std::size_t rows, std::int16_t* left, std::int16_t* least, std::int16_t* largest) {
+               std::size_t rows, Ahead ahead, std::int16_t* left, std::int16_t* least,
+               std::int16_t* largest) {
   const I16 d;
   const std::size_t n = hn::Lanes(d);
   const bool moved = header.digits == delta::moved_only;
   const Map map(moved ? delta::Header{.digits = 0, .width = {}, .matrix = {}, .centre = {}, .base = {}}
                       : header);
+  const Triples triples;
   // Named, not in arrays, so that they stay in registers.
   const V most = hn::Set(d, std::int16_t{32767}), least_of_all = hn::Set(d, std::int16_t{-32768});
   V low_x = most, low_y = most, low_z = most;
@@ -78,8 +129,14 @@ void residuals(const delta::Header& header, const std::int16_t* key, const std::
           from_y = as_signed(hn::Set(U16(), header.base[1])),
           from_z = as_signed(hn::Set(U16(), header.base[2]));
   for (std::size_t i = 0; i < rows * delta::lanes; i += n) {
+    if (ahead.numbers != nullptr) {
+      for (std::size_t part = 0; part < 3; ++part) {
+        hwy::Prefetch(ahead.numbers + 3 * i + part * n);
+        hwy::Prefetch(ahead.key + i + part * kPlane);
+      }
+    }
     hn::Vec<U16> qx, qy, qz;
-    hn::LoadInterleaved3(U16(), numbers + 3 * i, qx, qy, qz);
+    triples.load(numbers + 3 * i, qx, qy, qz);
     const V x = hn::LoadU(d, key + i), y = hn::LoadU(d, key + kPlane + i),
             z = hn::LoadU(d, key + 2 * kPlane + i);
     const V ex = hn::Sub(hn::Sub(as_signed(qx), from_x), moved ? x : map(0, x, y, z));
@@ -95,9 +152,8 @@ void residuals(const delta::Header& header, const std::int16_t* key, const std::
     high_y = hn::Max(high_y, ey);
     high_z = hn::Max(high_z, ez);
   }
-  extremes(low_x, high_x, least[0], largest[0]);
-  extremes(low_y, high_y, least[1], largest[1]);
-  extremes(low_z, high_z, least[2], largest[2]);
+  const V low[3] = {low_x, low_y, low_z}, high[3] = {high_x, high_y, high_z};
+  extremes(low, high, least, largest);
 }
 
 // One plane: lane l's words are the bits of its rows, first row lowest; word j of all lanes stands together.
@@ -166,9 +222,10 @@ void decode_block(const delta::Header& header, const std::byte* data, const std:
   const Map map(moved ? delta::Header{.digits = 0, .width = {}, .matrix = {}, .centre = {}, .base = {}}
                       : header);
   const int shift = moved ? 0 : header.digits + 2;
+  const Triples triples;
   for (std::size_t i = 0; i < rows * delta::lanes; i += hn::Lanes(d)) {
     hn::Vec<U16> k[3];
-    hn::LoadInterleaved3(U16(), key + 3 * i, k[0], k[1], k[2]);
+    triples.load(key + 3 * i, k[0], k[1], k[2]);
     V x[3];
     for (std::size_t c = 0; c < 3; ++c)
       x[c] = hn::ShiftLeftSame(as_signed(hn::Sub(k[c], hn::Set(U16(), header.centre[c]))), shift);
@@ -182,37 +239,90 @@ void decode_block(const delta::Header& header, const std::byte* data, const std:
   }
 }
 
-// Sums over the fitted rows for the least-squares map: of y = q << (digits + 2), less the first vertex', and
-// of x_j (y_i - x_i).
+// Sums over the fitted rows for the least-squares map: of how far each axis moved, relative to the first
+// vertex, and of that times each x.
 void fit_sums(const std::int16_t* key, const std::uint16_t* numbers, std::size_t rows, std::size_t step,
               int shift, float* sums) {
+  const I16 d;
   using F = hn::CappedTag<float, 16>;
   using I32 = hn::Rebind<std::int32_t, F>;
   using H = hn::Rebind<std::int16_t, F>;
-  using UH = hn::Rebind<std::uint16_t, F>;
   const F f;
-  const auto scale = hn::Set(f, static_cast<float>(1 << shift));
-  hn::Vec<I32> first[3];
-  for (std::size_t c = 0; c < 3; ++c) first[c] = hn::Set(I32(), std::int32_t{numbers[c]});
+  const Triples triples;
+  const std::size_t n = hn::Lanes(d);
+  V first[3];
+  for (std::size_t c = 0; c < 3; ++c)
+    first[c] = as_signed(hn::Set(U16(), static_cast<std::uint16_t>(numbers[c] - (key[c * kPlane] >> shift))));
   hn::Vec<F> total[12];
   for (auto& t : total) t = hn::Zero(f);
+  HWY_ALIGN std::int16_t moved[3 * delta::lanes];
   for (std::size_t r = 0; r < rows; r += step) {
-    for (std::size_t i = r * delta::lanes; i < (r + 1) * delta::lanes; i += hn::Lanes(f)) {
-      hn::Vec<UH> q[3];
-      hn::LoadInterleaved3(UH(), numbers + 3 * i, q[0], q[1], q[2]);
-      hn::Vec<F> x[3], moved[3];
+    for (std::size_t i = r * delta::lanes; i < (r + 1) * delta::lanes; i += n) {
+      hn::Vec<U16> q[3];
+      triples.load(numbers + 3 * i, q[0], q[1], q[2]);
       for (std::size_t c = 0; c < 3; ++c) {
-        x[c] = hn::ConvertTo(f, hn::PromoteTo(I32(), hn::LoadU(H(), key + c * kPlane + i)));
-        const auto y = hn::Mul(scale, hn::ConvertTo(f, hn::Sub(hn::PromoteTo(I32(), q[c]), first[c])));
-        moved[c] = hn::Sub(y, x[c]);
-        total[9 + c] = hn::Add(total[9 + c], moved[c]);
+        const V at = hn::ShiftRightSame(hn::LoadU(d, key + c * kPlane + i), shift);
+        hn::Store(hn::Sub(hn::Sub(as_signed(q[c]), first[c]), at), d, moved + c * delta::lanes);
       }
-      for (std::size_t a = 0; a < 3; ++a) {
-        for (std::size_t b = 0; b < 3; ++b) total[3 * a + b] = hn::MulAdd(moved[a], x[b], total[3 * a + b]);
+      for (std::size_t part = 0; part < n; part += hn::Lanes(f)) {
+        hn::Vec<F> x[3], y[3];
+        for (std::size_t c = 0; c < 3; ++c) {
+          x[c] = hn::ConvertTo(f, hn::PromoteTo(I32(), hn::LoadU(H(), key + c * kPlane + i + part)));
+          y[c] = hn::ConvertTo(f, hn::PromoteTo(I32(), hn::LoadU(H(), moved + c * delta::lanes + part)));
+          total[9 + c] = hn::Add(total[9 + c], y[c]);
+        }
+        for (std::size_t a = 0; a < 3; ++a) {
+          for (std::size_t b = 0; b < 3; ++b) total[3 * a + b] = hn::MulAdd(y[a], x[b], total[3 * a + b]);
+        }
       }
     }
   }
-  for (std::size_t s = 0; s < 12; ++s) sums[s] = hn::GetLane(hn::SumOfLanes(f, total[s]));
+  const auto scale = static_cast<float>(1 << shift);
+  for (std::size_t s = 0; s < 12; s += 4) sum_up(f, total + s, sums + s);
+  for (std::size_t s = 0; s < 12; ++s) sums[s] *= scale;
+}
+
+// The least and the largest of each axis.
+void extent(const std::uint16_t* numbers, std::size_t rows, std::uint16_t* least, std::uint16_t* largest) {
+  const I16 d;
+  const Triples triples;
+  // As signed numbers, whose order is that of the unsigned ones less 2^15.
+  const V half = hn::Set(d, std::int16_t{-32768});
+  V low[3], high[3];
+  for (std::size_t c = 0; c < 3; ++c) {
+    low[c] = hn::Set(d, std::int16_t{32767});
+    high[c] = half;
+  }
+  for (std::size_t i = 0; i < rows * delta::lanes; i += hn::Lanes(d)) {
+    hn::Vec<U16> q[3];
+    triples.load(numbers + 3 * i, q[0], q[1], q[2]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const V x = hn::Xor(as_signed(q[c]), half);
+      low[c] = hn::Min(low[c], x);
+      high[c] = hn::Max(high[c], x);
+    }
+  }
+  std::int16_t l[3], h[3];
+  extremes(low, high, l, h);
+  for (std::size_t c = 0; c < 3; ++c) {
+    least[c] = static_cast<std::uint16_t>(l[c] + 32768);
+    largest[c] = static_cast<std::uint16_t>(h[c] + 32768);
+  }
+}
+
+// Three planes: the numbers less `centre`, shifted.
+void scale(const std::uint16_t* numbers, std::size_t rows, const std::uint16_t* centre, int shift,
+           std::int16_t* planes) {
+  const I16 d;
+  const Triples triples;
+  for (std::size_t i = 0; i < rows * delta::lanes; i += hn::Lanes(d)) {
+    hn::Vec<U16> q[3];
+    triples.load(numbers + 3 * i, q[0], q[1], q[2]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const V x = as_signed(hn::Sub(q[c], hn::Set(U16(), centre[c])));
+      hn::StoreU(hn::ShiftLeftSame(x, shift), d, planes + c * kPlane + i);
+    }
+  }
 }
 
 }  // namespace ecorche::wire::HWY_NAMESPACE
@@ -225,10 +335,13 @@ HWY_EXPORT(residuals);
 HWY_EXPORT(pack);
 HWY_EXPORT(decode_block);
 HWY_EXPORT(fit_sums);
+HWY_EXPORT(extent);
+HWY_EXPORT(scale);
 
 void residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
-               std::size_t rows, std::int16_t* left, std::int16_t* least, std::int16_t* largest) {
-  HWY_DYNAMIC_DISPATCH(residuals)(header, key, numbers, rows, left, least, largest);
+               std::size_t rows, Ahead ahead, std::int16_t* left, std::int16_t* least,
+               std::int16_t* largest) {
+  HWY_DYNAMIC_DISPATCH(residuals)(header, key, numbers, rows, ahead, left, least, largest);
 }
 void pack(const std::int16_t* left, std::int16_t base, std::size_t rows, std::size_t width, std::byte* out) {
   HWY_DYNAMIC_DISPATCH(pack)(left, base, rows, width, out);
@@ -240,6 +353,14 @@ void decode_block(const delta::Header& header, const std::byte* data, const std:
 void fit_sums(const std::int16_t* key, const std::uint16_t* numbers, std::size_t rows, std::size_t step,
               int shift, float* sums) {
   HWY_DYNAMIC_DISPATCH(fit_sums)(key, numbers, rows, step, shift, sums);
+}
+
+void extent(const std::uint16_t* numbers, std::size_t rows, std::uint16_t* least, std::uint16_t* largest) {
+  HWY_DYNAMIC_DISPATCH(extent)(numbers, rows, least, largest);
+}
+void scale(const std::uint16_t* numbers, std::size_t rows, const std::uint16_t* centre, int shift,
+           std::int16_t* planes) {
+  HWY_DYNAMIC_DISPATCH(scale)(numbers, rows, centre, shift, planes);
 }
 
 }  // namespace ecorche::wire::kernels

@@ -14,8 +14,9 @@
 namespace ecorche::server {
 namespace {
 
-constexpr std::size_t kBlocksPerRun = 32;         // 16384 vertices
-constexpr std::size_t kNumbersPerRun = 64 << 10;  // looked at in one go
+constexpr std::size_t kBlocksPerRun = 32;           // 16384 vertices
+constexpr std::size_t kSlowToMake = 1 << 20;        // bytes
+constexpr std::size_t kNumbersPerPiece = 64 << 10;  // looked at in one go
 
 v1::MeshArray& add_array(v1::MeshFrame& frame, std::uint32_t tissue, v1::MeshArray::Kind kind) {
   v1::MeshArray& array = *frame.add_arrays();
@@ -43,20 +44,6 @@ bool inside(std::span<const std::uint16_t> numbers) {
 
 }  // namespace
 
-bool fits_box(const runtime::PosedBody& body, std::span<const std::uint32_t> tissues) {
-  return std::all_of(tissues.begin(), tissues.end(), [&](std::uint32_t tissue) {
-    const std::span<const std::uint16_t> numbers = body.quantised[tissue];
-    const std::size_t runs = (numbers.size() + kNumbersPerRun - 1) / kNumbersPerRun;
-    if (runs < 2) return inside(numbers);
-    std::atomic<bool> good = true;
-    tbb::parallel_for(std::size_t{0}, runs, [&](std::size_t r) {
-      const std::size_t first = r * kNumbersPerRun;
-      if (!inside(numbers.subspan(first, std::min(kNumbersPerRun, numbers.size() - first)))) good = false;
-    });
-    return good.load();
-  });
-}
-
 MeshStream::MeshStream(MeshWant want, std::uint32_t level, std::shared_ptr<const MeshParts> parts,
                        std::vector<std::uint32_t> nodes)
     : want_(std::move(want)), level_(level), parts_(std::move(parts)), nodes_(std::move(nodes)) {
@@ -77,6 +64,19 @@ void MeshStream::gather(const runtime::PosedBody& body) {
 std::span<const std::uint16_t> MeshStream::numbers(const runtime::PosedBody& body, std::size_t t) const {
   if (parts_) return gathered_[t];
   return body.quantised[want_.tissues[t]];
+}
+
+bool MeshStream::fits_box(const runtime::PosedBody& body) const {
+  std::atomic<bool> good = true;
+  tbb::parallel_for(std::size_t{0}, want_.tissues.size(), [&](std::size_t t) {
+    const std::span<const std::uint16_t> all = numbers(body, t);
+    const std::size_t pieces = (all.size() + kNumbersPerPiece - 1) / kNumbersPerPiece;
+    tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t p) {
+      const std::size_t first = p * kNumbersPerPiece;
+      if (!inside(all.subspan(first, std::min(kNumbersPerPiece, all.size() - first)))) good = false;
+    });
+  });
+  return good;
 }
 
 // oct16, into `packed`.
@@ -138,12 +138,15 @@ bool MeshStream::keyframe_due(std::uint64_t frame) const {
   return keyframe_ == 0 || frame - keyframe_ >= keyframe_interval || grown;
 }
 
-void MeshStream::write(const runtime::PosedBody& body, bool fits, bool keyframe, v1::MeshFrame& frame,
+bool MeshStream::write(const runtime::PosedBody& body, bool boxed, bool keyframe, v1::MeshFrame& frame,
                        wire::Payload& payload) {
-  const v1::Encoding encoding = fits ? want_.encoding : v1::ENCODING_F32;
+  const v1::Encoding encoding = boxed ? want_.encoding : v1::ENCODING_F32;
   frame.set_encoding(encoding);
   frame.set_level(level_);
-  if (want_.control_nodes) return write_nodes(body, frame, payload);
+  if (want_.control_nodes) {
+    write_nodes(body, frame, payload);
+    return true;
+  }
   if (encoding != v1::ENCODING_F32) {
     v1::QuantiseBox& box = *frame.mutable_box();
     box.set_low_x(body.box.low[0]);
@@ -151,9 +154,12 @@ void MeshStream::write(const runtime::PosedBody& body, bool fits, bool keyframe,
     box.set_low_z(body.box.low[2]);
     box.set_step(body.box.step);
     gather(body);
+  } else {
+    frame.clear_box();
   }
   if (encoding == v1::ENCODING_U16_DELTA && !keyframe && !keyframe_due(frame.frame()))
     return write_deltas(body, frame, payload);
+  if (encoding != v1::ENCODING_F32 && !fits_box(body)) return false;
 
   std::vector<std::vector<float>> some(parts_ && encoding == v1::ENCODING_F32 ? want_.tissues.size() : 0);
   lay_out(body, frame, payload, [&](PayloadLayout& layout, std::size_t t, v1::Array& array) {
@@ -167,12 +173,13 @@ void MeshStream::write(const runtime::PosedBody& body, bool fits, bool keyframe,
       layout.append(array, v1::SCALAR_TYPE_F32, 3, std::span<const float>(positions));
     }
   });
-  if (encoding != v1::ENCODING_U16_DELTA) return;
+  if (encoding != v1::ENCODING_U16_DELTA) return true;
   frame.set_keyframe(frame.frame());
   keyframe_ = frame.frame();
   keyframe_bytes_ = payload.size();
   first_bytes_ = last_bytes_ = 0;
   unsettled_ = true;
+  return true;
 }
 
 void MeshStream::settle(const runtime::PosedBody& body) {
@@ -181,11 +188,15 @@ void MeshStream::settle(const runtime::PosedBody& body) {
     for (std::uint32_t t = 0; t < want_.tissues.size(); ++t) {
       keys_.emplace_back(numbers(body, t).size() / 3);
       for (std::size_t b = 0; b < keys_[t].blocks(); b += kBlocksPerRun) {
-        runs_.push_back({t, static_cast<std::uint32_t>(b),
-                         static_cast<std::uint32_t>(std::min(keys_[t].blocks(), b + kBlocksPerRun))});
+        const std::size_t end = std::min(keys_[t].blocks(), b + kBlocksPerRun);
+        const std::size_t room = wire::delta::most_bytes(end - b);
+        runs_.push_back({.tissue = t,
+                         .first = static_cast<std::uint32_t>(b),
+                         .end = static_cast<std::uint32_t>(end),
+                         .room = room,
+                         .bytes = std::make_unique_for_overwrite<std::byte[]>(room)});
       }
     }
-    pieces_.resize(runs_.size());
   }
   tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t r) {
     const Run& run = runs_[r];
@@ -193,21 +204,30 @@ void MeshStream::settle(const runtime::PosedBody& body) {
   });
 }
 
-void MeshStream::write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) {
+bool MeshStream::write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) {
+  std::atomic<bool> good = true;
   tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t r) {
-    const Run& run = runs_[r];
-    pieces_[r].clear();
-    keys_[run.tissue].encode(numbers(body, run.tissue), run.first, run.end, pieces_[r]);
+    Run& run = runs_[r];
+    const std::span<const std::uint16_t> all = numbers(body, run.tissue);
+    const std::size_t first = 3 * wire::delta::block_vertices * run.first,
+                      end = std::min(all.size(), 3 * wire::delta::block_vertices * run.end);
+    // Here and not before, so that what it has read is still in the cache.
+    if (!inside(all.subspan(first, end - first))) good = false;
+    if (good) run.size = keys_[run.tissue].encode(all, run.first, run.end, {run.bytes.get(), run.room});
   });
+  if (!good) return false;
+  // The next keyframe must not wait for memory.
+  if (keyframe_bytes_ >= kSlowToMake) payload.reserve(keyframe_bytes_);
   std::size_t r = 0;
   lay_out(body, frame, payload, [&](PayloadLayout& layout, std::size_t t, v1::Array& array) {
     layout.begin(array, v1::SCALAR_TYPE_U8, 1);
-    for (; r < runs_.size() && runs_[r].tissue == t; ++r) layout.add(pieces_[r]);
+    for (; r < runs_.size() && runs_[r].tissue == t; ++r) layout.add({runs_[r].bytes.get(), runs_[r].size});
     layout.end(1);
   });
   frame.set_keyframe(keyframe_);
   last_bytes_ = payload.size();
   if (first_bytes_ == 0) first_bytes_ = last_bytes_;
+  return true;
 }
 
 }  // namespace ecorche::server

@@ -39,26 +39,31 @@ class MeshStream {
   bool needs_positions() const { return want_.encoding == v1::ENCODING_F32 && !want_.control_nodes; }
 
   /// Fills encoding, arrays, box and keyframe of `frame`, whose number is set. `keyframe`: somebody needs
-  /// one. `payload` is replaced. A body with a vertex outside its box goes out as float32 (`fits` is false;
-  /// `body` then has positions).
-  void write(const runtime::PosedBody& body, bool fits, bool keyframe, v1::MeshFrame& frame,
+  /// one. `payload` is replaced. False where a vertex lies outside the body's box: then nothing was written
+  /// that counts, and the frame goes out as float32, by another call with `boxed` false and a body that has
+  /// positions.
+  bool write(const runtime::PosedBody& body, bool boxed, bool keyframe, v1::MeshFrame& frame,
              wire::Payload& payload);
   /// After a keyframe has left: readies it for the deltas to come. Cheap where nothing is to be done.
   void settle(const runtime::PosedBody& body);
 
  private:
   void write_nodes(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) const;
-  void write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload);
+  bool write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload);
   void pack_normals(const runtime::PosedBody& body, std::size_t t, std::vector<std::int8_t>& packed) const;
   template <class Add>
   void lay_out(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload, Add&& add);
   /// The numbers of tissue `t` of the want, gathered where it is a part.
   void gather(const runtime::PosedBody& body);
   std::span<const std::uint16_t> numbers(const runtime::PosedBody& body, std::size_t t) const;
+  bool fits_box(const runtime::PosedBody& body) const;
   bool keyframe_due(std::uint64_t frame) const;
 
   struct Run {
     std::uint32_t tissue, first, end;  // row of `want_.tissues`, blocks
+    std::size_t room;
+    std::unique_ptr<std::byte[]> bytes;  // of the present deltas; left as it is made, which touches nothing
+    std::size_t size = 0;
   };
 
   MeshWant want_;
@@ -68,14 +73,10 @@ class MeshStream {
   std::vector<std::vector<std::uint16_t>> gathered_;  // of parts, one per tissue of the want
   std::vector<wire::DeltaKey> keys_;                  // one per tissue of the want
   std::vector<Run> runs_;
-  std::vector<std::vector<std::byte>> pieces_;  // one per run
-  std::uint64_t keyframe_ = 0;                  // number of its frame; 0: none yet
+  std::uint64_t keyframe_ = 0;  // number of its frame; 0: none yet
   std::size_t keyframe_bytes_ = 0;
   std::size_t first_bytes_ = 0, last_bytes_ = 0;  // of the deltas against it
   bool unsettled_ = false;
 };
-
-/// Whether every vertex of the tissues lies inside the box: none has a number on its side.
-bool fits_box(const runtime::PosedBody& body, std::span<const std::uint32_t> tissues);
 
 }  // namespace ecorche::server

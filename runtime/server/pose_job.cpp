@@ -111,9 +111,21 @@ Judged judge(const PoseJob& job, const Subscription& subscription, const runtime
   return {std::move(quality), true, microseconds(Clock::now() - start)};
 }
 
+// `everywhere`: with positions of all that is shown, whatever else is wanted of it.
+Status pose(const PoseJob& job, runtime::PosedBody& body, bool everywhere = false) {
+  const runtime::BodyPoser& poser = job.model->poser();
+  Wanted wanted(poser.model().tissues.size());
+  for (const Subscription& subscription : job.subscriptions) {
+    if (!subscription.streams.empty()) wanted.add(*subscription.streams[0], measured(job, subscription));
+  }
+  if (everywhere) wanted.positions = wanted.shown;
+  wanted.shape(poser.model(), body);
+  return poser.run(job.request.pose, job.request.skinning, Wanted::rows(wanted.shown), body,
+                   nodes_wanted(job));
+}
+
 PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std::size_t at,
-                      const runtime::PosedBody& body, bool fits, const v1::ServerTimings& timings,
-                      const Judged& judged) {
+                      runtime::PosedBody& body, const v1::ServerTimings& timings, const Judged& judged) {
   MeshStream& stream = *subscription.streams[at];
   v1::Envelope envelope;
   v1::MeshFrame& frame = *envelope.mutable_mesh_frame();
@@ -129,7 +141,11 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
   }
   const auto start = Clock::now();
   const std::shared_ptr<wire::Payload> payload = job.model->payloads->take();
-  stream.write(body, fits, (subscription.keyframes >> at & 1) != 0, frame, *payload);
+  const bool keyframe = (subscription.keyframes >> at & 1) != 0;
+  if (!stream.write(body, true, keyframe, frame, *payload)) {
+    static_cast<void>(pose(job, body, true));  // as good as the first time
+    stream.write(body, false, keyframe, frame, *payload);
+  }
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
   return {.subscription = subscription.id,
           .level = stream.level(),
@@ -166,33 +182,13 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
           .bytes = job.memory->hold(wire::encode(envelope, payload))};
 }
 
-Status pose(const PoseJob& job, runtime::PosedBody& body, bool& fits) {
-  const runtime::BodyPoser& poser = job.model->poser();
-  Wanted wanted(poser.model().tissues.size());
-  for (const Subscription& subscription : job.subscriptions) {
-    if (!subscription.streams.empty()) wanted.add(*subscription.streams[0], measured(job, subscription));
-  }
-  const std::vector<std::uint32_t> tissues = Wanted::rows(wanted.shown),
-                                   numbers = Wanted::rows(wanted.numbers);
-  wanted.shape(poser.model(), body);
-  const auto pose_once = [&] {
-    return poser.run(job.request.pose, job.request.skinning, tissues, body, nodes_wanted(job));
-  };
-  if (Status status = pose_once(); !status.ok()) return status;
-  fits = fits_box(body, numbers);
-  if (fits) return {};
-  wanted.positions = wanted.shown;
-  wanted.shape(poser.model(), body);
-  return pose_once();
-}
-
 void hand_over(const PoseJob& job, PosedFrame frame) {
   if (job.digests) frame.digest = digest_of(*frame.bytes);
   job.on_frame(std::move(frame));
 }
 
 // Every frame of the posed body.
-Status show(const PoseJob& job, const runtime::PosedBody& body, bool fits, const v1::ServerTimings& timings) {
+Status show(const PoseJob& job, runtime::PosedBody& body, const v1::ServerTimings& timings) {
   if (job.probe) {
     job.model->probe().follow(body.nodes, job.probe->tree);
     job.probe->sequence = job.request.sequence;
@@ -206,8 +202,7 @@ Status show(const PoseJob& job, const runtime::PosedBody& body, bool fits, const
     if (subscription.streams.empty()) continue;
     const Judged judged = judge(job, subscription, body);
     for (std::size_t i = 0; i < subscription.streams.size(); ++i) {
-      if (wanted(subscription, i))
-        hand_over(job, mesh_frame(job, subscription, i, body, fits, timings, judged));
+      if (wanted(subscription, i)) hand_over(job, mesh_frame(job, subscription, i, body, timings, judged));
     }
   }
   for (const Subscription& subscription : job.subscriptions) {
@@ -243,11 +238,10 @@ Status run(const PoseJob& job) {
   outcome.sequence = job.request.sequence;
   outcome.timings.set_waited(microseconds(start - job.request.arrived));
   BodyPool::Lease body;
-  bool fits = true;  // the box of the u16 encodings
   const auto pose_all = [&] {
     outcome.status = guarded([&] {
       body = job.model->bodies.take();
-      return pose(job, *body, fits);
+      return pose(job, *body);
     });
     outcome.timings.set_posed(microseconds(Clock::now() - start));
   };
@@ -258,7 +252,7 @@ Status run(const PoseJob& job) {
     const bool posed = outcome.status.ok();
     if (posed) outcome.clamped = body->clamped;
     job.on_outcome(std::move(outcome));
-    if (posed) status = guarded([&] { return show(job, *body, fits, timings); });
+    if (posed) status = guarded([&] { return show(job, *body, timings); });
   };
   if (small(job)) {
     serially(all);

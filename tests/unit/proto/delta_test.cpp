@@ -71,8 +71,8 @@ Numbers slow_decode(const std::vector<std::byte>& bytes, const Numbers& key) {
 std::vector<std::byte> encode(const Numbers& key, const Numbers& now) {
   DeltaKey prepared(key.size() / 3);
   prepared.prepare(key, 0, prepared.blocks());
-  std::vector<std::byte> bytes;
-  prepared.encode(now, 0, prepared.blocks(), bytes);
+  std::vector<std::byte> bytes(delta::most_bytes(prepared.blocks()));
+  bytes.resize(prepared.encode(now, 0, prepared.blocks(), bytes));
   return bytes;
 }
 
@@ -131,9 +131,9 @@ TEST(Delta, PiecesPutTogetherAreTheWhole) {
   DeltaKey prepared(2000);
   prepared.prepare(key, 2, 4);
   prepared.prepare(key, 0, 2);
-  std::vector<std::byte> bytes;
-  prepared.encode(now, 0, 1, bytes);
-  prepared.encode(now, 1, 4, bytes);
+  std::vector<std::byte> bytes(delta::most_bytes(4));
+  const std::size_t first = prepared.encode(now, 0, 1, bytes);
+  bytes.resize(first + prepared.encode(now, 1, 4, std::span(bytes).subspan(first)));
   EXPECT_EQ(bytes, encode(key, now));
 }
 

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/server/mesh_stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include "proto/mesh_decoder.hpp"
+
+namespace ecorche::server {
+namespace {
+
+constexpr std::size_t kVertices = 40'000;  // several runs of blocks, the last one shorter
+
+runtime::PosedBody body_at(std::uint16_t moved) {
+  runtime::PosedBody body;
+  body.box = {.low = {0, 0, 0}, .step = 1};
+  body.tissues.resize(1);
+  body.normals.resize(1);
+  body.quantised.resize(1);
+  for (std::size_t v = 0; v < kVertices; ++v) {
+    for (const std::size_t n : {v % 200, v / 200, v % 7 * (1 + moved)})
+      body.quantised[0].push_back(static_cast<std::uint16_t>(1000 + n + moved));
+  }
+  return body;
+}
+
+MeshWant want_of(v1::Encoding encoding) {
+  MeshWant want;
+  want.tissues = {0};
+  want.encoding = encoding;
+  return want;
+}
+
+struct Streamed {
+  explicit Streamed(v1::Encoding encoding) : stream(want_of(encoding), 0, nullptr) {}
+
+  bool write(const runtime::PosedBody& body) {
+    frame.Clear();
+    frame.set_frame(++number);
+    return stream.write(body, true, false, frame, payload);
+  }
+
+  MeshStream stream;
+  std::uint64_t number = 0;
+  v1::MeshFrame frame;
+  wire::Payload payload;
+};
+
+TEST(MeshStream, WritesWhatADecoderReadsBack) {
+  Streamed streamed(v1::ENCODING_U16_DELTA);
+  wire::MeshDecoder decoder;
+  std::vector<wire::DecodedTissue> tissues;
+  for (const std::uint16_t moved : {0, 3, 0, 9}) {
+    const runtime::PosedBody body = body_at(moved);
+    ASSERT_TRUE(streamed.write(body));
+    EXPECT_EQ(streamed.frame.keyframe(), 1U);
+    ASSERT_TRUE(decoder.decode(streamed.frame, streamed.payload, tissues).ok());
+    ASSERT_EQ(tissues.size(), 1U);
+    for (std::size_t i = 0; i < 3 * kVertices; ++i)
+      ASSERT_EQ(tissues[0].positions[i], static_cast<float>(body.quantised[0][i])) << i;
+    streamed.stream.settle(body);
+  }
+}
+
+// Wherever it is: every run of blocks looks at its own vertices.
+TEST(MeshStream, FindsTheVertexBeyondTheBox) {
+  for (const v1::Encoding encoding : {v1::ENCODING_U16, v1::ENCODING_U16_DELTA}) {
+    for (const bool first : {true, false}) {
+      Streamed streamed(encoding);
+      if (!first) {
+        ASSERT_TRUE(streamed.write(body_at(0)));
+        streamed.stream.settle(body_at(0));
+      }
+      for (const std::size_t number : {std::size_t{0}, std::size_t{3 * 16384 - 1}, std::size_t{3 * 16384},
+                                       std::size_t{3 * 32768 + 1}, 3 * kVertices - 1}) {
+        for (const std::uint16_t side : {0, 65535}) {
+          runtime::PosedBody body = body_at(1);
+          body.quantised[0][number] = side;
+          EXPECT_FALSE(streamed.write(body)) << encoding << " " << number;
+          EXPECT_EQ(streamed.frame.arrays_size(), 0);
+        }
+      }
+      EXPECT_TRUE(streamed.write(body_at(1)));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::server
