@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/judging.hpp"
 
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
+#include <time.h>
+
 #include <algorithm>
 #include <new>
 #include <utility>
@@ -9,6 +15,27 @@
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
+namespace {
+
+// On Linux a thread may have a priority of its own; anybody may lower it.
+void politely(const Job& job) {
+#ifdef __linux__
+  constexpr int kLeast = 19;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kLeast);
+#endif
+  job();
+}
+
+// Of the calling thread.
+Clock::duration processor_time() {
+  timespec spent{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &spent);
+  return std::chrono::seconds(spent.tv_sec) + std::chrono::nanoseconds(spent.tv_nsec);
+}
+
+}  // namespace
+
+Judging::Judging(net::io_context& io) : timer_(io), aside_(1, politely) {}
 
 void Judging::ask(const std::shared_ptr<Session>& session) {
   if (!session->await_judgement()) waiting_.push_back(session);
@@ -64,6 +91,7 @@ v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<
 }
 
 void run(JudgeJob& job) {
+  const Clock::duration start = processor_time();
   const auto judge = [&job] {
     const runtime::BodyPoser& poser = job.model->poser();
     const BodyPool::Lease body = job.model->bodies.take();
@@ -88,6 +116,7 @@ void run(JudgeJob& job) {
     serially(judge);
   } catch (const std::bad_alloc&) {  // not judged
   }
+  job.cost = processor_time() - start;
 }
 
 }  // namespace ecorche::server

@@ -4,27 +4,32 @@
 
 #include <deque>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/asio.hpp"
 #include "runtime/server/pose_job.hpp"
+#include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
 
 class Session;
 
-/// Sessions take turns: one pose is judged at a time, and after it nothing for `pause` times as long, so that
-/// judging costs less than a tenth of a processor however many watch. On the I/O thread.
+/// Sessions take turns: one pose is judged at a time, and after it nothing for `pause` times as long as it
+/// took of a processor, so that judging costs less than a tenth of one however many watch. It has a thread of
+/// its own that gives way to whoever makes a frame. On the I/O thread.
 class Judging {
  public:
   static constexpr int pause = 10;
 
-  explicit Judging(net::io_context& io) : timer_(io) {}
+  explicit Judging(net::io_context& io);
 
   /// The session has a pose that was not judged; its turn comes.
   void ask(const std::shared_ptr<Session>& session);
-  /// The turn took so long.
+  /// Has the turn's work done; it must not throw.
+  void submit(Job work) { aside_.submit(std::move(work)); }
+  /// The turn took so much of a processor.
   void done(Clock::duration cost);
   /// No more turns.
   void stop();
@@ -37,6 +42,7 @@ class Judging {
   bool busy_ = false;     ///< a turn is taken
   bool resting_ = false;  ///< the timer runs
   bool stopped_ = false;
+  Workers aside_;
 };
 
 /// What one turn judges: the pose, for every subscription of tissues.
@@ -50,6 +56,7 @@ struct JudgeJob {
   PoseRequest request;
   runtime::QualityThresholds thresholds;
   std::vector<Row> rows;
+  Clock::duration cost{};  ///< the result's, of a processor
 };
 
 /// Poses and measures, on the calling thread alone: the other cores are for frames. Throws nothing.

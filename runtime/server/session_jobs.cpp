@@ -301,13 +301,11 @@ bool Session::judge() {
     if (mesh && !mesh->quality) job->rows.push_back({row.subscription.id, mesh->tissues, nullptr});
   }
   if (job->rows.empty()) return false;
-  const auto start = Clock::now();
-  workers_.submit([self = shared_from_this(), job, start, guard = net::make_work_guard(io_)]() mutable {
+  judging_.submit([self = shared_from_this(), job, guard = net::make_work_guard(io_)]() mutable {
     run(*job);
     net::io_context& io = self->io_;
-    net::post(io, [self = std::move(self), job = std::move(job), cost = Clock::now() - start,
-                   guard = std::move(guard)] {
-      self->judging_.done(cost);
+    net::post(io, [self = std::move(self), job = std::move(job), guard = std::move(guard)] {
+      self->judging_.done(job->cost);
       self->judged(*job);
     });
   });
