@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+#include <utility>
 
 #include "bench/server/walking.hpp"
 #include "core/values/error.hpp"
@@ -41,10 +42,6 @@ std::uint32_t load_u32(const char* p) {
   std::uint32_t value = 0;
   std::memcpy(&value, p, 4);
   return value;
-}
-
-double ms(Clock::duration time) {
-  return std::chrono::duration<double, std::milli>(time).count();
 }
 
 // Poses of a session: when each was sent.
@@ -78,6 +75,11 @@ void Arrived::add(const Arrived& other) {
   if (!other.error.empty()) error = other.error;
 }
 
+struct Crowd::Held {
+  v1::MeshFrame frame;
+  wire::Payload payload;
+};
+
 struct Crowd::Member {
   Asked asked;
   int fd = -1;
@@ -92,6 +94,7 @@ struct Crowd::Member {
   bool keeps = false;  // the present frame's payload
   wire::Payload payload;
   v1::Envelope envelope;
+  std::vector<Held> held;  // to be checked
   wire::MeshDecoder decoder;
   std::vector<wire::DecodedTissue> decoded;
   std::uint64_t seen = 0;
@@ -236,7 +239,7 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
   std::array<epoll_event, 64> events{};
   while (true) {
     auto now = Clock::now();
-    if (now >= end) return;
+    if (now >= end) return check_all();
     if (tick && now >= next_tick) {
       next_tick += std::chrono::milliseconds(100);
       tick();
@@ -286,7 +289,7 @@ void Crowd::take(Member& member) {
   const ssize_t got = recv(member.fd, scratch_.data(), scratch_.size(), MSG_DONTWAIT);
   if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return fail(member, "the server hung up");
   std::size_t at = 0;
-  const std::size_t size = got > 0 ? static_cast<std::size_t>(got) : 0;
+  const auto size = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
   while (at < size && member.fd >= 0) {
     if (member.payload_left > 0) {
       const std::size_t n = std::min(member.payload_left, size - at);
@@ -353,18 +356,22 @@ void Crowd::arrive(Member& member) {
   member.arrived.judged_ago.push_back(
       static_cast<double>(frame.pose_sequence() - frame.quality().pose_sequence()));
   if (const Clock::time_point* sent = member.times->find(frame.pose_sequence()))
-    member.arrived.ms.push_back(ms(now - *sent));
-  if (member.keeps) check(member);
+    member.arrived.ms.push_back(std::chrono::duration<double, std::milli>(now - *sent).count());
+  if (member.keeps) member.held.push_back({frame, std::move(member.payload)});
+}
+
+void Crowd::check_all() {
+  for (const auto& member : members_) {
+    if (!member) continue;
+    for (const Held& held : std::exchange(member->held, {})) check(*member, held);
+  }
 }
 
 // Decodes, and compares with offline posing: every vertex within the encoding's bound, float32 to the bit.
-void Crowd::check(Member& member) {
-  const v1::MeshFrame& frame = member.envelope.mesh_frame();
+void Crowd::check(Member& member, const Held& held) {
+  const v1::MeshFrame& frame = held.frame;
   ++member.arrived.checked;
-  if (!member.decoder.decode(frame, member.payload, member.decoded).ok()) {
-    ++member.arrived.wrong;
-    return;
-  }
+  if (!member.decoder.decode(frame, held.payload, member.decoded).ok()) return void(++member.arrived.wrong);
   std::vector<std::uint32_t> rows;
   for (const wire::DecodedTissue& tissue : member.decoded) rows.push_back(tissue.tissue);
   Pose pose = Pose::rest(rig_.skeleton.segments.size());

@@ -20,9 +20,11 @@ using client::Clock;
 struct Asked {
   std::size_t vertices = 0;  ///< about so many, of whole tissues; 0: all
   v1::Encoding encoding = v1::ENCODING_U16_DELTA;
-  std::string session;           ///< empty: one's own
-  double rate = 90;              ///< poses per second; 0: only watches
-  std::uint64_t check_each = 0;  ///< every so many frames one is held against offline posing; 0: none
+  std::string session;  ///< empty: one's own
+  double rate = 90;     ///< poses per second; 0: only watches
+  /// Every so many frames one is held against offline posing, and every keyframe; 0: none. They are kept, and
+  /// looked at when a run() is over: the client of a user does nothing of the kind.
+  std::uint64_t check_each = 0;
 };
 
 struct Arrived {
@@ -65,7 +67,9 @@ class Crowd {
   void pose(Member& member);
   void finish_head(Member& member);
   void arrive(Member& member);
-  void check(Member& member);
+  struct Held;
+  void check(Member& member, const Held& held);
+  void check_all();
   void fail(Member& member, const std::string& why);
   std::size_t tissues_of(std::size_t vertices, v1::MeshSelection& mesh) const;
 
