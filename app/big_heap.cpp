@@ -32,6 +32,7 @@ void use_tidy_heap() {
 #ifdef __GLIBC__
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_MMAP_THRESHOLD, 1 << 18);  // does not grow by itself any more
+  mallopt(M_TRIM_THRESHOLD, 1 << 25);  // nor is what a frame frees given back and taken again for the next
 #endif
 }
 
