@@ -11,18 +11,26 @@
 namespace ecorche::voxel {
 namespace {
 
-constexpr std::uint8_t kSeen = 128;  // while flooding
 constexpr std::size_t kSmallPart = 8;
 
-/// Every voxel that is neither touched nor seen and joined to `start` by faces; marks them seen.
-std::vector<std::size_t> flood(VoxelMask& mask, std::size_t start, const Context& context) {
-  const std::size_t nx = static_cast<std::size_t>(mask.size[0]);
-  const std::size_t layer = nx * static_cast<std::size_t>(mask.size[1]);
+/// Where in the grid voxel n of the mask lies, i fastest.
+Vec3i place(const VoxelMask& mask, std::size_t n) {
+  const auto nx = static_cast<std::size_t>(mask.size[0]), ny = static_cast<std::size_t>(mask.size[1]);
+  return {mask.low[0] + static_cast<std::int32_t>(n % nx),
+          mask.low[1] + static_cast<std::int32_t>(n / nx % ny),
+          mask.low[2] + static_cast<std::int32_t>(n / (nx * ny))};
+}
+
+/// Every voxel that is not passed yet and joined to `start` by faces; marks them passed.
+std::vector<std::size_t> flood(const Vec3i& size, std::vector<std::uint8_t>& passed, std::size_t start,
+                               const Context& context) {
+  const auto nx = static_cast<std::size_t>(size[0]);
+  const std::size_t layer = nx * static_cast<std::size_t>(size[1]);
   std::vector<std::size_t> part{start};
-  mask.bytes[start] |= kSeen;
+  passed[start] = 1;
   const auto visit = [&](std::size_t voxel) {
-    if ((mask.bytes[voxel] & (kSeen | mask_touched)) != 0) return;
-    mask.bytes[voxel] |= kSeen;
+    if (passed[voxel]) return;
+    passed[voxel] = 1;
     part.push_back(voxel);
   };
   for (std::size_t n = 0; n < part.size(); ++n) {
@@ -33,16 +41,13 @@ std::vector<std::size_t> flood(VoxelMask& mask, std::size_t start, const Context
     if (in_layer >= nx) visit(v - nx);
     if (in_layer + nx < layer) visit(v + nx);
     if (v >= layer) visit(v - layer);
-    if (v + layer < mask.bytes.size()) visit(v + layer);
+    if (v + layer < passed.size()) visit(v + layer);
   }
   return part;
 }
 
-Eigen::Vector3d centre(const ImageGrid& grid, const VoxelMask& mask, std::size_t voxel) {
-  const auto nx = static_cast<std::size_t>(mask.size[0]), ny = static_cast<std::size_t>(mask.size[1]);
-  const std::array<double, 3> p = grid.point(mask.low[0] + static_cast<double>(voxel % nx),
-                                             mask.low[1] + static_cast<double>(voxel / nx % ny),
-                                             mask.low[2] + static_cast<double>(voxel / (nx * ny)));
+Eigen::Vector3d centre(const ImageGrid& grid, const Vec3i& voxel) {
+  const std::array<double, 3> p = grid.point(voxel[0], voxel[1], voxel[2]);
   return {p[0], p[1], p[2]};
 }
 
@@ -62,10 +67,17 @@ double generalized_winding(const SurfaceMesh& surface, const Eigen::Vector3d& p)
 
 std::size_t mark_inside_open(const SurfaceMesh& surface, const ImageGrid& grid, VoxelMask& mask,
                              const Context& context) {
-  flood(mask, 0, context);
+  std::vector<std::uint8_t> passed(static_cast<std::size_t>(mask.size[0]) *
+                                   static_cast<std::size_t>(mask.size[1]) *
+                                   static_cast<std::size_t>(mask.size[2]));
+  for (std::size_t v = 0; v < passed.size(); ++v) {
+    const Vec3i at = place(mask, v);
+    passed[v] = mask.is_touched(at[0], at[1], at[2]);
+  }
+  flood(mask.size, passed, 0, context);
   std::vector<std::vector<std::size_t>> parts;
-  for (std::size_t v = 0; v < mask.bytes.size(); ++v)
-    if ((mask.bytes[v] & (kSeen | mask_touched)) == 0) parts.push_back(flood(mask, v, context));
+  for (std::size_t v = 0; v < passed.size(); ++v)
+    if (!passed[v]) parts.push_back(flood(mask.size, passed, v, context));
   std::vector<double> winding(parts.size(), 1.0);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t n) {
     context.check_stop();
@@ -73,14 +85,17 @@ std::size_t mark_inside_open(const SurfaceMesh& surface, const ImageGrid& grid, 
     if (part.size() < kSmallPart) return;
     winding[n] = 0;
     for (const std::size_t quarter : {1, 2, 3})
-      winding[n] += generalized_winding(surface, centre(grid, mask, part[part.size() * quarter / 4])) / 3;
+      winding[n] +=
+          generalized_winding(surface, centre(grid, place(mask, part[part.size() * quarter / 4]))) / 3;
   });
   std::size_t inside = 0;
-  for (std::uint8_t& byte : mask.bytes) byte &= static_cast<std::uint8_t>(~kSeen);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (std::abs(winding[n]) < 0.5) continue;
     inside += parts[n].size();
-    for (const std::size_t voxel : parts[n]) mask.bytes[voxel] |= mask_inside;
+    for (const std::size_t voxel : parts[n]) {
+      const Vec3i at = place(mask, voxel);
+      mask.inside[mask.word(at[0], at[1], at[2])] |= VoxelMask::bit(at[0]);
+    }
   }
   return inside;
 }

@@ -7,7 +7,7 @@
 
 namespace ecorche::voxel {
 
-/// Marks `mask_inside` for an open surface: what a flood from outside cannot reach through untouched voxels
+/// Marks what is inside an open surface: what a flood from outside cannot reach through untouched voxels
 /// falls into parts, and each part asks one generalized winding number (JacobsonKavan13), the mean of three
 /// of its voxels: inside from 1/2. A part under 8 voxels is taken as inside unasked. So slits and holes up to
 /// a voxel are closed; through wider ones the inside floods away, and only the touched voxels remain. `mask`

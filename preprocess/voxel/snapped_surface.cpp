@@ -21,9 +21,23 @@ std::uint64_t place(const Vec3i& p) {
 /// Antisymmetric: the two ways through an edge cancel.
 std::uint64_t directed_edge(std::uint64_t a, std::uint64_t b) {
   if (a == b) return 0;
-  const std::uint64_t hash = solve::mix(solve::mix(std::min(a, b)) + std::max(a, b));
+  constexpr std::uint64_t odd = 0x9e3779b97f4a7c15ULL;
+  const std::uint64_t hash = solve::mix(std::min(a, b) * odd + std::max(a, b));
   return a < b ? hash : 0 - hash;
 }
+
+/// What the triangles say together, in any order.
+struct Seen {
+  Vec3i low{INT32_MAX, INT32_MAX, INT32_MAX}, high{0, 0, 0};
+  std::uint64_t boundary = 0;  // the sum of all directed edges; wraps
+
+  void add(const Vec3i& a, const Vec3i& b) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], a[axis]);
+      high[axis] = std::max(high[axis], b[axis]);
+    }
+  }
+};
 
 }  // namespace
 
@@ -41,51 +55,32 @@ SnappedSurface snap(const SurfaceMesh& surface, const ImageGrid& grid) {
         snapped.V[v][axis] = 2 * static_cast<std::int32_t>(std::floor(voxels * (units / 2))) + 1;
       }
   });
-  struct Bounds {
-    Vec3i low{INT32_MAX, INT32_MAX, INT32_MAX}, high{0, 0, 0};
-    void add(const Vec3i& a, const Vec3i& b) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        low[axis] = std::min(low[axis], a[axis]);
-        high[axis] = std::max(high[axis], b[axis]);
-      }
-    }
-  };
-  const Bounds bounds = tbb::parallel_reduce(
-      tbb::blocked_range<Eigen::Index>(0, surface.F.rows(), 4096), Bounds{},
-      [&](const auto& range, Bounds out) {
-        for (Eigen::Index f = range.begin(); f < range.end(); ++f)  // not over V: a vertex may be unused
+  const Seen seen = tbb::parallel_reduce(
+      tbb::blocked_range<Eigen::Index>(0, surface.F.rows(), 4096), Seen{},
+      [&](const auto& range, Seen out) {
+        for (Eigen::Index f = range.begin(); f < range.end(); ++f) {  // not over V: a vertex may be unused
+          std::array<std::uint64_t, 3> at{};
           for (Eigen::Index c = 0; c < 3; ++c) {
             const Vec3i& p = snapped.V[static_cast<std::size_t>(surface.F(f, c))];
             out.add(p, p);
+            at[static_cast<std::size_t>(c)] = place(p);
           }
+          out.boundary +=
+              directed_edge(at[0], at[1]) + directed_edge(at[1], at[2]) + directed_edge(at[2], at[0]);
+        }
         return out;
       },
-      [](Bounds a, const Bounds& b) {
+      [](Seen a, const Seen& b) {
         a.add(b.low, b.high);
+        a.boundary += b.boundary;
         return a;
       });
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    snapped.low[axis] = bounds.low[axis] / units;
-    snapped.high[axis] = bounds.high[axis] / units;
+    snapped.low[axis] = seen.low[axis] / units;
+    snapped.high[axis] = seen.high[axis] / units;
   }
+  snapped.closed = seen.boundary == 0;
   return snapped;
-}
-
-bool is_closed(const SnappedSurface& surface) {
-  const Triangles& F = *surface.F;
-  const std::uint64_t boundary = tbb::parallel_reduce(
-      tbb::blocked_range<Eigen::Index>(0, F.rows(), 4096), std::uint64_t{0},
-      [&](const auto& range, std::uint64_t sum) {
-        for (Eigen::Index f = range.begin(); f < range.end(); ++f) {
-          const std::uint64_t a = place(surface.V[static_cast<std::size_t>(F(f, 0))]);
-          const std::uint64_t b = place(surface.V[static_cast<std::size_t>(F(f, 1))]);
-          const std::uint64_t c = place(surface.V[static_cast<std::size_t>(F(f, 2))]);
-          sum += directed_edge(a, b) + directed_edge(b, c) + directed_edge(c, a);
-        }
-        return sum;
-      },
-      [](std::uint64_t x, std::uint64_t y) { return x + y; });  // wraps: any order gives the same
-  return boundary == 0;
 }
 
 }  // namespace ecorche::voxel

@@ -25,14 +25,13 @@ struct SnappedSurface {
   std::vector<Vec3i> V;               ///< #V, units, relative to the low corner of voxel (0, 0, 0)
   const Triangles* F = nullptr;       ///< of the surface that was snapped
   Vec3i low{0, 0, 0}, high{0, 0, 0};  ///< first and last voxel that the surface touches, along each axis
+  /// The triangles have no boundary: every edge is run through as often one way as the other (up to a hash of
+  /// 64 bits). Only then does every column cross the surface evenly. Edges are told by their snapped places,
+  /// so that a slit narrower than 1/256 voxel is closed, and vertices need not be merged.
+  bool closed = false;
 };
 
 /// Vertices must lie within the grid. `surface` must outlive the result.
 SnappedSurface snap(const SurfaceMesh& surface, const ImageGrid& grid);
-
-/// Whether the triangles have no boundary: every edge is run through as often one way as the other (up to a
-/// hash of 64 bits). Only then does every column cross the surface evenly. Edges are told by their snapped
-/// places, so that a slit narrower than 1/256 voxel is closed, and vertices need not be merged.
-bool is_closed(const SnappedSurface& surface);
 
 }  // namespace ecorche::voxel

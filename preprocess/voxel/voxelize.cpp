@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -25,29 +26,57 @@ namespace {
 
 struct Bounds {
   std::array<double, 3> low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
+
+  void add(const Bounds& other) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], other.low[axis]);
+      high[axis] = std::max(high[axis], other.high[axis]);
+    }
+  }
 };
 
-void grow(Bounds& bounds, const SurfaceMesh& surface, const std::string& name) {
-  if (surface.V.size() > 0 && !surface.V.allFinite())
-    throw Error(ErrorKind::data, name, "a vertex is not finite", "run ecorche check on the case");
-  const auto join = [](Bounds a, const Bounds& b) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      a.low[axis] = std::min(a.low[axis], b.low[axis]);
-      a.high[axis] = std::max(a.high[axis], b.high[axis]);
-    }
-    return a;
-  };
-  bounds = tbb::parallel_reduce(
-      tbb::blocked_range<Eigen::Index>(0, surface.F.rows(), 4096), bounds,
-      [&](const auto& range, Bounds out) {
+/// Of the triangles' corners; nothing where a vertex is not finite.
+std::optional<Bounds> bounds_of(const SurfaceMesh& surface) {
+  using Range = tbb::blocked_range<Eigen::Index>;
+  const bool finite = tbb::parallel_reduce(
+      Range(0, surface.V.rows(), 4096), true,
+      [&](const Range& range, bool out) {
+        return out &&
+               surface.V.middleRows(range.begin(), static_cast<Eigen::Index>(range.size())).allFinite();
+      },
+      std::logical_and<>());
+  if (!finite) return std::nullopt;
+  return tbb::parallel_reduce(
+      Range(0, surface.F.rows(), 4096), Bounds{},
+      [&](const Range& range, Bounds out) {
         for (Eigen::Index f = range.begin(); f < range.end(); ++f)
           for (Eigen::Index c = 0; c < 3; ++c) {
             const auto p = surface.V.row(surface.F(f, c));
-            out = join(out, {{p[0], p[1], p[2]}, {p[0], p[1], p[2]}});
+            out.add({{p[0], p[1], p[2]}, {p[0], p[1], p[2]}});
           }
         return out;
       },
-      join);
+      [](Bounds a, const Bounds& b) {
+        a.add(b);
+        return a;
+      });
+}
+
+/// Of skin and bones.
+Bounds bounds_of(const Case& patient) {
+  const std::size_t count = patient.bones.size() + 1;
+  std::vector<std::optional<Bounds>> each(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) {
+    each[n] = bounds_of(n == 0 ? patient.skin : patient.bones[n - 1].surface);
+  });
+  Bounds bounds;
+  for (std::size_t n = 0; n < count; ++n) {
+    if (!each[n])
+      throw Error(ErrorKind::data, n == 0 ? patient.skin_name : patient.bones[n - 1].name,
+                  "a vertex is not finite", "run ecorche check on the case");
+    bounds.add(*each[n]);
+  }
+  return bounds;
 }
 
 /// Voxels along one axis: the extent, a little room on both sides and one empty voxel beyond.
@@ -112,9 +141,8 @@ Solid solid(const SurfaceMesh& surface, const std::string& name, const ImageGrid
             const Context& context) {
   if (surface.F.rows() == 0) return {{}, name + ": the bone has no triangle"};
   const SnappedSurface snapped = snap(surface, grid);
-  const bool closed = is_closed(snapped);
-  Solid out{rasterize(snapped, closed, closed ? 0 : 1, context), {}};
-  if (!closed) {
+  Solid out{rasterize(snapped, snapped.closed, snapped.closed ? 0 : 1, context), {}};
+  if (!snapped.closed) {
     const std::size_t inside = mark_inside_open(surface, grid, out.mask, context);
     out.warning =
         name + ": the surface has open edges; " +
@@ -124,20 +152,45 @@ Solid solid(const SurfaceMesh& surface, const std::string& name, const ImageGrid
   return out;
 }
 
-/// Calls `visit(voxel of the image)` for every voxel of the mask in layer k of the image that is not empty.
-template <class Visit>
-void for_layer(int k, const VoxelMask& mask, const ImageGrid& grid, Visit&& visit) {
-  if (k < mask.low[2] || k >= mask.low[2] + mask.size[2]) return;
-  std::size_t n = mask.offset(mask.low[0], mask.low[1], k);
-  for (int j = 0; j < mask.size[1]; ++j) {
-    const std::size_t row = grid.offset(mask.low[0], mask.low[1] + j, k);
-    for (int i = 0; i < mask.size[0]; ++i, ++n)
-      if (mask.bytes[n] != 0) visit(row + static_cast<std::size_t>(i));
-  }
-}
-
 /// Voxels that more than one bone claims, and all that do, lower index first.
 using Contested = std::map<std::size_t, std::vector<std::uint16_t>>;
+
+/// Labels layer k of the image, which is zero, from the masks of the skin and the bones.
+void label_layer(int k, const std::vector<Solid>& solids, Image& labels, Contested& contested) {
+  const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
+  std::vector<std::uint64_t> taken(static_cast<std::size_t>(labels.grid.size[0] + 63) / 64);  // by bones
+  const auto holds = [&](std::size_t n, std::size_t axis, int at) {
+    const VoxelMask& mask = solids[n].mask;
+    return at >= mask.low[axis] && at < mask.low[axis] + mask.size[axis];
+  };
+  std::vector<std::size_t> here;
+  for (std::size_t n = 0; n < solids.size(); ++n)
+    if (holds(n, 2, k)) here.push_back(n);
+  for (int j = 0; j < labels.grid.size[1]; ++j) {
+    std::uint16_t* const row = out.data() + labels.grid.offset(0, j, k);
+    std::fill(taken.begin(), taken.end(), 0);
+    for (const std::size_t n : here) {
+      if (!holds(n, 1, j)) continue;
+      const VoxelMask& mask = solids[n].mask;
+      const auto label = static_cast<std::uint16_t>(soft + n);
+      const std::size_t first = mask.row(j, k);
+      for (std::size_t w = 0; w < mask.row_words(); ++w) {
+        const std::uint64_t claimed = mask.touched[first + w] | mask.inside[first + w];
+        std::uint64_t& others = taken[mask.first_word() + w];
+        std::uint16_t* const at = row + 64 * (mask.first_word() + w);
+        for_runs(claimed & ~others, [&](int i, int count) { std::fill_n(at + i, count, label); });
+        for_runs(claimed & others, [&](int i, int count) {
+          for (const std::uint16_t* voxel = at + i; voxel < at + i + count; ++voxel) {
+            std::vector<std::uint16_t>& claimants = contested[static_cast<std::size_t>(voxel - out.data())];
+            if (claimants.empty()) claimants.push_back(*voxel);
+            claimants.push_back(label);
+          }
+        });
+        if (n > 0) others |= claimed;
+      }
+    }
+  }
+}
 
 /// The claimant whose surface is nearest to the voxel's centre. Bones that share a wall lie at the same
 /// distance but for rounding: the lower index keeps the voxel unless another is nearer by more than that.
@@ -178,14 +231,9 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
                 "give a closed surface of the body");
   if (patient.bones.size() > std::numeric_limits<std::uint16_t>::max() - first_bone)
     throw Error(ErrorKind::data, patient.name, "more bones than 16-bit labels", "merge bones");
-  Bounds bounds;
-  grow(bounds, patient.skin, patient.skin_name);
+  const ImageGrid grid = make_grid(bounds_of(patient), options);
   auto triangles = static_cast<std::size_t>(patient.skin.F.rows());
-  for (const CaseBone& bone : patient.bones) {
-    grow(bounds, bone.surface, bone.name);
-    triangles += static_cast<std::size_t>(bone.surface.F.rows());
-  }
-  const ImageGrid grid = make_grid(bounds, options);
+  for (const CaseBone& bone : patient.bones) triangles += static_cast<std::size_t>(bone.surface.F.rows());
   std::vector<Solid> solids(patient.bones.size() + 1);  // of the skin, then of the bones
   std::mutex mutex;                                     // of progress
   std::size_t done = 0;
@@ -196,8 +244,12 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
     done += static_cast<std::size_t>(surface.F.rows());
     context.report(0.9 * static_cast<double>(done) / static_cast<double>(triangles));
   };
-  Image labels;
-  tbb::parallel_invoke([&] { labels = Image(grid, ScalarType::u16); },
+  // Taken here, so that it comes from this thread's heap, whose freed memory and large pages serve again;
+  // first touched beside the rest.
+  Image labels({}, ScalarType::u16);
+  labels.grid = grid;
+  labels.bytes.reserve(grid.voxels() * scalar_bytes(labels.type));
+  tbb::parallel_invoke([&] { labels.bytes.resize(labels.bytes.capacity()); },
                        [&] { make(0, patient.skin, patient.skin_name); },
                        [&] {
                          tbb::parallel_for(std::size_t{0}, patient.bones.size(), [&](std::size_t b) {
@@ -209,24 +261,9 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
   }
 
   // Bones after the skin, in their order; a layer of the image is one thread's.
-  const std::span<std::uint16_t> out = labels.scalars<std::uint16_t>();
   std::vector<Contested> contested(static_cast<std::size_t>(grid.size[2]));
-  tbb::parallel_for(0, grid.size[2], [&](int k) {
-    for_layer(k, solids[0].mask, grid, [&](std::size_t voxel) { out[voxel] = soft; });
-    Contested& own = contested[static_cast<std::size_t>(k)];
-    for (std::size_t b = 0; b < patient.bones.size(); ++b) {
-      const auto label = static_cast<std::uint16_t>(first_bone + b);
-      for_layer(k, solids[b + 1].mask, grid, [&](std::size_t voxel) {
-        if (out[voxel] < first_bone) {
-          out[voxel] = label;
-          return;
-        }
-        std::vector<std::uint16_t>& claimants = own[voxel];
-        if (claimants.empty()) claimants.push_back(out[voxel]);
-        claimants.push_back(label);
-      });
-    }
-  });
+  tbb::parallel_for(0, grid.size[2],
+                    [&](int k) { label_layer(k, solids, labels, contested[static_cast<std::size_t>(k)]); });
   for (Contested& layer : contested) contested.front().merge(layer);
   settle(contested.front(), patient, labels, context);
   return labels;

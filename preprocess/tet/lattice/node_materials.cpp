@@ -59,7 +59,7 @@ LatticeSurfaces::LatticeSurfaces(const Case& patient, const Image& labels, const
     Bits& bits = inside_[s];
     bits.assign(static_cast<std::size_t>(lattice.node_count() / 8 + 1), 0);
     const voxel::SnappedSurface snapped = voxel::snap(surface(s), grids[0]);
-    if (!voxel::is_closed(snapped)) {
+    if (!snapped.closed) {
       for (std::int64_t node = 0; node < lattice.node_count(); ++node) {
         const std::uint16_t label = voxel_at(labels, lattice.position(node));
         if (s == 0 ? label != voxel::outside : label == voxel::first_bone + s - 1) set_bit(bits, node);
@@ -71,13 +71,11 @@ LatticeSurfaces::LatticeSurfaces(const Case& patient, const Image& labels, const
       const voxel::VoxelMask mask =
           voxel::rasterize(centres ? voxel::snap(surface(s), grid) : snapped, true, 0, context);
       const std::int64_t first = centres ? lattice.first_centre() : 0;
-      std::size_t n = 0;
-      for (int k = 0; k < mask.size[2]; ++k)
-        for (int j = 0; j < mask.size[1]; ++j)
-          for (int i = 0; i < mask.size[0]; ++i, ++n)
-            if ((mask.bytes[n] & voxel::mask_inside) != 0)
-              set_bit(bits, first + static_cast<std::int64_t>(
-                                        grid.offset(i + mask.low[0], j + mask.low[1], k + mask.low[2])));
+      for (int k = mask.low[2]; k < mask.low[2] + mask.size[2]; ++k)
+        for (int j = mask.low[1]; j < mask.low[1] + mask.size[1]; ++j)
+          for (int i = mask.low[0]; i < mask.low[0] + mask.size[0]; ++i)
+            if (mask.is_inside(i, j, k))
+              set_bit(bits, first + static_cast<std::int64_t>(grid.offset(i, j, k)));
     }
   });
 }

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "preprocess/voxel/open_surface.hpp"
+#include "preprocess/voxel/triangle_box.hpp"
 #include "tests/unit/voxel/shapes.hpp"
 
 namespace ecorche::voxel {
@@ -61,7 +62,7 @@ TEST(TriangleBox, EqualsAllThirteenAxes) {
     if (n % 7 == 0) t[2] = t[1];                           // a segment
     if (n % 11 == 0) t[0][2] = t[1][2] = t[2][2];          // axis-parallel
     if (n % 13 == 0) t[0][2] = t[1][2] = t[2][2] = units;  // along voxel faces
-    const TriangleBoxTest fast(t[0], t[1], t[2]);
+    const TriangleBoxTest fast({t[0], t[1], t[2]});
     Vec3i low, high;
     for (std::size_t a = 0; a < 3; ++a) {
       low[a] = std::min({t[0][a], t[1][a], t[2][a]}) / units;
@@ -86,13 +87,15 @@ ImageGrid unit_grid(int n) {
   return grid;
 }
 
-std::array<int, 2> extent(const VoxelMask& mask, std::uint8_t bits, std::size_t axis) {
+using Of = bool (VoxelMask::*)(int, int, int) const;
+
+std::array<int, 2> extent(const VoxelMask& mask, Of of, std::size_t axis) {
   std::array<int, 2> found{INT32_MAX, INT32_MIN};
   for (int k = 0; k < mask.size[2]; ++k)
     for (int j = 0; j < mask.size[1]; ++j)
       for (int i = 0; i < mask.size[0]; ++i) {
         const Vec3i v{mask.low[0] + i, mask.low[1] + j, mask.low[2] + k};
-        if ((mask.bytes[mask.offset(v[0], v[1], v[2])] & bits) == 0) continue;
+        if (!(mask.*of)(v[0], v[1], v[2])) continue;
         found[0] = std::min(found[0], v[axis]);
         found[1] = std::max(found[1], v[axis]);
       }
@@ -104,20 +107,20 @@ TEST(Rasterize, SurfaceAlongVoxelFacesTouchesOneSideOnly) {
   const ImageGrid grid = unit_grid(10);
   const VoxelMask mask = rasterize(snap(box, grid), true, 0, {});
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(extent(mask, mask_touched, axis), (std::array<int, 2>{2, 6}))
+    EXPECT_EQ(extent(mask, &VoxelMask::is_touched, axis), (std::array<int, 2>{2, 6}))
         << "a face belongs to the voxels above it";
-    EXPECT_EQ(extent(mask, mask_inside, axis), (std::array<int, 2>{2, 5}));
+    EXPECT_EQ(extent(mask, &VoxelMask::is_inside, axis), (std::array<int, 2>{2, 5}));
   }
-  EXPECT_EQ(std::count_if(mask.bytes.begin(), mask.bytes.end(),
-                          [](std::uint8_t b) { return (b & mask_inside) != 0; }),
-            64);
+  int inside = 0;
+  for (const std::uint64_t word : mask.inside) inside += std::popcount(word);
+  EXPECT_EQ(inside, 64);
 }
 
 TEST(Rasterize, WindingIsNonZeroInside) {
   const ImageGrid grid = unit_grid(30);
   const auto inside = [&](const SurfaceMesh& surface, int i, int j, int k) {
     const VoxelMask mask = rasterize(snap(surface, grid), true, 0, {});
-    return (mask.bytes[mask.offset(i, j, k)] & mask_inside) != 0;
+    return mask.is_inside(i, j, k);
   };
   const SurfaceMesh a = shapes::box({3.3, 3.3, 3.3}, {15.3, 15.3, 15.3}),
                     b = shapes::box({9.7, 9.7, 9.7}, {25, 25, 25});
@@ -129,11 +132,118 @@ TEST(Rasterize, WindingIsNonZeroInside) {
   EXPECT_TRUE(inside(shapes::together(a, cavity), 4, 9, 9));
 }
 
+/// The surface on its snapped places, in units.
+SurfaceMesh snapped_mesh(const SnappedSurface& snapped) {
+  SurfaceMesh mesh;
+  mesh.F = *snapped.F;
+  mesh.V.resize(static_cast<Eigen::Index>(snapped.V.size()), 3);
+  for (std::size_t v = 0; v < snapped.V.size(); ++v)
+    mesh.V.row(static_cast<Eigen::Index>(v)) << snapped.V[v][0], snapped.V[v][1], snapped.V[v][2];
+  return mesh;
+}
+
+/// Every voxel of the grid, by thirteen axes for every triangle, and by winding numbers. `inside`: at least
+/// so many.
+void expect_plain_truth(const SurfaceMesh& surface, const ImageGrid& grid, int least_inside = 10) {
+  const SnappedSurface snapped = snap(surface, grid);
+  ASSERT_TRUE(snapped.closed);
+  const VoxelMask mask = rasterize(snapped, true, 0, {});
+  std::vector<std::uint8_t> touched(grid.voxels(), 0);
+  for (Eigen::Index f = 0; f < surface.F.rows(); ++f) {
+    Vec3i t[3], low, high;
+    for (Eigen::Index c = 0; c < 3; ++c) t[c] = snapped.V[static_cast<std::size_t>(surface.F(f, c))];
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min({t[0][a], t[1][a], t[2][a]}) / units;
+      high[a] = std::max({t[0][a], t[1][a], t[2][a]}) / units;
+    }
+    for (int k = low[2]; k <= high[2]; ++k)
+      for (int j = low[1]; j <= high[1]; ++j)
+        for (int i = low[0]; i <= high[0]; ++i)
+          if (overlap_by_all_axes(t, {i, j, k})) touched[grid.offset(i, j, k)] = 1;
+  }
+  const SurfaceMesh plain = snapped_mesh(snapped);
+  int inside = 0;
+  for (int k = 0; k < grid.size[2]; ++k)
+    for (int j = 0; j < grid.size[1]; ++j)
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const Vec3i v{i, j, k};
+        bool held = true;
+        for (std::size_t a = 0; a < 3; ++a)
+          held = held && v[a] >= mask.low[a] && v[a] < mask.low[a] + mask.size[a];
+        ASSERT_EQ(held && mask.is_touched(i, j, k), touched[grid.offset(i, j, k)] != 0)
+            << i << " " << j << " " << k;
+        const double winding =
+            generalized_winding(plain, Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5) * double{units});
+        if (std::abs(winding - std::round(winding)) > 1e-6) continue;  // on the surface
+        ASSERT_EQ(held && mask.is_inside(i, j, k), std::lround(winding) != 0) << i << " " << j << " " << k;
+        inside += winding > 0.5 ? 1 : 0;
+      }
+  EXPECT_GE(inside, least_inside);
+}
+
+TEST(Rasterize, EqualsPlainTruthOverSeveralWordsOfARow) {
+  ImageGrid grid = unit_grid(16);
+  grid.size[0] = 150;
+  // Triangles of a fraction of a voxel, of one or two, and of many.
+  for (const int n : {2, 5, 14}) {
+    SCOPED_TRACE(n);
+    expect_plain_truth(shapes::ellipsoid({74.3, 8.1, 7.7}, {70, 6.3, 5.9}, n), grid);
+    expect_plain_truth(shapes::ellipsoid({63.9, 8.1, 7.7}, {3.2, 3.3, 3.4}, n), grid);
+  }
+  expect_plain_truth(shapes::box({2.5, 3.5, 4.5}, {128.5, 9.5, 11.5}), grid);  // on voxel centres
+}
+
+TEST(Rasterize, EqualsPlainTruthWhereOneTriangleCrossesTheGrid) {
+  SurfaceMesh mesh;
+  mesh.V.resize(4, 3);
+  mesh.V << 1.2, 2.3, 1.7, 47.1, 5.2, 9.9, 8.4, 46.8, 20.3, 21.6, 12.2, 47.3;
+  mesh.F.resize(4, 3);
+  mesh.F << 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3;
+  expect_plain_truth(mesh, unit_grid(49));
+}
+
+SurfaceMesh random_tetrahedron(std::mt19937& random, double low, double high, double size) {
+  std::uniform_real_distribution<double> place(low, high), spread(-size, size);
+  const Eigen::RowVector3d middle(place(random), place(random), place(random));
+  SurfaceMesh mesh;
+  mesh.V.resize(4, 3);
+  for (Eigen::Index v = 0; v < 4; ++v)
+    mesh.V.row(v) = middle + Eigen::RowVector3d(spread(random), spread(random), spread(random));
+  mesh.F.resize(4, 3);
+  mesh.F << 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3;
+  return mesh;
+}
+
+TEST(Rasterize, WhatOtherTrianglesMarkedHidesNothing) {
+  std::mt19937 random(23);
+  for (int n = 0; n < 300; ++n) {
+    SCOPED_TRACE(n);
+    SurfaceMesh all = random_tetrahedron(random, 2, 5, 0.1);
+    for (int m = 0; m < 12; ++m) all = shapes::together(all, random_tetrahedron(random, 2, 5, 0.1));
+    for (int m = 0; m < 4; ++m) all = shapes::together(all, random_tetrahedron(random, 2.5, 4.5, 1.5));
+    expect_plain_truth(all, unit_grid(7), 0);
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST(Masks, RunsOfAWord) {
+  using Runs = std::vector<std::array<int, 2>>;
+  const auto runs = [](std::uint64_t word) {
+    Runs out;
+    for_runs(word, [&](int first, int count) { out.push_back({first, count}); });
+    return out;
+  };
+  EXPECT_EQ(runs(0), Runs{});
+  EXPECT_EQ(runs(~std::uint64_t{0}), (Runs{{0, 64}}));
+  EXPECT_EQ(runs(0x8000'0000'0000'0001), (Runs{{0, 1}, {63, 1}}));
+  EXPECT_EQ(runs(0xf0'0000'0036), (Runs{{1, 2}, {4, 2}, {36, 4}}));
+}
+
 TEST(Closed, TellsOpenEdgesAndClosesHairlineSlits) {
   const ImageGrid grid = unit_grid(30);
   SurfaceMesh sphere = shapes::ellipsoid({15, 15, 15}, {9, 9, 9}, 6);
-  EXPECT_TRUE(is_closed(snap(sphere, grid)));
-  EXPECT_TRUE(is_closed(snap(shapes::inside_out(sphere), grid)));
+  EXPECT_TRUE(snap(sphere, grid).closed);
+  EXPECT_TRUE(snap(shapes::inside_out(sphere), grid).closed);
   // Split a vertex: its triangles no longer share it, but the slit is far below 1/256 voxel.
   SurfaceMesh slit = sphere;
   slit.V.conservativeResize(sphere.V.rows() + 1, 3);
@@ -141,13 +251,13 @@ TEST(Closed, TellsOpenEdgesAndClosesHairlineSlits) {
   for (Eigen::Index f = 0; f < slit.F.rows() / 2; ++f)
     for (Eigen::Index c = 0; c < 3; ++c)
       if (slit.F(f, c) == 0) slit.F(f, c) = static_cast<std::int32_t>(sphere.V.rows());
-  EXPECT_TRUE(is_closed(snap(slit, grid)));
+  EXPECT_TRUE(snap(slit, grid).closed);
   SurfaceMesh open = sphere;
   open.F.conservativeResize(sphere.F.rows() - 1, 3);
-  EXPECT_FALSE(is_closed(snap(open, grid)));
+  EXPECT_FALSE(snap(open, grid).closed);
   SurfaceMesh flipped = sphere;
   std::swap(flipped.F(3, 0), flipped.F(3, 1));
-  EXPECT_FALSE(is_closed(snap(flipped, grid)));
+  EXPECT_FALSE(snap(flipped, grid).closed);
 }
 
 TEST(OpenSurface, GeneralizedWindingOfASphere) {
