@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/solve/counting_sort.hpp"
+
 namespace ecorche::weights {
 namespace {
 
@@ -80,9 +82,21 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
       }
     });
   });
-  for (const std::vector<Tie>& some : ties) {
-    for (const Tie& tie : some) system.rhs.row(tie.row) -= tie.value * boundary.row(tie.node);
-  }
+  // Each piece of the rows takes its ties in the order of the nodes.
+  const auto piece_of = [&](const Tie& tie) { return static_cast<std::size_t>(tie.row / kNodes); };
+  const std::size_t pieces = static_cast<std::size_t>((free_count + kNodes - 1) / kNodes);
+  solve::CountingSort<std::uint32_t> sort(pieces, ties.size(), [&](std::size_t part, auto&& add) {
+    for (const Tie& tie : ties[part]) add(piece_of(tie));
+  });
+  solve::RawVector<const Tie*> sorted(sort.places());
+  sort.fill([&](std::size_t part, auto&& take) {
+    for (const Tie& tie : ties[part]) sorted[take(piece_of(tie))] = &tie;
+  });
+  const auto first = sort.take_offsets();
+  tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t piece) {
+    for (std::size_t at = first[piece]; at < first[piece + 1]; ++at)
+      system.rhs.row(sorted[at]->row) -= sorted[at]->value * boundary.row(sorted[at]->node);
+  });
   return system;
 }
 

@@ -4,21 +4,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "preprocess/weights/worst_row.hpp"
+
 namespace ecorche::weights {
 namespace {
 
 /// How far each row of a free node has left [0, 1].
 std::vector<double> violations(const std::vector<std::uint8_t>& fixed, MonotoneResult& result) {
   std::vector<double> left(fixed.size(), 0);
-  result.violation = 0;
-  for (std::size_t n = 0; n < fixed.size(); ++n) {
-    if (fixed[n]) continue;
+  const Worst worst = worst_row(fixed, [&](std::size_t n) {
     const auto row = result.harmonic.values.row(static_cast<Eigen::Index>(n));
-    left[n] = std::max({0.0, -row.minCoeff(), row.maxCoeff() - 1});
-    if (left[n] <= result.violation) continue;
-    result.violation = left[n];
-    result.worst_node = static_cast<std::int32_t>(n);
-  }
+    return left[n] = std::max({0.0, -row.minCoeff(), row.maxCoeff() - 1});
+  });
+  result.violation = worst.value;
+  if (worst.node >= 0) result.worst_node = worst.node;
   return left;
 }
 
@@ -42,7 +41,7 @@ void drop_positive_ties(solve::SparseMatrix& L, const std::vector<std::uint8_t>&
 
 }  // namespace
 
-MonotoneResult solve_monotone(solve::SparseMatrix L, const std::vector<std::uint8_t>& fixed,
+MonotoneResult solve_monotone(solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
                               solve::Block boundary, solve::SpdSolver& solver, const Context& context) {
   MonotoneResult result;
   result.harmonic = solve_harmonic(L, fixed, std::move(boundary), solver, context);

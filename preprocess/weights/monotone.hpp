@@ -28,8 +28,9 @@ struct MonotoneResult {
 /// matrix stays symmetric and definite, its rows still sum to 0, and such a row becomes a mean of its
 /// neighbours), and the system is factored and solved again. A mesh with small violations is solved once and
 /// untouched. Dropping every positive off-diagonal would move weights by up to 0.14 all over the body, so for
-/// a mesh that asks for more than kMostMended of its nodes this gives up.
-MonotoneResult solve_monotone(solve::SparseMatrix L, const std::vector<std::uint8_t>& fixed,
+/// a mesh that asks for more than kMostMended of its nodes this gives up. `L` is mended in place: Eigen's
+/// sparse matrices cannot be moved, and a copy takes as much again.
+MonotoneResult solve_monotone(solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
                               solve::Block boundary, solve::SpdSolver& solver, const Context& context);
 
 }  // namespace ecorche::weights

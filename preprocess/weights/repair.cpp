@@ -3,27 +3,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include "preprocess/weights/worst_row.hpp"
 
 namespace ecorche::weights {
 
 Repair repair(const std::vector<std::uint8_t>& fixed, solve::Block& values) {
-  Repair report;
-  for (std::size_t n = 0; n < fixed.size(); ++n) {
-    if (fixed[n]) continue;
+  std::vector<std::uint8_t> repaired(fixed.size(), 0);
+  const Worst worst = worst_row(fixed, [&](std::size_t n) {
     auto row = values.row(static_cast<Eigen::Index>(n));
     const bool left = row.minCoeff() < -kRounding || row.maxCoeff() > 1 + kRounding;
     const Eigen::RowVectorXd before = left ? Eigen::RowVectorXd(row) : Eigen::RowVectorXd();
     row = row.cwiseMax(0).cwiseMin(1);
     row /= row.sum();
-    if (!left) continue;
-    ++report.rows;
-
-    const double change = (row - before).cwiseAbs().maxCoeff();
-    if (change > report.largest_change) {
-      report.largest_change = change;
-      report.worst_node = static_cast<std::int32_t>(n);
-    }
-  }
+    repaired[n] = left;
+    return left ? (row - before).cwiseAbs().maxCoeff() : 0;
+  });
+  Repair report;
+  report.rows = static_cast<decltype(report.rows)>(std::count(repaired.begin(), repaired.end(), 1));
+  report.largest_change = worst.value;
+  if (worst.node >= 0) report.worst_node = worst.node;
   return report;
 }
 

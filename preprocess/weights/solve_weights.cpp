@@ -2,6 +2,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -81,30 +82,49 @@ void warn_of_mended_nodes(const MonotoneResult& solved, const Context& context) 
               "the mesh is full of slivers: use another mesher, or more tets by --max-tets or --voxel");
 }
 
+using Range = tbb::blocked_range<std::size_t>;
+constexpr std::size_t kPiece = 4096;  // rows
+
 /// Largest, smallest and row sums over the rows that were solved.
 void measure_solved(const solve::Block& values, const std::vector<std::int32_t>& source,
                     Certificate& certificate) {
-  certificate.solved_min_weight = 1;
-  certificate.solved_max_weight = 0;
-  for (std::size_t n = 0; n < source.size(); ++n) {
-    if (source[n] >= 0) continue;
-    const auto row = values.row(static_cast<Eigen::Index>(n));
-    certificate.solved_min_weight = std::min(certificate.solved_min_weight, row.minCoeff());
-    certificate.solved_max_weight = std::max(certificate.solved_max_weight, row.maxCoeff());
-    certificate.solved_row_sum_error = std::max(certificate.solved_row_sum_error, std::abs(row.sum() - 1));
-  }
+  struct Seen {
+    double low = 1, high = 0, error = 0;
+  };
+  const auto join = [](const Seen& a, const Seen& b) {
+    return Seen{std::min(a.low, b.low), std::max(a.high, b.high), std::max(a.error, b.error)};
+  };
+  const Seen seen = tbb::parallel_reduce(
+      Range(0, source.size(), kPiece), Seen{},
+      [&](const Range& range, Seen out) {
+        for (std::size_t n = range.begin(); n < range.end(); ++n) {
+          if (source[n] >= 0) continue;
+          const auto row = values.row(static_cast<Eigen::Index>(n));
+          out = join(out, {row.minCoeff(), row.maxCoeff(), std::abs(row.sum() - 1)});
+        }
+        return out;
+      },
+      join);
+  certificate.solved_min_weight = seen.low;
+  certificate.solved_max_weight = seen.high;
+  certificate.solved_row_sum_error = std::max(certificate.solved_row_sum_error, seen.error);
 }
 
+/// What some of the nodes store.
+struct Stored {
+  std::vector<std::size_t> count;  // of each node
+  std::vector<std::uint16_t> segment;
+  std::vector<float> weight;
+  double row_sum_error = 0;
+};
+
 /// Rows cut at kStored, divided by their sum and narrowed to float32; `source` as in attachments().
-Weights store(const solve::Block& values, const std::vector<std::int32_t>& columns,
-              const std::vector<std::int32_t>& source, Certificate& certificate) {
-  Weights w;
-  w.offsets.reserve(source.size() + 1);
-  w.offsets.push_back(0);
-  certificate.min_weight = 1;
-  certificate.max_weight = 0;
-  for (std::size_t n = 0; n < source.size(); ++n) {
+Stored store_some(const Range& nodes, const solve::Block& values, const std::vector<std::int32_t>& columns,
+                  const std::vector<std::int32_t>& source) {
+  Stored out;
+  for (std::size_t n = nodes.begin(); n < nodes.end(); ++n) {
     const auto row = values.row(source[n] >= 0 ? source[n] : static_cast<Eigen::Index>(n));
+    const std::size_t before = out.segment.size();
     double kept = 0;
     for (const double x : row) kept += x >= kStored ? x : 0;
     double sum = 0;
@@ -112,14 +132,42 @@ Weights store(const solve::Block& values, const std::vector<std::int32_t>& colum
       const double x = row(static_cast<Eigen::Index>(c));
       const auto narrow = static_cast<float>(x / kept);
       if (x < kStored || static_cast<double>(narrow) < kStored) continue;  // narrowing may round 1e-6 down
-      w.segment.push_back(static_cast<std::uint16_t>(columns[c]));
-      w.weight.push_back(narrow);
+      out.segment.push_back(static_cast<std::uint16_t>(columns[c]));
+      out.weight.push_back(narrow);
       sum += narrow;
-      certificate.min_weight = std::min(certificate.min_weight, static_cast<double>(narrow));
-      certificate.max_weight = std::max(certificate.max_weight, static_cast<double>(narrow));
     }
-    certificate.row_sum_error = std::max(certificate.row_sum_error, std::abs(sum - 1));
-    w.offsets.push_back(w.segment.size());
+    out.row_sum_error = std::max(out.row_sum_error, std::abs(sum - 1));
+    out.count.push_back(out.segment.size() - before);
+  }
+  return out;
+}
+
+Weights store(const solve::Block& values, const std::vector<std::int32_t>& columns,
+              const std::vector<std::int32_t>& source, Certificate& certificate) {
+  const std::size_t nodes = source.size();
+  std::vector<Stored> pieces((nodes + kPiece - 1) / kPiece);
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
+    pieces[p] = store_some({p * kPiece, std::min((p + 1) * kPiece, nodes)}, values, columns, source);
+  });
+  Weights w;
+  w.offsets.reserve(nodes + 1);
+  w.offsets.push_back(0);
+  for (const Stored& piece : pieces) {
+    for (const std::size_t count : piece.count) w.offsets.push_back(w.offsets.back() + count);
+    certificate.row_sum_error = std::max(certificate.row_sum_error, piece.row_sum_error);
+  }
+  w.segment.reserve(w.offsets.back());
+  w.weight.reserve(w.offsets.back());
+  for (Stored& piece : pieces) {
+    w.segment.insert(w.segment.end(), piece.segment.begin(), piece.segment.end());
+    w.weight.insert(w.weight.end(), piece.weight.begin(), piece.weight.end());
+    piece = {};
+  }
+  certificate.min_weight = 1;
+  certificate.max_weight = 0;
+  for (const float x : w.weight) {
+    certificate.min_weight = std::min(certificate.min_weight, static_cast<double>(x));
+    certificate.max_weight = std::max(certificate.max_weight, static_cast<double>(x));
   }
   return w;
 }
@@ -186,12 +234,13 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   const auto solver = make_solver(result.solver);
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
-  MonotoneResult monotone = solve_monotone(std::move(L), fixed, std::move(boundary), *solver, scaled);
+  MonotoneResult monotone = solve_monotone(L, fixed, std::move(boundary), *solver, scaled);
   if (options.kind == Kind::quasi_harmonic && monotone.violation <= kSmallViolation) {
     context.check_stop();
-    L = stiffness(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
-    monotone =
-        solve_monotone(std::move(L), fixed, std::move(monotone.harmonic.values), *solver, stop_only(context));
+    solve::SparseMatrix().swap(L);
+    solve::SparseMatrix bent =
+        stiffness(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
+    monotone = solve_monotone(bent, fixed, std::move(monotone.harmonic.values), *solver, stop_only(context));
   }
   if (monotone.violation > kSmallViolation) {
     refuse(mesh, monotone.worst_node, monotone.violation, monotone.mended_nodes);
