@@ -31,8 +31,8 @@ class Quiet {
 /// the ten nodes of all eight are quiet and of one material. A large tet beside smaller ones is cut through
 /// the middles that they share: through one face, or by halving split edges, longest first; where more is
 /// split it falls into its pieces again (red-green refinement, Molino et al. 2003). Dihedral angles of large
-/// tets: 30 to 135 degrees; some off-diagonals of the Laplacian are positive there, which is why uncut
-/// lattices are not graded. The lattice must have an even number of cubes along each axis.
+/// tets: 30 to 135 degrees; some off-diagonals of the Laplacian are positive there: uncut
+/// lattices are graded by octree.hpp. The lattice must have an even number of cubes along each axis.
 Graded grade(const BccLattice& lattice, const Quiet& quiet);
 
 }  // namespace ecorche::tet

@@ -214,5 +214,18 @@ TEST(Octree, FiniteVolumesHaveNoPositiveOffDiagonal) {
   }
 }
 
+TEST(Octree, FiniteVolumesThatAreNotMonotoneAreNotTaken) {
+  const Clipped clipped = balls(1, {37, 32, 34}, 0);
+  TetMesh mesh = gather(clipped, Octree(clipped));
+  mesh.V.row(mesh.V.rows() / 2) += Eigen::RowVector3d(0.06, 0.02, -0.04);
+  double by_elements = 0, by_volumes = 0, used = 0;
+  weights::laplacian(mesh.V, mesh.T, &by_elements);
+  weights::finite_volumes(mesh.V, mesh.T, {}, &by_volumes);
+  weights::stiffness(mesh.V, mesh.T, {}, &used);
+  EXPECT_GT(by_volumes, 0);
+  EXPECT_LT(by_volumes, by_elements);
+  EXPECT_EQ(used, by_elements);
+}
+
 }  // namespace
 }  // namespace ecorche::tet
