@@ -115,7 +115,8 @@ class WayBack {
   void surface(const fs::path& from, const fs::path& to) {
     if (!locator_) locator_ = std::make_unique<mapping::Locator>(body_.posed, body_.tets);
     SurfaceMesh mesh = io::read_surface(from);
-    const mapping::Binding held = locator_->bind(mesh.V, context_);
+    mapping::Binding held = locator_->bind(mesh.V, context_);
+    mapping::bind_to_most_squeezed(mesh.V, body_.rest, body_.posed, body_.tets, held, context_);
     for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
       Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
       for (int c = 0; c < 4; ++c) {

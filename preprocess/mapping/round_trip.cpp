@@ -43,7 +43,7 @@ RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets
       const std::array<Vector3d, 4> before = corners_of(rest, tets, t);
       const double volume = tet_det(before[0], before[1], before[2], before[3]);
       const Vector3d at = centroid(corners_of(posed, tets, t));
-      const std::int32_t holder = grid.find(at);
+      const std::int32_t holder = grid.most_squeezed(at, rest);
       sums.volume += volume;
       if (holder < 0 || holder == t) continue;
       const Eigen::Vector4d share = geometry::barycentric(at, corners_of(posed, tets, holder));
@@ -74,6 +74,31 @@ RoundTrip round_trip(const PointsF& rest, const PointsF& posed, const Tets& tets
     out.elsewhere_share /= volume;
   }
   return out;
+}
+
+void bind_to_most_squeezed(const Points& points, const PointsF& rest, const PointsF& posed, const Tets& tets,
+                           Binding& binding, const Context& context) {
+  const TetGrid grid(posed, tets, context);
+  tbb::parallel_for(Range(0, points.rows(), kBlock), [&](const Range& range) {
+    context.check_stop();
+    for (Eigen::Index p = range.begin(); p < range.end(); ++p) {
+      const Vector3d at = points.row(p).transpose();
+      const std::int32_t holder = grid.most_squeezed(at, rest);
+      std::int32_t& known = binding.tet[static_cast<std::size_t>(p)];
+      if (holder < 0) continue;
+      binding.outside_mm[static_cast<std::size_t>(p)] = 0;
+      if (holder == known) continue;
+      known = holder;
+      binding.barycentric.row(p) =
+          geometry::barycentric(at, corners_of(posed, tets, holder)).transpose().cast<float>();
+    }
+  });
+  binding.outside = 0;
+  binding.max_outside_mm = 0;
+  for (const float distance : binding.outside_mm) {
+    binding.outside += distance > 0 ? 1 : 0;
+    binding.max_outside_mm = std::max(binding.max_outside_mm, double{distance});
+  }
 }
 
 }  // namespace ecorche::mapping

@@ -113,14 +113,21 @@ void TetGrid::for_cells(std::int64_t tet, F&& f) const {
   }
 }
 
-std::int32_t TetGrid::find(const Eigen::Vector3d& p) const {
-  if (!box_.contains(p)) return -1;
+std::int32_t TetGrid::most_squeezed(const Eigen::Vector3d& p, const PointsF& rest) const {
+  if (tets_.rows() == 0 || !box_.contains(p)) return -1;
   const auto at = cell_of(p);
   const auto cell = static_cast<std::size_t>((at[2] * size_[1] + at[1]) * size_[0] + at[0]);
+  std::int32_t found = -1;
+  double most = 0;
   for (std::uint32_t i = begin_[cell]; i < begin_[cell + 1]; ++i) {
-    if (TetTest(nodes_, tets_, tet_[i]).holds(p[0], p[1], p[2])) return tet_[i];
+    const TetTest now = TetTest(nodes_, tets_, tet_[i]).upright();
+    if (!(now.det() > 0) || !now.holds(p[0], p[1], p[2])) continue;
+    const double squeezed = std::abs(TetTest(rest, tets_, tet_[i]).det()) / now.det();
+    if (squeezed <= most) continue;
+    most = squeezed;
+    found = tet_[i];
   }
-  return -1;
+  return found;
 }
 
 }  // namespace ecorche::mapping

@@ -18,15 +18,17 @@ Eigen::AlignedBox3d box_of(const PointsF& nodes);  ///< of at least one node
 double mean_width(const PointsF& nodes, const Tets& tets);
 
 /// A grid of cells of about a tet's size, each with the tets whose bounding box meets it, in ascending order:
-/// the tet that holds a point is the first of its cell that does, exactly as a search through all tets would
+/// what holds a point is in its cell, exactly as a search through all tets would
 /// answer. No walk, hence nothing to go wrong where the body is not convex. Refers to `nodes` and `tets`,
 /// which must outlive it.
 class TetGrid {
  public:
   TetGrid(const PointsF& nodes, const Tets& tets, const Context& context);
 
-  /// The tet of lowest index that holds p, faces included; -1 outside of all.
-  std::int32_t find(const Eigen::Vector3d& p) const;
+  /// Of the tets that hold p, faces and inverted ones included, the one that is squeezed most: in which most
+  /// volume of `rest` (#nodes by 3) lies in least of this, ties to the lowest index. Of what lies in one
+  /// place most came from there. -1 outside of all.
+  std::int32_t most_squeezed(const Eigen::Vector3d& p, const PointsF& rest) const;
 
  private:
   std::array<std::int64_t, 3> cell_of(const Eigen::Vector3d& p) const;

@@ -42,6 +42,17 @@ class TetTest {
     return std::min(std::min(b1, b2), std::min(b3, det_ - b1 - b2 - b3)) >= least_;
   }
 
+  /// The same tet the right way round: one that is inverted now holds what lies in it.
+  TetTest upright() const {
+    TetTest out = *this;
+    if (det_ >= 0) return out;
+    for (double* x : {&out.vwx_, &out.vwy_, &out.vwz_, &out.wux_, &out.wuy_, &out.wuz_, &out.uvx_, &out.uvy_,
+                      &out.uvz_, &out.det_, &out.least_})
+      *x = -*x;
+    return out;
+  }
+  double det() const { return det_; }  ///< six times the volume, negative where it is inverted
+
  private:
   double ax_, ay_, az_, vwx_, vwy_, vwz_, wux_, wuy_, wuz_, uvx_, uvy_, uvz_, det_, least_;
 };
