@@ -58,11 +58,25 @@ struct CaseVolume {
   double background = 0;  ///< what lies outside the body
 };
 
+/// Limbs that touch in the scan what they do not hang on, and are to move apart from it
+/// (preprocess/label_surfaces/hold_apart.hpp).
+struct HeldApart {
+  struct Limbs {
+    std::vector<std::int64_t> ids;      ///< labels that these limbs are made of
+    std::vector<std::string> segments;  ///< the uppermost of each limb
+    int joints = 2;                     ///< at most so many lie between what may touch
+  };
+  double gap_mm = 0;  ///< between voxel centres
+  std::vector<Limbs> limbs;
+  std::string where;  ///< file, line and key, for messages
+};
+
 /// A label per voxel, and what the ids mean.
 struct CaseLabels {
   Image image;                                ///< integer scalars, one component; 0 is nothing
   std::map<std::int64_t, std::string> table;  ///< id -> name
   std::vector<Image> overlaps = {};           ///< further layers on the same grid, where labels overlap
+  std::optional<HeldApart> apart = {};        ///< `label_surfaces::resolve` takes that out of the images
 };
 
 struct Case {

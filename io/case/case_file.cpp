@@ -32,7 +32,7 @@ constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment"
 constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
                                                        "root", "labels", "side",  "within", "close_mm"};
 constexpr std::array<std::string_view, 4> kVolumeKeys{"name", "file", "background", "root"};
-constexpr std::array<std::string_view, 4> kLabelKeys{"file", "table", "root", "mid_plane_mm"};
+constexpr std::array<std::string_view, 5> kLabelKeys{"file", "table", "root", "mid_plane_mm", "apart"};
 constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
 
 Eigen::Matrix3d parse_axes(const Value& value) {
@@ -81,6 +81,8 @@ class CaseReader {
     for (const Value& entry : bones.items()) read_bone(entry);
     if (out_.bones.empty()) bones.fail("is empty", "list at least one bone");
     if (out_.generic) list_segments();
+    if (const auto apart = labels ? labels->find("apart") : std::nullopt)
+      out_.labels->apart = sources_->read_apart(*apart, out_.skeleton);
     read_regions(placed.regions);
     check_named(placed.named, out_);
     if (const auto tissues = root_.find("tissues")) {

@@ -14,6 +14,8 @@ using yaml::Value;
 constexpr std::size_t kMostIds = 65536;
 constexpr double kWidestGap = 100;  // mm; wider ones fill the space between the legs
 constexpr std::array<std::string_view, 3> kWithinKeys{"file", "ids", "root"};
+constexpr std::array<std::string_view, 2> kApartKeys{"gap_mm", "limbs"};
+constexpr std::array<std::string_view, 3> kLimbsKeys{"labels", "segments", "joints"};
 constexpr std::array<std::string_view, 4> kRestKeys{"labels", "except", "group", "groups"};
 
 std::optional<std::int64_t> whole_number(const std::string& text) {
@@ -66,6 +68,28 @@ std::string identifier_of(const std::string& name) {
   }
   while (!out.empty() && out.back() == '_') out.pop_back();
   return out.empty() ? "label" : out;
+}
+
+// The segment that `name` is; refuses the root, and what hangs on one of `taken`, or they on it.
+std::string limb_top(const Value& name, const Skeleton& skeleton, const std::vector<std::string>& taken) {
+  const int segment = skeleton.find_segment(name.text());
+  if (segment < 0) {
+    std::vector<std::string> known;
+    for (const Segment& s : skeleton.segments) known.push_back(s.name);
+    name.fail_unknown("segment", name.text(), known);
+  }
+  if (skeleton.segments[static_cast<std::size_t>(segment)].parent < 0)
+    name.fail("'" + name.text() + "' is the root, on which everything hangs", "name the uppermost of a limb");
+  const auto hangs_on = [&](int below, int above) {
+    while (below > above) below = skeleton.segments[static_cast<std::size_t>(below)].parent;
+    return below == above;
+  };
+  for (const std::string& other : taken) {
+    const int listed = skeleton.find_segment(other);
+    if (hangs_on(segment, listed) || hangs_on(listed, segment))
+      name.fail("'" + name.text() + "' is of one limb with '" + other + "'", "name the uppermost alone");
+  }
+  return name.text();
 }
 
 Group tissue_group(const Value& value, const std::string& word) {
@@ -228,6 +252,44 @@ LabelSource LabelSources::everything(const Value& labels) const {
   LabelSource source;
   source.where = labels.where();
   return source;
+}
+
+HeldApart LabelSources::read_apart(const Value& apart, const Skeleton& skeleton) const {
+  apart.allow(kApartKeys);
+  need_labels(apart);
+  HeldApart out;
+  out.where = apart.where();
+  const Value gap = apart.at("gap_mm");
+  out.gap_mm = gap.number();
+  if (!(out.gap_mm > 0 && out.gap_mm <= kWidestGap))
+    gap.fail(gap.text() + " is out of range", "give more than 0, at most 100");
+  const Value limbs = apart.at("limbs");
+  std::set<std::int64_t> seen;
+  std::vector<std::string> tops;
+  for (const Value& entry : limbs.items()) {
+    entry.allow(kLimbsKeys);
+    HeldApart::Limbs& made = out.limbs.emplace_back();
+    const Value labels = entry.at("labels");
+    made.ids = read_ids(labels);
+    for (const std::int64_t id : made.ids) {
+      if (!seen.insert(id).second) labels.fail("label " + std::to_string(id) + " stands twice", "keep one");
+    }
+    if (const auto segments = entry.find("segments")) {
+      for (const Value& name : segments->items()) {
+        made.segments.push_back(limb_top(name, skeleton, tops));
+        tops.push_back(made.segments.back());
+      }
+      if (made.segments.empty()) segments->fail("is empty", "name the uppermost segment of a limb");
+    }
+    if (const auto joints = entry.find("joints")) {
+      const std::int64_t most = joints->integer();
+      if (most < 1 || most > 16) joints->fail(joints->text() + " is out of range", "give 1 to 16");
+      made.joints = static_cast<int>(most);
+    }
+  }
+  if (out.limbs.empty() || out.limbs.size() > 100)
+    limbs.fail("lists no limbs, or more than 100", "list 1 to 100 entries");
+  return out;
 }
 
 bool LabelSources::is_rest(const Value& entry) {

@@ -31,6 +31,9 @@ class LabelSources {
   /// The outside of everything, for a case whose skin is left out.
   LabelSource everything(const yaml::Value& labels) const;
 
+  /// The `apart` of the case's labels. `labels` of a limb are not used by it: they stand for no surface.
+  HeldApart read_apart(const yaml::Value& apart, const Skeleton& skeleton) const;
+
   /// Whether `entry` asks for all labels that no other entry uses: `labels: rest`.
   static bool is_rest(const yaml::Value& entry);
   /// One tissue for each name of the table whose labels no other entry used, `except` does not list and the

@@ -1,75 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/label_surfaces/closing.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <vector>
+
+#include "preprocess/label_surfaces/nearest.hpp"
 
 namespace ecorche::label_surfaces {
 namespace {
-
-constexpr float kFar = std::numeric_limits<float>::infinity();
-
-// The lower envelope of parabolas over one line (SaitoToriwaki94 in the form of Felzenszwalb and Huttenlocher
-// 2012): f(q) becomes min over p of f(p) + (spacing (q - p))^2.
-void transform_line(float* line, std::size_t stride, int n, double spacing, std::vector<double>& scratch) {
-  scratch.resize(3 * static_cast<std::size_t>(n) + 1);
-  double* const value = scratch.data();
-  double* const centre = value + n;
-  double* const from = centre + n;  // n + 1
-  const double s2 = spacing * spacing;
-  int top = -1;
-  for (int q = 0; q < n; ++q) {
-    const double f = line[static_cast<std::size_t>(q) * stride];
-    if (f == static_cast<double>(kFar)) continue;
-    double start = -1;
-    while (top >= 0) {
-      const double p = centre[top];
-      start = ((f + s2 * q * q) - (value[top] + s2 * p * p)) / (2 * s2 * (q - p));
-      if (start > from[top]) break;
-      --top;
-    }
-    ++top;
-    centre[top] = q;
-    value[top] = f;
-    from[top] = top == 0 ? -1 : start;
-  }
-  if (top < 0) return;
-  int at = 0;
-  for (int q = 0; q < n; ++q) {
-    while (at < top && from[at + 1] <= q) ++at;
-    const double d = q - centre[at];
-    line[static_cast<std::size_t>(q) * stride] = static_cast<float>(value[at] + s2 * d * d);
-  }
-}
 
 // Squared distance, mm^2, of every voxel's centre to the nearest one whose `inside` is `target`.
 std::vector<float> squared_distance(const Mask& mask, std::uint8_t target,
                                     const std::array<double, 3>& spacing, const Context& context) {
   std::vector<float> d(mask.inside.size());
   for (std::size_t i = 0; i < d.size(); ++i) d[i] = mask.inside[i] == target ? 0 : kFar;
-  const auto nx = static_cast<std::size_t>(mask.size[0]), ny = static_cast<std::size_t>(mask.size[1]),
-             nz = static_cast<std::size_t>(mask.size[2]);
-  const auto lines = [&](std::size_t count, const auto& each) {
-    context.check_stop();
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count), [&](const auto& range) {
-      std::vector<double> scratch;
-      for (std::size_t l = range.begin(); l < range.end(); ++l) each(l, scratch);
-    });
-  };
-  lines(ny * nz, [&](std::size_t l, std::vector<double>& s) {
-    transform_line(&d[l * nx], 1, mask.size[0], spacing[0], s);
-  });
-  lines(nx * nz, [&](std::size_t l, std::vector<double>& s) {
-    transform_line(&d[l / nx * nx * ny + l % nx], nx, mask.size[1], spacing[1], s);
-  });
-  lines(nx * ny, [&](std::size_t l, std::vector<double>& s) {
-    transform_line(&d[l], nx * ny, mask.size[2], spacing[2], s);
-  });
+  std::vector<std::int32_t> untagged;
+  spread_nearest(d, untagged, mask.size, spacing, context);
   return d;
 }
 

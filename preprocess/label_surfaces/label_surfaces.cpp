@@ -9,6 +9,7 @@
 #include <atomic>
 #include <mutex>
 
+#include "preprocess/label_surfaces/hold_apart.hpp"
 #include "preprocess/label_surfaces/mask.hpp"
 #include "preprocess/label_surfaces/surface_net.hpp"
 
@@ -57,6 +58,7 @@ void resolve(Case& patient, const Context& context) {
     throw Error(ErrorKind::config, jobs.front().source->where, "the case has no labels",
                 "name them under labels");
   }
+  if (patient.labels->apart) hold_apart(patient, context);
   LabelBlocks blocks(*patient.labels, context);
   std::optional<Mask> body;
   if (patient.skin_source && patient.skin_source->ids.empty()) {
@@ -87,6 +89,7 @@ void resolve(Case& patient, const Context& context) {
     throw Error(ErrorKind::config, job.source->where, "its labels have no voxel there",
                 "check its ids, side and within");
   }
+  patient.labels->apart.reset();
   patient.skin_source.reset();
   for (CaseBone& bone : patient.bones) bone.source.reset();
   for (CaseTissue& tissue : patient.tissues) tissue.source.reset();

@@ -17,7 +17,8 @@ namespace ecorche::label_surfaces {
 /// face to face both have nearly the same surface.
 SurfaceMesh extract(const CaseLabels& labels, const LabelSource& source, const Context& context);
 
-/// Gives every entry of `patient` that has a source its surface, and forgets the source. Where the skin is
+/// Gives every entry of `patient` that has a source its surface, and forgets the source. Limbs are held apart
+/// first where the labels say so (hold_apart.hpp). Where the skin is
 /// the outside of everything, specks off the body belong to no entry. The same bytes for any number of
 /// threads. O(voxels + surface). Throws Error{config}, naming the entry, for a source without voxels;
 /// Error{interrupted}.

@@ -192,6 +192,59 @@ TEST_F(LabelCase, RefusalsOfTheRest) {
           "10:tissues[1]: no label of the table is left (leave it out)");
 }
 
+TEST_F(LabelCase, LimbsToBeHeldApartAreRead) {
+  const std::string apart =
+      "labels:\n  apart: {gap_mm: 4.5, limbs: [{labels: [Femora, 5], segments: [thigh_right], joints: 3}]}\n";
+  const Case patient = read(changed(kCase, "labels:\n", apart));
+  ASSERT_TRUE(patient.labels->apart);
+  const HeldApart& held = *patient.labels->apart;
+  EXPECT_EQ(held.gap_mm, 4.5);
+  ASSERT_EQ(held.limbs.size(), 1u);
+  EXPECT_EQ(held.limbs[0].ids, (std::vector<std::int64_t>{3, 5}));
+  EXPECT_EQ(held.limbs[0].segments, (std::vector<std::string>{"thigh_right"}));
+  EXPECT_EQ(held.limbs[0].joints, 3);
+  EXPECT_TRUE(held.where.ends_with("case.yaml:12:labels.apart")) << held.where;
+  EXPECT_EQ(patient.tissues.size(), 4u);  // its labels stand for no surface
+  EXPECT_FALSE(read(kCase).labels->apart);
+  const Case usual = read(changed(
+      kCase, "labels:\n", "labels:\n  apart: {gap_mm: 4, limbs: [{labels: 3, segments: [thigh_right]}]}\n"));
+  EXPECT_EQ(usual.labels->apart->limbs[0].joints, 2);
+  const Case without =
+      read(changed(kCase, "labels:\n", "labels:\n  apart: {gap_mm: 4, limbs: [{labels: 3}]}\n"));
+  EXPECT_TRUE(without.labels->apart->limbs[0].segments.empty());
+}
+
+TEST_F(LabelCase, RefusalsOfLimbsToBeHeldApart) {
+  const std::string where = "12:labels.apart";
+  const auto refuse = [&](const std::string& apart, const std::string& part) {
+    refused("labels:\n  file", "labels:\n  apart: {" + apart + "}\n  file", where + part);
+  };
+  const std::string limbs = "limbs: [{labels: [3], segments: [thigh_right]}]";
+  refuse("gap_mm: 0, " + limbs, ".gap_mm: 0 is out of range (give more than 0, at most 100)");
+  refuse("gap_mm: 101, " + limbs, ".gap_mm: 101 is out of range");
+  refuse("gap: 3, " + limbs, ".gap: unknown key 'gap' (use gap_mm, limbs)");
+  refuse("gap_mm: 3, limbs: []", ".limbs: lists no limbs, or more than 100 (list 1 to 100 entries)");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segments: []}]",
+         ".limbs[0].segments: is empty (name the uppermost segment of a limb)");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segments: [thigh_rigth]}]",
+         ".limbs[0].segments[0]: unknown segment 'thigh_rigth' (did you mean 'thigh_right'?)");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segments: [pelvis]}]",
+         ".limbs[0].segments[0]: 'pelvis' is the root, on which everything hangs (name the uppermost of a "
+         "limb)");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segments: [thigh_right]}, {labels: [5], segments: [thigh_right]}]",
+         ".limbs[1].segments[0]: 'thigh_right' is of one limb with 'thigh_right' (name the uppermost alone)");
+  refuse("gap_mm: 3, limbs: [{labels: [3, Femora], segments: [thigh_right]}]",
+         ".limbs[0].labels: label 3 stands twice (keep one)");
+  refuse("gap_mm: 3, limbs: [{labels: [88], segments: [thigh_right]}]",
+         ".limbs[0].labels: label 88 is not in the label map");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segments: [thigh_right], joints: 0}]",
+         ".limbs[0].joints: 0 is out of range (give 1 to 16)");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segments: [thigh_right], joints: 17}]",
+         ".limbs[0].joints: 17 is out of range");
+  refuse("gap_mm: 3, limbs: [{labels: [3], segment: [thigh_right]}]",
+         ".limbs[0].segment: unknown key 'segment' (did you mean 'segments'?)");
+}
+
 TEST_F(LabelCase, RefusalsWithoutALabelMap) {
   const std::string none = kCase.substr(0, kCase.find("labels:\n"));
   expect_error(ErrorKind::config,
