@@ -15,6 +15,7 @@
 #include "app/report/page.hpp"
 #include "app/stage_folder.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/files/stale_parts.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
 #include "io/surface/surface_file.hpp"
@@ -98,6 +99,12 @@ void inspect(const Case& patient, const Context& context) {
   }
 }
 
+// What killed runs left of the same output.
+void sweep(const fs::path& output) {
+  const fs::path folder = output.parent_path();
+  files::remove_stale_parts(folder.empty() ? "." : folder, output.filename().string());
+}
+
 // What would fail only after minutes of work is refused first.
 void check_outputs(const Settings& settings) {
   if (settings.output.extension() != ".hdf") {
@@ -105,12 +112,14 @@ void check_outputs(const Settings& settings) {
                 "name it so: ParaView opens VTKHDF files by that ending");
   }
   const files::AtomicFile model(settings.output);
+  sweep(settings.output);
   if (settings.report.empty()) return;
   if (settings.report.extension() != ".html") {
     throw Error(ErrorKind::usage, "--report", "'" + settings.report.string() + "' does not end in .html",
                 "name it so");
   }
   const files::AtomicFile report(settings.report);
+  sweep(settings.report);
 }
 
 // `context`, whose warnings are also put behind `warnings`.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/files/atomic_file.hpp"
+#include "core/files/stale_parts.hpp"
 #include "core/model_file/digest.hpp"
 #include "core/values/error.hpp"
 
@@ -42,6 +43,7 @@ StageFolder::StageFolder(fs::path folder, double limit_gib)
       limit_(static_cast<std::uint64_t>(limit_gib * (1U << 30))),
       program_(own_digest()) {
   files::make_folder(folder_);
+  files::remove_stale_parts(folder_, "*.stage");
 }
 
 fs::path StageFolder::path_of(std::string_view name) const {

@@ -18,7 +18,7 @@ namespace ecorche::app {
 /// folder.
 class StageFolder : public preprocess::StageStore {
  public:
-  /// Makes the folder. Throws Error{cannot_create}.
+  /// Makes the folder, and sweeps what killed runs left half written. Throws Error{cannot_create}.
   StageFolder(std::filesystem::path folder, double limit_gib);
 
   std::uint64_t program() const override { return program_; }

@@ -258,7 +258,8 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   Stages stage(stage_names(options), context, hooks, result.stages);
 
   model.name = patient.name;
-  model.rig = stage([&] { return rig::fit(patient, context); });
+  model.rig = stage.kept([&](const Context& inner) { return rig::fit(patient, inner); }, patient,
+                         RigRequest{patient});
   model.bone_segment = owners(patient, model.rig.skeleton);
   for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);
 

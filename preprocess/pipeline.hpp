@@ -60,8 +60,7 @@ struct Result {
 struct Hooks {
   /// As each stage starts.
   std::function<void(std::string_view name, int index, int count)> on_stage = {};
-  /// Where stages are kept from run to run. The rig and the certificate are not: the one takes as long as its
-  /// key, the other must be measured on what is there.
+  /// Where stages are kept from run to run. The certificate is not: it must be measured on what is there.
   StageStore* store = nullptr;
   /// Called where weights or certificate are refused and the mesh has tets to blame, with the worst of them.
   /// What it returns is put before the error's advice: where to look.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -63,6 +64,20 @@ class Out {
   void put(const Eigen::Matrix<T, Eigen::Dynamic, Columns, Eigen::RowMajor>& rows) {
     length(static_cast<std::size_t>(rows.rows()));
     raw(std::as_bytes(std::span(rows.data(), static_cast<std::size_t>(rows.size()))));
+  }
+  template <class T, int Rows, int Columns>
+  requires(Rows > 0 && Columns > 0) void put(const Eigen::Matrix<T, Rows, Columns>& values) {
+    raw(std::as_bytes(std::span(values.data(), static_cast<std::size_t>(values.size()))));
+  }
+  template <class A, class B>
+  void put(const std::pair<A, B>& two) {
+    put(two.first);
+    put(two.second);
+  }
+  template <class T>
+  void put(const std::shared_ptr<const T>& shared) {
+    put(shared != nullptr);
+    if (shared) put(*shared);
   }
   template <class K, class V>
   void put(const std::map<K, V>& entries) {
@@ -151,6 +166,10 @@ class Unpacker {
   void get(Eigen::Matrix<T, Eigen::Dynamic, Columns, Eigen::RowMajor>& rows) {
     rows.resize(static_cast<Eigen::Index>(length(sizeof(T) * Columns)), Columns);
     raw(rows.data(), sizeof(T) * static_cast<std::size_t>(rows.size()));
+  }
+  template <class T, int Rows, int Columns>
+  requires(Rows > 0 && Columns > 0) void get(Eigen::Matrix<T, Rows, Columns>& values) {
+    raw(values.data(), sizeof(T) * static_cast<std::size_t>(values.size()));
   }
   template <class T>
   requires requires(Unpacker& unpacker, T& value) { fields(unpacker, value); }

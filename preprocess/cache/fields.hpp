@@ -7,6 +7,7 @@
 
 #include "core/model_file/figures.hpp"
 #include "core/values/case.hpp"
+#include "core/values/joint_rule.hpp"
 #include "core/values/model.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
@@ -60,6 +61,83 @@ void fields(A& archive, T& skeleton) {
 template <class A, Some<Tissue> T>
 void fields(A& archive, T& tissue) {
   archive(tissue.name, tissue.group, tissue.V, tissue.F, tissue.segment, tissue.tet, tissue.barycentric);
+}
+
+template <class A, Some<AngleAxis> T>
+void fields(A& archive, T& angle) {
+  archive(angle.name, angle.axis, angle.sign, angle.rest, angle.min, angle.max);
+}
+
+template <class A, Some<Coupling> T>
+void fields(A& archive, T& coupling) {
+  archive(coupling.joint, coupling.angle, coupling.drives, coupling.ratio);
+}
+
+/// Without the rule by which it is found, which a rig has no more.
+template <class A, Some<Joint> T>
+void fields(A& archive, T& joint) {
+  archive(joint.name, joint.kind, joint.rule, joint.center, joint.center_bone, joint.facing_bone, joint.axes,
+          joint.sequence, joint.limits_source, joint.coupled);
+}
+
+template <class A, Some<Segment> T>
+void fields(A& archive, T& segment) {
+  archive(segment.name, segment.parent, segment.joint, segment.aliases);
+}
+
+template <class A, Some<Skeleton> T>
+void fields(A& archive, T& skeleton) {
+  archive(skeleton.name, skeleton.segments);
+}
+
+template <class A, Some<JointFit> T>
+void fields(A& archive, T& fit) {
+  archive(fit.joint, fit.rule, fit.radius_mm, fit.residual_mm, fit.inlier_share, fit.points, fit.confidence);
+}
+
+template <class A, Some<Rig> T>
+void fields(A& archive, T& rig) {
+  archive(rig.skeleton, rig.fits);
+}
+
+// How joints are to be found: for keys only.
+
+template <class A>
+void fields(A& archive, const Region& region) {
+  archive(region.name, region.bone, region.segment, region.boxes.size());
+  for (const Eigen::AlignedBox3d& box : region.boxes) archive(box.min(), box.max());
+  archive(region.of_bones, region.near, region.along, region.points);
+}
+
+template <class A>
+void fields(A& archive, const RegionUse& use) {
+  archive(use.region, use.bone, use.facing, use.segment, use.facing_segment, use.looks);
+}
+
+template <class A>
+void fields(A& archive, const PointSource& source) {
+  archive(source.rule, source.point, source.on, source.parts, source.share, source.joint);
+}
+
+template <class A>
+void fields(A& archive, const DirectionSource& source) {
+  archive(source.kind, source.direction, source.from, source.to, source.joint, source.choices);
+}
+
+template <class A>
+void fields(A& archive, const JointRule& rule) {
+  archive(rule.center, rule.axes, rule.measured_rest);
+}
+
+/// All that the rig reads of a case beside its surfaces.
+struct RigRequest {
+  const Case& patient;
+};
+
+template <class A>
+void fields(A& archive, const RigRequest& request) {
+  archive(request.patient.skeleton, request.patient.regions, request.patient.generic);
+  for (const Segment& segment : request.patient.skeleton.segments) archive(segment.joint.how);
 }
 
 /// The surfaces of a case: all that the stages behind the rig read of it. For keys only.

@@ -14,7 +14,7 @@ import unittest
 
 ECORCHE = os.environ["ECORCHE_BIN"]
 CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
-STAGES = ["voxelize", "mesh", "weights", "cor", "mapping"]
+STAGES = ["rig", "voxelize", "mesh", "weights", "cor", "mapping"]
 
 
 class Cache(unittest.TestCase):
@@ -42,8 +42,8 @@ class Cache(unittest.TestCase):
         first = self.model.read_bytes()
         self.assertEqual(self.taken(), STAGES)
         self.assertEqual(self.model.read_bytes(), first)
-        self.assertEqual(self.taken("--cor-sigma", 0.08), ["voxelize", "mesh", "weights", "mapping"])
-        self.assertEqual(self.taken("--voxel", 10), [])
+        self.assertEqual(self.taken("--cor-sigma", 0.08), ["rig", "voxelize", "mesh", "weights", "mapping"])
+        self.assertEqual(self.taken("--voxel", 10), ["rig"])
         shutil.rmtree(self.cache)
         self.assertEqual(self.taken(), [])
         self.assertEqual(self.model.read_bytes(), first)
@@ -56,6 +56,29 @@ class Cache(unittest.TestCase):
         process.send_signal(signal.SIGKILL)
         process.wait()
         self.assertIn("mesh", self.taken())
+
+    def test_what_a_killed_writer_left_is_swept_by_the_next_run_of_that_output(self):
+        half = []
+        for _ in range(30):  # until it is killed while it writes
+            process = subprocess.Popen(self.words(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            part = self.folder / f".{process.pid}.part.m.hdf"
+            while process.poll() is None and not part.exists():
+                pass
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            half += [part] if part.exists() else []
+            if half:
+                break
+        self.assertTrue(half, "no writer was killed in time")
+        stage = self.cache / f".{process.pid}.part.cor-0123.stage"
+        stage.write_text("half")
+        kept = [self.folder / f".{os.getpid()}.part.m.hdf",  # of a process that lives
+                self.folder / f".{process.pid}.part.other.hdf", self.folder / ".x.part.m.hdf", self.folder / f".{process.pid}.m.hdf"]
+        for path in kept:
+            path.write_text("mine")
+        self.taken()
+        self.assertFalse(any(path.exists() for path in [*half, stage]))
+        self.assertTrue(all(path.exists() for path in kept))
 
     def test_damaged_stages_are_made_again(self):
         self.taken()

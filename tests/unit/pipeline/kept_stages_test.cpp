@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
 #include <map>
+#include <memory>
 
 #include "core/model_file/model_file.hpp"
 #include "preprocess/cache/kept_stage.hpp"
@@ -48,9 +50,9 @@ TEST(KeptStages, a_second_run_takes_all_and_gives_the_same_model) {
   const Result plain = run(test::two_bones(), coarse(), {}, {});
   const Result first = run(test::two_bones(), coarse(), {}, {.store = &store});
   EXPECT_EQ(taken(first), "");
-  EXPECT_EQ(store.held.size(), 5U);
+  EXPECT_EQ(store.held.size(), 6U);
   const Result again = run(test::two_bones(), coarse(), {}, {.store = &store});
-  EXPECT_EQ(taken(again), "voxelize mesh weights cor mapping ");
+  EXPECT_EQ(taken(again), "rig voxelize mesh weights cor mapping ");
   EXPECT_EQ(model_file::identity(again.model), model_file::identity(plain.model));
   EXPECT_EQ(model_file::identity(first.model), model_file::identity(plain.model));
   EXPECT_EQ(again.model.provenance, plain.model.provenance);
@@ -62,14 +64,14 @@ TEST(KeptStages, spheres_are_kept_too) {
   Options options = coarse();
   options.spheres_tp = 0.3;
   const Result first = run(test::two_bones(), options, {}, {.store = &store});
-  EXPECT_EQ(store.held.size(), 6U);
+  EXPECT_EQ(store.held.size(), 7U);
   const Result again = run(test::two_bones(), options, {}, {.store = &store});
-  EXPECT_EQ(taken(again), "voxelize spheres mesh weights cor mapping ");
+  EXPECT_EQ(taken(again), "rig voxelize spheres mesh weights cor mapping ");
   EXPECT_EQ(model_file::identity(again.model), model_file::identity(first.model));
   EXPECT_EQ(again.warnings, first.warnings);
   options.spheres_tp = 0.2;
   EXPECT_EQ(taken(run(test::two_bones(), options, {}, {.store = &store})),
-            "voxelize mesh weights cor mapping ");
+            "rig voxelize mesh weights cor mapping ");
   Case other = test::two_bones();
   other.skeleton.segments[1].joint.center.x() += 1;  // they hang on the rig
   const std::string moved = taken(run(other, options, {}, {.store = &store}));
@@ -85,32 +87,83 @@ TEST(KeptStages, only_what_reads_the_change_is_made_again) {
 
   Options sigma = coarse();
   sigma.cor_sigma = 0.08;
-  EXPECT_EQ(after(test::two_bones(), sigma), "voxelize mesh weights mapping ");
+  EXPECT_EQ(after(test::two_bones(), sigma), "rig voxelize mesh weights mapping ");
   Options solver = coarse();
   solver.solver = "eigen";  // its weights differ in the last bits from amg's and cholmod's
   const std::string eigen = after(test::two_bones(), solver);
-  EXPECT_EQ(eigen.substr(0, 14), "voxelize mesh ") << "skinning does not mesh again";
+  EXPECT_EQ(eigen.substr(0, 18), "rig voxelize mesh ") << "skinning does not mesh again";
   EXPECT_EQ(eigen.find("weights"), std::string::npos);
   Options smooth = coarse();
   smooth.weights = "quasi-harmonic";
   const std::string other = after(test::two_bones(), smooth);
-  EXPECT_EQ(other.substr(0, 14), "voxelize mesh ");
+  EXPECT_EQ(other.substr(0, 18), "rig voxelize mesh ");
   EXPECT_EQ(other.find("weights"), std::string::npos);
   Options voxel = coarse();
   voxel.voxel_mm = 6;
-  EXPECT_EQ(after(test::two_bones(), voxel), "");
+  EXPECT_EQ(after(test::two_bones(), voxel), "rig ");
   Options tets = coarse();
   tets.max_tets = 900'000;
-  EXPECT_EQ(after(test::two_bones(), tets), "voxelize weights cor mapping ") << "the same mesh came out";
+  EXPECT_EQ(after(test::two_bones(), tets), "rig voxelize weights cor mapping ") << "the same mesh came out";
 
   Case muscle = test::two_bones();
   muscle.tissues[0].surface.V.rowwise() += Eigen::RowVector3d(0.5, 0, 0);
-  EXPECT_EQ(after(muscle, coarse()), "voxelize mesh weights cor ");
+  EXPECT_EQ(after(muscle, coarse()), "rig voxelize mesh weights cor ");
   Case bone = test::two_bones();
   bone.bones[0].surface.V(0, 0) += 1e-9;
   EXPECT_EQ(after(bone, coarse()).find("mesh"), std::string::npos);
   store.program_ = 2;
   EXPECT_EQ(after(test::two_bones(), coarse()), "") << "another build";
+}
+
+// The rig goes by all that finds it, not by what only later stages read.
+TEST(KeptStages, a_rig_goes_by_its_joints_and_how_they_are_to_be_found) {
+  MemoryStore store;
+  const auto rig_is_kept = [&](const Case& patient) {
+    return taken(run(patient, coarse(), {}, {.store = &store})).starts_with("rig ");
+  };
+  EXPECT_FALSE(rig_is_kept(test::two_bones()));
+  EXPECT_TRUE(rig_is_kept(test::two_bones()));
+  const auto with = [](auto&& change) {
+    Case patient = test::two_bones();
+    change(patient, patient.skeleton.segments[1].joint);
+    return patient;
+  };
+  const Case changed[] = {
+      with([](Case&, Joint& joint) { joint.center.x() += 1; }),
+      with([](Case&, Joint& joint) {
+        joint.axes = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).matrix();
+      }),
+      with([](Case&, Joint& joint) { joint.name += "_other"; }),
+      with([](Case&, Joint& joint) { joint.limits_source = "a book"; }),
+      with([](Case& patient, Joint&) { patient.skeleton.segments[1].aliases = {"Other"}; }),
+      with([](Case& patient, Joint&) { patient.regions.emplace_back().name = "r"; }),
+      with([](Case&, Joint& joint) {
+        JointRule rule;
+        rule.center.point = joint.center;
+        joint.how = std::make_shared<const JointRule>(rule);
+      }),
+      with([](Case&, Joint& joint) {
+        JointRule rule;
+        rule.center.point = joint.center + Eigen::Vector3d(0, 0, 1);
+        joint.how = std::make_shared<const JointRule>(rule);
+      }),
+      with([](Case&, Joint& joint) {
+        JointRule rule;
+        rule.center.point = joint.center;
+        DirectionSource along;
+        along.direction = Eigen::Vector3d(0, 1, 1).normalized();
+        rule.axes = {{1, along}, {0, {}}};
+        rule.axes[1].second.direction = Eigen::Vector3d::UnitX();
+        joint.how = std::make_shared<const JointRule>(rule);
+      }),
+      with([](Case& patient, Joint&) { patient.bones[1].surface.V(0, 0) += 1e-9; })};
+  for (const Case& patient : changed) {
+    EXPECT_FALSE(rig_is_kept(patient)) << &patient - changed;
+    EXPECT_TRUE(rig_is_kept(patient)) << &patient - changed;
+  }
+  Case muscle = test::two_bones();
+  muscle.tissues[0].surface.V.rowwise() += Eigen::RowVector3d(0.5, 0, 0);
+  EXPECT_TRUE(rig_is_kept(muscle));
 }
 
 TEST(KeptStages, an_interrupted_run_goes_on_at_its_last_stage) {
@@ -125,7 +178,7 @@ TEST(KeptStages, an_interrupted_run_goes_on_at_its_last_stage) {
                         },
                     .store = &store}),
                Error);
-  EXPECT_EQ(taken(run(test::two_bones(), coarse(), {}, {.store = &store})), "voxelize mesh weights ");
+  EXPECT_EQ(taken(run(test::two_bones(), coarse(), {}, {.store = &store})), "rig voxelize mesh weights ");
 }
 
 TEST(KeptStages, warnings_come_again) {
@@ -143,10 +196,13 @@ TEST(KeptStages, what_is_damaged_is_made_again) {
   MemoryStore store;
   const auto identity = model_file::identity(run(test::two_bones(), coarse(), {}, {.store = &store}).model);
   const std::map<std::string, std::string> good = store.held;
-  for (const std::size_t length : {0, 1, 7, 8, 100, 5000}) {
-    for (auto& [name, bytes] : store.held) bytes = good.at(name).substr(0, length);
+  for (const std::size_t cut : {1, 2, 3, 4, 5, 6}) {
+    for (auto& [name, bytes] : store.held) {
+      const std::string& whole = good.at(name);
+      bytes = whole.substr(0, std::array<std::size_t, 7>{0, 0, 1, 7, 8, 100, whole.size() - 1}[cut]);
+    }
     const Result result = run(test::two_bones(), coarse(), {}, {.store = &store});
-    EXPECT_EQ(taken(result), "") << length;
+    EXPECT_EQ(taken(result), "") << cut;
     EXPECT_EQ(model_file::identity(result.model), identity);
   }
   for (auto& [name, bytes] : store.held) bytes = good.at(name) + "x";
@@ -159,8 +215,8 @@ TEST(KeptStages, a_store_that_is_full_is_warned_of) {
   MemoryStore store;
   store.full = true;
   const Result result = run(test::two_bones(), coarse(), {}, {.store = &store});
-  ASSERT_EQ(result.warnings.size(), 5U);
-  EXPECT_EQ(result.warnings[0].substr(0, 19), "not kept: voxelize-") << result.warnings[0];
+  ASSERT_EQ(result.warnings.size(), 6U);
+  EXPECT_EQ(result.warnings[0].substr(0, 14), "not kept: rig-") << result.warnings[0];
   EXPECT_NE(result.warnings[0].find("no room"), std::string::npos);
 }
 
@@ -204,6 +260,67 @@ TEST(Archive, every_value_comes_back) {
   EXPECT_EQ(tissue_back.barycentric, tissue.barycentric);
   EXPECT_EQ(spheres_back.voxel, spheres.voxel);
   EXPECT_EQ(spheres_back.metric, spheres.metric);
+}
+
+TEST(Archive, a_rig_comes_back) {
+  Rig rig;
+  rig.skeleton.name = "s";
+  rig.skeleton.segments.resize(2);
+  Segment& segment = rig.skeleton.segments[1];
+  segment.name = "shank";
+  segment.parent = 0;
+  segment.aliases = {"A", "B"};
+  Joint& joint = segment.joint;
+  joint.name = "knee";
+  joint.kind = JointKind::hinge;
+  joint.rule = CenterRule::between;
+  joint.center = {1, 2, 3};
+  joint.center_bone = "c";
+  joint.facing_bone = "f";
+  joint.axes << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  joint.sequence = {{"flexion", 2, -1, 0.25, -0.5, 2}};
+  joint.limits_source = "l";
+  joint.coupled = {{"knee", "flexion", "y_mm", 3.5}};
+  rig.fits = {{"knee", CenterRule::plane_fit, 1, 2, 0.5, 77, 0.75}};
+  cache::Packer pack;
+  pack(rig);
+  const std::string bytes = pack.take();
+  Rig back;
+  cache::Unpacker unpack(bytes);
+  unpack(back);
+  EXPECT_TRUE(unpack.done());
+  EXPECT_EQ(back.skeleton.name, "s");
+  ASSERT_EQ(back.skeleton.segments.size(), 2U);
+  const Segment& s = back.skeleton.segments[1];
+  EXPECT_EQ(back.skeleton.segments[0].parent, -1);
+  EXPECT_EQ(s.name, "shank");
+  EXPECT_EQ(s.parent, 0);
+  EXPECT_EQ(s.aliases, segment.aliases);
+  EXPECT_EQ(s.joint.name, "knee");
+  EXPECT_EQ(s.joint.kind, JointKind::hinge);
+  EXPECT_EQ(s.joint.rule, CenterRule::between);
+  EXPECT_EQ(s.joint.center, joint.center);
+  EXPECT_EQ(s.joint.center_bone, "c");
+  EXPECT_EQ(s.joint.facing_bone, "f");
+  EXPECT_EQ(s.joint.axes, joint.axes);
+  ASSERT_EQ(s.joint.sequence.size(), 1U);
+  const AngleAxis& angle = s.joint.sequence[0];
+  EXPECT_EQ(angle.name, "flexion");
+  EXPECT_EQ(angle.axis, 2);
+  EXPECT_EQ((std::array{angle.sign, angle.rest, angle.min, angle.max}), (std::array{-1.0, 0.25, -0.5, 2.0}));
+  EXPECT_EQ(s.joint.limits_source, "l");
+  ASSERT_EQ(s.joint.coupled.size(), 1U);
+  EXPECT_EQ(s.joint.coupled[0].drives, "y_mm");
+  EXPECT_EQ(s.joint.coupled[0].ratio, 3.5);
+  ASSERT_EQ(back.fits.size(), 1U);
+  EXPECT_EQ(back.fits[0].rule, CenterRule::plane_fit);
+  EXPECT_EQ(back.fits[0].points, 77);
+  EXPECT_EQ(back.fits[0].confidence, 0.75);
+  for (std::size_t length = 0; length < bytes.size(); ++length) {  // every cut is noticed
+    Rig cut;
+    cache::Unpacker some(std::string_view(bytes).substr(0, length));
+    EXPECT_THROW(some(cut), cache::Misread) << length;
+  }
 }
 
 TEST(Archive, any_byte_and_any_border_between_values_changes_the_hash) {

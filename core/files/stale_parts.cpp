@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/files/stale_parts.hpp"
+
+#include <signal.h>
+#include <sys/types.h>
+
+#include <cerrno>
+#include <charconv>
+#include <string>
+#include <system_error>
+#include <vector>
+
+namespace ecorche::files {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Whether `file` is `.PID.part.NAME` and no process has that number.
+bool is_stale(std::string_view file, std::string_view name) {
+  constexpr std::string_view mark = ".part.";
+  if (!file.starts_with('.')) return false;
+  pid_t process = 0;
+  const char* const end = file.data() + file.size();
+  const auto [rest, error] = std::from_chars(file.data() + 1, end, process);
+  if (error != std::errc() || process <= 0) return false;
+  std::string_view own(rest, static_cast<std::size_t>(end - rest));
+  if (!own.starts_with(mark)) return false;
+  own.remove_prefix(mark.size());
+  if (name.starts_with('*') ? !own.ends_with(name.substr(1)) : own != name) return false;
+  return ::kill(process, 0) != 0 && errno == ESRCH;
+}
+
+}  // namespace
+
+void remove_stale_parts(const fs::path& folder, std::string_view name) {
+  std::error_code error;
+  std::vector<fs::path> stale;
+  fs::directory_iterator at(folder, error);
+  for (; !error && at != fs::directory_iterator(); at.increment(error)) {
+    if (is_stale(at->path().filename().string(), name) && at->is_regular_file(error))
+      stale.push_back(at->path());
+    error.clear();
+  }
+  for (const fs::path& path : stale) fs::remove(path, error);
+}
+
+}  // namespace ecorche::files
