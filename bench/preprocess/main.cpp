@@ -3,6 +3,7 @@
 // calls it.
 #include <tbb/global_control.h>
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -48,6 +49,16 @@ PeerRun run_igl(const Case& patient, const Model& model) {
   return libigl_harmonic(mesh.V, mesh.T, fixed, values);
 }
 
+// As many tets as the model has, about: a first mesh tells how fine that is.
+PeerRun run_cgal(const Case& patient, const Model& model) {
+  const double voxel = std::stod(model.provenance.at("option/voxel_mm"));
+  double near = 2.5 * voxel;
+  const PeerRun first = cgal_parallel(patient, voxel, near);
+  if (first.version.empty()) return first;
+  near *= std::cbrt(static_cast<double>(first.made) / static_cast<double>(model.tet_count()));
+  return cgal_parallel(patient, voxel, near);
+}
+
 int run(const std::string& peer, const std::string& case_path, const std::string& model_path, int runs) {
   const Case patient = io::read_case(case_path, {}, {});
   const Model model = model_file::read(model_path, {});
@@ -59,6 +70,7 @@ int run(const std::string& peer, const std::string& case_path, const std::string
     if (peer == "vtk_tree") one = vtk_locate(model, points, true);
     if (peer == "openvdb") one = openvdb_voxelize(patient, std::stod(model.provenance.at("option/voxel_mm")));
     if (peer == "libigl") one = run_igl(patient, model);
+    if (peer == "cgal_parallel") one = run_cgal(patient, model);
     if (peer == "brute_cor") one = brute_cor(model, kSampledNodes);
     out["version"] = one.version;
     out["did"] = one.did;
@@ -77,8 +89,10 @@ int run(const std::string& peer, const std::string& case_path, const std::string
 
 int main(int argc, char** argv) {
   if (argc != 5) {
-    std::fprintf(stderr,
-                 "usage: bench_preprocess vtk_static|vtk_tree|openvdb|libigl|brute_cor CASE MODEL RUNS\n");
+    std::fprintf(
+        stderr,
+        "usage: bench_preprocess vtk_static|vtk_tree|openvdb|libigl|cgal_parallel|brute_cor CASE MODEL "
+        "RUNS\n");
     return 64;
   }
   try {

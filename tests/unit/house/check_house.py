@@ -33,7 +33,7 @@ PLAIN_HEADERS = {"core/values/image.hpp", "core/values/error.hpp", "core/values/
 FOREIGN_IN_VALUES = re.compile(r"#include <(hdf5|H5|yaml|tbb|spdlog|fmt|fstream|filesystem|thread|mutex)")
 # Units that link GPL or AGPL libraries carry that licence themselves; nothing else may include those libraries.
 GPL_UNITS = ("preprocess/tet/cgal/", "preprocess/tet/tetgen/", "preprocess/weights/cholmod/",
-             "preprocess/check/cgal/")
+             "preprocess/check/cgal/", "bench/preprocess/cgal_parallel.cpp")
 GPL_INCLUDE = re.compile(r'#include [<"](CGAL/|tetgen|suitesparse/|cholmod)')
 GPL_LIBRARIES = re.compile(r"lib(tet|cholmod|CGAL|gmp|mpfr)[.\-]", re.I)
 SPDX = re.compile(r"SPDX-License-Identifier: (Apache-2\.0|AGPL-3\.0-or-later)")
