@@ -161,9 +161,10 @@ void DeltaKey::prepare(std::span<const std::uint16_t> numbers, std::size_t first
   }
 }
 
-std::size_t DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t first_block,
-                             std::size_t end_block, std::span<std::byte> out) const {
+EncodedDelta DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t first_block,
+                              std::size_t end_block, std::span<std::byte> out) const {
   std::size_t at = 0;
+  bool on_side = false;
   for (std::size_t b = first_block; b < end_block; ++b) {
     const std::size_t first = b * block_vertices;
     const std::size_t count = std::min(block_vertices, vertices_ - first);
@@ -180,7 +181,8 @@ std::size_t DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t
       header.base[c] = static_cast<std::uint16_t>(padded.data()[c] - mapped(header, key, c));
     alignas(64) std::array<std::int16_t, 3 * block_vertices> left;
     std::array<std::int16_t, 3> least{}, largest{};
-    kernels::residuals(header, key, padded.data(), rows, ahead, left.data(), least.data(), largest.data());
+    on_side |= kernels::residuals(header, key, padded.data(), rows, ahead, left.data(), least.data(),
+                                  largest.data());
     for (std::size_t c = 0; c < 3; ++c) {
       header.base[c] = static_cast<std::uint16_t>(header.base[c] + least[c]);
       header.width[c] =
@@ -194,7 +196,7 @@ std::size_t DeltaKey::encode(std::span<const std::uint16_t> numbers, std::size_t
       at += 2 * lanes * Header::words(rows, header.width[c]);
     }
   }
-  return at;
+  return {.bytes = at, .on_side = on_side};
 }
 
 // The affine map by least squares over some rows.

@@ -56,6 +56,12 @@ struct Header {
 };
 }  // namespace delta
 
+/// What an encoder has written, and seen on the way.
+struct EncodedDelta {
+  std::size_t bytes = 0;
+  bool on_side = false;  ///< some number is 0 or 65535
+};
+
 /// A keyframe as the encoder reads it.
 class DeltaKey {
  public:
@@ -68,10 +74,10 @@ class DeltaKey {
   void prepare(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block);
 
   /// Writes the blocks [first, end) of `numbers` (3 * #V) to the front of `out`, which has room for
-  /// delta::most_bytes(end - first), and returns how many bytes they took. Deterministic; blocks are
-  /// independent, so their bytes may be made in pieces and put together.
-  std::size_t encode(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block,
-                     std::span<std::byte> out) const;
+  /// delta::most_bytes(end - first). Deterministic; blocks are independent, so their bytes may be made in
+  /// pieces and put together.
+  EncodedDelta encode(std::span<const std::uint16_t> numbers, std::size_t first_block, std::size_t end_block,
+                      std::span<std::byte> out) const;
 
  private:
   struct Block {

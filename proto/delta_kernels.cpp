@@ -112,7 +112,7 @@ HWY_INLINE void sum_up(F f, const hn::Vec<F>* v, float* sums) {
 
 // What is left of a block's coordinates after its map, in three planes, and the least and the largest of
 // each. Meanwhile the block `ahead` comes into the cache: otherwise memory's latency is most of the time.
-void residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
+bool residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
                std::size_t rows, Ahead ahead, std::int16_t* left, std::int16_t* least,
                std::int16_t* largest) {
   const I16 d;
@@ -125,6 +125,9 @@ void residuals(const delta::Header& header, const std::int16_t* key, const std::
   const V most = hn::Set(d, std::int16_t{32767}), least_of_all = hn::Set(d, std::int16_t{-32768});
   V low_x = most, low_y = most, low_z = most;
   V high_x = least_of_all, high_y = least_of_all, high_z = least_of_all;
+  // Of the numbers plus one: 65535 becomes 0, and 0 becomes 1.
+  const auto one = hn::Set(U16(), std::uint16_t{1});
+  auto lowest = hn::Set(U16(), std::uint16_t{65535});
   const V from_x = as_signed(hn::Set(U16(), header.base[0])),
           from_y = as_signed(hn::Set(U16(), header.base[1])),
           from_z = as_signed(hn::Set(U16(), header.base[2]));
@@ -137,6 +140,7 @@ void residuals(const delta::Header& header, const std::int16_t* key, const std::
     }
     hn::Vec<U16> qx, qy, qz;
     triples.load(numbers + 3 * i, qx, qy, qz);
+    lowest = hn::Min(hn::Min(lowest, hn::Add(qx, one)), hn::Min(hn::Add(qy, one), hn::Add(qz, one)));
     const V x = hn::LoadU(d, key + i), y = hn::LoadU(d, key + kPlane + i),
             z = hn::LoadU(d, key + 2 * kPlane + i);
     const V ex = hn::Sub(hn::Sub(as_signed(qx), from_x), moved ? x : map(0, x, y, z));
@@ -154,6 +158,7 @@ void residuals(const delta::Header& header, const std::int16_t* key, const std::
   }
   const V low[3] = {low_x, low_y, low_z}, high[3] = {high_x, high_y, high_z};
   extremes(low, high, least, largest);
+  return !hn::AllTrue(U16(), hn::Gt(lowest, one));
 }
 
 // One plane: lane l's words are the bits of its rows, first row lowest; word j of all lanes stands together.
@@ -338,10 +343,10 @@ HWY_EXPORT(fit_sums);
 HWY_EXPORT(extent);
 HWY_EXPORT(scale);
 
-void residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
+bool residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
                std::size_t rows, Ahead ahead, std::int16_t* left, std::int16_t* least,
                std::int16_t* largest) {
-  HWY_DYNAMIC_DISPATCH(residuals)(header, key, numbers, rows, ahead, left, least, largest);
+  return HWY_DYNAMIC_DISPATCH(residuals)(header, key, numbers, rows, ahead, left, least, largest);
 }
 void pack(const std::int16_t* left, std::int16_t base, std::size_t rows, std::size_t width, std::byte* out) {
   HWY_DYNAMIC_DISPATCH(pack)(left, base, rows, width, out);

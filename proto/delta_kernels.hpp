@@ -14,8 +14,8 @@ struct Ahead {
 };
 
 /// What is left of `numbers` (interleaved) after the map of `header`, less header.base: three planes, and the
-/// least and the largest of each. `key`: the scaled planes.
-void residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
+/// least and the largest of each. `key`: the scaled planes. Returns whether a number is 0 or 65535.
+bool residuals(const delta::Header& header, const std::int16_t* key, const std::uint16_t* numbers,
                std::size_t rows, Ahead ahead, std::int16_t* left, std::int16_t* least, std::int16_t* largest);
 /// Packs one plane less `base`; `out` takes 2 * lanes * Header::words(rows, width) bytes, width at least 1.
 void pack(const std::int16_t* left, std::int16_t base, std::size_t rows, std::size_t width, std::byte* out);

@@ -17,11 +17,12 @@
 namespace ecorche::server {
 namespace {
 
-// On Linux a thread may have a priority of its own; anybody may lower it.
+// On Linux a thread may have a priority of its own; anybody may lower it. Not to the least: who waits for a
+// lock of this thread's then waits for all others.
 void politely(const Job& job) {
 #ifdef __linux__
-  constexpr int kLeast = 19;
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kLeast);
+  constexpr int kNice = 10;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
 #endif
   job();
 }

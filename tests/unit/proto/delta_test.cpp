@@ -72,7 +72,7 @@ std::vector<std::byte> encode(const Numbers& key, const Numbers& now) {
   DeltaKey prepared(key.size() / 3);
   prepared.prepare(key, 0, prepared.blocks());
   std::vector<std::byte> bytes(delta::most_bytes(prepared.blocks()));
-  bytes.resize(prepared.encode(now, 0, prepared.blocks(), bytes));
+  bytes.resize(prepared.encode(now, 0, prepared.blocks(), bytes).bytes);
   return bytes;
 }
 
@@ -132,9 +132,30 @@ TEST(Delta, PiecesPutTogetherAreTheWhole) {
   prepared.prepare(key, 2, 4);
   prepared.prepare(key, 0, 2);
   std::vector<std::byte> bytes(delta::most_bytes(4));
-  const std::size_t first = prepared.encode(now, 0, 1, bytes);
-  bytes.resize(first + prepared.encode(now, 1, 4, std::span(bytes).subspan(first)));
+  const std::size_t first = prepared.encode(now, 0, 1, bytes).bytes;
+  bytes.resize(first + prepared.encode(now, 1, 4, std::span(bytes).subspan(first)).bytes);
   EXPECT_EQ(bytes, encode(key, now));
+}
+
+TEST(Delta, TellsWhetherANumberLiesOnASide) {
+  const Numbers key = sheet(700, 0);
+  DeltaKey prepared(700);
+  prepared.prepare(key, 0, 2);
+  std::vector<std::byte> bytes(delta::most_bytes(2));
+  EXPECT_FALSE(prepared.encode(key, 0, 2, bytes).on_side);
+  for (std::size_t i = 0; i < key.size(); ++i) {
+    for (const std::uint16_t side : {0, 65535}) {
+      Numbers now = key;
+      now[i] = side;
+      EXPECT_EQ(prepared.encode(now, 0, 1, bytes).on_side, i < 3 * delta::block_vertices) << i;
+      EXPECT_EQ(prepared.encode(now, 1, 2, bytes).on_side, i >= 3 * delta::block_vertices) << i;
+    }
+    for (const std::uint16_t within : {1, 65534}) {
+      Numbers now = key;
+      now[i] = within;
+      EXPECT_FALSE(prepared.encode(now, 0, 2, bytes).on_side) << i;
+    }
+  }
 }
 
 // What protocol 1 has written once it reads for ever: a block of 33 vertices, by hand.

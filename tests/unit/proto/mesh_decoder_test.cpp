@@ -47,7 +47,7 @@ Made delta(std::uint64_t number, std::uint64_t key, const std::vector<std::uint1
   DeltaKey prepared(3);
   prepared.prepare(kKey, 0, 1);
   std::vector<std::byte> bytes(delta::most_bytes(1));
-  bytes.resize(prepared.encode(numbers, 0, 1, bytes));
+  bytes.resize(prepared.encode(numbers, 0, 1, bytes).bytes);
   v1::MeshArray& array = *made.frame.add_arrays();
   array.set_tissue(4);
   array.set_kind(v1::MeshArray::KIND_POSITIONS);
