@@ -21,7 +21,7 @@ constexpr std::size_t kFittedRows =
     2;  // 64 vertices for 12 numbers: of 128 the deltas are 3 % smaller, and take a fifth longer
 constexpr std::size_t kFewestFitted =
     16;  // fewer are moved as they stand: the map would cost more than it saves
-constexpr std::size_t kBlocksAhead = 2;
+constexpr std::size_t kBlocksAhead = 1;
 constexpr float kMatrixOne = 1 << delta::matrix_digits;
 
 std::size_t rows_of(std::size_t vertices) {

@@ -7,7 +7,7 @@
 /// A block has `rows` whole rows here; planes are 512 apart. On the calling thread; allocate nothing.
 namespace ecorche::wire::kernels {
 
-/// Where a block stands that comes next but one or so; null: none does.
+/// Where a block stands that comes soon; null: none does.
 struct Ahead {
   const std::int16_t* key = nullptr;
   const std::uint16_t* numbers = nullptr;  ///< both of a whole block

@@ -20,9 +20,9 @@ namespace ecorche::server {
 /// a time uses it, on a worker.
 class MeshStream {
  public:
-  /// Frames from one keyframe to the next: fewer than 1 % are keyframes, or come after one that is being made
+  /// Frames from one keyframe to the next: 0.4 % are keyframes, or come after one that is being made
   /// ready, so that the tail of latencies is not theirs.
-  static constexpr std::uint64_t keyframe_interval = 256;
+  static constexpr std::uint64_t keyframe_interval = 512;
 
   /// `parts`: of the tissues of `want`, one for each, null where they are whole. `nodes`: of
   /// MeshWant::control_nodes.

@@ -147,6 +147,7 @@ TEST(Delta, TellsWhetherANumberLiesOnASide) {
     for (const std::uint16_t side : {0, 65535}) {
       Numbers now = key;
       now[i] = side;
+      EXPECT_TRUE(prepared.encode(now, 0, 2, bytes).on_side) << i;
       EXPECT_EQ(prepared.encode(now, 0, 1, bytes).on_side, i < 3 * delta::block_vertices) << i;
       EXPECT_EQ(prepared.encode(now, 1, 2, bytes).on_side, i >= 3 * delta::block_vertices) << i;
     }
