@@ -217,6 +217,62 @@ TEST(Unfold, WhatBonesSqueezeStaysAndIsCounted) {
   EXPECT_EQ(bent.body.nodes, nodes);
 }
 
+/// Beside the bend, the free end of the beam is sheared, and two nodes of the bone below it have changed
+/// places: what lies on them cannot be unfolded.
+struct Hopeless : Bent {
+  Hopeless() : Bent(2.2) {
+    Model changed = *model;
+    float end = 0;  // of the bone
+    for (std::size_t t = 0; t < changed.tet_count(); ++t) {
+      float low = 300, high = 0;
+      for (int c = 0; c < 4; ++c) {
+        const float z = changed.nodes(changed.tets(static_cast<Eigen::Index>(t), c), 2);
+        low = std::min(low, z);
+        high = std::max(high, z);
+      }
+      if (low > 210) changed.tet_label[t] = TetMesh::soft;
+      if (changed.tet_label[t] == 2) end = std::max(end, high);
+    }
+    std::vector<std::size_t> swapped;
+    for (Eigen::Index n = 0; n < changed.nodes.rows(); ++n) {
+      const auto row = static_cast<std::size_t>(3 * n);
+      const float above = changed.nodes(n, 2) - end;
+      if (above == 0) swapped.push_back(row);
+      if (above > 0) {
+        body.nodes[row] += 0.2F * above;
+        free_end.push_back(row);
+      } else if (changed.nodes(n, 2) < 150) {
+        bend.push_back(row);
+      }
+    }
+    for (std::size_t c = 0; c < 3; ++c)
+      std::swap(body.nodes[swapped.front() + c], body.nodes[swapped[1] + c]);
+    model = std::make_shared<const Model>(std::move(changed));
+  }
+  std::vector<std::size_t> free_end, bend;  // the first coordinates of their nodes
+};
+
+// Relaxed over and over, the end cannot be had any better. Unfolding the bend then leaves it alone.
+TEST(Unfold, WhatCannotBeUnfoldedPushesNothingAway) {
+  Hopeless beam;
+  const std::vector<float> skinned = beam.body.nodes;
+  ASSERT_GT(beam.free_end.size(), 20u);
+  std::size_t stayed = 0;
+  Unfolding done;
+  for (int times = 0; times < 4 && stayed < beam.free_end.size(); ++times) {
+    for (const std::size_t row : beam.bend) std::copy_n(&skinned[row], 3, &beam.body.nodes[row]);
+    const std::vector<float> before = beam.body.nodes;
+    done = unfold(*beam.model, beam.body, Context{});
+    stayed = static_cast<std::size_t>(std::count_if(
+        beam.free_end.begin(), beam.free_end.end(),
+        [&](std::size_t row) { return std::equal(&before[row], &before[row] + 3, &beam.body.nodes[row]); }));
+  }
+  EXPECT_EQ(stayed, beam.free_end.size());
+  EXPECT_GT(done.inverted_after, done.held);
+  EXPECT_LT(done.inverted_after, done.inverted_before);
+  EXPECT_GT(done.moved_nodes, 0u);
+}
+
 TEST(Unfold, SameForAnyNumberOfThreads) {
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
   Bent one(2.2), four(2.2);
