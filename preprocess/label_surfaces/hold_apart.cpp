@@ -301,6 +301,7 @@ std::vector<TakenOut> hold_apart(Case& patient, const Context& context) {
   erase(patient.labels->image, gone);
   for (Image& layer : patient.labels->overlaps) erase(layer, gone);
   std::vector<TakenOut> out;
+  out.reserve(count.size());
   for (const auto& [pair, voxels] : count) out.push_back({pair.first, pair.second, voxels});
   tell(patient, out, std::count_if(segment.begin(), segment.end(), [](std::int16_t s) { return s >= 0; }),
        context);

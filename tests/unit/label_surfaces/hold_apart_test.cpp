@@ -113,6 +113,17 @@ TEST(HoldApart, JointsSayWhatMayTouch) {
   EXPECT_EQ(hold_apart(near, {})[0].voxels, hold_apart(usual, {})[0].voxels);
 }
 
+TEST(HoldApart, ALimbIsNoStrangerToItself) {
+  CaseLabels folded = fused(0);  // the hand between the upper arm and the forearm
+  for (std::uint8_t& v : folded.image.scalars<std::uint8_t>())
+    v = v == fore_bone || v == hand_bone ? static_cast<std::uint8_t>(fore_bone + hand_bone - v) : v;
+  Case patient = limbed(std::move(folded), 6);
+  patient.labels->apart->limbs[0].joints = 1;
+  const std::vector<TakenOut> taken = hold_apart(patient, {});
+  ASSERT_FALSE(taken.empty());
+  for (const TakenOut& t : taken) EXPECT_EQ(t.a, 0);
+}
+
 TEST(HoldApart, WhatIsThatFarApartStays) {
   Case touching = limbed(fused(0), 1), apart = limbed(fused(2), 3), wide = limbed(fused(2), 3.1);
   EXPECT_TRUE(hold_apart(touching, {}).empty());  // 1 mm between centres
@@ -237,6 +248,7 @@ TEST(HoldApart, AsEveryPairOfVoxelsSays) {
     // Blobs about seeds: flesh in patches, as bodies have it.
     std::vector<std::pair<Eigen::Vector3d, int>> seeds;
     const auto pick = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
+    seeds.reserve(14);
     for (int n = 0; n < 14; ++n)
       seeds.emplace_back(Eigen::Vector3d(pick(13), pick(9), pick(10)), n < 4 ? 0 : 1 + n % 3);
     patient.labels = draw(grid, [&](int i, int j, int k) {
