@@ -17,8 +17,7 @@ std::vector<std::string_view> solver_names() {
 }
 
 std::string_view solver_for(std::int64_t unknowns) {
-  // bench/preprocess: at 290 k tets, 50 000 unknowns, multigrid takes half of CHOLMOD's time and 0.4 of
-  // Eigen's. A factor leaves a smaller residual, so it is kept while it costs less than half a second more.
+  // docs/preparing.md, rows of bench/solvers: why here, and not where multigrid overtakes the factors.
 #ifdef ECORCHE_GPL
   constexpr std::int64_t kFactored = 40'000;
 #else
