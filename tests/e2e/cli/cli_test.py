@@ -34,6 +34,36 @@ class Cli(unittest.TestCase):
         for part in parts:
             self.assertIn(part, result.stderr)
 
+    def test_a_refused_model_shows_its_worst_tets(self):
+        def box(name, low, high):
+            corners = [(x, y, z) for z in (low[2], high[2]) for y in (low[1], high[1]) for x in (low[0], high[0])]
+            faces = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4), (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6),
+                     (1, 3, 5), (3, 7, 5)]
+            (self.folder / name).write_text("".join("v %g %g %g\n" % p for p in corners)
+                                            + "".join("f %d %d %d\n" % tuple(c + 1 for c in f) for f in faces))
+
+        box("skin.obj", (0, 0, 0), (60, 60, 120))
+        box("plate.obj", (20, 20, 20), (40, 40, 20.01))  # a bone of a hundredth of a millimetre: its tets are slivers
+        box("block.obj", (20, 20, 80), (40, 40, 100))
+        (self.folder / "skeleton.yaml").write_text(
+            "ecorche_skeleton: 1\nname: two\nsegments:\n  lower:\n    joint: {name: base, kind: ball, center: [30, 30, 20]}\n"
+            "  upper:\n    parent: lower\n    joint: {name: mid, kind: ball, center: [30, 30, 60]}\n")
+        (self.folder / "case.yaml").write_text(
+            "name: thin\nskeleton: skeleton.yaml\nskin: skin.obj\nbones:\n  - {name: plate, file: plate.obj, segment: lower}\n"
+            "  - {name: block, file: block.obj, segment: upper}\n")
+        model, shown = self.folder / "m.hdf", self.folder / "m.refused.vtu"
+        result = run("preprocess", self.folder, "-o", model, "--mesher", "tetgen", "--voxel", "4")
+        if result.returncode == 64:
+            self.skipTest("this build has no TetGen")
+        self.assert_error(result, 65, "min_dihedral_deg is ", "the bound is >= 0.5", f"its 1000 worst tets are in {shown};")
+        self.assertFalse(model.exists())
+        header = shown.read_bytes()[:3000].decode(errors="replace")
+        self.assertRegex(header, r'NumberOfCells="1000\s*"')
+        for name in ("label", "tet", "least_dihedral_deg", "greatest_dihedral_deg", "volume_mm3"):
+            self.assertIn(f'Name="{name}"', header)
+        found = re.search(r'Name="least_dihedral_deg"[^>]*RangeMin="([^"]+)"', header)
+        self.assertLess(float(found[1]), 0.5)
+
     def test_help_and_version(self):
         self.assertEqual(run("--version").returncode, 0)
         out = run("--help").stdout
