@@ -73,6 +73,7 @@ int run(const std::string& peer, const std::string& case_path, const std::string
     if (peer == "cgal_parallel") one = run_cgal(patient, model);
     if (peer == "brute_cor") one = brute_cor(model, kSampledNodes);
     out["version"] = one.version;
+    out["threads"] = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     out["did"] = one.did;
     out["share"] = one.share;
     if (one.version.empty()) break;
