@@ -170,6 +170,8 @@ TEST(HoldApart, LayersAreCutTogether) {
 struct Found {
   std::vector<int> segment;
   std::vector<bool> gone;
+  std::vector<bool>
+      either;  // two bones, or two strangers, are equally near to it or to what decides about it
 };
 Found by_pairs(const Case& patient, const std::vector<int>& limb, const std::vector<int>& parent,
                const std::vector<int>& joints, int flesh_entry_of_label[16]) {
@@ -186,19 +188,25 @@ Found by_pairs(const Case& patient, const std::vector<int>& limb, const std::vec
   Found out;
   out.segment.assign(voxels.size(), -1);
   out.gone.assign(voxels.size(), false);
+  out.either.assign(voxels.size(), false);
+  std::vector<std::size_t> tied;
   for (std::size_t v = 0; v < voxels.size(); ++v) {
     if (voxels[v] == 0) continue;
-    double best = 1e300;
+    double best = 1e300, second = 1e300;  // of another segment
     for (std::size_t b = 0; b < voxels.size(); ++b) {
       if (bone(b) < 0) continue;
       const int entry = flesh_entry_of_label[voxels[b]];
       if (entry != flesh_entry_of_label[voxels[v]]) continue;
       const double d = (at[v] - at[b]).squaredNorm();
       if (d < best) {
+        if (out.segment[v] != bone(b)) second = best;
         best = d;
         out.segment[v] = bone(b);
+      } else if (out.segment[v] != bone(b)) {
+        second = std::min(second, d);
       }
     }
+    if (second - best < 1e-6) tied.push_back(v);
   }
   const auto joints_between = [&](int a, int b) {
     int count = 0;
@@ -224,9 +232,13 @@ Found by_pairs(const Case& patient, const std::vector<int>& limb, const std::vec
   }
   for (std::size_t v = 0; v < voxels.size(); ++v) {
     if (nearest[v] >= gap) continue;
-    for (const std::size_t o : which[v])
-      out.gone[v] = out.gone[v] || 2 * nearest[v] < gap + nearest[o] - 1e-6;
+    int goes = 0;
+    for (const std::size_t o : which[v]) goes += 2 * nearest[v] < gap + nearest[o] - 1e-6 ? 1 : 0;
+    out.gone[v] = goes > 0;
+    out.either[v] = goes > 0 && goes < static_cast<int>(which[v].size());
   }
+  for (std::size_t v = 0; v < voxels.size(); ++v)
+    for (const std::size_t t : tied) out.either[v] = out.either[v] || (at[v] - at[t]).norm() < 2 * gap;
   return out;
 }
 
@@ -239,7 +251,7 @@ TEST(HoldApart, AsEveryPairOfVoxelsSays) {
   const std::vector<int> joints{99, 99, 2, 2, 1, 1, 1, 1};
   int entry[16] = {-1, 2, 0, 1, -1, -1, -1, -1, 2, 2, 0, 0, 1, 1, 1, 1};
   std::mt19937 random(7);
-  std::size_t cut = 0;
+  std::size_t cut = 0, decided = 0;
   for (int round = 0; round < 12; ++round) {
     ImageGrid grid;
     grid.size = {13, 9, 10};
@@ -249,8 +261,10 @@ TEST(HoldApart, AsEveryPairOfVoxelsSays) {
     std::vector<std::pair<Eigen::Vector3d, int>> seeds;
     const auto pick = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
     seeds.reserve(14);
-    for (int n = 0; n < 14; ++n)
-      seeds.emplace_back(Eigen::Vector3d(pick(13), pick(9), pick(10)), n < 4 ? 0 : 1 + n % 3);
+    for (int n = 0; n < 14; ++n) {
+      const int i = pick(13), j = pick(9), k = pick(10);  // in this order by every compiler
+      seeds.emplace_back(Eigen::Vector3d(i, j, k), n < 4 ? 0 : 1 + n % 3);
+    }
     patient.labels = draw(grid, [&](int i, int j, int k) {
       double best = 1e300;
       int label = 0;
@@ -279,17 +293,17 @@ TEST(HoldApart, AsEveryPairOfVoxelsSays) {
     hold_apart(patient, {});
     const auto was = before.labels->image.scalars<std::uint8_t>();
     const auto now = patient.labels->image.scalars<std::uint8_t>();
-    std::size_t differ = 0;
     for (std::size_t v = 0; v < was.size(); ++v) {
       const bool gone = was[v] != 0 && now[v] == 0;
-      differ += gone != slow.gone[v] ? 1 : 0;
+      if (slow.either[v]) continue;
+      EXPECT_EQ(gone, slow.gone[v]) << round << ' ' << v;
       cut += gone ? 1 : 0;
+      ++decided;
       EXPECT_TRUE(now[v] == 0 || now[v] == was[v]);
     }
-    // Where two bones, or two strangers, are equally near, either may be taken.
-    EXPECT_LE(differ, 5u) << round;
   }
   EXPECT_GT(cut, 200u);
+  EXPECT_GT(decided, 5000u);
 }
 
 TEST(HoldApart, SameOnAnyNumberOfThreads) {
