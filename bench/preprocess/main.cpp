@@ -53,7 +53,7 @@ PeerRun run_igl(const Case& patient, const Model& model) {
 PeerRun run_cgal(const Case& patient, const Model& model) {
   const double voxel = std::stod(model.provenance.at("option/voxel_mm"));
   double near = 2.5 * voxel;
-  const PeerRun first = cgal_parallel(patient, voxel, near);
+  PeerRun first = cgal_parallel(patient, voxel, near);
   if (first.version.empty()) return first;
   near *= std::cbrt(static_cast<double>(first.made) / static_cast<double>(model.tet_count()));
   return cgal_parallel(patient, voxel, near);

@@ -88,7 +88,7 @@ Sum measure(const Settings& settings, const Served& served, const std::string& l
   crowd.begin();
   const double cpu = served.cpu_seconds();
   crowd.run(settings.seconds, tick);
-  const Sum sum = sum_of(crowd, first, end);
+  Sum sum = sum_of(crowd, first, end);
   print(load, sum, served, (served.cpu_seconds() - cpu) / settings.seconds, must);
   return sum;
 }
