@@ -43,7 +43,7 @@ StageFolder::StageFolder(fs::path folder, double limit_gib)
       limit_(static_cast<std::uint64_t>(limit_gib * (1U << 30))),
       program_(own_digest()) {
   files::make_folder(folder_);
-  files::remove_stale_parts(folder_, "*.stage");
+  files::remove_stale_parts_ending(folder_, ".stage");
 }
 
 fs::path StageFolder::path_of(std::string_view name) const {

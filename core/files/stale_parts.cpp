@@ -15,8 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether `file` is `.PID.part.NAME` and no process has that number.
-bool is_stale(std::string_view file, std::string_view name) {
+/// Whether `file` is `.PID.part.NAME`, of a NAME that is meant, and no process has that number.
+template <class Meant>
+bool is_stale(std::string_view file, const Meant& meant) {
   constexpr std::string_view mark = ".part.";
   if (!file.starts_with('.')) return false;
   pid_t process = 0;
@@ -26,22 +27,30 @@ bool is_stale(std::string_view file, std::string_view name) {
   std::string_view own(rest, static_cast<std::size_t>(end - rest));
   if (!own.starts_with(mark)) return false;
   own.remove_prefix(mark.size());
-  if (name.starts_with('*') ? !own.ends_with(name.substr(1)) : own != name) return false;
-  return ::kill(process, 0) != 0 && errno == ESRCH;
+  return meant(own) && ::kill(process, 0) != 0 && errno == ESRCH;
+}
+
+template <class Meant>
+void remove(const fs::path& folder, const Meant& meant) {
+  std::error_code error;
+  std::vector<fs::path> stale;
+  fs::directory_iterator at(folder, error);
+  for (; !error && at != fs::directory_iterator(); at.increment(error)) {
+    if (is_stale(at->path().filename().string(), meant) && at->is_regular_file(error))
+      stale.push_back(at->path());
+    error.clear();
+  }
+  for (const fs::path& path : stale) fs::remove(path, error);
 }
 
 }  // namespace
 
 void remove_stale_parts(const fs::path& folder, std::string_view name) {
-  std::error_code error;
-  std::vector<fs::path> stale;
-  fs::directory_iterator at(folder, error);
-  for (; !error && at != fs::directory_iterator(); at.increment(error)) {
-    if (is_stale(at->path().filename().string(), name) && at->is_regular_file(error))
-      stale.push_back(at->path());
-    error.clear();
-  }
-  for (const fs::path& path : stale) fs::remove(path, error);
+  remove(folder, [&](std::string_view own) { return own == name; });
+}
+
+void remove_stale_parts_ending(const fs::path& folder, std::string_view ending) {
+  remove(folder, [&](std::string_view own) { return own.ends_with(ending); });
 }
 
 }  // namespace ecorche::files

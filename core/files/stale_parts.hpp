@@ -7,10 +7,11 @@
 
 namespace ecorche::files {
 
-/// Removes the temporaries of AtomicFile in `folder` for files that are to be called `name` (`*.stage`: all
-/// with this ending), of processes that live no more on this machine. Two that write the same name at once,
-/// one of them elsewhere, must not share a folder. What cannot be read or removed is left. Reads the whole
-/// folder.
+/// Removes the temporaries of AtomicFile in `folder` for files that are to be called `name`, of processes
+/// that live no more on this machine. Two that write the same name at once, one of them elsewhere, must not
+/// share a folder. What cannot be read or removed is left. Reads the whole folder.
 void remove_stale_parts(const std::filesystem::path& folder, std::string_view name);
+/// The same for all names that end so.
+void remove_stale_parts_ending(const std::filesystem::path& folder, std::string_view ending);
 
 }  // namespace ecorche::files

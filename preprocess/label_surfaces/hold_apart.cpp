@@ -118,20 +118,20 @@ class Tree {
 
 // The entry of limbs that each labelled voxel is of, `none` for those of no limb, -1 where nothing is, or
 // nothing that takes part.
-std::vector<std::int8_t> entries(const CaseLabels& labels, std::int8_t none) {
-  std::map<std::int64_t, std::int8_t> of_id;
+std::vector<std::int32_t> entries(const CaseLabels& labels, std::int32_t none) {
+  std::map<std::int64_t, std::int32_t> of_id;
   for (std::size_t e = 0; e < labels.apart->limbs.size(); ++e) {
     const HeldApart::Limbs& limbs = labels.apart->limbs[e];
     for (const std::int64_t id : limbs.ids)
-      of_id[id] = limbs.segments.empty() ? std::int8_t{-1} : static_cast<std::int8_t>(e);
+      of_id[id] = limbs.segments.empty() ? std::int32_t{-1} : static_cast<std::int32_t>(e);
   }
-  std::vector<std::int8_t> out(labels.image.grid.voxels(), -1);
+  std::vector<std::int32_t> out(labels.image.grid.voxels(), -1);
   const auto read = [&](const Image& layer) {
     with_scalar_type(layer.type, [&](auto zero) {
       using T = decltype(zero);
       const auto voxels = layer.scalars<T>();
       T last{};
-      std::int8_t entry = -1;
+      std::int32_t entry = -1;
       for (std::size_t v = 0; v < voxels.size(); ++v) {
         if (voxels[v] != last) {
           last = voxels[v];
@@ -149,12 +149,12 @@ std::vector<std::int8_t> entries(const CaseLabels& labels, std::int8_t none) {
 }
 
 // The segment of every labelled voxel, -1 elsewhere.
-std::vector<std::int16_t> segments_of_voxels(const Case& patient, const Tree& tree, const Context& context) {
+std::vector<std::int32_t> segments_of_voxels(const Case& patient, const Tree& tree, const Context& context) {
   const CaseLabels& labels = *patient.labels;
   const ImageGrid& grid = labels.image.grid;
   const auto count = labels.apart->limbs.size() + 1;
-  const std::vector<std::int8_t> entry = entries(labels, static_cast<std::int8_t>(count - 1));
-  std::vector<std::int16_t> of_bone(entry.size(), -1);
+  const std::vector<std::int32_t> entry = entries(labels, static_cast<std::int32_t>(count - 1));
+  std::vector<std::int32_t> of_bone(entry.size(), -1);
   std::vector<Box> boxes(count);  // of each entry's voxels and bones
   std::vector<bool> boned(count, false), fleshed(count, false);
   const LabelBlocks blocks(labels, context);
@@ -163,7 +163,7 @@ std::vector<std::int16_t> segments_of_voxels(const Case& patient, const Tree& tr
     LabelSource source = *bone.source;
     source.close_mm = 0;  // its own voxels
     const Mask mask = blocks.mask(source, context);
-    const auto segment = static_cast<std::int16_t>(patient.skeleton.find_segment(bone.segment));
+    const auto segment = static_cast<std::int32_t>(patient.skeleton.find_segment(bone.segment));
     const auto e = static_cast<std::size_t>(tree.entry(segment));
     for (int k = 0; k < mask.size[2]; ++k)
       for (int j = 0; j < mask.size[1]; ++j)
@@ -180,7 +180,7 @@ std::vector<std::int16_t> segments_of_voxels(const Case& patient, const Tree& tr
     boxes[static_cast<std::size_t>(entry[at])].add(v);
     fleshed[static_cast<std::size_t>(entry[at])] = true;
   });
-  std::vector<std::int16_t> out = of_bone;
+  std::vector<std::int32_t> out = of_bone;
   for (std::size_t e = 0; e < count; ++e) {
     if (!fleshed[e]) continue;
     if (!boned[e]) {
@@ -190,12 +190,12 @@ std::vector<std::int16_t> segments_of_voxels(const Case& patient, const Tree& tr
                   "give the bones there labels, not files");
     }
     const Nearest nearest(grid, boxes[e], context, [&](std::size_t, std::size_t voxel) {
-      const std::int16_t segment = of_bone[voxel];
+      const std::int32_t segment = of_bone[voxel];
       return segment >= 0 && tree.entry(segment) == static_cast<int>(e) ? segment : -1;
     });
     each_voxel(grid, boxes[e], [&](std::size_t at, std::size_t voxel, const Index&) {
       if (out[voxel] < 0 && entry[voxel] == static_cast<int>(e))
-        out[voxel] = static_cast<std::int16_t>(nearest.tag[at]);
+        out[voxel] = static_cast<std::int32_t>(nearest.tag[at]);
     });
   }
   return out;
@@ -208,7 +208,7 @@ struct Stranger {
 };
 using Strangers = std::unordered_map<std::size_t, Stranger>;
 
-Strangers near_strangers(const Case& patient, const Tree& tree, const std::vector<std::int16_t>& segment,
+Strangers near_strangers(const Case& patient, const Tree& tree, const std::vector<std::int32_t>& segment,
                          const Context& context) {
   const ImageGrid& grid = patient.labels->image.grid;
   const double gap = patient.labels->apart->gap_mm;
@@ -285,7 +285,7 @@ void tell(const Case& patient, const std::vector<TakenOut>& taken, std::int64_t 
 
 std::vector<TakenOut> hold_apart(Case& patient, const Context& context) {
   const Tree tree(patient.skeleton, *patient.labels->apart);
-  const std::vector<std::int16_t> segment = segments_of_voxels(patient, tree, context);
+  const std::vector<std::int32_t> segment = segments_of_voxels(patient, tree, context);
   const Strangers strangers = near_strangers(patient, tree, segment, context);
   const double gap = patient.labels->apart->gap_mm;
   std::vector<std::size_t> gone;
@@ -303,7 +303,7 @@ std::vector<TakenOut> hold_apart(Case& patient, const Context& context) {
   std::vector<TakenOut> out;
   out.reserve(count.size());
   for (const auto& [pair, voxels] : count) out.push_back({pair.first, pair.second, voxels});
-  tell(patient, out, std::count_if(segment.begin(), segment.end(), [](std::int16_t s) { return s >= 0; }),
+  tell(patient, out, std::count_if(segment.begin(), segment.end(), [](std::int32_t s) { return s >= 0; }),
        context);
   return out;
 }

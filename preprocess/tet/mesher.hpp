@@ -43,9 +43,9 @@ std::unique_ptr<Mesher> make_lattice_cut_mesher();  ///< tet/lattice, Apache-2.0
 std::unique_ptr<Mesher> make_cgal_mesher();         ///< tet/cgal, GPL
 std::unique_ptr<Mesher> make_tetgen_mesher();       ///< tet/tetgen, AGPL
 
-/// Names of the meshers in this build; the first is the default. It is `lattice`: of all it alone keeps
-/// every weight within its bounds without repair, folds no more than cgal when posed, and takes a hundredth
-/// of its time.
+/// Names of the meshers in this build; the first is the default. It is `lattice`: it keeps every
+/// weight within its bounds without repair, as of the others only `lattice_graded` does, folds no more than
+/// cgal when posed, and takes a hundredth of its time.
 std::vector<std::string_view> mesher_names();
 
 /// Throws Error{usage} for a name that this build does not have.
