@@ -14,9 +14,13 @@
 #include <limits>
 #include <memory>
 #include <system_error>
+#include <utility>
 
 namespace ecorche::client {
 namespace {
+
+// Waking for each segment of a large frame would take longer than copying it.
+constexpr std::size_t kEnough = 256 << 10;
 
 std::string reason(int error) {
   return std::generic_category().message(error);
@@ -71,7 +75,7 @@ Socket::~Socket() {
 }
 
 std::size_t Socket::read(std::span<std::byte> out, Clock::time_point until) {
-  if (!tls_) return read_plain(out, until);
+  if (!tls_) return read_plain(out, until, std::min(out.size(), kEnough));
   return tls_->read(
       out, [&](std::span<std::byte> plain) { return read_plain(plain, until); },
       [&](std::span<const std::byte> bytes) { write_plain(bytes, until); });
@@ -82,14 +86,24 @@ void Socket::write(std::span<const std::byte> bytes, Clock::time_point until) {
   tls_->write(bytes, [&](std::span<const std::byte> part) { write_plain(part, until); });
 }
 
-std::size_t Socket::read_plain(std::span<std::byte> out, Clock::time_point until) {
+std::size_t Socket::read_plain(std::span<std::byte> out, Clock::time_point until, std::size_t enough) {
+  bool late = false;
   while (true) {
     const ssize_t n = recv(fd_, out.data(), out.size(), 0);
     if (n > 0) return static_cast<std::size_t>(n);
     if (n == 0) fail("the server hung up");
     if (errno != EAGAIN && errno != EINTR) fail(reason(errno));
-    if (!wait(POLLIN, until)) return 0;
+    if (late) return 0;
+    wake_at(enough < kEnough / 4 ? 1 : enough);
+    late = !wait(POLLIN, until);  // fewer than that may be there
   }
+}
+
+void Socket::wake_at(std::size_t bytes) {
+  if (std::exchange(wakes_at_, bytes) == bytes) return;
+  const int least = static_cast<int>(bytes);
+  // Where it cannot be set, waits end sooner, that is all.
+  static_cast<void>(setsockopt(fd_, SOL_SOCKET, SO_RCVLOWAT, &least, sizeof least));
 }
 
 void Socket::write_plain(std::span<const std::byte> bytes, Clock::time_point until) {

@@ -25,19 +25,21 @@ class Socket {
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
 
-  /// Reads what is there, at least a byte; 0 when none came until `until`. Throws Error{temporary} when the
-  /// peer hung up.
+  /// Reads what is there, at least a byte; 0 when none came until `until`. Where `out` is large and nothing
+  /// is there, it sleeps until a good part of it has come. Throws Error{temporary} when the peer hung up.
   std::size_t read(std::span<std::byte> out, Clock::time_point until);
   /// Writes all. Throws Error{temporary} when the peer hung up, or did not take it until `until`.
   void write(std::span<const std::byte> bytes, Clock::time_point until);
 
  private:
-  std::size_t read_plain(std::span<std::byte> out, Clock::time_point until);
+  std::size_t read_plain(std::span<std::byte> out, Clock::time_point until, std::size_t enough = 1);
+  void wake_at(std::size_t bytes);
   void write_plain(std::span<const std::byte> bytes, Clock::time_point until);
   bool wait(short events, Clock::time_point until) const;
   [[noreturn]] void fail(const std::string& what) const;
 
   int fd_ = -1;
+  std::size_t wakes_at_ = 1;  ///< bytes that must have come before a wait for them ends
   std::string where_;
   std::unique_ptr<Tls> tls_;
 };
