@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "runtime/skin/skin_clusters.hpp"
 
@@ -19,14 +20,25 @@ std::span<const float> floats(const PointsF& points) {
   return {points.data(), static_cast<std::size_t>(points.size())};
 }
 
-std::vector<std::uint8_t> needed_nodes(const Model& model) {
-  std::vector<std::uint8_t> needed(model.node_count(), 0);
-  for (const Tissue& tissue : model.tissues) {
-    for (const std::int32_t tet : tissue.tet) {
-      for (int c = 0; c < 4; ++c) needed[static_cast<std::size_t>(model.tets(tet, c))] = 1;
+// Nodes of one kind hold up the same tissues; of kind 0, none.
+std::vector<std::uint32_t> kinds_of_nodes(const Model& model) {
+  std::vector<std::uint32_t> kind(model.node_count(), 0);
+  std::vector<std::int32_t> seen(model.node_count(), -1);
+  std::uint32_t kinds = 0;
+  std::vector<std::uint32_t> with;  // by kind: the same and this tissue
+  for (std::size_t t = 0; t < model.tissues.size(); ++t) {
+    with.assign(kinds + 1, 0);
+    for (const std::int32_t tet : model.tissues[t].tet) {
+      for (int c = 0; c < 4; ++c) {
+        const auto node = static_cast<std::size_t>(model.tets(tet, c));
+        if (std::exchange(seen[node], static_cast<std::int32_t>(t)) == static_cast<std::int32_t>(t)) continue;
+        std::uint32_t& more = with[kind[node]];
+        if (more == 0) more = ++kinds;
+        kind[node] = more;
+      }
     }
   }
-  return needed;
+  return kind;
 }
 
 float diagonal(const PointsF& points) {
@@ -43,7 +55,7 @@ T* data_or_null(std::vector<T>& rows) {
 }  // namespace
 
 BodyParts::BodyParts(const Model& model)
-    : clusters_(cluster_nodes(model, needed_nodes(model))),
+    : clusters_(cluster_nodes(model, kinds_of_nodes(model))),
       tissues_(model.tissues.size()),
       origin_(middle_of(floats(model.nodes))),
       reach_(std::max(1.0F, diagonal(model.nodes))) {

@@ -140,18 +140,23 @@ void quantise_weights(std::span<const double> weights, std::span<std::uint16_t> 
   }
 }
 
-NodeClusters cluster_nodes(const Model& model, std::span<const std::uint8_t> needed) {
+NodeClusters cluster_nodes(const Model& model, std::span<const std::uint32_t> kind) {
   check(model);
   NodeClusters out;
   out.nodes = model.node_count();
-  for (const bool wanted : {true, false}) {
-    for (std::size_t n = 0; n < out.nodes; ++n) {
-      if ((needed[n] != 0) == wanted) out.node.push_back(static_cast<std::uint32_t>(n));
-    }
-    if (wanted) out.needed = out.node.size();
-  }
-  sort_by_segments(model, std::span(out.node).first(out.needed));
-  sort_by_segments(model, std::span(out.node).subspan(out.needed));
+  // Where each kind begins; 0 is the last.
+  std::uint32_t kinds = 0;
+  for (const std::uint32_t k : kind) kinds = std::max(kinds, k);
+  std::vector<std::uint32_t> begin(kinds + 2, 0);
+  const auto place = [&](std::uint32_t k) { return k == 0 ? kinds : k - 1; };
+  for (const std::uint32_t k : kind) ++begin[place(k) + 1];
+  for (std::size_t k = 0; k + 1 < begin.size(); ++k) begin[k + 1] += begin[k];
+  out.needed = begin[kinds];
+  out.node.resize(out.nodes);
+  std::vector<std::uint32_t> next = begin;
+  for (std::uint32_t n = 0; n < out.nodes; ++n) out.node[next[place(kind[n])]++] = n;
+  for (std::size_t k = 0; k + 1 < begin.size(); ++k)
+    sort_by_segments(model, std::span(out.node).subspan(begin[k], begin[k + 1] - begin[k]));
   out.lane.resize(out.nodes);
   for (std::size_t i = 0; i < out.nodes; ++i) out.lane[out.node[i]] = static_cast<std::uint32_t>(i);
   out.node.resize((out.nodes + kSize - 1) / kSize * kSize, out.node.back());

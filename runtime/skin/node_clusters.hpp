@@ -12,14 +12,14 @@
 namespace ecorche::runtime {
 
 /// Clusters of 64 nodes with one palette of segments each and a dense planar weight for every pair of them:
-/// no index per node, no gather. First the nodes that some tissue hangs on, then the others, each in the
-/// model's own order (Morton), sorted within runs of 2048 by the segments that they hang on. A *lane* is a
-/// place in this order: node `node[lane]`. The last cluster repeats its last node.
+/// no index per node, no gather. Nodes of one kind lie together, 1 first and 0 last, each kind in the model's
+/// own order (Morton), sorted within runs of 2048 by the segments that they hang on. A *lane* is a place in
+/// this order: node `node[lane]`. The last cluster repeats its last node.
 struct NodeClusters {
   static constexpr std::size_t size = 64;
 
   std::size_t nodes = 0;   ///< lanes that count
-  std::size_t needed = 0;  ///< of them, those of the tissues come first
+  std::size_t needed = 0;  ///< of them, those not of kind 0 come first
 
   std::vector<std::uint32_t> node;  ///< 64 * #clusters
   std::vector<std::uint32_t> lane;  ///< #nodes, where a node is
@@ -32,9 +32,10 @@ struct NodeClusters {
   std::size_t clusters() const { return node.size() / size; }
 };
 
-/// Weights below 1e-4 are dropped and their rows renormalised (DESIGN 7). `needed`: #nodes, not 0 where a
-/// tissue hangs on the node. Throws Error{data} where weights or centres do not fit the nodes.
-NodeClusters cluster_nodes(const Model& model, std::span<const std::uint8_t> needed);
+/// Weights below 1e-4 are dropped and their rows renormalised (DESIGN 7). `kind`: #nodes, the same for nodes
+/// that the same tissues hang on, 0 for those without one: so a frame of few tissues skins few clusters.
+/// Throws Error{data} where weights or centres do not fit the nodes.
+NodeClusters cluster_nodes(const Model& model, std::span<const std::uint32_t> kind);
 
 /// `weights`, which sum to about 1, in whole 65535ths that sum to exactly 65535: the largest remainders are
 /// rounded up, the first of equal ones. Same size; each below 1 / 65535 off.

@@ -6,6 +6,7 @@
 
 #include <numeric>
 #include <random>
+#include <set>
 
 #include "core/kinematics/forward.hpp"
 #include "runtime/skin/body_parts.hpp"
@@ -246,6 +247,52 @@ TEST(Kernels, NodesOfTissuesGiveTheSameTissues) {
   EXPECT_EQ(all.tissues, some.tissues);
   EXPECT_LT(some.scratch.clusters.size(), all.scratch.clusters.size() / 2);
   EXPECT_EQ(some.scratch.clusters.size(), (parts.clusters().needed + 63) / 64);
+}
+
+TEST(Kernels, NodesOfTheSameTissuesLieTogether) {
+  Model model = cloud({3000, 9, 4, 400}, 12);
+  // Four tissues instead of one; every ninth vertex belongs to two of them, as where tissues touch.
+  const Tissue whole = model.tissues[0];
+  model.tissues.clear();
+  for (int t = 0; t < 4; ++t) {
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index v = 0; v < 400; ++v) {
+      if (v / 100 == t || (v % 9 == 0 && (v / 100 + 1) % 4 == t)) rows.push_back(v);
+    }
+    Tissue& tissue = model.tissues.emplace_back();
+    tissue.name = "part" + std::to_string(t);
+    tissue.V = whole.V(rows, Eigen::all);
+    tissue.barycentric = whole.barycentric(rows, Eigen::all);
+    tissue.F.resize(0, 3);
+    for (const Eigen::Index v : rows) tissue.tet.push_back(whole.tet[static_cast<std::size_t>(v)]);
+  }
+  std::vector<std::set<std::size_t>> tissues(model.node_count());
+  for (std::size_t t = 0; t < 4; ++t) {
+    for (const std::int32_t tet : model.tissues[t].tet) {
+      for (int c = 0; c < 4; ++c) tissues[static_cast<std::size_t>(model.tets(tet, c))].insert(t);
+    }
+  }
+  const BodyParts parts(model);
+  const NodeClusters& clusters = parts.clusters();
+  std::vector<std::set<std::size_t>> kinds;  // in the order of lanes
+  for (std::size_t lane = 0; lane < clusters.nodes; ++lane) {
+    const std::set<std::size_t>& kind = tissues[clusters.node[lane]];
+    EXPECT_EQ(kind.empty(), lane >= clusters.needed);
+    if (kinds.empty() || kinds.back() != kind) kinds.push_back(kind);
+  }
+  EXPECT_EQ(kinds.size(), std::set(kinds.begin(), kinds.end()).size()) << "a kind lies in two places";
+  EXPECT_GT(kinds.size(), 8U);
+
+  // One tissue's frame: its own clusters, and the same bytes.
+  const auto segments = random_segments(9, 1, 13);
+  PosedBody all = frame_of(parts, model, segments), some = frame_of(parts, model, segments);
+  const std::vector<std::uint32_t> third{2};
+  for (const auto& [body, nodes] : {std::pair{&all, NodesOf::body}, {&some, NodesOf::tissues}}) {
+    parts.skin(Skinning::cor, third, nodes, *body);
+    parts.move(model, third, *body);
+  }
+  EXPECT_EQ(all.tissues[2], some.tissues[2]);
+  EXPECT_LT(64 * some.scratch.clusters.size(), clusters.needed * 3 / 4);
 }
 
 TEST(Kernels, VanishedBlendsFollowTheHeaviestSegment) {
