@@ -6,14 +6,27 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "core/values/image.hpp"
 
 namespace ecorche::runtime {
 
-/// A region of the posed grid: first and last index, both in.
+/// A region of the posed grid: first and last index, both in; empty where one is above the other.
 struct VoxelRange {
   std::array<std::int32_t, 3> first{}, last{};
+
+  /// Meets no other.
+  static VoxelRange nothing() {
+    constexpr std::int32_t most = std::numeric_limits<std::int32_t>::max();
+    return {{most, most, most}, {-1, -1, -1}};
+  }
+  bool empty() const { return first[0] > last[0] || first[1] > last[1] || first[2] > last[2]; }
+  bool meets(const VoxelRange& other) const {
+    bool out = true;
+    for (std::size_t a = 0; a < 3; ++a) out &= first[a] <= other.last[a] && last[a] >= other.first[a];
+    return out;
+  }
 };
 
 /// Cubes of a grid, x fastest; the last ones along an axis may be cut short.

@@ -10,7 +10,6 @@
 
 #include <hwy/highway.h>
 
-#include "core/values/mesh.hpp"
 #include "runtime/skin/palette-inl.hpp"
 #include "runtime/volume/tet_palettes.hpp"
 
@@ -27,23 +26,7 @@ struct Corners {
   VI x[4][3];
 };
 
-HWY_INLINE void load_nodes(const Tets& tets, VI ids, VI (&node)[4]) {
-  const VI first = hn::ShiftLeft<2>(ids);
-  for (int c = 0; c < 4; ++c) {
-    const VI n = hn::GatherIndex(I(), tets.data(), hn::Add(first, hn::Set(I(), c)));
-    node[c] = hn::Add(n, hn::Add(n, n));
-  }
-}
-
-HWY_INLINE Corners load_corners(const std::int32_t* points, const VI (&node)[4]) {
-  Corners out;
-  for (int c = 0; c < 4; ++c) {
-    for (int a = 0; a < 3; ++a) out.x[c][a] = hn::GatherIndex(I(), points + a, node[c]);
-  }
-  return out;
-}
-
-// The same of tets i .. i + lanes of a run, whose palette lies in `table`.
+// Those of tets i .. i + lanes of a run, whose palette lies in `table`.
 template <bool kLong>
 HWY_INLINE Corners corners_of(const Table<std::int32_t>& table, const std::uint8_t* corners) {
   Corners out;

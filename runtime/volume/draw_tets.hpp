@@ -15,7 +15,7 @@ namespace ecorche::runtime {
 
 /// Voxels on their way to be sampled, planar. Sampled in order: a later voxel overwrites an earlier one.
 struct VoxelBatch {
-  static constexpr std::size_t capacity = 1024;
+  static constexpr std::size_t capacity = 512;  ///< in the first cache, beside all else
   std::size_t count = 0;
   static constexpr std::size_t most_lanes = 16;  ///< a vector may be stored at `count`, whatever it is
   static constexpr std::size_t held = capacity + most_lanes;
@@ -30,10 +30,17 @@ struct BatchSink {
   const void* to;
 };
 
-/// Where one tet may hold voxels, and how it lies.
-struct TetExtent {
-  static constexpr std::uint16_t none = 0xffff;
-  std::uint16_t first = none, last = 0;  ///< bands; first > last: it holds no voxel of the range
+/// Which tets to draw: those of positive posed volume, or those that lie the wrong way round (zero too).
+enum class Claim : std::uint8_t { positive, inverted };
+
+/// Where drawing met inverted tets that it left out: a handful of boxes that hold all their voxels of the
+/// range drawn. Near ones share one.
+struct Inverted {
+  static constexpr std::size_t most = 16;
+  std::size_t count = 0;
+  std::array<VoxelRange, most> box;
+
+  void add(const VoxelRange& voxels);
 };
 
 /// A job on tets of one posed body; owns nothing, allocates nothing. Corners and axes as whole numbers of
@@ -52,18 +59,15 @@ struct DrawTets {
   BrickMask only{};                    ///< tets and voxels of other bricks are left out
 };
 
-/// Tets whose determinant is below this share of their longest edge cubed are drawn in double precision.
-inline constexpr float kFlatTet = 1e-3F;
+/// Tets whose determinant is below this share of the longest side of their box cubed are drawn in double
+/// precision.
+inline constexpr float kFlatTet = 3e-3F;
+
+/// The voxel centres of `range` that the box of a run of tets holds; it meets nothing where there is none, or
+/// only such of bricks that are not drawn.
+VoxelRange box_of_run(const DrawTets& job, const VoxelRange& range, std::size_t run);
 
 namespace kernels {
-
-/// For tets [begin, end), where `begin` begins a run: the bands of `band` slices along `axis` (from
-/// range.first on) of the voxel centres that its box holds. Returns how many of them lie the wrong way round
-/// (posed volume zero or less) and hold some; those are written to `inverted`, ascending, and left out of
-/// `extents` (which has end - begin entries).
-std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis, std::int32_t band,
-                          std::size_t begin, std::size_t end, std::span<TetExtent> extents,
-                          std::span<std::uint32_t> inverted);
 
 /// Sets `moved` of every brick of `bricks` that a tet of [begin, end), where `begin` begins a run, may hold
 /// voxels of at `before` or at `job.posed`, where a corner of it differs between the two. `range`: the whole
@@ -71,16 +75,13 @@ std::size_t classify_tets(const DrawTets& job, const VoxelRange& range, int axis
 void mark_moved(const DrawTets& job, std::span<const std::int32_t> before, const VoxelRange& range,
                 const Bricks& bricks, std::size_t begin, std::size_t end, std::uint8_t* moved);
 
-/// Puts the voxels of `range` that the tets `ids` hold, in that order, into `batch`, which goes to `sink`
-/// whenever it is full, not at the end. Every voxel whose centre lies in the closed tet is drawn; one that
-/// lies outside by less than about 1e-5 of the tet's size may be.
-void draw_tets(const DrawTets& job, const VoxelRange& range, std::span<const std::uint32_t> ids,
-               VoxelBatch& batch, const BatchSink& sink);
-
-/// The same for tets of the runs from `first` on, the last first: those whose entry of `wanted`, sixteen a
-/// run, is not zero.
-void draw_runs(const DrawTets& job, const VoxelRange& range, std::size_t first,
-               std::span<const std::uint8_t> wanted, VoxelBatch& batch, const BatchSink& sink);
+/// Puts the voxels of `range` that those tets of `runs` hold whose claim it is into `batch`: runs in their
+/// order, tets of a run from the last to the first. The batch goes to `sink` whenever it is full, not at the
+/// end. Every voxel whose centre lies in the closed tet is drawn; one that lies outside by less than about
+/// 1e-5 of the tet's size (of a voxel, where that is more) may be. Where positive ones are drawn, inverted
+/// ones are told to `found`.
+void draw_runs(const DrawTets& job, const VoxelRange& range, std::span<const std::uint32_t> runs, Claim claim,
+               VoxelBatch& batch, const BatchSink& sink, Inverted& found);
 
 }  // namespace kernels
 

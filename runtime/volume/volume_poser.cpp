@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 #include "runtime/volume/fixed_points.hpp"
 #include "runtime/volume/grid_affine.hpp"
@@ -16,8 +17,10 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::int32_t kBand = 16;  // slices of a task: a few tets high
-constexpr std::size_t kBlocksPerTask = 128;
+constexpr std::int32_t kBand = 16;      // slices of a task: a few tets high
+constexpr std::int32_t kHighBand = 32;  // where there are many: fewer tets lie in two
+constexpr std::size_t kRunsPerBlock = TetBlocks::size / TetPalettes::width;
+constexpr std::size_t kStretch = 32;  // runs that are looked at together
 constexpr double kMostVoxels = 2147483648.0;
 
 // Slices of the grid in bands, along its longer one of the two slow axes: a slice plane has only one slice.
@@ -28,7 +31,7 @@ struct Bands {
 
   explicit Bands(const ImageGrid& grid) : axis(grid.size[2] >= grid.size[1] ? 2 : 1) {
     const std::int32_t slices = grid.size[static_cast<std::size_t>(axis)];
-    height = std::max(kBand, slices / 32768);
+    height = std::max(slices < 8 * kHighBand ? kBand : kHighBand, slices / 32768);
     count = static_cast<std::size_t>((slices + height - 1) / height);
   }
   VoxelRange of(std::size_t band, const ImageGrid& grid) const {
@@ -40,8 +43,10 @@ struct Bands {
   }
 };
 
-// Whether the groups of a block reach into the grid. `low_high` are their boxes in LPS.
+// Whether the groups of a block reach into the grid: on either side of each axis, a bit each, one of them
+// must not end short of it.
 struct GridBox {
+  static constexpr std::uint8_t reaches = 0x3f;
   Affine index;
   Eigen::Matrix3d reach;  // |linear|
   Eigen::Vector3d last;
@@ -51,29 +56,19 @@ struct GridBox {
         reach(index.linear.cwiseAbs()),
         last(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1) {}
 
-  bool meets(const TetBlocks& blocks, std::size_t b, std::span<const float> low_high) const {
-    std::array<float, 6> box = box_around(blocks.groups_of(b), low_high);
-    const Eigen::Map<const Eigen::Vector3f> low(box.data()), high(box.data() + 3);
-    if (!low.allFinite() || !high.allFinite()) return true;
+  // `low_high`: of a group, in LPS.
+  std::uint8_t sides(std::span<const float, 6> low_high) const {
+    const Eigen::Map<const Eigen::Vector3f> low(low_high.data()), high(low_high.data() + 3);
+    if (!low.allFinite() || !high.allFinite()) return reaches;
     const Eigen::Vector3d middle = index * Eigen::Vector3d((0.5F * (low + high)).cast<double>());
     const Eigen::Vector3d half = reach * Eigen::Vector3d((0.5F * (high - low)).cast<double>());
     constexpr double rounding = 1e-2;  // of float32 metres away, in voxels of a tenth of a millimetre
-    return ((middle + half).array() >= -rounding).all() &&
-           ((middle - half).array() <= last.array() + rounding).all();
-  }
-
- private:
-  static std::array<float, 6> box_around(std::span<const std::uint32_t> groups,
-                                         std::span<const float> low_high) {
-    std::array<float, 6> box;
-    std::copy_n(&low_high[6 * std::size_t{groups[0]}], 6, box.begin());
-    for (const std::uint32_t g : groups) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        box[c] = std::min(box[c], low_high[6 * std::size_t{g} + c]);
-        box[c + 3] = std::max(box[c + 3], low_high[6 * std::size_t{g} + c + 3]);
-      }
+    unsigned out = 0;
+    for (int a = 0; a < 3; ++a) {
+      out |= middle[a] + half[a] >= -rounding ? 1U << static_cast<unsigned>(a) : 0U;
+      out |= middle[a] - half[a] <= last[a] + rounding ? 8U << static_cast<unsigned>(a) : 0U;
     }
-    return box;
+    return static_cast<std::uint8_t>(out);
   }
 };
 
@@ -81,29 +76,28 @@ bool one_lattice(const ImageGrid& a, const ImageGrid& b) {
   return a.spacing == b.spacing && a.direction == b.direction;
 }
 
-// Every task its own part of the output, whole rows or those of the mask's bricks.
-void fill_band(const SampleJob& job, const BrickMask& only, const VoxelRange& range) {
+// The background into `range`, or those of its voxels that lie in the mask's bricks.
+void fill(const SampleJob& job, const BrickMask& only, const VoxelRange& range) {
   with_scalar_type(job.posed.type, [&](auto zero) {
     using T = decltype(zero);
     const std::span<T> posed = job.posed.scalars<T>();
     const auto components = static_cast<std::size_t>(job.posed.components);
     const ImageGrid& grid = job.posed.grid;
     const T background = to_scalar<T>(job.background);
-    const auto fill = [&](std::size_t first, std::size_t end) {
-      std::fill(posed.begin() + static_cast<std::ptrdiff_t>(components * first),
-                posed.begin() + static_cast<std::ptrdiff_t>(components * end), background);
+    const auto fill_row = [&](std::int32_t first, std::int32_t last, std::int32_t j, std::int32_t k) {
+      std::fill_n(posed.begin() + static_cast<std::ptrdiff_t>(components * grid.offset(first, j, k)),
+                  components * static_cast<std::size_t>(last - first + 1), background);
     };
     for (std::int32_t k = range.first[2]; k <= range.last[2]; ++k) {
-      if (!only) {
-        fill(grid.offset(0, range.first[1], k),
-             grid.offset(0, range.last[1], k) + static_cast<std::size_t>(grid.size[0]));
-        continue;
-      }
       for (std::int32_t j = range.first[1]; j <= range.last[1]; ++j) {
-        for (std::int32_t i = 0; i < grid.size[0]; i += Bricks::edge) {
-          if (only.has(i, j, k))
-            fill(grid.offset(i, j, k),
-                 grid.offset(0, j, k) + static_cast<std::size_t>(std::min(i + Bricks::edge, grid.size[0])));
+        if (!only) {
+          fill_row(range.first[0], range.last[0], j, k);
+          continue;
+        }
+        for (std::int32_t i = range.first[0]; i <= range.last[0];) {
+          const std::int32_t last = std::min((i / Bricks::edge + 1) * Bricks::edge - 1, range.last[0]);
+          if (only.has(i, j, k)) fill_row(i, last, j, k);
+          i = last + 1;
         }
       }
     }
@@ -165,15 +159,24 @@ DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
       std::max(index_reach(job.grid, box_of(scratch.bounds)), index_reach(rest_grid, rest_box_)));
 
   const GridBox grid_box(job.grid);
+  scratch.sides.resize(blocks_.groups());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.groups(), 512), [&](const auto& range) {
+    for (std::size_t g = range.begin(); g < range.end(); ++g)
+      scratch.sides[g] = grid_box.sides(std::span<const float, 6>(&scratch.bounds[6 * g], 6));
+  });
   scratch.block_meets.resize(blocks_.blocks());
   scratch.groups.assign(blocks_.groups(), job.all_nodes ? 1 : 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.blocks(), 512), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.blocks(), 1024), [&](const auto& range) {
     for (std::size_t b = range.begin(); b < range.end(); ++b) {
-      const bool meets = grid_box.meets(blocks_, b, scratch.bounds);
+      const std::span<const std::uint32_t> groups = blocks_.groups_of(b);
+      std::uint8_t sides = 0;
+      for (const std::uint32_t g : groups) sides |= scratch.sides[g];
+      const bool meets = sides == GridBox::reaches;
       scratch.block_meets[b] = meets ? 1 : 0;
-      for (std::size_t i = 0; meets && !job.all_nodes && i < blocks_.groups_of(b).size(); ++i) {
+      if (!meets || job.all_nodes) continue;
+      for (const std::uint32_t g : groups) {
         // Everybody writes the same 1.
-        std::atomic_ref(scratch.groups[blocks_.groups_of(b)[i]]).store(1, std::memory_order_relaxed);
+        std::atomic_ref(scratch.groups[g]).store(1, std::memory_order_relaxed);
       }
     }
   });
@@ -262,71 +265,97 @@ void VolumePoser::find_moved(const Job& job, const DrawTets& tets, PosedVolume& 
   job.context.check_stop();
 }
 
+namespace {
+
+constexpr std::uint16_t kNoBand = 0xffff;
+
+// One band on its way into the output.
+class Band {
+ public:
+  Band(const DrawTets& tets, const SampleJob& samples, const BatchSink& sink,
+       const VolumePoser::Scratch& scratch, std::uint16_t number)
+      : tets_(tets), samples_(samples), sink_(sink), scratch_(scratch), number_(number) {}
+
+  // From the least to the greatest claim on a voxel, each writing over the last: inverted tets, then positive
+  // ones. The former are few, and found on the way: what they may hold is then drawn again, with them.
+  void draw(const VoxelRange& range) {
+    fill(samples_, tets_.only, range);
+    Inverted inverted, none;
+    put(range, Claim::positive, inverted);
+    for (std::size_t b = 0; b < inverted.count; ++b) {
+      const VoxelRange& again = inverted.box[b];
+      fill(samples_, tets_.only, again);
+      put(again, Claim::inverted, none);
+      put(again, Claim::positive, none);
+    }
+  }
+
+ private:
+  // Runs from the last to the first.
+  void put(const VoxelRange& range, Claim claim, Inverted& found) {
+    std::array<std::uint32_t, 256> runs;
+    std::size_t count = 0;
+    const auto put_runs = [&] {
+      kernels::draw_runs(tets_, range, std::span(runs).first(count), claim, batch_, sink_, found);
+      count = 0;
+    };
+    for (std::size_t stretch = scratch_.first_band.size(); stretch-- > 0;) {
+      if (number_ < scratch_.first_band[stretch] || number_ > scratch_.last_band[stretch]) continue;
+      const std::size_t first = stretch * kStretch;
+      for (std::size_t r = std::min(scratch_.runs.size(), first + kStretch); r-- > first;) {
+        runs[count] = static_cast<std::uint32_t>(r);
+        count += scratch_.runs[r].meets(range) ? 1 : 0;
+        if (count == runs.size()) put_runs();
+      }
+    }
+    put_runs();
+    if (batch_.count > 0) sink_.sample(sink_.to, batch_);
+    batch_.count = 0;
+  }
+
+  const DrawTets& tets_;
+  const SampleJob& samples_;
+  const BatchSink& sink_;
+  const VolumePoser::Scratch& scratch_;
+  std::uint16_t number_;
+  VoxelBatch batch_;
+};
+
+}  // namespace
+
 void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratch& scratch) const {
   const ImageGrid& grid = job.grid;
   const Context& context = job.context;
   const Bands bands(grid);
 
-  // The blocks that reach into the grid, and the bands of each of their tets.
-  const std::size_t tets = model_->tet_count(), all = blocks_.blocks();
-  scratch.extents.resize(tets);
-  scratch.block_first.resize(all);
-  scratch.block_last.resize(all);
-  const std::size_t tasks = (all + kBlocksPerTask - 1) / kBlocksPerTask;
-  scratch.inverted.resize(tets);
-  scratch.blocks.assign(tasks, 0);  // inverted tets of each task
-  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+  // Where the runs of the blocks that reach into the grid lie.
+  scratch.runs.resize(drawn.palettes.runs());
+  const std::size_t stretches = (scratch.runs.size() + kStretch - 1) / kStretch;
+  scratch.first_band.resize(stretches);
+  scratch.last_band.resize(stretches);
+  const VoxelRange all = whole(grid);
+  const auto along = static_cast<std::size_t>(bands.axis);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, 16), [&](const auto& some) {
     if (context.stop.stop_requested()) return;
-    const std::size_t task_first = task * kBlocksPerTask * TetBlocks::size;
-    for (std::size_t b = task * kBlocksPerTask; b < std::min(all, (task + 1) * kBlocksPerTask); ++b) {
-      std::uint16_t& first = scratch.block_first[b] = TetExtent::none;
-      std::uint16_t& last = scratch.block_last[b] = 0;
-      if (scratch.block_meets[b] == 0) continue;
-      const std::size_t begin = b * TetBlocks::size, end = std::min(tets, begin + TetBlocks::size);
-      const std::span<TetExtent> extents = std::span(scratch.extents).subspan(begin, end - begin);
-      scratch.blocks[task] += static_cast<std::uint32_t>(
-          kernels::classify_tets(drawn, whole(grid), bands.axis, bands.height, begin, end, extents,
-                                 std::span(scratch.inverted).subspan(task_first + scratch.blocks[task])));
-      for (const TetExtent& extent : extents) {
-        if (extent.first > extent.last) continue;
-        first = std::min(first, extent.first);
-        last = std::max(last, extent.last);
+    for (std::size_t s = some.begin(); s < some.end(); ++s) {
+      std::int32_t first = std::numeric_limits<std::int32_t>::max(), last = -1;
+      for (std::size_t r = s * kStretch; r < std::min(scratch.runs.size(), (s + 1) * kStretch); ++r) {
+        const bool meets = scratch.block_meets[r / kRunsPerBlock] != 0;
+        const VoxelRange box = scratch.runs[r] = meets ? box_of_run(drawn, all, r) : VoxelRange::nothing();
+        first = std::min(first, box.first[along]);
+        last = std::max(last, box.last[along]);
       }
+      scratch.first_band[s] = static_cast<std::uint16_t>(last < 0 ? kNoBand : first / bands.height);
+      scratch.last_band[s] = static_cast<std::uint16_t>(last < 0 ? 0 : last / bands.height);
     }
   });
   context.check_stop();
-  std::size_t inverted = 0;
-  for (std::size_t task = 0; task < tasks; ++task) {
-    const auto from =
-        scratch.inverted.begin() + static_cast<std::ptrdiff_t>(task * kBlocksPerTask * TetBlocks::size);
-    std::copy_n(from, scratch.blocks[task], scratch.inverted.begin() + static_cast<std::ptrdiff_t>(inverted));
-    inverted += scratch.blocks[task];
-  }
-  std::reverse(scratch.inverted.begin(), scratch.inverted.begin() + static_cast<std::ptrdiff_t>(inverted));
 
-  // From the least to the greatest claim on a voxel, each writing over the last.
   const SampleJob samples{job.volume.image, job.volume.background, out};
   const BatchSink sink = sink_for(samples, job.volume.labels ? Sampling::nearest : job.sampling);
   tbb::parallel_for(std::size_t{0}, bands.count, [&](std::size_t number) {
-    const auto band = static_cast<std::uint16_t>(number);
     if (context.stop.stop_requested()) return;
-    const VoxelRange range = bands.of(band, grid);
-    fill_band(samples, drawn.only, range);
-    VoxelBatch batch;
-    kernels::draw_tets(drawn, range, std::span<const std::uint32_t>(scratch.inverted).first(inverted), batch,
-                       sink);
-    std::array<std::uint8_t, TetBlocks::size> wanted{};
-    for (std::size_t b = all; b-- > 0;) {
-      if (band < scratch.block_first[b] || band > scratch.block_last[b]) continue;
-      const std::size_t count = std::min(TetBlocks::size, tets - b * TetBlocks::size);
-      const TetExtent* extents = &scratch.extents[b * TetBlocks::size];
-      for (std::size_t i = 0; i < count; ++i)
-        wanted[i] = static_cast<std::uint8_t>(band >= extents[i].first) &
-                    static_cast<std::uint8_t>(band <= extents[i].last);
-      std::fill(wanted.begin() + static_cast<std::ptrdiff_t>(count), wanted.end(), std::uint8_t{0});
-      kernels::draw_runs(drawn, range, b * TetBlocks::size / TetPalettes::width, wanted, batch, sink);
-    }
-    if (batch.count > 0) sink.sample(sink.to, batch);
+    Band(drawn, samples, sink, scratch, static_cast<std::uint16_t>(number)).draw(bands.of(number, grid));
   });
   context.check_stop();
 }

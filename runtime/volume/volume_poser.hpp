@@ -44,10 +44,9 @@ class VolumePoser {
   struct Scratch {
     std::vector<float> bounds;
     std::vector<std::int32_t> posed, rest;
-    std::vector<TetExtent> extents;
-    std::vector<std::uint32_t> blocks, inverted;
-    std::vector<std::uint16_t> block_first, block_last;
-    std::vector<std::uint8_t> block_meets, groups;
+    std::vector<VoxelRange> runs;                      // boxes of runs of tets
+    std::vector<std::uint16_t> first_band, last_band;  // of stretches of runs; first > last: none
+    std::vector<std::uint8_t> sides, block_meets, groups;
     struct Rest {  // what `rest` holds
       const Model* model = nullptr;
       ImageGrid grid;

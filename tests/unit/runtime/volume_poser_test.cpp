@@ -331,7 +331,8 @@ void expect_samplers_nearest(std::size_t count) {
 
 TEST(NearestSamples, AreTheSamplersToTheByteOnEveryInstructionSet) {
   on_every_target([] {
-    for (const std::size_t count : {1, 3, 16, 17, 100, 1024}) {
+    for (const std::size_t count : {std::size_t{1}, std::size_t{3}, std::size_t{16}, std::size_t{17},
+                                    std::size_t{100}, VoxelBatch::capacity}) {
       expect_samplers_nearest<std::uint8_t>(count);
       expect_samplers_nearest<std::int8_t>(count);
       expect_samplers_nearest<std::uint16_t>(count);
