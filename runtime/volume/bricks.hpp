@@ -22,6 +22,15 @@ struct VoxelRange {
     return {{most, most, most}, {-1, -1, -1}};
   }
   bool empty() const { return first[0] > last[0] || first[1] > last[1] || first[2] > last[2]; }
+  /// The least that holds both.
+  VoxelRange around(const VoxelRange& other) const {
+    VoxelRange out;
+    for (std::size_t a = 0; a < 3; ++a) {
+      out.first[a] = std::min(first[a], other.first[a]);
+      out.last[a] = std::max(last[a], other.last[a]);
+    }
+    return out;
+  }
   bool meets(const VoxelRange& other) const {
     bool out = true;
     for (std::size_t a = 0; a < 3; ++a) out &= first[a] <= other.last[a] && last[a] >= other.first[a];

@@ -21,6 +21,23 @@ using VI = hn::Vec<I>;
 
 constexpr std::size_t kMostLanes = 16;
 
+// What surely fits 32 bits, to the nearest or down towards zero: saturating costs more than converting.
+HWY_INLINE VI to_nearest(V x) {
+#if HWY_TARGET <= HWY_AVX3
+  return VI{_mm512_cvtps_epi32(x.raw)};
+#else
+  return hn::NearestInt(x);
+#endif
+}
+
+HWY_INLINE VI truncated(V x) {
+#if HWY_TARGET <= HWY_AVX3
+  return VI{_mm512_cvttps_epi32(x.raw)};
+#else
+  return hn::ConvertTo(I(), x);
+#endif
+}
+
 // The corners of a vector of tets, whole numbers.
 struct Corners {
   VI x[4][3];

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
 
 #include "runtime/volume/draw_box-inl.hpp"
 #include "runtime/volume/draw_tets.hpp"
@@ -79,28 +80,27 @@ HWY_INLINE void walk(const Steps& steps, int nx, int ny, int nz, VU (&outside)[2
   }
 }
 
-// Voxels of a vector of tets in the order in which they are put: the tet's lane, and above it the voxel's
-// bit.
+// Voxels of a vector of tets in the order in which they are put: the tet's lane and the voxel's bit.
 struct Hits {
-  static constexpr unsigned lane_bits = 4;
   static constexpr std::size_t group = 4;  // written at once, whether or not there are so many
   std::size_t count = 0;
-  HWY_ALIGN std::array<std::uint16_t, 64 * kMostLanes + group + kMostLanes> hit{};
+  HWY_ALIGN std::array<std::uint8_t, 64 * kMostLanes + group + kMostLanes> lane{}, voxel{};
 
-  HWY_INLINE void add(std::size_t lane, std::uint64_t voxels) {
+  HWY_INLINE void add(std::size_t of_lane, std::uint64_t voxels) {
     constexpr std::uint64_t never_none = std::uint64_t{1} << 63U;  // or counting zeros would branch
-    std::uint16_t* at = &hit[count];
+    const std::uint32_t lanes = 0x01010101U * static_cast<std::uint32_t>(of_lane);
+    static_assert(sizeof lanes == group);
+    std::size_t at = count;
     count += static_cast<std::size_t>(std::popcount(voxels));
     do {
+      std::memcpy(&lane[at], &lanes, group);
       for (std::size_t i = 0; i < group; ++i) {
-        const auto voxel = static_cast<std::size_t>(std::countr_zero(voxels | never_none));
-        *at++ = static_cast<std::uint16_t>(lane | voxel << lane_bits);
+        voxel[at + i] = static_cast<std::uint8_t>(std::countr_zero(voxels | never_none));
         voxels &= voxels - 1;
       }
+      at += group;
     } while (HWY_UNLIKELY(voxels != 0));
   }
-  std::size_t lane(std::size_t i) const { return hit[i] & (kMostLanes - 1); }
-  unsigned voxel(std::size_t i) const { return hit[i] >> lane_bits; }
 };
 
 // Those of the bricks that are drawn.
@@ -108,9 +108,10 @@ template <class L>
 void keep_bricks(const DrawTets& job, const Setup& tets, Hits& hits) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < hits.count; ++i) {
-    const std::size_t t = hits.lane(i);
-    const auto at = [&](std::size_t a) { return tets.first[a][t] + L::along(hits.voxel(i), a); };
-    hits.hit[kept] = hits.hit[i];
+    const std::size_t t = hits.lane[i];
+    const auto at = [&](std::size_t a) { return tets.first[a][t] + L::along(hits.voxel[i], a); };
+    hits.lane[kept] = hits.lane[i];
+    hits.voxel[kept] = hits.voxel[i];
     kept += job.only.has(at(0), at(1), at(2)) ? 1 : 0;
   }
   hits.count = kept;
@@ -124,8 +125,8 @@ HWY_INLINE void put_hits(const DrawTets& job, const Setup& tets, Hits& hits, Vox
   const std::size_t lanes = hn::Lanes(F());
   const VI row = hn::Set(I(), job.size[0]), slice = hn::Set(I(), job.size[0] * job.size[1]);
   for (std::size_t i = 0; i < hits.count; i += lanes) {
-    const VI hit = hn::PromoteTo(I(), hn::LoadU(U16(), &hits.hit[i]));
-    const VI lane = hn::And(hit, hn::Set(I(), kMostLanes - 1));
+    const VI lane = hn::PromoteTo(I(), hn::LoadU(U8(), &hits.lane[i]));
+    const VI voxel = hn::PromoteTo(I(), hn::LoadU(U8(), &hits.voxel[i]));
     const auto in_floats = hn::IndicesFromVec(F(), lane);
     const auto in_wholes = hn::IndicesFromVec(I(), lane);
     const auto fixed = [&](const std::int32_t* of)
@@ -134,8 +135,7 @@ HWY_INLINE void put_hits(const DrawTets& job, const Setup& tets, Hits& hits, Vox
                             HWY_ATTR { return hn::TableLookupLanes(hn::Load(F(), of), in_floats); };
     const auto along = [&](auto axis) HWY_ATTR {
       constexpr std::size_t a = decltype(axis)::value;
-      return hn::And(hn::ShiftRight<static_cast<int>(Hits::lane_bits) + L::first[a]>(hit),
-                     hn::Set(I(), L::most(a) - 1));
+      return hn::And(hn::ShiftRight<L::first[a]>(voxel), hn::Set(I(), L::most(a) - 1));
     };
     const VI x = along(std::integral_constant<std::size_t, 0>());
     const VI y = along(std::integral_constant<std::size_t, 1>());

@@ -63,11 +63,11 @@ struct DrawTets {
 /// precision.
 inline constexpr float kFlatTet = 3e-3F;
 
-/// The voxel centres of `range` that the box of a run of tets holds; it meets nothing where there is none, or
-/// only such of bricks that are not drawn.
-VoxelRange box_of_run(const DrawTets& job, const VoxelRange& range, std::size_t run);
-
 namespace kernels {
+
+/// Of the runs from `first` on the voxel centres of `range` that their boxes hold: `nothing` where there is
+/// none, or only such of bricks that are not drawn.
+void box_runs(const DrawTets& job, const VoxelRange& range, std::size_t first, std::span<VoxelRange> boxes);
 
 /// Sets `moved` of every brick of `bricks` that a tet of [begin, end), where `begin` begins a run, may hold
 /// voxels of at `before` or at `job.posed`, where a corner of it differs between the two. `range`: the whole

@@ -48,7 +48,7 @@ HWY_INLINE void nearest(const void* to, const VoxelBatch& batch) {
       const V part = hn::Load(F(), &batch.part[a][i]), whole = hn::Floor(part);
       const auto up = hn::Ge(part, hn::Add(whole, hn::Set(F(), 0.5F)));
       const VI one = hn::IfThenElseZero(hn::RebindMask(I(), up), hn::Set(I(), 1));
-      at[a] = hn::Add(hn::Add(hn::Load(I(), &batch.base[a][i]), hn::ConvertTo(I(), whole)), one);
+      at[a] = hn::Add(hn::Add(hn::Load(I(), &batch.base[a][i]), truncated(whole)), one);
       inside = hn::And(inside,
                        hn::And(hn::Gt(at[a], hn::Set(I(), -1)), hn::Lt(at[a], hn::Set(I(), grid.size[a]))));
     }

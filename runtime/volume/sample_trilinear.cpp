@@ -9,18 +9,13 @@
 
 #include <algorithm>
 
+#include "runtime/volume/corners-inl.hpp"
 #include "runtime/volume/sample_batch.hpp"
 #include "runtime/volume/sampler.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using F = hn::CappedTag<float, 16>;
-using I = hn::Rebind<std::int32_t, F>;
-using V = hn::Vec<F>;
-using VI = hn::Vec<I>;
-constexpr std::size_t kMostLanes = 16;
 
 // The value at `offset` and the next one along x, in one load of 32 bits.
 template <class T>
@@ -65,7 +60,7 @@ void trilinear(const void* to, const VoxelBatch& batch) {
     for (std::size_t a = 0; a < 3; ++a) {
       const V part = hn::Load(F(), &batch.part[a][i]), whole = hn::Floor(part);
       share[a] = hn::Sub(part, whole);
-      at[a] = hn::Add(hn::Load(I(), &batch.base[a][i]), hn::ConvertTo(I(), whole));
+      at[a] = hn::Add(hn::Load(I(), &batch.base[a][i]), truncated(whole));
       const auto inside =
           hn::And(hn::Gt(at[a], hn::Set(I(), -1)), hn::Lt(at[a], hn::Set(I(), grid.size[a] - 1)));
       fast = hn::And(fast, hn::RebindMask(F(), inside));
@@ -87,9 +82,14 @@ void trilinear(const void* to, const VoxelBatch& batch) {
     // Half away from zero, as to_scalar.
     sum = hn::Add(sum, hn::CopySign(hn::Set(F(), 0.5F), sum));
     HWY_ALIGN std::int32_t value[kMostLanes], easy[kMostLanes];
-    hn::Store(hn::ConvertTo(I(), sum), I(), value);
+    hn::Store(truncated(sum), I(), value);
+    const std::size_t count = std::min(lanes, batch.count - i);
+    if (HWY_LIKELY(count == lanes && hn::AllTrue(F(), fast))) {
+      for (std::size_t l = 0; l < lanes; ++l) posed[batch.offset[i + l]] = static_cast<T>(value[l]);
+      continue;
+    }
     hn::Store(hn::BitCast(I(), hn::VecFromMask(F(), fast)), I(), easy);
-    for (std::size_t l = 0; l < std::min(lanes, batch.count - i); ++l) {
+    for (std::size_t l = 0; l < count; ++l) {
       T* voxel = &posed[batch.offset[i + l]];
       if (easy[l] != 0) {
         *voxel = static_cast<T>(value[l]);

@@ -105,25 +105,24 @@ HWY_INLINE Steps steps_of(const PosedTets& tets) {
   const V reach = hn::Max(tets.reach, hn::Set(F(), 1e-30F));
   const auto exponent = hn::And(hn::BitCast(u, reach), hn::Set(u, 0x7f800000U));
   const V scale = hn::BitCast(F(), hn::Sub(hn::Set(u, (127U + bits + 127U) << 23U), exponent));
-  const auto rounded = [&](V x) HWY_ATTR { return hn::NearestInt(x); };
   const V margin = hn::Mul(hn::Mul(hn::Set(F(), kMargin), reach), scale);
-  const VI out_by = rounded(margin);
+  const VI out_by = to_nearest(margin);
   Steps out;
   VI sum[4] = {hn::Zero(I()), hn::Zero(I()), hn::Zero(I()), hn::Zero(I())};
   for (int p = 1; p < 4; ++p) {
     const V3 n = times(tets.n[p - 1], scale);
-    const VI at = hn::Sub(hn::Zero(I()), rounded(dot(n, tets.origin)));
+    const VI at = hn::Sub(hn::Zero(I()), to_nearest(dot(n, tets.origin)));
     out.at[p] = hn::Add(at, out_by);
-    out.by[0][p] = rounded(n.x);
-    out.by[1][p] = rounded(n.y);
-    out.by[2][p] = rounded(n.z);
+    out.by[0][p] = to_nearest(n.x);
+    out.by[1][p] = to_nearest(n.y);
+    out.by[2][p] = to_nearest(n.z);
     sum[0] = hn::Add(sum[0], out.by[0][p]);
     sum[1] = hn::Add(sum[1], out.by[1][p]);
     sum[2] = hn::Add(sum[2], out.by[2][p]);
     sum[3] = hn::Add(sum[3], at);
   }
   // All four coordinates add up to the whole.
-  out.at[0] = hn::Sub(hn::Add(rounded(hn::Mul(tets.size, scale)), out_by), sum[3]);
+  out.at[0] = hn::Sub(hn::Add(to_nearest(hn::Mul(tets.size, scale)), out_by), sum[3]);
   for (int a = 0; a < 3; ++a) out.by[a][0] = hn::Sub(hn::Zero(I()), sum[a]);
   return out;
 }

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 
 #include "runtime/volume/fixed_points.hpp"
 #include "runtime/volume/grid_affine.hpp"
@@ -31,7 +30,7 @@ struct Bands {
 
   explicit Bands(const ImageGrid& grid) : axis(grid.size[2] >= grid.size[1] ? 2 : 1) {
     const std::int32_t slices = grid.size[static_cast<std::size_t>(axis)];
-    height = std::max(slices < 8 * kHighBand ? kBand : kHighBand, slices / 32768);
+    height = slices < 8 * kHighBand ? kBand : kHighBand;
     count = static_cast<std::size_t>((slices + height - 1) / height);
   }
   VoxelRange of(std::size_t band, const ImageGrid& grid) const {
@@ -267,14 +266,12 @@ void VolumePoser::find_moved(const Job& job, const DrawTets& tets, PosedVolume& 
 
 namespace {
 
-constexpr std::uint16_t kNoBand = 0xffff;
-
 // One band on its way into the output.
 class Band {
  public:
   Band(const DrawTets& tets, const SampleJob& samples, const BatchSink& sink,
-       const VolumePoser::Scratch& scratch, std::uint16_t number)
-      : tets_(tets), samples_(samples), sink_(sink), scratch_(scratch), number_(number) {}
+       const VolumePoser::Scratch& scratch)
+      : tets_(tets), samples_(samples), sink_(sink), scratch_(scratch) {}
 
   // From the least to the greatest claim on a voxel, each writing over the last: inverted tets, then positive
   // ones. The former are few, and found on the way: what they may hold is then drawn again, with them.
@@ -299,8 +296,8 @@ class Band {
       kernels::draw_runs(tets_, range, std::span(runs).first(count), claim, batch_, sink_, found);
       count = 0;
     };
-    for (std::size_t stretch = scratch_.first_band.size(); stretch-- > 0;) {
-      if (number_ < scratch_.first_band[stretch] || number_ > scratch_.last_band[stretch]) continue;
+    for (std::size_t stretch = scratch_.stretches.size(); stretch-- > 0;) {
+      if (!scratch_.stretches[stretch].meets(range)) continue;
       const std::size_t first = stretch * kStretch;
       for (std::size_t r = std::min(scratch_.runs.size(), first + kStretch); r-- > first;) {
         runs[count] = static_cast<std::uint32_t>(r);
@@ -317,7 +314,6 @@ class Band {
   const SampleJob& samples_;
   const BatchSink& sink_;
   const VolumePoser::Scratch& scratch_;
-  std::uint16_t number_;
   VoxelBatch batch_;
 };
 
@@ -330,23 +326,23 @@ void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratc
 
   // Where the runs of the blocks that reach into the grid lie.
   scratch.runs.resize(drawn.palettes.runs());
-  const std::size_t stretches = (scratch.runs.size() + kStretch - 1) / kStretch;
-  scratch.first_band.resize(stretches);
-  scratch.last_band.resize(stretches);
+  scratch.stretches.resize((scratch.runs.size() + kStretch - 1) / kStretch);
   const VoxelRange all = whole(grid);
-  const auto along = static_cast<std::size_t>(bands.axis);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, 16), [&](const auto& some) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scratch.stretches.size(), 16), [&](const auto& some) {
     if (context.stop.stop_requested()) return;
     for (std::size_t s = some.begin(); s < some.end(); ++s) {
-      std::int32_t first = std::numeric_limits<std::int32_t>::max(), last = -1;
-      for (std::size_t r = s * kStretch; r < std::min(scratch.runs.size(), (s + 1) * kStretch); ++r) {
-        const bool meets = scratch.block_meets[r / kRunsPerBlock] != 0;
-        const VoxelRange box = scratch.runs[r] = meets ? box_of_run(drawn, all, r) : VoxelRange::nothing();
-        first = std::min(first, box.first[along]);
-        last = std::max(last, box.last[along]);
+      VoxelRange& stretch = scratch.stretches[s] = VoxelRange::nothing();
+      const std::size_t end = std::min(scratch.runs.size(), (s + 1) * kStretch);
+      for (std::size_t r = s * kStretch; r < end; r += kRunsPerBlock) {
+        const std::span<VoxelRange> runs =
+            std::span(scratch.runs).subspan(r, std::min(end - r, kRunsPerBlock));
+        if (scratch.block_meets[r / kRunsPerBlock] != 0) {
+          kernels::box_runs(drawn, all, r, runs);
+        } else {
+          std::fill(runs.begin(), runs.end(), VoxelRange::nothing());
+        }
+        for (const VoxelRange& run : runs) stretch = stretch.around(run);
       }
-      scratch.first_band[s] = static_cast<std::uint16_t>(last < 0 ? kNoBand : first / bands.height);
-      scratch.last_band[s] = static_cast<std::uint16_t>(last < 0 ? 0 : last / bands.height);
     }
   });
   context.check_stop();
@@ -355,7 +351,7 @@ void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratc
   const BatchSink sink = sink_for(samples, job.volume.labels ? Sampling::nearest : job.sampling);
   tbb::parallel_for(std::size_t{0}, bands.count, [&](std::size_t number) {
     if (context.stop.stop_requested()) return;
-    Band(drawn, samples, sink, scratch, static_cast<std::uint16_t>(number)).draw(bands.of(number, grid));
+    Band(drawn, samples, sink, scratch).draw(bands.of(number, grid));
   });
   context.check_stop();
 }

@@ -44,8 +44,7 @@ class VolumePoser {
   struct Scratch {
     std::vector<float> bounds;
     std::vector<std::int32_t> posed, rest;
-    std::vector<VoxelRange> runs;                      // boxes of runs of tets
-    std::vector<std::uint16_t> first_band, last_band;  // of stretches of runs; first > last: none
+    std::vector<VoxelRange> runs, stretches;  // boxes of runs of tets, and of some that follow each other
     std::vector<std::uint8_t> sides, block_meets, groups;
     struct Rest {  // what `rest` holds
       const Model* model = nullptr;

@@ -186,5 +186,38 @@ TEST_F(BricksTest, SameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(kept.rewritten, four.rewritten);
 }
 
+TEST(InvertedTets, AllLieInAFewBoxesAndNearOnesShareOne) {
+  std::mt19937 random(7);
+  const auto box = [&](std::int32_t spread) {
+    VoxelRange out;
+    for (std::size_t a = 0; a < 3; ++a) {
+      out.first[a] = static_cast<std::int32_t>(random()) % spread;
+      out.last[a] = out.first[a] + static_cast<std::int32_t>(random() % 4U);
+    }
+    return out;
+  };
+  for (const std::int32_t spread : {2, 50, 5000}) {
+    Inverted inverted;
+    std::vector<VoxelRange> added;
+    for (int i = 0; i < 100; ++i) {
+      added.push_back(box(spread));
+      inverted.add(added.back());
+    }
+    if (spread == 2) {
+      EXPECT_LT(inverted.count, Inverted::most);
+    } else {
+      EXPECT_EQ(inverted.count, Inverted::most);
+    }
+    for (const VoxelRange& one : added) {
+      bool held = false;
+      for (std::size_t b = 0; b < inverted.count; ++b) {
+        const VoxelRange around = inverted.box[b].around(one);
+        held = held || (around.first == inverted.box[b].first && around.last == inverted.box[b].last);
+      }
+      EXPECT_TRUE(held);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::runtime
