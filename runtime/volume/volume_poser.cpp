@@ -281,7 +281,6 @@ class Band {
     put(range, Claim::positive, inverted);
     for (std::size_t b = 0; b < inverted.count; ++b) {
       const VoxelRange& again = inverted.box[b];
-      fill(samples_, tets_.only, again);
       put(again, Claim::inverted, none);
       put(again, Claim::positive, none);
     }

@@ -145,19 +145,26 @@ TEST_F(PosedInOnePass, FinerAndCoarserGridsAndTheirParts) {
   const ImageGrid whole = skew_grid(false, 2);
   Image all, part;
   poser.pose(nodes, volume, Sampling::trilinear, whole, all, scratch);
-  ImageGrid roi = whole;
-  roi.origin = whole.point(17, 9, 21);
-  roi.size = {31, 29, 24};
-  poser.pose(nodes, volume, Sampling::trilinear, roi, part, scratch);
   std::size_t differ = 0, other = 0;
-  for (int k = 0; k < roi.size[2]; ++k) {
-    for (int j = 0; j < roi.size[1]; ++j) {
-      for (int i = 0; i < roi.size[0]; ++i) {
-        const auto a = all.scalars<std::uint8_t>()[whole.offset(i + 17, j + 9, k + 21)];
-        const auto b = part.scalars<std::uint8_t>()[roi.offset(i, j, k)];
-        differ += std::abs(a - b) > 1;
-        other += b != 7;
-      }
+  std::mt19937 random(11);
+  for (int region = 0; region < 300; ++region) {
+    // The first is large; the others are where only some blocks of tets reach.
+    std::array<std::int32_t, 3> first{17, 9, 21}, size{31, 29, 24};
+    for (std::size_t a = 0; a < 3 && region > 0; ++a) {
+      size[a] = 2 + static_cast<std::int32_t>(random() % 7U);
+      first[a] = static_cast<std::int32_t>(random() % static_cast<unsigned>(whole.size[a] - size[a]));
+    }
+    ImageGrid roi = whole;
+    roi.origin = whole.point(first[0], first[1], first[2]);
+    roi.size = size;
+    poser.pose(nodes, volume, Sampling::trilinear, roi, part, scratch);
+    for (std::size_t v = 0; v < roi.voxels(); ++v) {
+      const auto at = static_cast<std::int32_t>(v);
+      const std::int32_t i = at % size[0], j = at / size[0] % size[1], k = at / size[0] / size[1];
+      const auto a = all.scalars<std::uint8_t>()[whole.offset(i + first[0], j + first[1], k + first[2])];
+      const auto b = part.scalars<std::uint8_t>()[v];
+      differ += std::abs(a - b) > 1;
+      other += b != 7;
     }
   }
   EXPECT_GT(other, 400u);
