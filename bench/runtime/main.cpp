@@ -189,16 +189,6 @@ class Bench {
     std::size_t all = 0;
     for (const Tissue& tissue : model_->tissues) all += static_cast<std::size_t>(tissue.V.rows());
     const double body = bytes_.nodes[2] + bytes_.tissues;
-    const auto move = [&](std::vector<runtime::PosedBody>& bodies) {
-      return time(kFrames, [&](int f) {
-        runtime::PosedBody& frame = bodies[static_cast<std::size_t>(f) % copies_];
-        parts_.move(*model_, posers_[0]->all_tissues(), frame);
-      });
-    };
-    line("tissues, float32, one layout", threads, move(plain_frames_),
-         floor_of(bytes_.tissues + size_of(all, 12)));
-    line("tissues, u16, one layout", threads, move(wire_frames_),
-         floor_of(bytes_.tissues + bytes_.quantised));
     line("frame, CoR, float32", threads, frames(plain_frames_), floor_of(body + size_of(all, 12)), plain);
     line("frame, CoR, u16", threads, frames(wire_frames_), floor_of(body + bytes_.quantised), plain);
     line("frame, CoR, u16 and normals", threads, frames(full_frames_),

@@ -2,8 +2,11 @@
 #include "runtime/skin/body_parts.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -13,8 +16,8 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::size_t kCellsPerBlock = 12;           // some 1000 vertices
 constexpr std::size_t kBoneVerticesPerBlock = 2048;  // a multiple of any vector
+constexpr std::size_t kSpansPerThread = 8;           // few, since cells reach across their ends
 
 std::span<const float> floats(const PointsF& points) {
   return {points.data(), static_cast<std::size_t>(points.size())};
@@ -45,7 +48,19 @@ float diagonal(const PointsF& points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
 
-constexpr Eigen::Index kWorthThreads = 20'000;  // vertices; fewer are done before a thread wakes
+constexpr std::size_t kWorthThreads = 20'000;  // vertices or nodes; fewer are done before a thread wakes
+
+auto kernel_of(Skinning skinning) {
+  switch (skinning) {
+    case Skinning::lbs:
+      return kernels::lbs;
+    case Skinning::dqs:
+      return kernels::dqs;
+    case Skinning::cor:
+      break;
+  }
+  return kernels::cor;
+}
 
 template <class T>
 T* data_or_null(std::vector<T>& rows) {
@@ -74,54 +89,140 @@ BodyParts::BodyParts(const Model& model)
       part.mask[cluster / 64] |= std::uint64_t{1} << cluster % 64;
     }
   };
-  Eigen::Index vertices = 0;
-  for (const Tissue& tissue : model.tissues) vertices += tissue.V.rows();
+  std::size_t vertices = 0;
+  for (const Tissue& tissue : model.tissues) vertices += static_cast<std::size_t>(tissue.V.rows());
   if (vertices < kWorthThreads) {
     for (std::size_t t = 0; t < tissues_.size(); ++t) build(t);
   } else {
     tbb::parallel_for(std::size_t{0}, tissues_.size(), build);
   }
-  for (std::size_t t = 0; t < tissues_.size(); ++t) {
-    const bool bone = model.tissues[t].segment != Tissue::by_tets;
-    const auto count =
-        bone ? static_cast<std::size_t>(model.tissues[t].V.rows()) : tissues_[t].groups.cells.size();
-    const std::size_t most = bone ? kBoneVerticesPerBlock : kCellsPerBlock;
-    tissues_[t].first = static_cast<std::uint32_t>(blocks_.size());
-    for (std::size_t i = 0; i < count; i += most) {
-      blocks_.push_back({static_cast<std::uint32_t>(t), static_cast<std::uint32_t>(i),
-                         static_cast<std::uint32_t>(std::min(count, i + most))});
+  std::vector<std::vector<Run>> of_slab(clusters_.slabs());
+  for (std::uint32_t t = 0; t < tissues_.size(); ++t) {
+    if (model.tissues[t].segment != Tissue::by_tets) {
+      add_bone(t, static_cast<std::size_t>(model.tissues[t].V.rows()));
+    } else {
+      add_runs(t, of_slab);
     }
-    tissues_[t].end = static_cast<std::uint32_t>(blocks_.size());
+  }
+  first_run_.push_back(0);
+  for (const std::vector<Run>& runs : of_slab) {
+    runs_.insert(runs_.end(), runs.begin(), runs.end());
+    first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
+  }
+}
+
+void BodyParts::add_bone(std::uint32_t tissue, std::size_t vertices) {
+  tissues_[tissue].first = static_cast<std::uint32_t>(bones_.size());
+  for (std::size_t i = 0; i < vertices; i += kBoneVerticesPerBlock) {
+    bones_.push_back({tissue, static_cast<std::uint32_t>(i),
+                      static_cast<std::uint32_t>(std::min(vertices, i + kBoneVerticesPerBlock))});
+  }
+  tissues_[tissue].end = static_cast<std::uint32_t>(bones_.size());
+}
+
+void BodyParts::add_runs(std::uint32_t tissue, std::vector<std::vector<Run>>& of_slab) {
+  const VertexGroups& groups = tissues_[tissue].groups;
+  for (std::uint32_t c = 0, end = 0; c < groups.cells.size(); c = end) {
+    const std::size_t slab = groups.last_slab(groups.cells[c]);
+    Run run{tissue, c, c, static_cast<std::uint32_t>(slab), ~0U, 0};
+    for (end = c; end < groups.cells.size() && groups.last_slab(groups.cells[end]) == slab; ++end) {
+      run.from = std::min(run.from, static_cast<std::uint32_t>(groups.first_slab(groups.cells[end])));
+    }
+    run.end = end;
+    const std::size_t first = groups.first_group(c), count = groups.cells[end - 1].end - first;
+    for (const VertexGroups::Group& group : std::span(groups.groups).subspan(first, count)) {
+      run.first = std::min(run.first, group.first);
+      run.last = std::max(run.last, static_cast<std::uint32_t>(group.first + groups.group_vertices(group)));
+    }
+    if (!groups.in_order || run.last - run.first > 2 * VertexGroups::size * count) run.first = run.last = 0;
+    of_slab[slab].push_back(run);
   }
 }
 
 void BodyParts::make_scratch(PosedBody::Scratch& scratch) const {
   scratch.lanes.assign(lane_floats(), 0.0F);
-  scratch.mask.resize((clusters_.clusters() + 63) / 64);
-  scratch.clusters.reserve(clusters_.clusters());
-  scratch.blocks.reserve(blocks_.size());
+  scratch.mask.resize(clusters_.slabs());
+  scratch.asked.resize(tissues_.size());
+  scratch.begun.resize(clusters_.slabs());
+  scratch.late.reserve(runs_.size());
+  scratch.bones.reserve(bones_.size());
 }
 
-void BodyParts::skin(Skinning skinning, std::span<const std::uint32_t> tissues, NodesOf nodes,
-                     PosedBody& out) const {
-  PosedBody::Scratch& scratch = out.scratch;
-  const std::size_t count = clusters_.clusters();
+// What is to be done for a frame, as all its threads read it.
+struct BodyParts::Frame {
+  const Model& model;
+  const SkinClusters& job;
+  void (*skin)(const SkinClusters&, std::size_t, std::size_t);
+  PosedBody& out;
+
+  VertexSink sink(std::size_t tissue) const {
+    return {data_or_null(out.tissues[tissue]), data_or_null(out.quantised[tissue]),
+            data_or_null(out.normals[tissue]), out.box};
+  }
+};
+
+void BodyParts::choose(std::span<const std::uint32_t> tissues, NodesOf nodes,
+                       PosedBody::Scratch& scratch) const {
   std::fill(scratch.mask.begin(), scratch.mask.end(),
             nodes == NodesOf::body ? ~std::uint64_t{0} : std::uint64_t{0});
-  if (nodes == NodesOf::tissues) {
-    for (const std::uint32_t t : tissues) {
-      const std::vector<std::uint64_t>& mask = tissues_[t].mask;
-      for (std::size_t w = 0; w < mask.size(); ++w) scratch.mask[w] |= mask[w];
-    }
+  if (nodes == NodesOf::body && clusters_.clusters() % 64 != 0) {
+    scratch.mask.back() = (std::uint64_t{1} << clusters_.clusters() % 64) - 1;
   }
-  scratch.clusters.clear();
-  for (std::size_t w = 0; w < scratch.mask.size(); ++w) {
-    for (std::uint64_t bits = scratch.mask[w]; bits != 0; bits &= bits - 1) {
-      const std::size_t cluster = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
-      if (cluster < count) scratch.clusters.push_back(static_cast<std::uint32_t>(cluster));
-    }
+  std::fill(scratch.asked.begin(), scratch.asked.end(), std::uint8_t{0});
+  scratch.bones.clear();
+  for (const std::uint32_t t : tissues) {
+    const Part& part = tissues_[t];
+    scratch.asked[t] = 1;
+    for (std::size_t w = 0; w < part.mask.size(); ++w) scratch.mask[w] |= part.mask[w];
+    for (std::uint32_t b = part.first; b < part.end; ++b) scratch.bones.push_back(b);
   }
+}
 
+void BodyParts::pose_slab(const Frame& frame, std::size_t slab, std::size_t begun) const {
+  static_assert(NodeClusters::slab == 64 * NodeClusters::size, "a word of the mask is a slab");
+  PosedBody::Scratch& scratch = frame.out.scratch;
+  scratch.begun[slab] = static_cast<std::uint32_t>(begun);
+  std::array<std::uint32_t, 64> clusters;
+  std::size_t count = 0;
+  for (std::uint64_t bits = scratch.mask[slab]; bits != 0; bits &= bits - 1) {
+    clusters[count++] =
+        static_cast<std::uint32_t>(64 * slab) + static_cast<std::uint32_t>(std::countr_zero(bits));
+  }
+  if (count == 0) return;
+  SkinClusters job = frame.job;
+  job.clusters = std::span(clusters).first(count);
+  frame.skin(job, 0, count);
+  if (!job.nodes.empty()) kernels::hand_on(job, 0, count);
+  for (std::uint32_t r = first_run_[slab]; r < first_run_[slab + 1]; ++r) {
+    if (scratch.asked[runs_[r].tissue] != 0) move_cells(frame, runs_[r], begun, false);
+  }
+}
+
+// Those that reach no further down than `begun`, or, late, those that do.
+void BodyParts::move_cells(const Frame& frame, const Run& run, std::size_t begun, bool late) const {
+  const VertexGroups& groups = tissues_[run.tissue].groups;
+  const TissueVertices job{groups, frame.out.scratch.lanes, frame.sink(run.tissue), run.first, run.last};
+  if (!late && run.from >= begun) return kernels::tissue(job, run.begin, run.end);
+  const auto wanted = [&](std::uint32_t c) { return (groups.first_slab(groups.cells[c]) < begun) == late; };
+  for (std::uint32_t c = run.begin, end = 0; c < run.end; c = end + 1) {
+    for (end = c; end < run.end && wanted(end);) ++end;
+    if (end > c) kernels::tissue(job, c, end);
+  }
+}
+
+void BodyParts::move_bone(const Frame& frame, const Block& block) const {
+  const Tissue& tissue = frame.model.tissues[block.tissue];
+  const Part& part = tissues_[block.tissue];
+  const RigidTransform& motion = frame.out.segments[static_cast<std::size_t>(tissue.segment)];
+  const RootMotion carried = make_motions({&motion, 1}, part.origin, {});
+  kernels::bone({floats(tissue.V), floats(part.normals), carried, frame.sink(block.tissue)}, block.begin,
+                block.end);
+}
+
+void BodyParts::pose(const Model& model, Skinning skinning, std::span<const std::uint32_t> tissues,
+                     NodesOf nodes, PosedBody& out) const {
+  PosedBody::Scratch& scratch = out.scratch;
+  choose(tissues, nodes, scratch);
   const RootMotion root = make_motions(out.segments, origin_, scratch.motions);
   for (std::size_t c = 0; c < 3; ++c) {
     out.box.low[c] = static_cast<float>(static_cast<double>(origin_[c] - reach_) + root.shift[c]);
@@ -130,42 +231,50 @@ void BodyParts::skin(Skinning skinning, std::span<const std::uint32_t> tissues, 
   const SkinClusters job{clusters_,
                          scratch.motions,
                          root,
-                         scratch.clusters,
+                         {},
                          std::span(scratch.lanes).first(3 * clusters_.node.size()),
                          nodes == NodesOf::body ? std::span<float>(out.nodes) : std::span<float>()};
-  switch (skinning) {
-    case Skinning::lbs:
-      return job.lbs();
-    case Skinning::dqs:
-      return job.dqs();
-    case Skinning::cor:
-      return job.cor();
-  }
-}
+  const Frame frame{model, job, kernel_of(skinning), out};
 
-void BodyParts::move_block(const Model& model, const Block& block, PosedBody& out) const {
-  const std::size_t t = block.tissue;
-  const Tissue& tissue = model.tissues[t];
-  const VertexSink sink{data_or_null(out.tissues[t]), data_or_null(out.quantised[t]),
-                        data_or_null(out.normals[t]), out.box};
-  if (tissue.segment == Tissue::by_tets) {
-    kernels::tissue({tissues_[t].groups, out.scratch.lanes, sink}, block.begin, block.end);
-    return;
-  }
-  const RigidTransform& motion = out.segments[static_cast<std::size_t>(tissue.segment)];
-  const RootMotion carried = make_motions({&motion, 1}, tissues_[t].origin, {});
-  kernels::bone({floats(tissue.V), floats(tissues_[t].normals), carried, sink}, block.begin, block.end);
-}
-
-void BodyParts::move(const Model& model, std::span<const std::uint32_t> tissues, PosedBody& out) const {
-  out.scratch.blocks.clear();
-  for (const std::uint32_t t : tissues) {
-    for (std::uint32_t b = tissues_[t].first; b < tissues_[t].end; ++b) out.scratch.blocks.push_back(b);
-  }
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, out.scratch.blocks.size(), 2), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      move_block(model, blocks_[out.scratch.blocks[i]], out);
+  // Threads take spans of slabs one after another, then blocks of bones. What reaches from a span into one
+  // before it waits until both are there, but where the same thread has just posed that.
+  std::size_t work = 0;
+  for (const std::uint64_t bits : scratch.mask)
+    work += NodeClusters::size * static_cast<std::size_t>(std::popcount(bits));
+  for (const std::uint32_t t : tissues) work += static_cast<std::size_t>(model.tissues[t].V.rows());
+  const std::size_t threads =
+      work < kWorthThreads ? 1 : static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t slabs = clusters_.slabs();
+  const std::size_t span = std::max<std::size_t>(1, slabs / (kSpansPerThread * threads));
+  const std::size_t spans = (slabs + span - 1) / span;
+  std::atomic<std::size_t> next{0};
+  const auto take_part = [&](std::size_t) {
+    std::size_t begun = 0, end = 0;
+    for (std::size_t i = next++; i < spans + scratch.bones.size(); i = next++) {
+      if (i >= spans) {
+        move_bone(frame, bones_[scratch.bones[i - spans]]);
+        continue;
+      }
+      if (i * span != end) begun = i * span;
+      end = std::min(slabs, (i + 1) * span);
+      for (std::size_t slab = i * span; slab < end; ++slab) pose_slab(frame, slab, begun);
     }
+  };
+  if (threads == 1) return take_part(0);
+  tbb::parallel_for(std::size_t{0}, threads, take_part, tbb::simple_partitioner());
+
+  scratch.late.clear();
+  for (std::size_t slab = 0; slab < slabs; ++slab) {
+    for (std::uint32_t r = first_run_[slab]; r < first_run_[slab + 1]; ++r) {
+      if (scratch.asked[runs_[r].tissue] != 0 && runs_[r].from < scratch.begun[slab])
+        scratch.late.push_back(r);
+    }
+  }
+  tbb::parallel_for(std::size_t{0}, scratch.late.size(), [&](std::size_t i) {
+    const Run& run = runs_[scratch.late[i]];
+    const std::size_t slab =
+        tissues_[run.tissue].groups.last_slab(tissues_[run.tissue].groups.cells[run.begin]);
+    move_cells(frame, run, scratch.begun[slab], true);
   });
 }
 

@@ -172,8 +172,7 @@ Status BodyPoser::run(const Pose& pose, Skinning skinning, std::span<const std::
   out.clamped.clear();
   kinematics::constrain(rig.skeleton, out.pose, out.clamped);
   kinematics::forward(rig, out.pose, out.segments);
-  impl_->parts.skin(skinning, tissues, nodes, out);
-  impl_->parts.move(*impl_->model, tissues, out);
+  impl_->parts.pose(*impl_->model, skinning, tissues, nodes, out);
   return {};
 }
 

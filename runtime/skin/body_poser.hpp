@@ -56,11 +56,13 @@ struct PosedBody {
 
   /// Of `run`; means nothing to others.
   struct Scratch {
-    std::vector<SegmentMotion> motions;   // #segments, as the kernels read them
-    Aligned<float> lanes;                 // posed nodes in the order of NodeClusters, and one float more
-    std::vector<std::uint64_t> mask;      // a bit per cluster
-    std::vector<std::uint32_t> clusters;  // what to skin
-    std::vector<std::uint32_t> blocks;    // what to move
+    std::vector<SegmentMotion> motions;  // #segments, as the kernels read them
+    Aligned<float> lanes;                // posed nodes in the order of NodeClusters, and one float more
+    std::vector<std::uint64_t> mask;     // a bit per cluster that is skinned; a word a slab
+    std::vector<std::uint8_t> asked;     // #tissues
+    std::vector<std::uint32_t> begun;    // per slab, where its thread had begun
+    std::vector<std::uint32_t> late;     // runs of cells that reach across where two threads met
+    std::vector<std::uint32_t> bones;    // blocks of bones
   } scratch;
 };
 

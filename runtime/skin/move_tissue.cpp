@@ -58,8 +58,10 @@ HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::si
   }
 }
 
-// Posed nodes lie in the cache that the cores share: what a cell needs is asked for some cells ahead.
+// Where results go is asked for some cells ahead; further ahead where they follow each other, since cells
+// take groups of the next slices of a scan too.
 constexpr std::size_t kAhead = 2;
+constexpr std::size_t kResultsAhead = 1024;
 
 template <bool kNormals, std::size_t kBlocks>
 HWY_INLINE void move_cell(const TissueVertices& job, const Sink& sink, std::size_t c) {
@@ -74,12 +76,20 @@ template <bool kNormals>
 HWY_INLINE void move_cells(const TissueVertices& job, std::size_t begin, std::size_t end) {
   const VertexGroups& groups = job.groups;
   const Sink sink(job.out);
+  // Results too: where they follow each other one line after another, which the processor then foresees.
+  std::size_t asked = std::max<std::size_t>(job.first, groups.groups[groups.first_group(begin)].first);
   const auto ask_for_cell = [&](std::size_t c) HWY_ATTR {
-    ask_for(job.posed.data(), &groups.rows[groups.cells[c].palette], groups.cells[c].count, 2);
     if (!groups.in_order) return;
-    for (std::size_t g = groups.first_group(c); g < groups.cells[c].end; ++g) {
-      sink.ask_for(groups.groups[g].first, kSize);
+    if (job.last == 0) {
+      for (std::size_t g = groups.first_group(c); g < groups.cells[c].end; ++g) {
+        sink.ask_for(groups.groups[g].first, kSize);
+      }
+      return;
     }
+    const std::size_t to = std::min(job.last, groups.groups[groups.first_group(c)].first + kResultsAhead);
+    if (asked >= to) return;
+    sink.ask_for(asked, to - asked);
+    asked = to;
   };
   for (std::size_t c = begin; c < std::min(end, begin + kAhead); ++c) ask_for_cell(c);
   for (std::size_t c = begin; c < end; ++c) {

@@ -32,6 +32,7 @@ struct TissueVertices {
   const VertexGroups& groups;
   std::span<const float> posed;  ///< of SkinClusters, a row a lane, and one float more, which is not used
   VertexSink out;
+  std::size_t first = 0, last = 0;  ///< places of results that follow each other, to be asked for; or none
 };
 
 /// x' = x + (R - I)(x - origin) + t in displacement form, as segment_motion.hpp does for the root: the rest

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <tuple>
 
 #include "core/values/error.hpp"
 
@@ -13,6 +15,7 @@ namespace {
 
 constexpr float kSmallestWeight = 1e-4F;  // 0.08 mm on the reference body; below it memory traffic is wasted
 constexpr std::size_t kSize = NodeClusters::size;
+constexpr std::size_t kOtherRun = 2048;  // of nodes that no tissue hangs on
 
 [[noreturn]] void unfit(const Model& model, const std::string& what) {
   throw Error(ErrorKind::data, "model " + model.name, what, "preprocess the case again");
@@ -94,25 +97,46 @@ void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, std::
   }
 }
 
-// Nodes that hang on the same segments next to each other within each run: their clusters share shorter
-// palettes, and what is near in space stays within a cache's reach.
-void sort_by_segments(const Model& model, std::span<std::uint32_t> nodes) {
-  constexpr std::size_t run = 2048;
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
+// Along the longest side of the box about them. Places in whole 65535ths of it, counted: there may be
+// millions.
+void sort_along(const Model& model, std::span<std::uint32_t> nodes) {
+  if (nodes.empty()) return;
+  Eigen::RowVector3f low = model.nodes.row(nodes[0]), high = low;
+  for (const std::uint32_t node : nodes) {
+    low = low.cwiseMin(model.nodes.row(node));
+    high = high.cwiseMax(model.nodes.row(node));
+  }
+  Eigen::Index axis = 0;
+  const float length = (high - low).maxCoeff(&axis);
+  if (!(length > 0)) return;
+  const auto place = [&](std::uint32_t node) {
+    return static_cast<std::size_t>((model.nodes(node, axis) - low[axis]) / length * 65535);
+  };
+  std::vector<std::uint32_t> next(65537);
+  for (const std::uint32_t node : nodes) ++next[place(node) + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  const std::vector<std::uint32_t> before(nodes.begin(), nodes.end());
+  for (const std::uint32_t node : before) nodes[next[place(node)]++] = node;
+}
+
+// Nodes of one kind, and of these such as hang on the same segments, next to each other within each run: a
+// frame of few tissues skins few clusters, and these share shorter palettes.
+void sort_runs(const Model& model, std::span<const std::uint32_t> kind, std::span<std::uint32_t> nodes,
+               std::size_t run) {
+  std::vector<std::tuple<std::uint32_t, std::uint64_t, std::uint32_t>> keyed;
   for (std::size_t first = 0; first < nodes.size(); first += run) {
     const std::span<std::uint32_t> part = nodes.subspan(first, std::min(run, nodes.size() - first));
     keyed.clear();
     for (const std::uint32_t node : part) {
-      std::uint64_t key = 0;  // beyond 64 segments some share a bit: a worse order, nothing else
+      std::uint64_t segments = 0;  // beyond 64 segments some share a bit: a worse order, nothing else
       for (auto e = model.weights.offsets[node]; e < model.weights.offsets[node + 1]; ++e) {
         if (model.weights.weight[e] >= kSmallestWeight)
-          key |= std::uint64_t{1} << model.weights.segment[e] % 64U;
+          segments |= std::uint64_t{1} << model.weights.segment[e] % 64U;
       }
-      keyed.emplace_back(key, node);
+      keyed.emplace_back(kind[node], segments, node);
     }
-    std::stable_sort(keyed.begin(), keyed.end(),
-                     [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (std::size_t i = 0; i < part.size(); ++i) part[i] = keyed[i].second;
+    std::sort(keyed.begin(), keyed.end());
+    for (std::size_t i = 0; i < part.size(); ++i) part[i] = std::get<2>(keyed[i]);
   }
 }
 
@@ -144,19 +168,16 @@ NodeClusters cluster_nodes(const Model& model, std::span<const std::uint32_t> ki
   check(model);
   NodeClusters out;
   out.nodes = model.node_count();
-  // Where each kind begins; 0 is the last.
-  std::uint32_t kinds = 0;
-  for (const std::uint32_t k : kind) kinds = std::max(kinds, k);
-  std::vector<std::uint32_t> begin(kinds + 2, 0);
-  const auto place = [&](std::uint32_t k) { return k == 0 ? kinds : k - 1; };
-  for (const std::uint32_t k : kind) ++begin[place(k) + 1];
-  for (std::size_t k = 0; k + 1 < begin.size(); ++k) begin[k + 1] += begin[k];
-  out.needed = begin[kinds];
-  out.node.resize(out.nodes);
-  std::vector<std::uint32_t> next = begin;
-  for (std::uint32_t n = 0; n < out.nodes; ++n) out.node[next[place(kind[n])]++] = n;
-  for (std::size_t k = 0; k + 1 < begin.size(); ++k)
-    sort_by_segments(model, std::span(out.node).subspan(begin[k], begin[k + 1] - begin[k]));
+  for (const bool wanted : {true, false}) {
+    for (std::size_t n = 0; n < out.nodes; ++n) {
+      if ((kind[n] != 0) == wanted) out.node.push_back(static_cast<std::uint32_t>(n));
+    }
+    if (wanted) out.needed = out.node.size();
+  }
+  const std::span<std::uint32_t> needed = std::span(out.node).first(out.needed);
+  sort_along(model, needed);
+  sort_runs(model, kind, needed, NodeClusters::slab);
+  sort_runs(model, kind, std::span(out.node).subspan(out.needed), kOtherRun);
   out.lane.resize(out.nodes);
   for (std::size_t i = 0; i < out.nodes; ++i) out.lane[out.node[i]] = static_cast<std::uint32_t>(i);
   out.node.resize((out.nodes + kSize - 1) / kSize * kSize, out.node.back());

@@ -12,11 +12,14 @@
 namespace ecorche::runtime {
 
 /// Clusters of 64 nodes with one palette of segments each and a dense planar weight for every pair of them:
-/// no index per node, no gather. Nodes of one kind lie together, 1 first and 0 last, each kind in the model's
-/// own order (Morton), sorted within runs of 2048 by the segments that they hang on. A *lane* is a place in
-/// this order: node `node[lane]`. The last cluster repeats its last node.
+/// no index per node, no gather. First the nodes that some tissue hangs on (those not of kind 0), in slabs
+/// across the longest side of the box about them, nodes of one kind together within each; then the others in
+/// the model's own order (Morton), in runs of 2048. Then by the segments that they hang on. A *lane* is a
+/// place in this order: node `node[lane]`. The last cluster repeats its last node.
 struct NodeClusters {
   static constexpr std::size_t size = 64;
+  /// Of 64 clusters. What hangs on its nodes reaches into a few others: posed, they stay in a core's cache.
+  static constexpr std::size_t slab = 64 * size;
 
   std::size_t nodes = 0;   ///< lanes that count
   std::size_t needed = 0;  ///< of them, those not of kind 0 come first
@@ -30,6 +33,7 @@ struct NodeClusters {
   Aligned<std::uint16_t> weight;       ///< 64 an entry of `palette`; those of a lane sum to exactly 65535
 
   std::size_t clusters() const { return node.size() / size; }
+  std::size_t slabs() const { return (node.size() + slab - 1) / slab; }
 };
 
 /// Weights below 1e-4 are dropped and their rows renormalised (DESIGN 7). `kind`: #nodes, the same for nodes

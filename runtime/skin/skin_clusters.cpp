@@ -13,8 +13,7 @@ namespace {
 // first cache when it is handed on to `nodes`.
 constexpr std::size_t kClustersPerTask = 32;
 
-// From lanes to the model's order.
-void hand_on(const SkinClusters& job, std::size_t cluster) {
+void hand_on_one(const SkinClusters& job, std::size_t cluster) {
   const std::size_t first = NodeClusters::size * cluster;
   const std::size_t end = std::min(first + NodeClusters::size, job.layout.nodes);
   for (std::size_t lane = first; lane < end; ++lane) {
@@ -27,12 +26,15 @@ void run(const SkinClusters& job, Kernel kernel) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, job.clusters.size(), kClustersPerTask),
                     [&job, kernel](const auto& range) {
                       kernel(job, range.begin(), range.end());
-                      if (job.nodes.empty()) return;
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) hand_on(job, job.clusters[i]);
+                      if (!job.nodes.empty()) kernels::hand_on(job, range.begin(), range.end());
                     });
 }
 
 }  // namespace
+
+void kernels::hand_on(const SkinClusters& job, std::size_t begin, std::size_t end) {
+  for (std::size_t i = begin; i < end; ++i) hand_on_one(job, job.clusters[i]);
+}
 
 std::string_view SkinClusters::check() const {
   if (motions.empty()) return "no segment moves";

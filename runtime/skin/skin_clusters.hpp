@@ -49,6 +49,8 @@ namespace kernels {
 void lbs(const SkinClusters& job, std::size_t begin, std::size_t end);
 void dqs(const SkinClusters& job, std::size_t begin, std::size_t end);
 void cor(const SkinClusters& job, std::size_t begin, std::size_t end);
+/// What they posed, from lanes to job.nodes.
+void hand_on(const SkinClusters& job, std::size_t begin, std::size_t end);
 }  // namespace kernels
 
 }  // namespace ecorche::runtime

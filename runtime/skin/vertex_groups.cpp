@@ -114,6 +114,25 @@ GroupNodes nodes_of(const Order& order, Palette& palette) {
   return out;
 }
 
+// The groups of each cell, cells sorted by the slab of the last of their nodes.
+std::vector<std::span<const std::uint32_t>> by_last_slab(const GroupCells& cells, const GroupNodes& nodes) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> slab_and_cell;
+  for (std::uint32_t c = 0, g = 0; c < cells.end.size(); ++c) {
+    std::uint32_t last = 0;
+    for (; g < cells.end[c]; ++g) {
+      for (const std::uint32_t lane : nodes.of(cells.group[g])) last = std::max(last, lane);
+    }
+    slab_and_cell.emplace_back(static_cast<std::uint32_t>(last / NodeClusters::slab), c);
+  }
+  std::sort(slab_and_cell.begin(), slab_and_cell.end());
+  std::vector<std::span<const std::uint32_t>> out;
+  for (const auto& [slab, c] : slab_and_cell) {
+    const std::uint32_t first = c == 0 ? 0 : cells.end[c - 1];
+    out.push_back(std::span(cells.group).subspan(first, cells.end[c] - first));
+  }
+  return out;
+}
+
 Eigen::Matrix3f edges(const Model& model, std::int32_t tet) {
   Eigen::Matrix3f out;
   for (int c = 0; c < 3; ++c) {
@@ -166,9 +185,7 @@ class Builder {
     out_.narrow.reserve(3 * kSize * nodes.groups());
     out_.normal.reserve(2 * kSize * nodes.groups());
     const GroupCells cells = share_palettes(nodes, VertexGroups::most_lanes, VertexGroups::most_groups);
-    for (std::size_t c = 0, first = 0; c < cells.end.size(); first = cells.end[c++]) {
-      add_cell(order, std::span(cells.group).subspan(first, cells.end[c] - first));
-    }
+    for (const std::span<const std::uint32_t> groups : by_last_slab(cells, nodes)) add_cell(order, groups);
     if (!out_.in_order) {
       out_.vertex = std::move(order);
       out_.vertex.resize(kSize * out_.groups.size(), out_.vertex.back());

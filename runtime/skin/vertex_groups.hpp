@@ -8,13 +8,14 @@
 
 #include "core/values/model.hpp"
 #include "runtime/skin/aligned.hpp"
+#include "runtime/skin/node_clusters.hpp"
 
 namespace ecorche::runtime {
 
 /// Vertices in groups of 16, and groups that lie near each other in cells, each over one palette of nodes: a
 /// node is fetched once for all vertices of a cell and found again by a byte. A group's vertices follow each
 /// other in the tissue's own order where that is local, and are then written in one go; else along a Morton
-/// curve, and then each vertex to its place.
+/// curve, and then each vertex to its place. Cells are sorted by the slab of the last of their nodes.
 struct VertexGroups {
   static constexpr std::size_t size = 16;
   static constexpr std::size_t most_lanes = 4 * size;  ///< of a palette
@@ -46,10 +47,15 @@ struct VertexGroups {
   Aligned<std::int16_t> normal;
   static constexpr std::int16_t no_normal = -32768;
 
+  static constexpr std::size_t slab_floats = 3 * NodeClusters::slab;  ///< posed, of a slab
+
   std::size_t group_vertices(const Group& group) const {
     return group.first + size <= vertices ? size : vertices - group.first;
   }
   std::size_t first_group(std::size_t cell) const { return cell == 0 ? 0 : cells[cell - 1].end; }
+  /// Slabs of NodeClusters that a cell's nodes lie in, the first and the last: palettes are sorted.
+  std::size_t first_slab(const Cell& cell) const { return rows[cell.palette] / slab_floats; }
+  std::size_t last_slab(const Cell& cell) const { return rows[cell.palette + cell.count - 1] / slab_floats; }
 };
 
 /// `lane`: of NodeClusters. The tissue hangs on tets (`tet`, `barycentric` as Tissue says).
