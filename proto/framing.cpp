@@ -18,6 +18,26 @@ void append_u32(std::string& out, std::size_t value) {
   for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<char>(value >> shift & 0xff));
 }
 
+// Header, envelope and padding of a frame.
+std::string head_of(const v1::Envelope& envelope, std::size_t payload_bytes) {
+  const std::size_t envelope_bytes = envelope.ByteSizeLong();
+  // Protobuf itself ends at 2 GiB.
+  if (envelope_bytes > std::numeric_limits<std::int32_t>::max() ||
+      payload_bytes > std::numeric_limits<std::uint32_t>::max() || payload_bytes % alignment != 0) {
+    throw Error(ErrorKind::internal, "frame",
+                "an envelope of " + std::to_string(envelope_bytes) + " and a payload of " +
+                    std::to_string(payload_bytes) + " bytes do not make a frame",
+                "report this");
+  }
+  std::string head;
+  head.reserve(aligned(header_bytes + envelope_bytes));
+  append_u32(head, envelope_bytes);
+  append_u32(head, payload_bytes);
+  envelope.AppendToString(&head);
+  head.resize(aligned(head.size()), '\0');
+  return head;
+}
+
 }  // namespace
 
 std::span<std::byte> FrameReader::want() {
@@ -89,24 +109,20 @@ Frame FrameReader::take() {
   return std::exchange(frame_, {});
 }
 
+std::size_t Pieces::bytes() const {
+  std::size_t sum = 0;
+  for (const std::span<const std::byte> part : parts) sum += part.size();
+  return sum;
+}
+
 EncodedFrame encode(const v1::Envelope& envelope, std::shared_ptr<const Payload> payload) {
-  const std::size_t envelope_bytes = envelope.ByteSizeLong();
-  const std::size_t payload_bytes = payload ? payload->size() : 0;
-  // Protobuf itself ends at 2 GiB.
-  if (envelope_bytes > std::numeric_limits<std::int32_t>::max() ||
-      payload_bytes > std::numeric_limits<std::uint32_t>::max() || payload_bytes % alignment != 0) {
-    throw Error(ErrorKind::internal, "frame",
-                "an envelope of " + std::to_string(envelope_bytes) + " and a payload of " +
-                    std::to_string(payload_bytes) + " bytes do not make a frame",
-                "report this");
-  }
-  EncodedFrame frame{.head = {}, .payload = std::move(payload)};
-  frame.head.reserve(aligned(header_bytes + envelope_bytes));
-  append_u32(frame.head, envelope_bytes);
-  append_u32(frame.head, payload_bytes);
-  envelope.AppendToString(&frame.head);
-  frame.head.resize(aligned(frame.head.size()), '\0');
-  return frame;
+  std::string head = head_of(envelope, payload ? payload->size() : 0);
+  return {.head = std::move(head), .payload = std::move(payload)};
+}
+
+EncodedFrame encode(const v1::Envelope& envelope, Pieces pieces) {
+  std::string head = head_of(envelope, pieces.bytes());
+  return {.head = std::move(head), .payload = nullptr, .pieces = std::move(pieces)};
 }
 
 }  // namespace ecorche::wire

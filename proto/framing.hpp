@@ -85,15 +85,26 @@ class FrameReader {
   Payload spent_;
 };
 
+/// A payload whose bytes lie in several places, in their order.
+struct Pieces {
+  std::vector<std::span<const std::byte>> parts;
+  std::shared_ptr<const void> owner;  ///< keeps what they show
+
+  std::size_t bytes() const;
+};
+
 /// A frame ready for any number of sockets: header, envelope and padding in one piece, the payload shared.
 struct EncodedFrame {
   std::string head;
   std::shared_ptr<const Payload> payload;  ///< may be null
+  Pieces pieces = {};                      ///< or the payload is these
 
-  std::size_t bytes() const { return head.size() + (payload ? payload->size() : 0); }
+  std::size_t payload_bytes() const { return payload ? payload->size() : pieces.bytes(); }
+  std::size_t bytes() const { return head.size() + payload_bytes(); }
 };
 
 /// Throws Error{internal} when the payload is no multiple of 16 or either part does not fit 32 bits.
 EncodedFrame encode(const v1::Envelope& envelope, std::shared_ptr<const Payload> payload = nullptr);
+EncodedFrame encode(const v1::Envelope& envelope, Pieces pieces);
 
 }  // namespace ecorche::wire

@@ -83,6 +83,7 @@ void Connection::handle(const wire::Frame& frame) {
       return handle_pose(request.pose_update());
     case v1::Envelope::kFrameAck:
       outbox_.acknowledge(request.frame_ack().subscription(), request.frame_ack().frame(), Clock::now());
+      if (session_) session_->arrived();
       wake_.cancel();
       return;
     case v1::Envelope::kPing: {

@@ -255,6 +255,8 @@ net::awaitable<void> Connection::write_frames() {
       posed = outbox_.last_was_posed();
       buffers.push_back(net::buffer(frame->head));
       if (frame->payload) buffers.push_back(net::buffer(*frame->payload));
+      for (const auto& piece : frame->pieces.parts)
+        buffers.push_back(net::buffer(piece.data(), piece.size()));
       frames.push_back(std::move(frame));
       if (!transport_->joins_frames()) break;
     }

@@ -182,6 +182,17 @@ bool MeshStream::write(const runtime::PosedBody& body, bool boxed, bool keyframe
   return true;
 }
 
+wire::Pieces MeshStream::show(const std::shared_ptr<const Positions>& positions, v1::MeshFrame& frame) const {
+  frame.set_encoding(v1::ENCODING_F32);
+  frame.set_level(level_);
+  PayloadLayout layout;
+  for (const std::uint32_t tissue : want_.tissues) {
+    layout.append(*add_array(frame, tissue, v1::MeshArray::KIND_POSITIONS).mutable_array(),
+                  v1::SCALAR_TYPE_F32, 3, std::span<const float>((*positions)[tissue]));
+  }
+  return layout.pieces(positions);
+}
+
 void MeshStream::settle(const runtime::PosedBody& body) {
   if (!std::exchange(unsettled_, false)) return;
   if (keys_.empty()) {

@@ -11,6 +11,7 @@
 #include "proto/delta.hpp"
 #include "proto/framing.hpp"
 #include "runtime/server/mesh_rows.hpp"
+#include "runtime/server/payload_pool.hpp"
 #include "runtime/server/subscription.hpp"
 #include "runtime/skin/body_poser.hpp"
 
@@ -37,6 +38,11 @@ class MeshStream {
   /// What the frame needs of the posed body.
   bool needs_numbers() const { return want_.encoding != v1::ENCODING_F32; }
   bool needs_positions() const { return want_.encoding == v1::ENCODING_F32 && !want_.control_nodes; }
+
+  /// Whether its frames' payload is positions just as they are posed.
+  bool plain() const { return needs_positions() && !parts_ && !want_.normals; }
+  /// Of a plain one: as write(), without a copy. `positions`: per tissue of the model.
+  wire::Pieces show(const std::shared_ptr<const Positions>& positions, v1::MeshFrame& frame) const;
 
   /// Fills encoding, arrays, box and keyframe of `frame`, whose number is set. `keyframe`: somebody needs
   /// one. `payload` is replaced. False where a vertex lies outside the body's box: then nothing was written

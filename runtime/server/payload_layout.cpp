@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 namespace ecorche::server {
 namespace {
@@ -44,6 +46,18 @@ void PayloadLayout::fill(wire::Payload& payload) const {
     std::fill(payload.begin() + static_cast<std::ptrdiff_t>(end),
               payload.begin() + static_cast<std::ptrdiff_t>(wire::aligned(end)), std::byte{0});
   }
+}
+
+wire::Pieces PayloadLayout::pieces(std::shared_ptr<const void> owner) const {
+  static constexpr std::array<std::byte, wire::alignment> zeros{};
+  wire::Pieces out{.parts = {}, .owner = std::move(owner)};
+  out.parts.reserve(pieces_.size() + ends_.size());
+  std::size_t p = 0;
+  for (const std::size_t end : ends_) {
+    for (; p < pieces_.size() && pieces_[p].to < end; ++p) out.parts.push_back(pieces_[p].from);
+    if (wire::aligned(end) > end) out.parts.push_back(std::span(zeros).first(wire::aligned(end) - end));
+  }
+  return out;
 }
 
 }  // namespace ecorche::server

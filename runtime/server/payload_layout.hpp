@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,8 @@ class PayloadLayout {
 
   /// Replaces what `payload` holds; zeros lie between the arrays.
   void fill(wire::Payload& payload) const;
+  /// Copies nothing: the same payload as it lies, kept by `owner`.
+  wire::Pieces pieces(std::shared_ptr<const void> owner) const;
 
  private:
   struct Piece {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Payloads of frames, used again: fresh ones cost more than filling them.
+// Memory of frames, used again: fresh one costs more than filling it.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +13,15 @@
 namespace ecorche::server {
 
 /// Any number of threads may take and let go.
-class PayloadPool : public std::enable_shared_from_this<PayloadPool> {
+template <class T>
+class SparePool : public std::enable_shared_from_this<SparePool<T>> {
  public:
   /// Keeps up to `most` that nobody holds.
-  explicit PayloadPool(std::size_t most = 2) : most_(most) { spare_.reserve(most); }
+  explicit SparePool(std::size_t most = 2) : most_(most) { spare_.reserve(most); }
 
   /// Holds whatever it held last; comes back when the last one lets go.
-  std::shared_ptr<wire::Payload> take() {
-    std::unique_ptr<wire::Payload> payload;
+  std::shared_ptr<T> take() {
+    std::unique_ptr<T> payload;
     {
       const std::lock_guard lock(mutex_);
       if (!spare_.empty()) {
@@ -28,22 +29,28 @@ class PayloadPool : public std::enable_shared_from_this<PayloadPool> {
         spare_.pop_back();
       }
     }
-    if (!payload) payload = std::make_unique<wire::Payload>();
-    return {payload.release(), [pool = weak_from_this()](wire::Payload* back) {
-              std::unique_ptr<wire::Payload> owned(back);
+    if (!payload) payload = std::make_unique<T>();
+    return {payload.release(), [pool = this->weak_from_this()](T* back) {
+              std::unique_ptr<T> owned(back);
               if (const auto self = pool.lock()) self->put_back(std::move(owned));
             }};
   }
 
  private:
-  void put_back(std::unique_ptr<wire::Payload> payload) {
+  void put_back(std::unique_ptr<T> payload) {
     const std::lock_guard lock(mutex_);
     if (spare_.size() < most_) spare_.push_back(std::move(payload));
   }
 
   std::size_t most_;
   std::mutex mutex_;
-  std::vector<std::unique_ptr<wire::Payload>> spare_;
+  std::vector<std::unique_ptr<T>> spare_;
 };
+
+/// Payloads of frames.
+using PayloadPool = SparePool<wire::Payload>;
+/// Positions as bodies are posed, float32, per tissue of the model, which frames send as they lie.
+using Positions = std::vector<std::vector<float>>;
+using PositionsPool = SparePool<Positions>;
 
 }  // namespace ecorche::server

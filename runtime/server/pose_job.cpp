@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/pose_job.hpp"
 
+#include <algorithm>
 #include <new>
 #include <utility>
 
@@ -124,6 +125,31 @@ Status pose(const PoseJob& job, runtime::PosedBody& body, bool everywhere = fals
                    nodes_wanted(job));
 }
 
+// Gives the frame the body's arrays, and the body spent ones in their place.
+std::shared_ptr<const Positions> give(const PoseJob& job, const MeshStream& stream,
+                                      runtime::PosedBody& body) {
+  const std::shared_ptr<Positions> given = job.model->positions->take();
+  const std::vector<std::uint32_t>& wanted = stream.want().tissues;
+  bool fits = given->size() == body.tissues.size();
+  for (std::uint32_t t = 0; t < body.tissues.size() && fits; ++t)
+    fits = std::binary_search(wanted.begin(), wanted.end(), t) != (*given)[t].empty();
+  // Of another selection: it would keep more memory than the frame is counted for.
+  if (!fits) given->clear();
+  given->resize(body.tissues.size());
+  for (const std::uint32_t t : wanted) (*given)[t].swap(body.tissues[t]);
+  return given;
+}
+
+// Whether the arrays of this job's body are asked for by one frame alone, which may then keep them.
+bool lone(const PoseJob& job) {
+  std::size_t frames = 0;
+  for (const Subscription& subscription : job.subscriptions) {
+    for (std::size_t i = 0; i < subscription.streams.size(); ++i)
+      frames += (subscription.levels >> i & 1) != 0 ? 1 : 0;
+  }
+  return frames == 1 && !job.digests;
+}
+
 PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std::size_t at,
                       runtime::PosedBody& body, const v1::ServerTimings& timings, const Judged& judged) {
   MeshStream& stream = *subscription.streams[at];
@@ -140,11 +166,17 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
     describe(clamped, job.model->model().rig.skeleton, *frame.add_clamped());
   }
   const auto start = Clock::now();
-  const std::shared_ptr<wire::Payload> payload = job.model->payloads->take();
-  const bool keyframe = (subscription.keyframes >> at & 1) != 0;
-  if (!stream.write(body, true, keyframe, frame, *payload)) {
-    static_cast<void>(pose(job, body, true));  // as good as the first time
-    stream.write(body, false, keyframe, frame, *payload);
+  wire::Pieces pieces;
+  std::shared_ptr<wire::Payload> payload;
+  if (stream.plain() && lone(job)) {
+    pieces = stream.show(give(job, stream, body), frame);
+  } else {
+    payload = job.model->payloads->take();
+    const bool keyframe = (subscription.keyframes >> at & 1) != 0;
+    if (!stream.write(body, true, keyframe, frame, *payload)) {
+      static_cast<void>(pose(job, body, true));  // as good as the first time
+      stream.write(body, false, keyframe, frame, *payload);
+    }
   }
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
   return {.subscription = subscription.id,
@@ -152,7 +184,8 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
           .number = job.number,
           .keyframe = frame.keyframe(),
           .encoded = frame.timings().encoded(),
-          .bytes = job.memory->hold(wire::encode(envelope, payload)),
+          .bytes = job.memory->hold(payload ? wire::encode(envelope, payload)
+                                            : wire::encode(envelope, std::move(pieces))),
           .judged = judged.now ? judged.quality : nullptr};
 }
 

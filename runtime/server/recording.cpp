@@ -78,7 +78,7 @@ void Recording::add(const PosedFrame& frame, const v1::Subscribe& request) {
   recorded.set_subscription(frame.subscription);
   recorded.set_pose_sequence(last_sequence_);
   recorded.set_digest(*frame.digest);
-  recorded.set_payload_bytes(frame.bytes->payload ? frame.bytes->payload->size() : 0);
+  recorded.set_payload_bytes(frame.bytes->payload_bytes());
   if (append(envelope)) ++frames_;
 }
 

@@ -61,6 +61,7 @@ struct ServedModel {
   mutable BodyPool bodies;  ///< for jobs to pose into
   /// For the frames of meshes.
   std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);
+  std::shared_ptr<PositionsPool> positions = std::make_shared<PositionsPool>(4);
 
  private:
   struct Balls {

@@ -112,6 +112,9 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// Makes what had to wait for memory.
   void catch_up();
+  /// A client has a frame whole. The pose is judged now, if it is to be: where cores are shared with clients,
+  /// not while they read.
+  void arrived();
   /// From now on its turn is awaited; whether it was already.
   bool await_judgement() { return std::exchange(awaits_judgement_, true); }
   /// Its turn: has the present pose judged, and Judging::done() called then; false where nobody looks.
@@ -170,6 +173,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   bool awaited_ = false;  ///< the last one may come back
   bool retired_ = false;
+  bool unjudged_ = false;  ///< the present pose, once it has arrived somewhere
   bool awaits_judgement_ = false;
 
   std::vector<Row> rows_;

@@ -274,7 +274,7 @@ void Session::publish(const PosedFrame& frame) {
   if (frame.judged && by_present_thresholds(*frame.judged)) row->subscription.quality = frame.judged;
   const bool mesh = !row->subscription.streams.empty();
   if (mesh && (!row->subscription.quality || row->subscription.quality->pose_sequence() != present_.sequence))
-    judging_.ask(shared_from_this());
+    unjudged_ = true;
   bool all = true;
   for (Member* member : row->members) all = member->deliver(frame) && all;
   if (all) return;
@@ -282,6 +282,10 @@ void Session::publish(const PosedFrame& frame) {
   const auto& streams = row->subscription.streams;
   row->subscription.keyframes |= streams.empty() ? 1U : 1U << (frame.level - streams.front()->level());
   fresh_.insert(row->subscription.id);
+}
+
+void Session::arrived() {
+  if (std::exchange(unjudged_, false)) judging_.ask(shared_from_this());
 }
 
 bool Session::by_present_thresholds(const v1::PoseQuality& quality) const {

@@ -16,6 +16,9 @@ std::string bytes_of(const EncodedFrame& frame) {
   std::string bytes = frame.head;
   if (frame.payload)
     bytes.append(reinterpret_cast<const char*>(frame.payload->data()), frame.payload->size());
+  for (const auto& part : frame.pieces.parts)
+    bytes.append(reinterpret_cast<const char*>(part.data()), part.size());
+  EXPECT_EQ(frame.bytes(), bytes.size());
   return bytes;
 }
 
@@ -58,6 +61,9 @@ TEST(Framing, GoldenBytes) {
       "\xa0\xa1\xa2\xa3\xa4\xa5\xa6\xa7\xa8\xa9\xaa\xab\xac\xad\xae\xaf",
       48);
   EXPECT_EQ(bytes_of(encode(a_ping(), sixteen_bytes())), golden);
+  const auto payload = sixteen_bytes();
+  const std::span<const std::byte> whole(*payload);
+  EXPECT_EQ(bytes_of(encode(a_ping(), Pieces{{whole.first(5), whole.subspan(5)}, payload})), golden);
   FrameReader reader(kLimits);
   ASSERT_TRUE(feed(reader, golden).ok());
   ASSERT_TRUE(reader.complete());

@@ -76,6 +76,40 @@ TEST(Encodings, QuantisedFramesAreOfflinePosingWithinHalfAStep) {
   }
 }
 
+// Arrays that frames keep and bodies get back are those of the same selection, or nobody's.
+TEST(Encodings, Float32OfSeveralSelectionsInTurn) {
+  const TestServer server;
+  TestClient all(server), one(server), both(server);
+  const std::string name = test::toy_model().tissues.back().name;
+  const auto subscribe_one = [&](TestClient& client) {
+    v1::Envelope request;
+    request.mutable_subscribe()->mutable_mesh()->set_encoding(v1::ENCODING_F32);
+    request.mutable_subscribe()->mutable_mesh()->add_tissues(name);
+    client.client().call(request);
+  };
+  subscribe(all, v1::ENCODING_F32);
+  subscribe_one(one);
+  subscribe(both, v1::ENCODING_F32);
+  subscribe_one(both);
+  wire::MeshDecoder decoder;
+  std::vector<wire::DecodedTissue> tissues;
+  for (std::uint64_t sequence = 1; sequence < 8; ++sequence) {
+    std::size_t angle = sequence;
+    for (TestClient* client : {&all, &one, &both}) {
+      const Pose pose = client->bent(0.05 * static_cast<double>(++angle));
+      client->send(sequence, pose);
+      const Offline offline(pose);
+      for (int i = 0; i < (client == &both ? 2 : 1); ++i) {
+        const wire::Frame frame = client->next_mesh(sequence);
+        ASSERT_TRUE(decoder.decode(frame.envelope.mesh_frame(), frame.payload, tissues).ok());
+        EXPECT_EQ(frame.envelope.mesh_frame().encoding(), v1::ENCODING_F32);
+        for (const wire::DecodedTissue& tissue : tissues)
+          EXPECT_EQ(tissue.positions, offline.body.tissues[tissue.tissue]) << sequence << " " << i;
+      }
+    }
+  }
+}
+
 TEST(Encodings, DeltasFollowOneKeyframeAndTheNextComesInTime) {
   const TestServer server;
   TestClient client(server);

@@ -84,5 +84,31 @@ TEST(MeshStream, FindsTheVertexBeyondTheBox) {
   }
 }
 
+// What is sent as it lies is what would be copied: every tissue that is wanted, no other.
+TEST(MeshStream, ShowsPositionsAsTheyLie) {
+  runtime::PosedBody body = body_at(0);
+  body.tissues = {{1, 2, 3}, {4, 5, 6, 7, 8, 9}, {10, 11, 12}};
+  MeshWant want = want_of(v1::ENCODING_F32);
+  want.tissues = {0, 2};
+  MeshStream stream(want, 0, nullptr);
+  EXPECT_TRUE(stream.plain());
+  v1::MeshFrame copied, shown;
+  wire::Payload payload, joined;
+  ASSERT_TRUE(stream.write(body, true, false, copied, payload));
+  const auto positions = std::make_shared<Positions>(body.tissues);
+  const wire::Pieces pieces = stream.show(positions, shown);
+  EXPECT_EQ(pieces.owner, positions);
+  for (const auto& part : pieces.parts) joined.insert(joined.end(), part.begin(), part.end());
+  EXPECT_EQ(joined, payload);
+  EXPECT_EQ(shown.SerializeAsString(), copied.SerializeAsString());
+  want.normals = true;
+  EXPECT_FALSE(MeshStream(want, 0, nullptr).plain());
+  want.normals = false;
+  EXPECT_FALSE(MeshStream(want, 0, std::make_shared<MeshParts>(2)).plain());
+  EXPECT_FALSE(MeshStream(want_of(v1::ENCODING_U16), 0, nullptr).plain());
+  want.control_nodes = true;
+  EXPECT_FALSE(MeshStream(want, 0, nullptr).plain());
+}
+
 }  // namespace
 }  // namespace ecorche::server

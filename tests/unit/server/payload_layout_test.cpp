@@ -42,6 +42,11 @@ TEST(PayloadLayout, IsTheSameAsOneAfterTheOther) {
     wire::Payload payload(before, std::byte{0xff});
     layout.fill(payload);
     EXPECT_EQ(payload, expected) << before;
+    const wire::Pieces pieces = layout.pieces(nullptr);
+    wire::Payload joined;
+    for (const auto& part : pieces.parts) joined.insert(joined.end(), part.begin(), part.end());
+    EXPECT_EQ(joined, expected);
+    EXPECT_EQ(pieces.bytes(), expected.size());
     for (std::size_t i = 0; i < told.size(); ++i)
       EXPECT_EQ(told[i].SerializeAsString(), plain[i].SerializeAsString()) << i;
   }

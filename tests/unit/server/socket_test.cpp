@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <thread>
 #include <vector>
 
 #include "core/values/error.hpp"
@@ -68,6 +69,40 @@ TEST(ClientSocket, HangsUp) {
   ::close(listener.accept());
   std::array<std::byte, 8> bytes{};
   EXPECT_EQ(problem([&] { socket.read(bytes, soon()); }), "the server hung up");
+}
+
+// Of a large payload: a good part of it ends the wait, a little is there when time is up, the end at once.
+TEST(ClientSocket, SleepsUntilAGoodPartHasCome) {
+  const Listener listener;
+  listener.listen();
+  Socket socket(listener.address(), soon());
+  const int peer = listener.accept();
+  std::vector<std::byte> out(std::size_t{1} << 20), much(300'000), little(1000);
+  const auto read_after = [&](const std::vector<std::byte>& sent, bool then_end, Clock::time_point until) {
+    std::thread sender([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(30));
+      EXPECT_EQ(::send(peer, sent.data(), sent.size(), 0), static_cast<ssize_t>(sent.size()));
+      if (then_end) ::close(peer);
+    });
+    const std::size_t got = socket.read(out, until);
+    sender.join();
+    return got;
+  };
+  const auto late = Clock::now() + std::chrono::seconds(20);
+  std::size_t got = read_after(much, false, late);
+  EXPECT_GE(got, 256U << 10);
+  while (got < much.size()) got += socket.read(std::span(out).first(much.size() - got), late);
+  EXPECT_EQ(read_after(little, false, soon()), little.size());
+  std::array<std::byte, 8> few{};
+  std::thread sender([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    EXPECT_EQ(::send(peer, few.data(), 1, 0), 1);
+  });
+  EXPECT_EQ(socket.read(few, late), 1U);
+  sender.join();
+  EXPECT_EQ(read_after(little, true, late), little.size());
+  EXPECT_EQ(problem([&] { socket.read(out, soon()); }), "the server hung up");
+  EXPECT_LT(Clock::now(), late);
 }
 
 TEST(ClientSocket, StopsReading) {
