@@ -19,8 +19,8 @@
 namespace ecorche::client {
 namespace {
 
-// Waking for each segment of a large frame would take longer than copying it.
-constexpr std::size_t kEnough = 256 << 10;
+// Fewer bytes than this are not worth changing what a wait is for.
+constexpr std::size_t kMany = 64U << 10;
 
 std::string reason(int error) {
   return std::generic_category().message(error);
@@ -74,8 +74,8 @@ Socket::~Socket() {
   close(fd_);
 }
 
-std::size_t Socket::read(std::span<std::byte> out, Clock::time_point until) {
-  if (!tls_) return read_plain(out, until, std::min(out.size(), kEnough));
+std::size_t Socket::read(std::span<std::byte> out, Clock::time_point until, std::size_t enough) {
+  if (!tls_) return read_plain(out, until, enough);
   return tls_->read(
       out, [&](std::span<std::byte> plain) { return read_plain(plain, until); },
       [&](std::span<const std::byte> bytes) { write_plain(bytes, until); });
@@ -94,7 +94,7 @@ std::size_t Socket::read_plain(std::span<std::byte> out, Clock::time_point until
     if (n == 0) fail("the server hung up");
     if (errno != EAGAIN && errno != EINTR) fail(reason(errno));
     if (late) return 0;
-    wake_at(enough < kEnough / 4 ? 1 : enough);
+    wake_at(enough < kMany ? 1 : enough);
     late = !wait(POLLIN, until);  // fewer than that may be there
   }
 }

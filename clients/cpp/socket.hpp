@@ -25,9 +25,10 @@ class Socket {
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
 
-  /// Reads what is there, at least a byte; 0 when none came until `until`. Where `out` is large and nothing
-  /// is there, it sleeps until a good part of it has come. Throws Error{temporary} when the peer hung up.
-  std::size_t read(std::span<std::byte> out, Clock::time_point until);
+  /// Reads what is there, at least a byte; 0 when none came until `until`. Where nothing is there it sleeps
+  /// until `enough` bytes have come, if they are many: waking for each segment of a large frame would take
+  /// longer than copying it. Throws Error{temporary} when the peer hung up.
+  std::size_t read(std::span<std::byte> out, Clock::time_point until, std::size_t enough = 1);
   /// Writes all. Throws Error{temporary} when the peer hung up, or did not take it until `until`.
   void write(std::span<const std::byte> bytes, Clock::time_point until);
 
