@@ -68,6 +68,8 @@ void Arrived::add(const Arrived& other) {
   append(encoded_ms, other.encoded_ms);
   append(judged_ago, other.judged_ago);
   frames += other.frames;
+  sent += other.sent;
+  unseen += other.unseen;
   bytes += other.bytes;
   checked += other.checked;
   wrong += other.wrong;
@@ -98,6 +100,7 @@ struct Crowd::Member {
   wire::MeshDecoder decoder;
   std::vector<wire::DecodedTissue> decoded;
   std::uint64_t seen = 0;
+  std::uint64_t last = 0;  // pose of the last frame
   Arrived arrived;
 
   void say(const std::string& bytes) const {
@@ -222,8 +225,17 @@ const Arrived& Crowd::arrived(std::size_t client) const {
   return members_[client]->arrived;
 }
 
+double Crowd::posed() const {
+  double fewest = 1e9;
+  for (const auto& member : members_) {
+    if (member && member->asked.rate > 0)
+      fewest = std::min(fewest, static_cast<double>(member->arrived.sent) / seconds());
+  }
+  return fewest;
+}
+
 double Crowd::seconds() const {
-  return std::chrono::duration<double>(Clock::now() - begun_).count();
+  return std::chrono::duration<double>(ended_ - begun_).count();
 }
 
 void Crowd::fail(Member& member, const std::string& why) {
@@ -239,7 +251,10 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
   std::array<epoll_event, 64> events{};
   while (true) {
     auto now = Clock::now();
-    if (now >= end) return check_all();
+    if (now >= end) {
+      ended_ = now;
+      return;
+    }
     if (tick && now >= next_tick) {
       next_tick += std::chrono::milliseconds(100);
       tick();
@@ -280,6 +295,7 @@ void Crowd::pose(Member& member) {
   const auto bytes = static_cast<std::uint32_t>(frame.size() - 8);
   std::memcpy(frame.data(), &bytes, 4);
   frame.resize(wire::aligned(frame.size()), '\0');
+  ++member.arrived.sent;
   member.times->note(member.sequence, now);
   member.say(frame);
 }
@@ -349,6 +365,9 @@ void Crowd::arrive(Member& member) {
   answer.mutable_frame_ack()->set_frame(frame.frame());
   member.say(wire::encode(answer).head);
   ++member.arrived.frames;
+  if (member.last > 0 && frame.pose_sequence() > member.last)
+    member.arrived.unseen += frame.pose_sequence() - member.last - 1;
+  member.last = frame.pose_sequence();
   member.arrived.bytes += member.payload_bytes;
   member.arrived.posed_ms.push_back(static_cast<double>(frame.timings().posed()) / 1e3);
   member.arrived.encoded_ms.push_back(static_cast<double>(frame.timings().encoded()) / 1e3);
@@ -360,7 +379,7 @@ void Crowd::arrive(Member& member) {
   if (member.keeps) member.held.push_back({frame, std::move(member.payload)});
 }
 
-void Crowd::check_all() {
+void Crowd::check() {
   for (const auto& member : members_) {
     if (!member) continue;
     for (const Held& held : std::exchange(member->held, {})) check(*member, held);

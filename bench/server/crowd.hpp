@@ -22,8 +22,8 @@ struct Asked {
   v1::Encoding encoding = v1::ENCODING_U16_DELTA;
   std::string session;  ///< empty: one's own
   double rate = 90;     ///< poses per second; 0: only watches
-  /// Every so many frames one is held against offline posing, and every keyframe; 0: none. They are kept, and
-  /// looked at when a run() is over: the client of a user does nothing of the kind.
+  /// Every so many frames one is held against offline posing, and every keyframe; 0: none. They are kept
+  /// until check(): the client of a user does nothing of the kind.
   std::uint64_t check_each = 0;
 };
 
@@ -32,6 +32,8 @@ struct Arrived {
   std::vector<double> posed_ms, encoded_ms;  ///< as the server says
   std::vector<double> judged_ago;            ///< poses between a frame's and the one whose quality it tells
   std::uint64_t frames = 0, bytes = 0;
+  std::uint64_t sent = 0;    ///< poses
+  std::uint64_t unseen = 0;  ///< poses between those of two frames that came one after the other
   std::uint64_t checked = 0, wrong = 0;
   std::uint64_t unjudged = 0;  ///< frames that told no quality
   std::string error;           ///< empty: none
@@ -55,10 +57,13 @@ class Crowd {
 
   /// Lives on for so long. `tick` is called ten times a second.
   void run(double seconds, const std::function<void()>& tick = {});
+  /// Holds what was kept against offline posing.
+  void check();
   /// Forgets what arrived: the figures count from here.
   void begin();
   const Arrived& arrived(std::size_t client) const;
-  double seconds() const;  ///< since begin()
+  double posed() const;    ///< poses a second, of who sent fewest
+  double seconds() const;  ///< from begin() to the end of the last run()
 
  private:
   struct Member;
@@ -69,7 +74,6 @@ class Crowd {
   void arrive(Member& member);
   struct Held;
   void check(Member& member, const Held& held);
-  void check_all();
   void fail(Member& member, const std::string& why);
   std::size_t tissues_of(std::size_t vertices, v1::MeshSelection& mesh) const;
 
@@ -82,7 +86,7 @@ class Crowd {
   std::vector<std::unique_ptr<Member>> members_;
   std::vector<std::byte> scratch_;
   int epoll_ = -1;
-  Clock::time_point begun_ = Clock::now();
+  Clock::time_point begun_ = Clock::now(), ended_ = begun_;
 };
 
 }  // namespace ecorche::bench

@@ -4,11 +4,12 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <string>
 
 #include "core/values/error.hpp"
@@ -56,6 +57,7 @@ Peers::Peers(const wire::Address& address, int count, Manner manner)
     : manner_(manner), alive_(static_cast<std::size_t>(count)) {
   const std::string much = asks_for_much();
   for (int i = 0; i < count; ++i) {
+    born_.push_back(std::chrono::steady_clock::now());
     sockets_.push_back(connected(address));
     if (manner == Manner::stop_reading && send(sockets_.back(), much.data(), much.size(), MSG_NOSIGNAL) < 0)
       throw Error(ErrorKind::temporary, "bench", "cannot send", "see the server");
@@ -74,10 +76,12 @@ Peers::~Peers() {
 void Peers::run() {
   const char byte = 1;
   auto next_drip = std::chrono::steady_clock::now();
+  std::vector<pollfd> watched;
   while (!stop_ && alive_ > 0) {
     const bool drip = manner_ == Manner::drip && std::chrono::steady_clock::now() >= next_drip;
     if (drip) next_drip += std::chrono::seconds(1);
-    for (int& fd : sockets_) {
+    for (std::size_t i = 0; i < sockets_.size(); ++i) {
+      int& fd = sockets_[i];
       if (fd < 0) continue;
       char seen[4096];
       bool gone = drip && send(fd, &byte, 1, MSG_NOSIGNAL) < 0 && errno != EAGAIN;
@@ -105,9 +109,20 @@ void Peers::run() {
       if (!gone) continue;
       close(fd);
       fd = -1;
+      const auto lived = std::chrono::steady_clock::now() - born_[i];
+      longest_ = std::max(longest_.load(), std::chrono::duration<double>(lived).count());
       --alive_;
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    if (manner_ == Manner::stop_reading) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      continue;
+    }
+    // Until one hears something, most likely the end.
+    watched.clear();
+    for (const int fd : sockets_) {
+      if (fd >= 0) watched.push_back({.fd = fd, .events = POLLIN, .revents = 0});
+    }
+    poll(watched.data(), watched.size(), 100);
   }
 }
 

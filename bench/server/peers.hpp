@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <memory>
 #include <thread>
@@ -27,12 +28,16 @@ class Peers {
 
   /// The server has hung up on every one.
   bool gone() const { return alive_ == 0; }
+  /// Of those that are gone: the longest from its own beginning until the server had hung up, seconds.
+  double longest() const { return longest_; }
 
  private:
   void run();
 
   Manner manner_;
   std::vector<int> sockets_;
+  std::vector<std::chrono::steady_clock::time_point> born_;
+  std::atomic<double> longest_ = 0;
   std::atomic<std::size_t> alive_;
   std::atomic<bool> stop_ = false;
   std::thread thread_;

@@ -2,7 +2,9 @@
 #include "bench/server/ready.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <thread>
 
 #include "bench/server/served.hpp"
 #include "clients/cpp/client.hpp"
@@ -12,6 +14,7 @@ namespace {
 
 using client::Clock;
 constexpr int kStarts = 5;  // the first one may find the file not in memory
+constexpr double kLater = 5;
 
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -27,6 +30,15 @@ void first_frame(const Served& served, std::uint32_t level) {
   while (const auto frame = client.receive(Clock::now() + std::chrono::seconds(30))) {
     if (frame->envelope.has_mesh_frame()) return;
   }
+}
+
+// Levels are made beside all else once the server listens.
+double coarse_later(const std::string& program, const std::string& model) {
+  const Served served(program, model);
+  std::this_thread::sleep_for(std::chrono::duration<double>(kLater));
+  const auto start = Clock::now();
+  first_frame(served, 1);
+  return since(start);
 }
 
 }  // namespace
@@ -49,9 +61,10 @@ void ready(const std::string& program, const std::string& model) {
   }
   std::printf(
       "ready to serve, the quickest of %d starts: listens after %.3f s (%.2f s of processor), first frame of "
-      "the "
-      "whole body after %.3f s, %.0f MiB; the first client of a coarser level waits %.2f s  (must: 0.5 s)\n",
-      kStarts, best.listens, best.cpu, best.first, best.mebibytes, best.coarse);
+      "the whole body after %.3f s, %.0f MiB; who asks for a coarser level right then waits %.2f s, who asks "
+      "%.0f s later %.3f s  (must: 0.5 s)\n",
+      kStarts, best.listens, best.cpu, best.first, best.mebibytes, best.coarse, kLater,
+      coarse_later(program, model));
   std::fflush(stdout);
 }
 

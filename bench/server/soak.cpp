@@ -79,6 +79,7 @@ bool soak(const std::string& program, const std::string& model, const std::share
     };
     while (now_minutes() < minutes) {
       crowd.run(0.1, [] {});
+      crowd.check();
       const auto now = Clock::now();
       guests.push_back(
           {crowd.join(guest_of(random)), now + std::chrono::milliseconds(500 + random() % 1500)});
@@ -116,16 +117,19 @@ bool soak(const std::string& program, const std::string& model, const std::share
   };
   nanosleep(&pause, nullptr);
   const std::size_t after = served.descriptors();
+  const std::vector<std::pair<double, double>> later(
+      memory.begin() + static_cast<std::ptrdiff_t>(memory.size() / 3), memory.end());
   std::printf(
       "soak of %.1f min: %llu guests, %llu failed; %llu frames, %llu held against offline posing, %llu "
       "wrong; memory %.1f MiB, "
-      "slope %.2f MiB an hour over %.1f min (must: under 1 over 30 min); descriptors %zu before, %zu at "
+      "slope %.2f MiB an hour over %.1f min, %.2f over the last two thirds (must: under 1 over 30 min); "
+      "descriptors %zu before, %zu at "
       "most, %zu after; %.2f "
       "cores\n",
       minutes, static_cast<unsigned long long>(visits), static_cast<unsigned long long>(failed),
       static_cast<unsigned long long>(frames), static_cast<unsigned long long>(checked),
       static_cast<unsigned long long>(wrong), memory.empty() ? 0 : memory.back().second, slope_of(memory),
-      minutes - warm_up, before, most, after, served.cpu_seconds() / (60 * now_minutes()));
+      minutes - warm_up, slope_of(later), before, most, after, served.cpu_seconds() / (60 * now_minutes()));
   return failed == 0 && wrong == 0 && checked > 0 && after <= before;
 }
 

@@ -207,10 +207,10 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   const bool coarse = mesh && (mesh->level > 0 || mesh->adaptive);
   if (!coarse || session_->model()->has_levels(mesh->tissues))
     return subscribe(id, want, request.subscribe());
-  // The first who wants them waits for the levels of detail, and nobody else does.
+  // They are made after the start, beside all else: who comes before that waits, and nobody else does.
   ++coarsening_;
   const auto made = std::make_shared<Status>();
-  house_.offload(
+  house_.set_aside(
       [made, model = session_->model(), tissues = mesh->tissues] {
         try {
           model->make_levels(tissues);

@@ -112,12 +112,17 @@ void Connection::close(const char* why) {
   house_.left(resume_token_, std::move(place));
 }
 
-void Connection::check(Clock::time_point now) {
+Clock::duration Connection::check(Clock::time_point now) {
   const Limits& limits = house_.limits();
+  Clock::duration left = Clock::duration::max();
   const auto longer = [&](std::optional<Clock::time_point> since, double seconds) {
-    return since && now - *since > duration(seconds);
+    if (!since) return false;
+    const Clock::duration allowed = duration(seconds), passed = now - *since;
+    if (passed >= allowed) return true;
+    left = std::min(left, allowed - passed);
+    return false;
   };
-  if (closed_) return;
+  if (closed_) return left;
   if (ending_) {
     if (longer(ending_since_, kLastWordsSeconds)) close("last words not read");
   } else if (!open_ && longer(born_, limits.hello_seconds)) {
@@ -137,6 +142,7 @@ void Connection::check(Clock::time_point now) {
   } else if (longer(heard_, limits.idle_seconds)) {
     hit("idle", {StatusCode::deadline_exceeded, "connection: nothing heard (send a Ping now and then)"});
   }
+  return left;
 }
 
 void Connection::hit(const char* limit, const Status& status) {

@@ -27,8 +27,8 @@ struct ProbeAsked;
 ///                                   +--> Session -- frames-+
 ///
 /// Nothing that a client sends reaches beyond its own connection: a broken rule ends it with a Status and a
-/// second to read it. Its deadlines are points in time that the server looks at ten times a second (check),
-/// so that no read or write needs a timer of its own.
+/// second to read it. Its deadlines are points in time that the server looks at when the first is due, and
+/// ten times a second (check), so that no read or write needs a timer of its own.
 class Connection final : public std::enable_shared_from_this<Connection>, private Member {
  public:
   /// `proven`: the client has shown its right to connect already.
@@ -43,8 +43,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   /// Second step: now.
   void close(const char* why);
 
-  /// Drops the connection when it broke a deadline.
-  void check(Clock::time_point now);
+  /// Drops the connection when it broke a deadline; how long until the next one could be.
+  Clock::duration check(Clock::time_point now);
   bool closed() const { return closed_; }
   bool ending() const { return ending_; }
 

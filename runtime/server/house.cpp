@@ -39,7 +39,8 @@ House::House(net::io_context& io, Workers& workers, Options options, std::vector
       options_(std::move(options)),
       memory_(options_.limits.queued_bytes),
       judging_(io),
-      seams_(std::move(seams)) {
+      seams_(std::move(seams)),
+      aside_(1, giving_way) {
   if (models.empty() || models.size() > options_.limits.models) {
     throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
                 "serve 1 to " + std::to_string(options_.limits.models) + ", or raise --max-models");
@@ -51,7 +52,32 @@ House::House(net::io_context& io, Workers& workers, Options options, std::vector
         std::make_shared<const ServedModel>(model.name, std::move(model.model), std::move(model.clips)));
     // The first frame of all will want it.
     workers_.submit([served = models_.back()] { warm_up(*served); });
+    coarsen(models_.back());
   }
+}
+
+House::~House() {
+  leaving_ = true;
+}
+
+void House::stop() {
+  leaving_ = true;
+  judging_.stop();
+}
+
+// Levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a
+// model that nobody has any more.
+void House::coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
+  if (leaving_ || tissue >= model->model().tissues.size() || model.use_count() == 1) return;
+  aside_.submit([this, model = std::move(model), tissue]() mutable {
+    if (seams_.may_coarsen && !seams_.may_coarsen()) return;
+    try {
+      model->make_levels({tissue});
+    } catch (const std::bad_alloc&) {
+      return;  // who asks is told
+    }
+    coarsen(std::move(model), tissue + 1);
+  });
 }
 
 net::awaitable<void> House::wait(net::steady_timer& timer, boost::system::error_code& ec) {
@@ -271,11 +297,20 @@ void House::replace(std::shared_ptr<const ServedModel> model) {
     it = sessions_.erase(it);
   }
   *old = std::move(model);
+  coarsen(*old);
 }
 
 void House::offload(std::function<void()> work, std::function<void()> then) {
-  workers_.submit([&io = io_, work = std::move(work), then = std::move(then),
-                   guard = net::make_work_guard(io_)]() mutable {
+  hand_over(workers_, std::move(work), std::move(then));
+}
+
+void House::set_aside(std::function<void()> work, std::function<void()> then) {
+  hand_over(aside_, std::move(work), std::move(then));
+}
+
+void House::hand_over(Workers& to, std::function<void()> work, std::function<void()> then) {
+  to.submit([&io = io_, work = std::move(work), then = std::move(then),
+             guard = net::make_work_guard(io_)]() mutable {
     work();
     // What both hold ends on the I/O thread.
     net::post(io, [work = std::move(work), then = std::move(then), guard = std::move(guard)] { then(); });

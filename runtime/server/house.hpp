@@ -2,6 +2,7 @@
 // What all connections of a server share; lives on the I/O thread.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -16,6 +17,7 @@
 #include "runtime/server/named_model.hpp"
 #include "runtime/server/seams.hpp"
 #include "runtime/server/session.hpp"
+#include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
 
@@ -30,6 +32,9 @@ struct Lost {
 class House {
  public:
   House(net::io_context& io, Workers& workers, Options options, std::vector<NamedModel> models, Seams seams);
+  ~House();
+  House(const House&) = delete;
+  House& operator=(const House&) = delete;
 
   const Options& options() const { return options_; }
   const Limits& limits() const { return options_.limits; }
@@ -65,6 +70,8 @@ class House {
 
   /// `work` on a worker, then `then` on the I/O thread. Neither may throw.
   void offload(std::function<void()> work, std::function<void()> then);
+  /// As offload, but on one thread that gives way to all others.
+  void set_aside(std::function<void()> work, std::function<void()> then);
 
   Metrics& metrics() { return metrics_; }
   const FrameMemory& memory() const { return memory_; }
@@ -72,8 +79,8 @@ class House {
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
 
-  /// No pose is judged beside the stream any more.
-  void stop() { judging_.stop(); }
+  /// Nothing is made or judged beside the stream any more.
+  void stop();
 
   std::size_t sessions() const { return sessions_.size() + retired_.size(); }
   /// Ends the sessions that are over, and lets those go on that waited for memory.
@@ -82,6 +89,8 @@ class House {
  private:
   net::io_context& io_;
   Workers& workers_;
+  void hand_over(Workers& to, std::function<void()> work, std::function<void()> then);
+  void coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
   void replace(std::shared_ptr<const ServedModel> model);
   bool make_room();
   void keep_recording(Session& session);
@@ -100,6 +109,8 @@ class House {
   Metrics metrics_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
   std::uint64_t unnamed_ = 0;
+  std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
+  Workers aside_;
 };
 
 }  // namespace ecorche::server

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/judging.hpp"
 
-#ifdef __linux__
-#include <sys/resource.h>
-#include <unistd.h>
-#endif
 #include <time.h>
 
 #include <algorithm>
@@ -17,16 +13,6 @@
 namespace ecorche::server {
 namespace {
 
-// On Linux a thread may have a priority of its own; anybody may lower it. Not to the least: who waits for a
-// lock of this thread's then waits for all others.
-void politely(const Job& job) {
-#ifdef __linux__
-  constexpr int kNice = 10;
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
-#endif
-  job();
-}
-
 // Of the calling thread.
 Clock::duration processor_time() {
   timespec spent{};
@@ -36,7 +22,7 @@ Clock::duration processor_time() {
 
 }  // namespace
 
-Judging::Judging(net::io_context& io) : timer_(io), aside_(1, politely) {}
+Judging::Judging(net::io_context& io) : timer_(io), aside_(1, giving_way) {}
 
 void Judging::ask(const std::shared_ptr<Session>& session) {
   if (!session->await_judgement()) waiting_.push_back(session);

@@ -18,6 +18,9 @@ struct Seams {
   /// A message is being handled, from true to false. What finds no memory meanwhile ends its connection; Asio
   /// itself, between messages, ends the process.
   std::function<void(bool)> handling;
+  /// Asked before each tissue's levels of detail are made that nobody waits for, on the thread that makes
+  /// them; false: no more of this model.
+  std::function<bool()> may_coarsen = {};
 };
 
 }  // namespace ecorche::server

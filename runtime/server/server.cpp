@@ -13,9 +13,9 @@
 namespace ecorche::server {
 namespace {
 
-// How often deadlines are looked at.
-constexpr auto kTick = std::chrono::milliseconds(100);
-constexpr auto kLastTick = std::chrono::milliseconds(5);  // once stopping
+// How often deadlines are looked at, at least and, where one is due, at most.
+constexpr Clock::duration kTick = std::chrono::milliseconds(100);
+constexpr Clock::duration kShortTick = std::chrono::milliseconds(5);
 // Connections beyond the limit that may be told so at one time; the next ones are closed without a word.
 constexpr std::size_t kMostRefusals = 32;
 
@@ -94,9 +94,9 @@ struct Server::Impl {
 
   net::awaitable<void> accept(tcp::acceptor& at, bool web);
   net::awaitable<void> watch();
-  net::awaitable<void> pause(net::steady_timer& timer);
+  net::awaitable<void> pause(net::steady_timer& timer, Clock::duration time = kTick);
   bool admit(Clock::time_point now);
-  void look_after(Clock::time_point now);
+  Clock::duration look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool web);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven);
   void begin_shutdown();
@@ -215,12 +215,13 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
 net::awaitable<void> Server::Impl::watch() {
   boost::system::error_code ec;
   while (!stopping || !connections.empty()) {
+    Clock::duration next = kTick;
     try {
-      look_after(Clock::now());
+      next = look_after(Clock::now());
     } catch (const std::exception& error) {
       spdlog::error("server: {}", error.what());
     }
-    co_await pause(tick);
+    co_await pause(tick, next);
   }
   house->end_recordings();
   // Until the last client had its goodbye, the HTTP port tells that the server stops.
@@ -228,16 +229,23 @@ net::awaitable<void> Server::Impl::watch() {
   for (const auto& request : requests) request->close();
 }
 
-void Server::Impl::look_after(Clock::time_point now) {
-  for (const auto& connection : connections) connection->check(now);
+// How long until a deadline could be broken.
+Clock::duration Server::Impl::look_after(Clock::time_point now) {
+  Clock::duration next = kTick;
+  for (const auto& connection : connections) next = std::min(next, connection->check(now));
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   for (const auto& request : requests) {
-    if (now - request->born() <= duration(house->limits().hello_seconds)) continue;
+    const Clock::duration left = duration(house->limits().hello_seconds) - (now - request->born());
+    if (left > Clock::duration::zero()) {
+      next = std::min(next, left);
+      continue;
+    }
     if (!request->over()) house->metrics().hit("hello");
     request->close();
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });
   house->sweep(now);
+  return std::max(next, kShortTick);
 }
 
 std::string Server::Impl::metrics() {
@@ -265,11 +273,11 @@ void Server::Impl::begin_shutdown() {
   }
 }
 
-// A tick's time, or nothing where even the wait finds no memory.
-net::awaitable<void> Server::Impl::pause(net::steady_timer& timer) {
+// So long, or not at all where even the wait finds no memory.
+net::awaitable<void> Server::Impl::pause(net::steady_timer& timer, Clock::duration time) {
   boost::system::error_code ec;
   try {
-    timer.expires_after(stopping ? kLastTick : kTick);
+    timer.expires_after(stopping ? kShortTick : time);
     co_await house->wait(timer, ec);
   } catch (const std::exception& error) {
     spdlog::error("server: {}", error.what());

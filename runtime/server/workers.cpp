@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/workers.hpp"
 
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
+
 #include <utility>
 
 namespace ecorche::server {
@@ -50,6 +55,17 @@ void Workers::work() {
     }
     idle_.notify_all();
   }
+}
+
+// On Linux a thread may have a priority of its own; anybody may lower it. Not to the least: who waits for a
+// lock of this thread's then waits for all others.
+void giving_way(const Job& job) {
+#ifdef __linux__
+  constexpr int kNice = 10;
+  thread_local const int lowered = setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
+  static_cast<void>(lowered);  // where it may not, it does not
+#endif
+  job();
 }
 
 }  // namespace ecorche::server

@@ -41,4 +41,8 @@ class Workers {
   std::vector<std::thread> threads_;
 };
 
+/// Calls `job` on a thread that gives way to whoever makes a frame, from its first job on (on Linux;
+/// elsewhere it does not). For Workers of their own.
+void giving_way(const Job& job);
+
 }  // namespace ecorche::server

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Levels of detail, regions, control nodes and rates against offline posing.
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <numeric>
+#include <semaphore>
 #include <thread>
 
 #include "proto/arrays.hpp"
 #include "proto/mesh_decoder.hpp"
+#include "runtime/server/house.hpp"
 #include "runtime/server/mesh_rows.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/skin/body_poser.hpp"
@@ -79,9 +84,57 @@ TEST(Parts, LevelsAreMadeForTheTissuesThatSomebodyWants) {
   }
 }
 
-// A worker makes them: whoever asks first may be gone by then.
+bool soon(const std::function<bool()>& done) {
+  for (int i = 0; i < 2000 && !done(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return done();
+}
+
+TEST(Parts, LevelsAreMadeBeforeAnybodyAsks) {
+  const auto model = std::make_shared<const Model>(test::toy_model());
+  std::vector<std::uint32_t> all(model->tissues.size());
+  std::iota(all.begin(), all.end(), 0U);
+  auto changed = std::make_shared<Model>(*model);
+  changed->tissues[0].V.array() += 1e-3;
+  net::io_context io;
+  Workers workers(1, [](const Job& job) { job(); });
+  House house(io, workers, {}, {{"toy", model, {}, [changed] { return ModelParts{changed}; }}}, {});
+  const auto first = house.models()[0];
+  EXPECT_TRUE(soon([&] { return first->has_levels(all); }));
+  house.reload("toy", [](const Status& status) { EXPECT_TRUE(status.ok()) << status.message; });
+  io.run();
+  ASSERT_NE(house.models()[0], first);
+  EXPECT_TRUE(soon([&] { return house.models()[0]->has_levels(all); }));
+}
+
+TEST(Parts, LevelsThatNobodyWaitsForDoNotHoldUpTheEnd) {
+  const auto model = std::make_shared<const Model>(test::toy_model());
+  ASSERT_GT(model->tissues.size(), 2U);
+  std::atomic<int> asked = 0;
+  std::binary_semaphore stopped(0);
+  {
+    net::io_context io;
+    Workers workers(1, [](const Job& job) { job(); });
+    Seams seams;
+    seams.may_coarsen = [&] {
+      if (++asked == 1) stopped.acquire();
+      return true;
+    };
+    House house(io, workers, {}, {{"toy", model, {}, {}}}, seams);
+    house.stop();
+    stopped.release();
+  }
+  EXPECT_LE(asked, 1);
+}
+
+Seams on_demand() {
+  Seams seams;
+  seams.may_coarsen = [] { return false; };
+  return seams;
+}
+
+// A thread of its own makes them: whoever asks first may be gone by then.
 TEST(Parts, WhoAsksForLevelsFirstMayLeaveBeforeTheyAreMade) {
-  const TestServer server;
+  const TestServer server(Options{}, on_demand());
   v1::Envelope request;
   request.mutable_subscribe()->mutable_mesh()->set_level(2);
   {
@@ -97,7 +150,9 @@ TEST(Parts, WhoAsksForLevelsFirstMayLeaveBeforeTheyAreMade) {
 TEST(Parts, SubscriptionsThatWaitForLevelsAreLimitedToo) {
   Limits limits;
   limits.subscriptions = 2;
-  const TestServer server(limits);
+  Options options;
+  options.limits = limits;
+  const TestServer server(options, on_demand());
   RawClient client(server);
   client.send_hello();
   v1::Envelope open, request;
@@ -135,7 +190,7 @@ TEST(Parts, SubscriptionsThatWaitForLevelsAreLimitedToo) {
 
 // The levels are of the model that was open; the subscription would be of another.
 TEST(Parts, LevelsOfAModelThatMadeWayAreNotSubscribedTo) {
-  TestServer server;
+  TestServer server(Options{}, on_demand());
   RawClient client(server);
   client.send_hello();
   v1::Envelope open, subscribe, reload;

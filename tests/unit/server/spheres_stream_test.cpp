@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
@@ -134,12 +135,13 @@ TEST(SpheresStream, BricksAndSlicesEqualOfflineRefilling) {
     pose.rotation[2] = Eigen::AngleAxisd(0.02 * static_cast<double>(sequence), Eigen::Vector3d::UnitZ());
     client.send(sequence, pose);
     ASSERT_TRUE(poser.run(pose, runtime::Skinning::cor, {}, body).ok());
-    for (const std::uint32_t subscription : {volume, cut}) {
+    for (std::set<std::uint32_t> left{volume, cut}; !left.empty();) {  // whichever comes first
       const wire::Frame frame = client.next([&](const v1::Envelope& e) {
-        return e.volume_frame().subscription() == subscription &&
-               e.volume_frame().pose_sequence() == sequence;
+        return left.contains(e.volume_frame().subscription()) && e.volume_frame().pose_sequence() == sequence;
       });
       const v1::VolumeFrame& sent = frame.envelope.volume_frame();
+      const std::uint32_t subscription = sent.subscription();
+      left.erase(subscription);
       ASSERT_EQ(sent.status().code(), 0U) << sent.status().message();
       std::vector<std::byte> expected;
       if (subscription == volume) {
