@@ -38,7 +38,7 @@ struct Settings {
   std::shared_ptr<const Model> truth;
 };
 
-constexpr double kWarmUp = 1;
+constexpr double kWarmUp = 4;  // until the levels of detail are made
 const std::vector<std::string> kRoomy{"--max-connections", "4000", "--max-sessions", "200"};
 
 // All clients together; the slowest one's rate.

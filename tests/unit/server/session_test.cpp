@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A session without a server: which poses it takes to come after a rest.
+// A session without a server: which poses it takes to come after a rest, when it makes keyframes, when
+// judges.
 #include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "proto/framing.hpp"
@@ -16,17 +18,21 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Keeps of every frame that it is shown whether its own quality came with it.
+// Keeps of every frame that it is shown whether its own quality came with it, and whether it is a keyframe.
 class Watcher final : public Member {
  public:
   const std::vector<bool>& judged() const { return judged_; }
+  const std::vector<bool>& keyframes() const { return keyframes_; }
+  // As if it had not got what the next frame is against.
+  void lose_next() { loses_ = true; }
   Clock::time_point last() const { return last_; }
 
  private:
   bool deliver(const PosedFrame& frame) override {
     judged_.push_back(frame.judged != nullptr);
+    keyframes_.push_back(frame.keyframe == frame.number);
     last_ = Clock::now();
-    return true;
+    return !std::exchange(loses_, false);
   }
   std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
     return finest;
@@ -35,7 +41,8 @@ class Watcher final : public Member {
   void control_changed(v1::Role, bool) override {}
   void model_changed(std::uint64_t) override {}
 
-  std::vector<bool> judged_;
+  std::vector<bool> judged_, keyframes_;
+  bool loses_ = false;
   Clock::time_point last_{};
 };
 
@@ -61,7 +68,7 @@ class Gate {
 };
 
 struct Stage {
-  Stage()
+  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32)
       : model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(test::toy_model()))),
         workers(1,
                 [this](const Job& job) {
@@ -72,6 +79,7 @@ struct Stage {
     session->join(watcher);
     MeshWant want;
     want.tissues = {0};
+    want.encoding = encoding;
     session->subscribe(watcher, {.id = 0, .want = want, .request = {}});
   }
   ~Stage() {
@@ -165,6 +173,74 @@ TEST(Session, APoseBehindOneThatIsStillBeingMadeComesAfterNoRest) {
   stage.gate.open();
   EXPECT_EQ(stage.next_is_judged(), true);
   EXPECT_EQ(stage.next_is_judged(), false);
+}
+
+// While poses come, keyframes that somebody lacks keep their distance; once none waits, there is one at once.
+TEST(Session, AKeyframeThatIsAskedForSoonAfterTheLastComesWithTheNextRest) {
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Stage stage(v1::ENCODING_U16_DELTA);
+    const auto frames = [&](std::size_t count) {
+      stage.run_until([&] { return stage.watcher.keyframes().size() >= count; });
+      return stage.watcher.keyframes();
+    };
+    ASSERT_EQ(frames(1), std::vector<bool>{true});
+    const auto first = stage.watcher.last();
+    stage.gate.close();
+    stage.pose(1);
+    stage.wait(milliseconds(20));  // until it was taken up
+    stage.pose(2);                 // waits in the slot
+    stage.watcher.lose_next();
+    stage.gate.open();
+    const std::vector<bool> made = frames(4);
+    if (stage.watcher.last() - first > milliseconds(90)) continue;  // a busy machine
+    EXPECT_EQ(made, (std::vector<bool>{true, false, false, true}));
+    return;
+  }
+  ADD_FAILURE() << "the machine was too busy each time";
+}
+
+// Ten times as long as a turn took, nobody has one.
+TEST(Session, JudgingRestsAfterATurn) {
+  Stage stage;
+  ASSERT_EQ(stage.next_is_judged(), true);
+  stage.judging.done(milliseconds(60));
+  stage.judging.ask(stage.session);
+  stage.wait(kShort);
+  EXPECT_TRUE(stage.session->await_judgement()) << "its turn came too soon";
+  bool waits = true;
+  stage.run_until([&] { return !(waits = waits && stage.session->await_judgement()); });
+  EXPECT_FALSE(waits) << "its turn never came";
+}
+
+// What was measured by thresholds that are others by now is not told with later frames.
+TEST(Session, AQualityByFormerThresholdsIsNotKept) {
+  Stage stage;
+  ASSERT_EQ(stage.next_is_judged(), true);
+  stage.judging.done(std::chrono::seconds(3));  // nothing is judged beside the frames
+  stage.wait(kLong);
+  stage.gate.close();
+  stage.pose(1);
+  stage.wait(milliseconds(20));
+  stage.session->set_thresholds({.max_volume_change = 1e-9});
+  stage.gate.open();
+  ASSERT_EQ(stage.next_is_judged(), true);
+  stage.pose(2);
+  EXPECT_EQ(stage.next_is_judged(), true);
+}
+
+TEST(Session, AnUnnamedOneWaitsOnlyForWhoMayComeBack) {
+  Stage stage;
+  const auto own = std::make_shared<Session>(stage.io, stage.workers, stage.model, "-1", false, stage.limits,
+                                             stage.memory, stage.judging, stage.metrics);
+  Watcher guest;
+  own->join(guest);
+  EXPECT_FALSE(own->over(Clock::now()));
+  own->leave(guest, true);
+  EXPECT_FALSE(own->over(Clock::now()));
+  EXPECT_TRUE(own->over(Clock::now() + duration(stage.limits.linger_seconds)));
+  own->join(guest);
+  own->leave(guest, false);
+  EXPECT_TRUE(own->over(Clock::now()));
 }
 
 }  // namespace
