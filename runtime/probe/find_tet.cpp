@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The walk down the tree of boxes: sixteen boxes against a point at a time, then sixteen tets.
+// For permutations of bytes.
+#define HWY_WANT_AVX3_DL
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "runtime/probe/find_tet.cpp"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, as Highway asks.
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "runtime/probe/tet_runs.hpp"
-#include "runtime/skin/palette-inl.hpp"
 #include "runtime/skin/vectors-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -20,8 +23,8 @@ namespace ecorche::runtime::HWY_NAMESPACE {
 constexpr double kMargin = 1e-10;
 constexpr double kFlat = 1e-12;
 constexpr std::size_t kWidth = TetRuns::width;
-// What float32 may do to a determinant of vectors in a box, of its longest side cubed: 42 roundings of 6e-8.
-constexpr float kRounding = 1e-5F;
+// By how many steps a node may lie beside its own of a PackedRun: half of one, and what float32 rounds off.
+constexpr float kStep = 0.51F;
 
 HWY_INLINE std::uint32_t bits_of(hn::Mask<F> mask) {
   HWY_ALIGN std::uint8_t bytes[8] = {};
@@ -41,6 +44,32 @@ HWY_INLINE std::uint32_t children_around(const BoxNode& node, const float* point
                                        hn::Le(x, hn::Load(F(), &node.high[a][i]))));
     }
     bits |= bits_of(inside) << i;
+  }
+  return bits;
+}
+
+// The point, which the node's own box holds, in its steps; what is no number, at none.
+HWY_INLINE void count_steps(const ByteBoxes& node, const float* point, float (&steps)[3]) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const float step = (point[a] - node.from[a]) * node.scale;
+    steps[a] = step > 0 ? std::min(step, 255.0F) : 0.0F;
+  }
+}
+
+// A bit for every run whose box holds the point.
+HWY_INLINE std::uint32_t runs_around(const ByteBoxes& node, const float (&point)[3]) {
+  const hn::CappedTag<std::uint8_t, kWidth> d;
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < kWidth; i += hn::Lanes(d)) {
+    auto beside = hn::Zero(d);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto x = hn::Set(d, static_cast<std::uint8_t>(point[a]));
+      beside = hn::Or(beside, hn::Or(hn::SaturatedSub(hn::Load(d, &node.low[a][i]), x),
+                                     hn::SaturatedSub(x, hn::Load(d, &node.high[a][i]))));
+    }
+    HWY_ALIGN std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, hn::Eq(beside, hn::Zero(d)), bytes);
+    bits |= (bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8U) << i;
   }
   return bits;
 }
@@ -84,113 +113,152 @@ HWY_INLINE double held_by(const float* const (&corner)[4], const float* point, d
   return det;
 }
 
-// The tets of a vector that may hold the point: no determinant of it with a face has the wrong sign by more
-// than rounding explains. Any they are that do hold it.
-template <bool kLong>
-HWY_INLINE std::uint32_t may_hold(const Table<float>& table, const std::uint8_t* corners, const V3& point,
-                                  V margin) {
-  const auto corner = [&](std::size_t c) HWY_ATTR {
-    const Corner at(corners + kWidth * c);
-    return minus(
-        {at.template of<kLong>(table.x), at.template of<kLong>(table.y), at.template of<kLong>(table.z)},
-        point);
-  };
-  const auto along = [](const V3& a, const V3& b)
-                         HWY_ATTR { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); };
-  const V3 a = corner(0), b = corner(1), c = corner(2), d = corner(3), bc = cross(b, c), ad = cross(a, d);
-  const V n0 = along(d, bc), n1 = along(c, ad), n2 = hn::Neg(along(b, ad)), n3 = hn::Neg(along(a, bc));
-  const V least = hn::Min(hn::Min(n0, n1), hn::Min(n2, n3)), most = hn::Max(hn::Max(n0, n1), hn::Max(n2, n3));
-  return bits_of(hn::Or(hn::Ge(least, hn::Neg(margin)), hn::Le(most, margin)));
-}
+// Nodes of a run, x, y and z in a byte each of a word, and the corners of a vector of its tets.
+class Words {
+ public:
+#if HWY_TARGET <= HWY_AVX3_DL
+  HWY_INLINE explicit Words(const PackedRun& run) {
+    HWY_ALIGN static constexpr std::array<std::uint8_t, 128> from = [] {
+      std::array<std::uint8_t, 128> at{};
+      for (std::size_t i = 0; i < 80; ++i) at[i] = static_cast<std::uint8_t>(i / 4 * 3 + i % 4);
+      return at;
+    }();
+    const __m512i bytes = _mm512_load_si512(&run);
+    first_ = _mm512_maskz_permutexvar_epi8(kThree, _mm512_load_si512(from.data()), bytes);
+    last_ = _mm512_maskz_permutexvar_epi8(kThree, _mm512_load_si512(from.data() + 64), bytes);
+  }
+  HWY_INLINE hn::Vec<I> at(const std::uint8_t* corners) const {
+    const hn::Vec<I> places = hn::PromoteTo(I(), hn::LoadU(U8(), corners));
+    return hn::Vec<I>{_mm512_permutex2var_epi32(first_, places.raw, last_)};
+  }
 
-// A run whose box holds a point, to be searched once what it needs has come to the caches.
-struct Waiting {
-  std::uint32_t run, point;  // the point's place in `out`
-  float margin;
+ private:
+  static constexpr std::uint64_t kThree = 0x7777777777777777;
+  __m512i first_, last_;
+#else
+  HWY_INLINE explicit Words(const PackedRun& run) {
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(&run);
+    for (std::size_t n = 0; n < PackedRun::most; ++n)
+      std::memcpy(words_ + n, bytes + 3 * n, 4);  // one too many
+  }
+  HWY_INLINE hn::Vec<I> at(const std::uint8_t* corners) const {
+    return hn::GatherIndex(I(), words_, hn::PromoteTo(I(), hn::LoadU(U8(), corners)));
+  }
+
+ private:
+  std::int32_t words_[PackedRun::most];
+#endif
 };
 
-struct Search {
-  const FindTets& where;
-  const float* points;
-  const std::uint32_t* which;
-  TetPlace* out;
+// The tets of a vector that may hold the point, by their corners' steps. What a tet holds lies at most kStep,
+// along each axis, from a point of the tet of its steps, so no face has it further on its outer side than
+// that; nor, by the margin of held_by (1e-10 of edges of at most 442 steps, cubed), than another 1. Steps are
+// whole numbers: normals are exact. What is no number is in all of them.
+HWY_INLINE std::uint32_t may_hold(const Words& words, const std::uint8_t* corners, const V3& point) {
+  const auto corner = [&](std::size_t c) HWY_ATTR {
+    const auto word = words.at(corners + kWidth * c), mask = hn::Set(I(), 255);
+    return V3{hn::ConvertTo(F(), hn::And(word, mask)),
+              hn::ConvertTo(F(), hn::And(hn::ShiftRight<8>(word), mask)),
+              hn::ConvertTo(F(), hn::And(hn::ShiftRight<16>(word), mask))};
+  };
+  const V3 a = corner(0), b = corner(1), c = corner(2), d = corner(3);
+  const V3 u = minus(b, a), v = minus(c, a), w = minus(d, a), from_a = minus(point, a);
+  auto out_of_positive = hn::MaskFromVec(hn::Zero(F())), out_of_inverted = out_of_positive;
+  const auto face = [&](const V3& normal, const V3& at) HWY_ATTR {
+    const V n = hn::MulAdd(normal.x, at.x, hn::MulAdd(normal.y, at.y, hn::Mul(normal.z, at.z)));
+    const V size = hn::Add(hn::Abs(normal.x), hn::Add(hn::Abs(normal.y), hn::Abs(normal.z)));
+    const V margin = hn::MulAdd(size, all(kStep), all(1));
+    out_of_positive = hn::Or(out_of_positive, hn::Lt(n, hn::Neg(margin)));
+    out_of_inverted = hn::Or(out_of_inverted, hn::Gt(n, margin));
+  };
+  const V3 vw = cross(v, w), wu = cross(w, u), uv = cross(u, v);
+  face(vw, from_a);
+  face(wu, from_a);
+  face(uv, from_a);
+  face(plus(vw, plus(wu, uv)), minus(b, point));
+  return ~bits_of(hn::And(out_of_positive, out_of_inverted)) & ((1U << hn::Lanes(F())) - 1);
+}
 
-  static constexpr std::size_t kMost = 128, kNodesAhead = 5, kPaletteAhead = 12;
-  std::size_t count = 0;
-  Waiting waiting[kMost];
+// Points wait for what they need to come to the caches: for runs whose boxes hold them, then for tets that
+// may.
+class Search {
+ public:
+  HWY_INLINE Search(const FindTets& where, const float* points, const std::uint32_t* which, TetPlace* out)
+      : where_(where), points_(points), which_(which), out_(out) {}
 
-  HWY_INLINE void wait_for(const BoxNode& node, std::size_t child, std::size_t run, std::size_t point) {
-    hwy::Prefetch(where.runs.palettes().where(run));
-    float side = 0;
-    for (std::size_t a = 0; a < 3; ++a) side = std::max(side, node.high[a][child] - node.low[a][child]);
-    waiting[count++] = {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(point),
-                        kRounding * side * side * side};
-    if (count == kMost) search_all();
+  // Run `i` of `node`; `steps`: of the point in it.
+  HWY_INLINE void wait_for(std::size_t run, std::size_t point, const ByteBoxes& node, std::size_t i,
+                           const float (&steps)[3]) {
+    hwy::Prefetch(&where_.tree.runs[run]);
+    hwy::Prefetch(where_.runs.corners(run));
+    Waiting& at = runs_[come_++ % kRuns];
+    at.run = static_cast<std::uint32_t>(run);
+    at.point = static_cast<std::uint32_t>(point);
+    for (std::size_t a = 0; a < 3; ++a) at.steps[a] = steps[a] - static_cast<float>(node.low[a][i]);
+    if (come_ - gone_ == kRuns) search(runs_[gone_++ % kRuns]);
   }
 
-  // First the palette, with the corners before it, then its nodes.
-  HWY_INLINE void ask_for_palette(std::size_t w) const {
-    if (w >= count) return;
-    const std::uint8_t* first = where.runs.palettes().corners(waiting[w].run);
-    for (std::size_t line = 0; line < 3; ++line) hwy::Prefetch(first + 64 * line);
-  }
-  HWY_INLINE void ask_for_nodes(std::size_t w) const {
-    if (w >= count) return;
-    const std::span<const std::uint32_t> rows = where.runs.palettes().rows_of(waiting[w].run);
-    ask_for(where.nodes.data(), rows.data(), rows.size(), 1);
+  void finish() {
+    while (gone_ != come_) search(runs_[gone_++ % kRuns]);
+    while (decided_ != claimed_) advance();
   }
 
-  void search_all() {
-    const TetPalettes& palettes = where.runs.palettes();
-    // The next palette is fetched before one is searched: wide loads of what was just stored narrowly would
-    // wait for the stores.
-    Table<float> tables[2];
-    const auto fetch_palette = [&](std::size_t w) HWY_ATTR {
-      const std::size_t run = waiting[w].run;
-      fetch(where.nodes.data(), palettes.rows(run), palettes.filled(run), tables[w % 2]);
-    };
-    for (std::size_t w = 0; w < kPaletteAhead; ++w) ask_for_palette(w);
-    for (std::size_t w = 0; w < kNodesAhead; ++w) ask_for_nodes(w);
-    if (count > 0) fetch_palette(0);
-    for (std::size_t w = 0; w < count; ++w) {
-      ask_for_palette(w + kPaletteAhead);
-      ask_for_nodes(w + kNodesAhead);
-      if (w + 1 < count) fetch_palette(w + 1);
-      if (palettes.filled(waiting[w].run) <= 32) {
-        search<false>(waiting[w], tables[w % 2]);
-      } else {
-        search<true>(waiting[w], tables[w % 2]);
-      }
+ private:
+  static constexpr std::size_t kRuns = 32, kClaims = 16;
+  struct Waiting {
+    std::uint32_t run, point;  // the point's place in `out`
+    float steps[3];            // from the lowest corner of the run's box
+  };
+  struct Claim {
+    std::uint32_t run, i, point;
+  };
+
+  HWY_INLINE void search(const Waiting& at) {
+    if (!where_.runs.packed(at.run)) {
+      for (std::size_t i = 0; i < kWidth; ++i) claim(at, i);
+      return;
     }
-    count = 0;
-  }
-
-  template <bool kLong>
-  HWY_INLINE void search(const Waiting& at, const Table<float>& table) {
-    const float* point = points + 3 * std::size_t{which[at.point]};
-    const std::uint8_t* corners = where.runs.palettes().corners(at.run);
-    const V3 x{all(point[0]), all(point[1]), all(point[2])};
+    const PackedRun& run = where_.tree.runs[at.run];
+    const Words words(run);
+    const V3 point = times({all(at.steps[0]), all(at.steps[1]), all(at.steps[2])}, all(run.finer));
     for (std::size_t i = 0; i < kWidth; i += hn::Lanes(F())) {
-      std::uint32_t bits = may_hold<kLong>(table, corners + i, x, all(at.margin));
-      for (; bits != 0; bits &= bits - 1)
-        hold(at, i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits), point, out[at.point]);
+      std::uint32_t bits = may_hold(words, where_.runs.corners(at.run) + i, point);
+      for (; bits != 0; bits &= bits - 1) claim(at, i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
     }
   }
 
-  // Whether tet `i` of the run does hold the point, and has more of a claim on it than the tet that was
-  // found.
-  void hold(const Waiting& at, std::size_t i, const float* point, TetPlace& best) const {
-    const auto tet = static_cast<std::int32_t>(where.runs.tets(at.run)[i]);
+  // First where the run's rows begin is asked for, then its rows, then its nodes, each four claims later.
+  HWY_INLINE void claim(const Waiting& at, std::size_t i) {
+    hwy::Prefetch(where_.runs.begin(at.run));
+    hwy::Prefetch(where_.runs.tets(at.run));
+    claims_[claimed_++ % kClaims] = {at.run, static_cast<std::uint32_t>(i), at.point};
+    if (claimed_ - decided_ == kClaims) advance();
+  }
+  HWY_INLINE void advance() {
+    while (begun_ < claimed_ && begun_ < decided_ + kClaims - 4) {
+      const std::span<const std::uint32_t> rows = where_.runs.rows(claims_[begun_++ % kClaims].run);
+      hwy::Prefetch(rows.data());
+      hwy::Prefetch(rows.data() + kWidth);
+    }
+    while (fetched_ < begun_ && fetched_ < decided_ + kClaims - 8) {
+      const Claim& next = claims_[fetched_++ % kClaims];
+      for (std::size_t c = 0; c < 4; ++c) hwy::Prefetch(&where_.nodes[where_.runs.row(next.run, next.i, c)]);
+    }
+    decide(claims_[decided_++ % kClaims]);
+  }
+
+  // Whether the tet does hold the point, and has more of a claim on it than the tet that was found.
+  void decide(const Claim& claim) const {
+    TetPlace& best = out_[claim.point];
+    const auto tet = static_cast<std::int32_t>(where_.runs.tets(claim.run)[claim.i]);
     const bool found = best.tet != TetPlace::none;
     if (found && !best.inverted && best.tet <= tet) return;
-    const TetPalettes& palettes = where.runs.palettes();
     std::uint32_t rows[4];
-    for (std::size_t c = 0; c < 4; ++c)
-      rows[c] = palettes.rows(at.run)[palettes.corners(at.run)[kWidth * c + i]];
-    const float* nodes = where.nodes.data();
+    for (std::size_t c = 0; c < 4; ++c) rows[c] = where_.runs.row(claim.run, claim.i, c);
+    const float* nodes = where_.nodes.data();
+    const float* const corners[4] = {nodes + rows[0], nodes + rows[1], nodes + rows[2], nodes + rows[3]};
     double shares[4];
-    const double det =
-        held_by({nodes + rows[0], nodes + rows[1], nodes + rows[2], nodes + rows[3]}, point, shares);
+    const double det = held_by(corners, points_ + 3 * std::size_t{which_[claim.point]}, shares);
     if (det == 0) return;
     const bool inverted = det < 0;
     if (found && inverted && (!best.inverted || best.tet <= tet)) return;
@@ -199,6 +267,15 @@ struct Search {
     for (std::size_t c = 0; c < 4; ++c) best.nodes[c] = rows[c] / TetRuns::stride;
     std::copy_n(shares, 4, best.barycentric.begin());
   }
+
+  const FindTets& where_;
+  const float* points_;
+  const std::uint32_t* which_;
+  TetPlace* out_;
+  std::size_t come_ = 0, gone_ = 0;
+  std::size_t claimed_ = 0, begun_ = 0, fetched_ = 0, decided_ = 0;
+  Waiting runs_[kRuns];
+  Claim claims_[kClaims];
 };
 
 // Nodes of the tree whose boxes hold a point, first come first served: many points go down at once, so that
@@ -226,10 +303,16 @@ class Descent {
     return visit;
   }
   HWY_INLINE void add(const FindTets& where, const Visit& visit) {
-    const BoxNode& node = where.tree[where.runs.first(visit.level) + visit.node];
-    for (std::size_t a = 0; a < 3; ++a) {
-      hwy::Prefetch(node.low[a].data());
-      hwy::Prefetch(node.high[a].data());
+    if (visit.level == 0) {
+      const ByteBoxes& node = where.tree.lowest[visit.node];
+      hwy::Prefetch(&node);
+      hwy::Prefetch(&node.high);
+    } else {
+      const BoxNode& node = where.tree.above[where.runs.first(visit.level) + visit.node];
+      for (std::size_t a = 0; a < 3; ++a) {
+        hwy::Prefetch(node.low[a].data());
+        hwy::Prefetch(node.high[a].data());
+      }
     }
     visits_[end_++] = visit;
   }
@@ -244,18 +327,18 @@ class Descent {
 // of a level costs each point less than its own way down from the top.
 class Entry {
  public:
-  // The lowest level of at most so many nodes.
+  // The lowest level of floats of at most so many nodes.
   static constexpr std::size_t kMost = 64;
   static std::size_t level_of(const TetRuns& runs) {
-    std::size_t level = 0;
-    while (runs.first(level + 1) - runs.first(level) > kMost) ++level;
+    std::size_t level = 1;
+    while (runs.nodes(level) > kMost) ++level;
     return level;
   }
 
   HWY_INLINE Entry(const FindTets& where, std::size_t level, const float (&low)[3], const float (&high)[3]) {
     const std::size_t first = where.runs.first(level), lanes = hn::Lanes(F());
-    for (std::size_t n = 0; n < where.runs.first(level + 1) - first; ++n) {
-      const BoxNode& node = where.tree[first + n];
+    for (std::size_t n = 0; n < where.runs.nodes(level); ++n) {
+      const BoxNode& node = where.tree.above[first + n];
       for (std::size_t i = 0; i < kWidth; i += lanes) {
         auto meets = hn::MaskFromVec(hn::BitCast(F(), hn::Set(I(), -1)));
         for (std::size_t a = 0; a < 3; ++a) {
@@ -310,24 +393,28 @@ HWY_INLINE void bound(const float* points, std::span<const std::uint32_t> which,
 void find_tets(const FindTets& where, std::span<const float> points, std::span<const std::uint32_t> which,
                std::span<TetPlace> out) {
   constexpr std::size_t together = 32;
-  Search search{where, points.data(), which.data(), out.data(), 0, {}};
+  Search search(where, points.data(), which.data(), out.data());
   Descent descent;
   const std::size_t level = Entry::level_of(where.runs);
-  // The children of `node`, which is of level `at`, that a point lies in.
-  const auto go_down = [&](const BoxNode& node, std::size_t at, std::uint32_t p, auto child) HWY_ATTR {
-    std::uint32_t bits = children_around(node, &points[3 * std::size_t{which[p]}]);
-    for (; bits != 0; bits &= bits - 1) {
-      const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
-      if (at == 0) {
-        search.wait_for(node, i, child(i), p);
-      } else {
-        descent.add(where, {child(i), p, static_cast<std::uint32_t>(at - 1)});
-      }
-    }
+  const auto for_bits = [](std::uint32_t bits, auto f) HWY_ATTR {
+    for (; bits != 0; bits &= bits - 1) f(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
   };
   const auto visit = [&](const Descent::Visit& at) HWY_ATTR {
-    go_down(where.tree[where.runs.first(at.level) + at.node], at.level, at.point,
-            [&](std::size_t i) HWY_ATTR { return static_cast<std::uint32_t>(kWidth * at.node + i); });
+    const float* point = &points[3 * std::size_t{which[at.point]}];
+    if (at.level == 0) {
+      const ByteBoxes& node = where.tree.lowest[at.node];
+      float steps[3];
+      count_steps(node, point, steps);
+      for_bits(runs_around(node, steps), [&](std::size_t i) HWY_ATTR {
+        search.wait_for(kWidth * at.node + i, at.point, node, i, steps);
+      });
+    } else {
+      for_bits(
+          children_around(where.tree.above[where.runs.first(at.level) + at.node], point),
+          [&](std::size_t i) HWY_ATTR {
+            descent.add(where, {static_cast<std::uint32_t>(kWidth * at.node + i), at.point, at.level - 1});
+          });
+    }
   };
   for (std::size_t first = 0; first < which.size(); first += together) {
     const std::size_t end = std::min(which.size(), first + together);
@@ -337,14 +424,17 @@ void find_tets(const FindTets& where, std::span<const float> points, std::span<c
     for (std::size_t p = first; p < end; ++p) {
       out[p] = {};
       for (std::size_t g = 0; g < entry.groups(); ++g) {
-        go_down(entry.group(g), level, static_cast<std::uint32_t>(p),
-                [&](std::size_t i) HWY_ATTR { return entry.child(g, i); });
+        for_bits(children_around(entry.group(g), &points[3 * std::size_t{which[p]}]),
+                 [&](std::size_t i) HWY_ATTR {
+                   descent.add(where, {entry.child(g, i), static_cast<std::uint32_t>(p),
+                                       static_cast<std::uint32_t>(level - 1)});
+                 });
         while (descent.crowded()) visit(descent.next());
       }
     }
     while (!descent.empty()) visit(descent.next());
   }
-  search.search_all();
+  search.finish();
 }
 
 }  // namespace ecorche::runtime::HWY_NAMESPACE

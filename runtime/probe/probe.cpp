@@ -3,10 +3,12 @@
 
 #include <hwy/cache_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <string>
 
 #include "runtime/probe/space_order.hpp"
@@ -34,43 +36,62 @@ EdgeVectors edges(const PaddedNodes& nodes, const TetPlace& place) {
   return out;
 }
 
-// One volume's values at rest points.
+// One volume's values at rest points, as a posed volume would hold them: rounded to the volume's own type.
+template <class T>
 struct Values {
   const ModelVolume& volume;
-  Affine index;
   bool nearest;
-  std::vector<double>& out;
+  Sampler<T> sampler{volume.image.grid, volume.image.scalars<T>(),
+                     static_cast<std::size_t>(volume.image.components), volume.background};
 
-  void at(std::size_t i, bool held, const Eigen::Vector3d& rest) const {
-    with_scalar_type(volume.image.type, [&](auto zero) {
-      using T = decltype(zero);
-      const auto components = static_cast<std::size_t>(volume.image.components);
-      // As a posed volume would hold it: rounded to the volume's own type.
-      std::array<T, 4> few;
-      std::vector<T> many(components > few.size() ? components : 0);
-      T* value = many.empty() ? few.data() : many.data();
-      std::fill_n(value, components, to_scalar<T>(volume.background));
-      if (held) {
-        const Sampler<T> sampler{volume.image.grid, volume.image.scalars<T>(), components, volume.background};
-        const Eigen::Vector3d x = index * rest;
-        nearest ? sampler.nearest(x.x(), x.y(), x.z(), value) : sampler.trilinear(x.x(), x.y(), x.z(), value);
-      }
-      for (std::size_t c = 0; c < components; ++c) out[components * i + c] = static_cast<double>(value[c]);
-    });
+  // Voxels of points that were drawn at random lie far apart: all are asked for before the first is looked
+  // at.
+  void ask_for(const Eigen::Vector3d& x) const {
+    const double half = nearest ? 0.5 : 0;
+    const std::int32_t i = index_below(x.x() + half), j = index_below(x.y() + half),
+                       k = index_below(x.z() + half);
+    const std::int32_t next = nearest ? 0 : 1;
+    if (!sampler.inside(i, j, k) || !sampler.inside(i, j + next, k + next)) return;
+    for (std::int32_t w = 0; w <= next; ++w) {
+      for (std::int32_t v = 0; v <= next; ++v) hwy::Prefetch(sampler.at(i, j + v, k + w));
+    }
+  }
+  // `x`: #which, voxels; what is no number is beyond.
+  void at(std::span<const Eigen::Vector3d> x, std::span<const std::uint32_t> which,
+          std::vector<double>& out) const {
+    for (const Eigen::Vector3d& each : x) ask_for(each);
+    std::array<T, 4> few;
+    std::vector<T> many(sampler.components > few.size() ? sampler.components : 0);
+    T* value = many.empty() ? few.data() : many.data();
+    for (std::size_t turn = 0; turn < x.size(); ++turn) {
+      std::fill_n(value, sampler.components, to_scalar<T>(volume.background));
+      nearest ? sampler.nearest(x[turn].x(), x[turn].y(), x[turn].z(), value)
+              : sampler.trilinear(x[turn].x(), x[turn].y(), x[turn].z(), value);
+      std::copy_n(value, sampler.components, &out[sampler.components * which[turn]]);
+    }
   }
 };
 
 // Points that are asked one after the other then find the same nodes and tets in the caches.
-std::vector<std::uint32_t> near_order(std::span<const float> points, const BoxNode& top) {
+void near_order(std::span<const float> points, const BoxNode& top, ProbeOrder& out) {
+  constexpr unsigned fine = 9;     // cells of a 128th of the body
+  constexpr std::size_t few = 32;  // are looked at together in any order
+  if (points.size() <= 3 * few) {
+    out.rows.resize(points.size() / 3);
+    return std::iota(out.rows.begin(), out.rows.end(), 0U);
+  }
   std::array<float, 3> low, high;
   for (std::size_t a = 0; a < 3; ++a) {
     low[a] = *std::min_element(top.low[a].begin(), top.low[a].end());
     high[a] = *std::max_element(top.high[a].begin(), top.high[a].end());
   }
   const SpaceOrder order(low, high);
-  std::vector<std::uint32_t> places(points.size() / 3);
-  for (std::size_t i = 0; i < places.size(); ++i) places[i] = morton_place(order.cell(&points[3 * i]));
-  return SpaceOrder::sorted(places);
+  out.places.resize(points.size() / 3);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, out.places.size(), 2048), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      out.places[i] = morton_place(order.cell(&points[3 * i])) >> fine;
+  });
+  SpaceOrder::sort(out.places, out.rows, out.other);
 }
 
 }  // namespace
@@ -90,13 +111,13 @@ struct Probe::Way {
 };
 
 Probe::Probe(std::shared_ptr<const Model> model)
-    : model_(std::move(model)), runs_(model_->tets, model_->nodes), tissues_(*model_) {
-  pad_nodes({model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_);
+    : model_(std::move(model)), runs_(model_->tets, model_->nodes), columns_(*model_) {
+  pad_nodes(runs_, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_);
   fit_boxes(runs_, rest_nodes_, rest_);
 }
 
 void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
-  pad_nodes(nodes, tree.nodes);
+  pad_nodes(runs_, nodes, tree.nodes);
   fit_boxes(runs_, tree.nodes, tree.boxes);
 }
 
@@ -119,24 +140,27 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
   out.gradient.resize(wants.gradient ? 9 * count : 0);
   out.tissue.resize(wants.tissue ? count : 0);
   out.values.resize(wants.volumes.size());
-  std::vector<Values> volumes;
   for (std::size_t v = 0; v < wants.volumes.size(); ++v) {
     const ProbeWants::Volume& wanted = wants.volumes[v];
     if (wanted.row >= model_->volumes.size())
       throw Error(ErrorKind::usage, "probe", "the model has no volume " + std::to_string(wanted.row),
                   "it has " + std::to_string(model_->volumes.size()));
-    const ModelVolume& volume = model_->volumes[wanted.row];
-    out.values[v].resize(static_cast<std::size_t>(volume.image.components) * count);
-    volumes.push_back({volume, to_index(volume.image.grid),
-                       volume.labels || wanted.sampling == Sampling::nearest, out.values[v]});
+    out.values[v].resize(static_cast<std::size_t>(model_->volumes[wanted.row].image.components) * count);
   }
-  const std::vector<std::uint32_t> order = near_order(points, way.here.tree.back());
+  if (wants.tissue) {
+    // A thread that waits here must not begin another probe: it would wait for itself.
+    std::call_once(cells_made_, [&] {
+      tbb::this_task_arena::isolate([&] { cells_ = std::make_unique<const TissueCells>(columns_); });
+    });
+  }
+  near_order(points, way.here.tree.above.back(), out.order);
   const std::size_t tasks = (count + kPointsPerTask - 1) / kPointsPerTask;
   tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
     const std::size_t first = kPointsPerTask * task;
-    const std::span which =
-        std::span<const std::uint32_t>(order).subspan(first, std::min(kPointsPerTask, count - first));
+    const std::span which = std::span<const std::uint32_t>(out.order.rows)
+                                .subspan(first, std::min(kPointsPerTask, count - first));
     std::array<TetPlace, kPointsPerTask> places;
+    std::array<Eigen::Vector3d, kPointsPerTask> rest, voxel;
     kernels::find_tets(way.here, points, which, places);
     for (std::size_t turn = 0; turn < which.size(); ++turn) way.ask_for(*model_, places[turn]);
     for (std::size_t turn = 0; turn < which.size(); ++turn) {
@@ -160,15 +184,25 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
         F.setConstant(kNowhere);
         if (held) F = (edges(way.posed, place) * edges(way.rest, place).inverse()).cast<float>();
       }
-      const Eigen::Vector3d rest =
-          way.from_rest ? Eigen::Vector3d(static_cast<double>(point[0]), static_cast<double>(point[1]),
-                                          static_cast<double>(point[2]))
-                        : other;
+      rest[turn] = way.from_rest
+                       ? Eigen::Vector3d(static_cast<double>(point[0]), static_cast<double>(point[1]),
+                                         static_cast<double>(point[2]))
+                       : other;
+      if (!held) rest[turn].setConstant(static_cast<double>(kNowhere));
       if (wants.tissue) {
-        const Eigen::Vector3f at = rest.cast<float>();
-        out.tissue[i] = held ? tissues_.at({at.x(), at.y(), at.z()}) : TissueColumns::none;
+        const Eigen::Vector3f at = rest[turn].cast<float>();
+        out.tissue[i] = held ? cells_->at({at.x(), at.y(), at.z()}) : TissueColumns::none;
       }
-      for (const Values& values : volumes) values.at(i, held, rest);
+    }
+    for (std::size_t v = 0; v < wants.volumes.size(); ++v) {
+      const ModelVolume& volume = model_->volumes[wants.volumes[v].row];
+      const Affine index = to_index(volume.image.grid);
+      for (std::size_t turn = 0; turn < which.size(); ++turn) voxel[turn] = index * rest[turn];
+      with_scalar_type(volume.image.type, [&](auto zero) {
+        const bool nearest = volume.labels || wants.volumes[v].sampling == Sampling::nearest;
+        const std::span<const Eigen::Vector3d> all(voxel);
+        Values<decltype(zero)>{volume, nearest}.at(all.first(which.size()), which, out.values[v]);
+      });
     }
   });
 }

@@ -5,11 +5,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
 #include "core/values/model.hpp"
 #include "runtime/probe/tet_runs.hpp"
+#include "runtime/probe/tissue_cells.hpp"
 #include "runtime/probe/tissue_columns.hpp"
 #include "runtime/volume/resample.hpp"
 
@@ -22,8 +24,14 @@ struct ProbeWants {
     Sampling sampling = Sampling::trilinear;  ///< labels are always sampled nearest
   };
   bool gradient = false;
-  bool tissue = false;  ///< by the surfaces: most of the time of a probe
+  bool tissue =
+      false;  ///< by the surfaces: most of the time of a probe; the first who asks waits a second more
   std::vector<Volume> volumes = {};
+};
+
+/// In which order points are looked at; kept from call to call, so that nothing is allocated again.
+struct ProbeOrder {
+  std::vector<std::uint32_t> places, rows, other;
 };
 
 /// One row per point, #P.
@@ -35,6 +43,7 @@ struct Probed {
   std::vector<float> gradient;       ///< 9 * #P, row by row: F = d posed / d rest of the tet; NaN outside
   std::vector<std::int32_t> tissue;  ///< as TissueColumns::at says of the rest point; none outside
   std::vector<std::vector<double>> values;  ///< per wanted volume, #P * components; its background outside
+  ProbeOrder order;
 };
 
 /// Made once per model; shared and immutable, as BodyPoser is. The body is its tets: what lies in the skin's
@@ -71,7 +80,9 @@ class Probe {
   TetRuns runs_;
   PaddedNodes rest_nodes_;
   BoxTree rest_;
-  TissueColumns tissues_;
+  TissueColumns columns_;
+  mutable std::once_flag cells_made_;
+  mutable std::unique_ptr<const TissueCells> cells_;  // made by the first who asks for tissues
 };
 
 }  // namespace ecorche::runtime

@@ -6,8 +6,6 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr unsigned kBits = 10;
-
 // Ten bits, two zeros between.
 std::uint32_t spread(std::uint32_t bits) {
   bits = (bits | bits << 16U) & 0x030000ffU;
@@ -20,27 +18,6 @@ std::uint32_t spread(std::uint32_t bits) {
 
 std::uint32_t morton_place(const SpaceCell& cell) {
   return spread(cell[0]) | spread(cell[1]) << 1U | spread(cell[2]) << 2U;
-}
-
-std::uint32_t hilbert_place(SpaceCell cell) {
-  for (std::uint32_t bit = 1U << (kBits - 1); bit > 1; bit >>= 1U) {
-    for (std::uint32_t& x : cell) {
-      // Either turn the lower bits of the first axis about, or exchange them with this one's: no branch,
-      // since no processor could guess it.
-      const std::uint32_t below = bit - 1, turn = 0U - static_cast<std::uint32_t>((x & bit) != 0);
-      const std::uint32_t exchange = (cell[0] ^ x) & below & ~turn;
-      cell[0] ^= (below & turn) | exchange;
-      x ^= exchange;
-    }
-  }
-  cell[1] ^= cell[0];
-  cell[2] ^= cell[1];
-  std::uint32_t turns = 0;
-  for (std::uint32_t bit = 1U << (kBits - 1); bit > 1; bit >>= 1U) {
-    if ((cell[2] & bit) != 0) turns ^= bit - 1;
-  }
-  for (std::uint32_t& x : cell) x ^= turns;
-  return morton_place({cell[2], cell[1], cell[0]});
 }
 
 SpaceOrder::SpaceOrder(const std::array<float, 3>& low, const std::array<float, 3>& high) : low_(low) {
@@ -58,17 +35,21 @@ SpaceCell SpaceOrder::cell(const float* point) const {
   return cell;
 }
 
-std::vector<std::uint32_t> SpaceOrder::sorted(std::span<const std::uint32_t> places) {
-  std::vector<std::uint32_t> order(places.size()), other(places.size());
+void SpaceOrder::sort(std::span<const std::uint32_t> places, std::vector<std::uint32_t>& order,
+                      std::vector<std::uint32_t>& other) {
+  constexpr std::size_t digit = 2048;
+  order.resize(places.size());
+  other.resize(places.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
-  for (const unsigned shift : {0U, 10U, 20U}) {
-    std::array<std::uint32_t, 1025> begin{};
-    for (const std::uint32_t p : places) ++begin[(p >> shift & 1023U) + 1];
-    for (std::size_t b = 0; b < 1024; ++b) begin[b + 1] += begin[b];
-    for (const std::uint32_t i : order) other[begin[places[i] >> shift & 1023U]++] = i;
+  for (const unsigned shift : {0U, 11U, 22U}) {
+    const auto bin = [&](std::uint32_t i) { return places[i] >> shift & (digit - 1); };
+    std::array<std::uint32_t, digit + 1> begin{};
+    for (const std::uint32_t i : order) ++begin[bin(i) + 1];
+    if (begin[1] == places.size()) continue;
+    for (std::size_t b = 0; b < digit; ++b) begin[b + 1] += begin[b];
+    for (const std::uint32_t i : order) other[begin[bin(i)]++] = i;
     order.swap(other);
   }
-  return order;
 }
 
 }  // namespace ecorche::runtime

@@ -6,70 +6,94 @@
 #include <algorithm>
 #include <limits>
 
-#include "runtime/probe/space_order.hpp"
+#include "runtime/probe/halving_order.hpp"
+#include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
-constexpr float kFar = std::numeric_limits<float>::infinity();
-
-std::vector<std::uint32_t> curve_order(const Tets& tets, const PointsF& nodes) {
-  if (tets.rows() == 0) return {};
-  const Eigen::RowVector3f low = nodes.colwise().minCoeff(), high = nodes.colwise().maxCoeff();
-  const SpaceOrder order({low[0], low[1], low[2]}, {high[0], high[1], high[2]});
-  std::vector<std::uint32_t> places(static_cast<std::size_t>(tets.rows()));
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 16384), [&](const auto& range) {
-    for (std::size_t t = range.begin(); t < range.end(); ++t) {
-      Eigen::RowVector3f middle = Eigen::RowVector3f::Zero();
-      for (int c = 0; c < 4; ++c) middle += nodes.row(tets(static_cast<Eigen::Index>(t), c)) / 4;
-      places[t] = hilbert_place(order.cell(middle.data()));
-    }
-  });
-  return SpaceOrder::sorted(places);
-}
+constexpr std::size_t kWidth = TetRuns::width;
+static_assert(kWidth == TetPalettes::width && sizeof(PackedRun) == 64 && sizeof(ByteBoxes) == 128);
 
 BoxNode empty_node() {
+  constexpr float far = std::numeric_limits<float>::infinity();
   BoxNode node;
-  for (auto& axis : node.low) axis.fill(kFar);
-  for (auto& axis : node.high) axis.fill(-kFar);
+  for (auto& axis : node.low) axis.fill(far);
+  for (auto& axis : node.high) axis.fill(-far);
   return node;
 }
 
 }  // namespace
 
-TetRuns::TetRuns(const Tets& tets, const PointsF& nodes)
-    : tet_(curve_order(tets, nodes)), palettes_(tets, tet_, stride) {
-  std::size_t level = runs();
+TetRuns::TetRuns(const Tets& tets, const PointsF& nodes) : tet_(halving_order(tets, nodes, width)) {
+  const TetPalettes palettes(tets, tet_, stride);
+  const std::size_t runs = palettes.runs();
+  if (!tet_.empty()) tet_.resize(width * runs, tet_.back());
+  begin_.resize(runs + 1);
+  for (std::size_t r = 0; r < runs; ++r)
+    begin_[r + 1] = begin_[r] + static_cast<std::uint32_t>(palettes.filled(r));
+  rows_.resize(begin_.back());
+  corners_.resize(runs);
+  // Nodes that no tet has come last.
+  const auto count = static_cast<std::uint32_t>(nodes.rows());
+  std::vector<std::uint32_t> place(count, count);
+  order_.reserve(count);
+  const auto come_to = [&](std::uint32_t node) {
+    if (place[node] != count) return;
+    place[node] = static_cast<std::uint32_t>(order_.size());
+    order_.push_back(node);
+  };
+  for (std::size_t r = 0; r < runs; ++r) {
+    for (const std::uint32_t row : palettes.rows_of(r)) come_to(row / stride);
+  }
+  for (std::uint32_t node = 0; node < count; ++node) come_to(node);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, runs, 1024), [&](const auto& range) {
+    for (std::size_t r = range.begin(); r < range.end(); ++r) {
+      const std::uint8_t more = palettes.rows_of(r).size() > PackedRun::most ? unpacked : 0;
+      for (std::size_t i = 0; i < palettes.filled(r); ++i)
+        rows_[begin_[r] + i] = stride * place[palettes.rows(r)[i] / stride];
+      for (std::size_t i = 0; i < corners_[r].size(); ++i)
+        corners_[r][i] = static_cast<std::uint8_t>(palettes.corners(r)[i] + more);
+    }
+  });
+  std::size_t level = runs;
   do {
     level = std::max<std::size_t>(1, (level + width - 1) / width);
-    first_[levels_ + 1] = first_[levels_] + level;
+    nodes_[levels_] = level;
+    first_[levels_ + 1] = levels_ == 0 ? 0 : first_[levels_] + level;
     ++levels_;
   } while (level > 1 || levels_ < 2);  // what is fitted in parallel always has a node above it
-  if (!tet_.empty()) tet_.resize(width * runs(), tet_.back());
 }
 
-void pad_nodes(std::span<const float> nodes, PaddedNodes& out) {
-  out.resize(nodes.size() / 3 * 4);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size() / 3, 16384), [&](const auto& range) {
+void pad_nodes(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& out) {
+  const std::span<const std::uint32_t> order = runs.order();
+  out.resize(4 * order.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 16384), [&](const auto& range) {
+    // Not std::copy_n, which calls a function for every node.
     for (std::size_t n = range.begin(); n < range.end(); ++n) {
-      std::copy_n(&nodes[3 * n], 3, &out[4 * n]);
+      const float* from = &nodes[std::size_t{3} * order[n]];
+      for (std::size_t a = 0; a < 3; ++a) out[4 * n + a] = from[a];
     }
   });
 }
 
 void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree) {
-  if (tree.size() != runs.tree_nodes()) tree.assign(runs.tree_nodes(), empty_node());
-  constexpr std::size_t width = TetRuns::width;
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, runs.first(2) - runs.first(1), 4),
-      [&](const auto& range) { kernels::fit_boxes(runs, nodes, tree, range.begin(), range.end()); });
-  for (std::size_t level = 2; level < runs.levels(); ++level) {
-    for (std::size_t child = runs.first(level - 1); child < runs.first(level); ++child) {
-      const std::size_t i = child - runs.first(level - 1);
-      BoxNode& parent = tree[runs.first(level) + i / width];
+  const std::size_t levels = runs.levels(), above = runs.first(levels);
+  if (tree.above.size() != above || tree.runs.size() != runs.runs() + 1) {
+    tree.above.assign(above, empty_node());
+    tree.lowest.resize(runs.nodes(0));
+    tree.runs.resize(runs.runs() + 1);
+  }
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, runs.nodes(1), 4), [&](const auto& range) {
+    kernels::fit_boxes(runs, nodes, tree, range.begin(), range.end());
+  });
+  for (std::size_t level = 2; level < levels; ++level) {
+    for (std::size_t i = 0; i < runs.nodes(level - 1); ++i) {
+      const BoxNode& child = tree.above[runs.first(level - 1) + i];
+      BoxNode& parent = tree.above[runs.first(level) + i / kWidth];
       for (std::size_t a = 0; a < 3; ++a) {
-        parent.low[a][i % width] = *std::min_element(tree[child].low[a].begin(), tree[child].low[a].end());
-        parent.high[a][i % width] = *std::max_element(tree[child].high[a].begin(), tree[child].high[a].end());
+        parent.low[a][i % kWidth] = *std::min_element(child.low[a].begin(), child.low[a].end());
+        parent.high[a][i % kWidth] = *std::max_element(child.high[a].begin(), child.high[a].end());
       }
     }
   }

@@ -9,36 +9,63 @@
 
 #include "core/values/mesh.hpp"
 #include "runtime/skin/aligned.hpp"
-#include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
 
-/// Made once per mesh. Sixteen tets that follow each other on a Hilbert curve through the rest body are a
-/// run, sixteen runs a node of the tree, sixteen nodes one of the next level. (In the model's own order, a
-/// Morton curve, twice as many runs' boxes hold a point.)
+/// The nodes of a run in whole steps of a byte, counted from the lowest corner of the run's box of ByteBoxes,
+/// whose longest side is 255: one cache line tells which of sixteen tets may hold a point.
+struct alignas(64) PackedRun {
+  static constexpr std::size_t most = 20;   ///< nodes; a run of more is searched tet by tet
+  std::array<std::uint8_t, 3 * most> node;  ///< x, y, z
+  float finer;                              ///< steps of this in one of ByteBoxes
+};
+
+/// Made once per mesh. Sixteen tets that follow each other in halving_order are a run, sixteen runs a node of
+/// the tree's level 0, sixteen nodes one of the next level.
 class TetRuns {
  public:
-  static constexpr std::size_t width = TetPalettes::width;
+  static constexpr std::size_t width = 16;
   static constexpr std::size_t most_levels = 8;  ///< 16^8 tets: beyond 32 bits
   static constexpr std::uint32_t stride = 4;     ///< of PaddedNodes
 
   TetRuns(const Tets& tets, const PointsF& nodes);
 
-  std::size_t runs() const { return palettes_.runs(); }
+  std::size_t runs() const { return corners_.size(); }
+  /// At least two; the last is one node.
   std::size_t levels() const { return levels_; }
-  /// Nodes of the tree of all levels together; those of level l are first(l) .. first(l + 1). The last level
-  /// is one node.
-  std::size_t tree_nodes() const { return first_[levels_]; }
+  std::size_t nodes(std::size_t level) const { return nodes_[level]; }
+  /// Of the levels above 0, where `level` begins.
   std::size_t first(std::size_t level) const { return first_[level]; }
-  const TetPalettes& palettes() const { return palettes_; }
+
+  /// #nodes: those of the mesh in the order in which runs come to them, so that those of a run lie together.
+  std::span<const std::uint32_t> order() const { return order_; }
+  /// Where the nodes of run `r` begin in PaddedNodes, each once; filled up with the last to a multiple of
+  /// eight.
+  std::span<const std::uint32_t> rows(std::size_t r) const {
+    return {rows_.data() + begin_[r], begin_[r + 1] - begin_[r]};
+  }
+  /// Whether the run's nodes fit a PackedRun.
+  bool packed(std::size_t r) const { return corners_[r].front() < unpacked; }
+  /// 4 x 16: which of its nodes is corner c of the run's tet i, at 16 c + i.
+  const std::uint8_t* corners(std::size_t r) const { return corners_[r].data(); }
+  /// Of corner c of its tet i, in PaddedNodes.
+  std::uint32_t row(std::size_t r, std::size_t i, std::size_t c) const {
+    return rows_[begin_[r] + corners_[r][width * c + i] % unpacked];
+  }
+  /// What row() reads first, and then, to be asked for beforehand.
+  const std::uint32_t* begin(std::size_t r) const { return &begin_[r]; }
   /// The tets of run `r`, sixteen; the last run is filled up with its last tet.
   const std::uint32_t* tets(std::size_t r) const { return tet_.data() + width * r; }
 
  private:
+  static constexpr std::uint8_t unpacked = 64;  // added to the bytes of a run whose nodes do not fit
+
   std::vector<std::uint32_t> tet_;
-  TetPalettes palettes_;
+  std::vector<std::uint32_t> order_;
+  std::vector<std::uint32_t> begin_, rows_;
+  Aligned<std::array<std::uint8_t, 4 * width>> corners_;
   std::size_t levels_ = 0;
-  std::array<std::size_t, most_levels + 1> first_{};
+  std::array<std::size_t, most_levels + 1> nodes_{}, first_{};
 };
 
 /// The boxes of sixteen children, planar.
@@ -47,11 +74,24 @@ struct BoxNode {
   alignas(64) std::array<std::array<float, TetRuns::width>, 3> high;
 };
 
-/// The tree's boxes for one place of the nodes; #tree_nodes.
-using BoxTree = Aligned<BoxNode>;
+/// The boxes of sixteen runs in 255ths of the longest side of their own, in two cache lines. Points are
+/// counted in the same steps, by the same operations: what lies in a box lies between its bytes, however they
+/// are rounded.
+struct alignas(64) ByteBoxes {
+  std::array<float, 3> from;
+  float scale;  ///< steps a mm; 0 where the box is a point, or too large for a float
+  alignas(16) std::array<std::array<std::uint8_t, TetRuns::width>, 3> low, high;
+};
 
-/// Nodes as x, y, z and a zero, so that each is one load; 4 * #nodes.
+/// Nodes as x, y, z and a zero, so that each is one load; 4 * #nodes, in TetRuns::order.
 using PaddedNodes = Aligned<float>;
+
+/// The tree about one place of the nodes.
+struct BoxTree {
+  Aligned<BoxNode> above;     ///< of levels 1 and more
+  Aligned<ByteBoxes> lowest;  ///< of level 0
+  Aligned<PackedRun> runs;    ///< and one more, so that vectors may be read beyond the last
+};
 
 /// Where to look. `tree` is what fit_boxes made of `nodes`.
 struct FindTets {
@@ -65,19 +105,19 @@ struct FindTets {
 void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree);
 
 /// `nodes`: 3 * #nodes, finite. Allocates only where `out` has another size. Parallel.
-void pad_nodes(std::span<const float> nodes, PaddedNodes& out);
+void pad_nodes(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& out);
 
 /// Where a point lies in a mesh.
 struct TetPlace {
   static constexpr std::int32_t none = -1;
   std::int32_t tet = none;               ///< `none`: in none
   bool inverted = false;                 ///< the tet is: no positive one holds the point
-  std::array<std::uint32_t, 4> nodes{};  ///< its corners
+  std::array<std::uint32_t, 4> nodes{};  ///< its corners, by their place in TetRuns::order
   std::array<double, 4> barycentric{};   ///< of its corners; they sum to 1
 };
 
 namespace kernels {
-/// The boxes of the runs under nodes [begin, end) of level 1 of the tree, and of those nodes.
+/// The runs under nodes [begin, end) of level 1 of the tree, their boxes, and those of the nodes.
 void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
                std::size_t end);
 

@@ -117,6 +117,12 @@ int TissueColumns::crossing(const Surface& surface, std::uint32_t triangle, cons
   return height > p[2] ? ab : 0;
 }
 
+std::vector<const Tissue*> TissueColumns::closed() const {
+  std::vector<const Tissue*> out;
+  for (std::size_t s = 0; s + 1 < surfaces_.size(); ++s) out.push_back(surfaces_[s].tissue);
+  return out;
+}
+
 std::int32_t TissueColumns::at(const std::array<float, 3>& point) const {
   Flat p{};
   for (std::size_t a = 0; a < 3; ++a) p[a] = static_cast<double>(point[static_cast<std::size_t>(axes_[a])]);

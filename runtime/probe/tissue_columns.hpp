@@ -25,6 +25,9 @@ class TissueColumns {
   /// volume, so organs go before the skin; `none` where none does. On a surface, either side.
   std::int32_t at(const std::array<float, 3>& point) const;
 
+  /// All closed surfaces.
+  std::vector<const Tissue*> closed() const;
+
  private:
   struct Surface {
     const Tissue* tissue;

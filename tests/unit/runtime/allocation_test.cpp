@@ -8,6 +8,7 @@
 #include <memory>
 #include <new>
 
+#include "runtime/probe/probe.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/volume/volume_poser.hpp"
 #include "tests/support/toy_model.hpp"
@@ -87,6 +88,32 @@ TEST(Allocation, NoneInAVolume) {
       ASSERT_TRUE(poser.run(pose, Skinning::cor, {}, body).ok());
       volumes.pose(body.nodes, model->volumes[0], Sampling::trilinear, grid, whole, scratch);
       volumes.follow(body.nodes, model->volumes[0], Sampling::nearest, grid, kept, scratch);
+    }
+    EXPECT_EQ(allocated - before, 0u);
+  });
+}
+
+TEST(Allocation, NoneInAProbe) {
+  const auto model = std::make_shared<const Model>(test::toy_model());
+  const BodyPoser poser(model);
+  const Probe probe(model);
+  PosedBody body = poser.make_frame();
+  Probe::PosedTree tree;
+  Probed out;
+  const ProbeWants wants{.gradient = true, .tissue = true, .volumes = {{0}, {1}}};
+  std::vector<float> points;
+  for (int i = 0; i < 3 * 500; ++i)
+    points.push_back(static_cast<float>(i * 37 % 300) - (i % 3 == 2 ? 0.0F : 150.0F));
+  Pose pose = Pose::rest(3);
+  tbb::task_arena(1).execute([&] {
+    std::size_t before = 0;
+    for (int frame = 0; frame <= 10; ++frame) {
+      if (frame == 2) before = allocated;
+      pose.rotation[1] = Eigen::AngleAxisd(0.1 * frame, Eigen::Vector3d::UnitX());
+      ASSERT_TRUE(poser.run(pose, Skinning::cor, {}, body).ok());
+      probe.follow(body.nodes, tree);
+      probe.posed_to_rest(tree, points, wants, out);
+      probe.rest_to_posed(tree, points, wants, out);
     }
     EXPECT_EQ(allocated - before, 0u);
   });

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points both ways through the body, against a search of every tet and triangle.
+#define HWY_WANT_AVX3_DL  // the probe has kernels of its own for it
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 #include <tbb/task_arena.h>
@@ -7,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -384,6 +386,59 @@ TEST_F(ProbeTest, SameAnswersForAnyNumberOfThreads) {
   EXPECT_EQ(out.tet, four.tet);
   EXPECT_EQ(out.barycentric, four.barycentric);
   EXPECT_EQ(out.tissue, four.tissue);
+}
+
+TEST_F(ProbeTest, HugeTinyAndFlatBodiesAreSearchedTheSame) {
+  // By powers of two nothing is rounded but in steps of boxes; the largest are wider than a float can say,
+  // the smallest count as points.
+  fold(2.7);
+  for (std::size_t n = 2; n < nodes.size(); n += 3) nodes[n] -= 150;
+  const std::vector<float> body = nodes, points = random_points(body, 2000);
+  probe.follow(body, tree);
+  probe.posed_to_rest(tree, points, {}, out);
+  const std::vector<std::int32_t> tets = out.tet;
+  expect_exhaustive(body, points, true);
+  const auto scaled = [](std::vector<float> x, const std::array<int, 3>& by) {
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::ldexp(x[i], by[i % 3]);
+    return x;
+  };
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    for (const int by : {-112, -60, -20, 20, 60, 119, 120}) {
+      probe.follow(scaled(body, {by, by, by}), tree);
+      probe.posed_to_rest(tree, scaled(points, {by, by, by}), {}, out);
+      EXPECT_EQ(out.tet, tets) << by;
+    }
+    for (const std::array<int, 3>& by :
+         {std::array{0, 0, -10}, std::array{-12, 0, 0}, std::array{3, -7, 4}}) {
+      nodes = scaled(body, by);
+      const std::vector<float> there = scaled(points, by);
+      probe.follow(nodes, tree);
+      probe.posed_to_rest(tree, there, {}, out);
+      expect_exhaustive(nodes, there, true);
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+TEST_F(ProbeTest, WhatIsNoNumberOrEndlessLiesOutside) {
+  bend(1.0);
+  const float nan = std::nanf(""), inf = std::numeric_limits<float>::infinity();
+  std::vector<float> points;
+  for (const float x : {nan, inf, -inf, 3e38F}) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::array<float, 3> point{0, 0, 100};
+      point[a] = x;
+      points.insert(points.end(), point.begin(), point.end());
+    }
+  }
+  const std::vector<float> within{0, 0, 100};
+  points.insert(points.end(), within.begin(), within.end());
+  probe.rest_to_posed(tree, points, {.volumes = {{0}}}, out);
+  EXPECT_GE(out.tet.back(), 0);
+  EXPECT_EQ(std::count(out.tet.begin(), out.tet.end(), TetPlace::none), 12);
+  for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(out.values[0][i], model->volumes[0].background);
 }
 
 TEST_F(ProbeTest, RefusesAVolumeThatIsNotThere) {

@@ -1,43 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a probe is made of: orders of points, palettes of tets, columns of tissues.
+// What a probe is made of: orders of points and tets, palettes of tets, columns of tissues.
+#define HWY_WANT_AVX3_DL  // the probe has kernels of its own for it
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <random>
+#include <set>
 
+#include "runtime/probe/halving_order.hpp"
 #include "runtime/probe/space_order.hpp"
+#include "runtime/probe/tet_runs.hpp"
+#include "runtime/probe/tissue_cells.hpp"
 #include "runtime/probe/tissue_columns.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/volume/tet_palettes.hpp"
+#include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
-TEST(SpaceOrder, NeighboursOnHilbertsCurveShareAFace) {
-  // Every aligned cube of 16^3 cells is one piece of the curve.
-  for (const SpaceCell& corner :
-       {SpaceCell{0, 0, 0}, SpaceCell{1008, 1008, 1008}, SpaceCell{496, 512, 160}}) {
-    std::vector<SpaceCell> along(4096);
-    std::vector<std::uint32_t> places;
-    for (std::uint32_t c = 0; c < 4096; ++c) {
-      places.push_back(hilbert_place({corner[0] + c % 16, corner[1] + c / 16 % 16, corner[2] + c / 256}));
-    }
-    const std::uint32_t first = *std::min_element(places.begin(), places.end());
-    for (std::uint32_t c = 0; c < 4096; ++c) {
-      ASSERT_LT(places[c] - first, 4096U);
-      along[places[c] - first] = {c % 16, c / 16 % 16, c / 256};
-    }
-    for (std::size_t i = 1; i < along.size(); ++i) {
-      int apart = 0;
-      for (std::size_t a = 0; a < 3; ++a)
-        apart += std::abs(static_cast<int>(along[i][a]) - static_cast<int>(along[i - 1][a]));
-      ASSERT_EQ(apart, 1) << i;
+// The same halves by sorting them.
+void halve_slowly(const std::vector<std::array<float, 3>>& middles, std::vector<std::uint32_t>& tets,
+                  std::size_t begin, std::size_t end, std::size_t width) {
+  if (end - begin <= width) return;
+  std::size_t stretch = width;
+  while (stretch * width < end - begin) stretch *= width;
+  std::array<float, 3> low{1e30F, 1e30F, 1e30F}, high{-1e30F, -1e30F, -1e30F}, side{};
+  for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], middles[tets[i]][a]);
+      high[a] = std::max(high[a], middles[tets[i]][a]);
+      side[a] = high[a] - low[a];
     }
   }
-  EXPECT_EQ(hilbert_place({0, 0, 0}), 0U);
+  const auto axis = static_cast<std::size_t>(std::max_element(side.begin(), side.end()) - side.begin());
+  std::sort(tets.begin() + static_cast<std::ptrdiff_t>(begin),
+            tets.begin() + static_cast<std::ptrdiff_t>(end),
+            [&](auto a, auto b) { return std::pair(middles[a][axis], a) < std::pair(middles[b][axis], b); });
+  const std::size_t middle = begin + (end - begin + stretch - 1) / stretch / 2 * stretch;
+  halve_slowly(middles, tets, begin, middle, width);
+  halve_slowly(middles, tets, middle, end, width);
+}
+
+TEST(HalvingOrder, EveryRunHoldsWhatSortingPutsThere) {
+  std::mt19937 random(2);
+  for (const Eigen::Index count : {0, 1, 16, 17, 300, 4096, 50001}) {
+    PointsF nodes(std::max<Eigen::Index>(4, count), 3);
+    // In whole numbers: many middles are equal.
+    for (Eigen::Index i = 0; i < nodes.size(); ++i)
+      nodes.data()[i] = static_cast<float>(random() % 8 * (1 + i % 3));
+    Tets tets(count, 4);
+    for (Eigen::Index i = 0; i < tets.size(); ++i)
+      tets.data()[i] = static_cast<std::int32_t>(random() % static_cast<unsigned>(nodes.rows()));
+    std::vector<std::array<float, 3>> middles;
+    std::vector<std::uint32_t> slow;
+    for (Eigen::Index t = 0; t < count; ++t) {
+      Eigen::RowVector3f middle = Eigen::RowVector3f::Zero();
+      for (int c = 0; c < 4; ++c) middle += nodes.row(tets(t, c)) / 4;
+      middles.push_back({middle[0], middle[1], middle[2]});
+      slow.push_back(static_cast<std::uint32_t>(t));
+    }
+    halve_slowly(middles, slow, 0, slow.size(), 16);
+    std::vector<std::uint32_t> fast = halving_order(tets, nodes, 16);
+    ASSERT_EQ(fast.size(), slow.size());
+    for (std::size_t first = 0; first < slow.size(); first += 16) {
+      for (auto* order : {&fast, &slow}) {
+        const auto begin = order->begin() + static_cast<std::ptrdiff_t>(first);
+        std::sort(begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(16, slow.size() - first)));
+      }
+    }
+    EXPECT_EQ(fast, slow) << count;
+  }
 }
 
 TEST(SpaceOrder, MortonsPlaceInterleavesBits) {
@@ -62,11 +98,49 @@ TEST(SpaceOrder, CellsEndAtTheBox) {
 TEST(SpaceOrder, SortsAsAStableSort) {
   std::mt19937 random(3);
   std::vector<std::uint32_t> places;
-  for (int i = 0; i < 5000; ++i) places.push_back(random() % 7 == 0 ? random() % 5 : random() % (1U << 30U));
-  std::vector<std::uint32_t> slow(places.size());
-  for (std::size_t i = 0; i < slow.size(); ++i) slow[i] = static_cast<std::uint32_t>(i);
-  std::stable_sort(slow.begin(), slow.end(), [&](auto a, auto b) { return places[a] < places[b]; });
-  EXPECT_EQ(SpaceOrder::sorted(places), slow);
+  std::vector<std::uint32_t> fast, other;
+  for (const unsigned bits : {30U, 21U, 9U, 32U}) {
+    places.clear();
+    for (int i = 0; i < 5000; ++i)
+      places.push_back(random() % 7 == 0 ? random() % 5 : random() % (std::uint64_t{1} << bits));
+    std::vector<std::uint32_t> slow(places.size());
+    for (std::size_t i = 0; i < slow.size(); ++i) slow[i] = static_cast<std::uint32_t>(i);
+    std::stable_sort(slow.begin(), slow.end(), [&](auto a, auto b) { return places[a] < places[b]; });
+    SpaceOrder::sort(places, fast, other);
+    EXPECT_EQ(fast, slow);
+  }
+}
+
+TEST(TetRuns, StepsAreTheNearestToTheNodes) {
+  const Model model = test::toy_model();
+  std::vector<float> nodes(model.nodes.data(), model.nodes.data() + model.nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i] += 3 * std::sin(0.1F * static_cast<float>(i));
+  const TetRuns runs(model.tets, model.nodes);
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    PaddedNodes padded;
+    BoxTree boxes;
+    pad_nodes(runs, nodes, padded);
+    fit_boxes(runs, padded, boxes);
+    std::size_t packed = 0;
+    for (std::size_t x = 0; x < 192 * runs.runs(); ++x) {
+      const std::size_t r = x / 192, i = x / 12 % 16, c = x / 3 % 4, a = x % 3;
+      const ByteBoxes& in = boxes.lowest[r / 16];
+      const auto node = static_cast<std::size_t>(model.tets(runs.tets(r)[i], static_cast<Eigen::Index>(c)));
+      const float place = padded[runs.row(r, i, c) + a];
+      ASSERT_EQ(place, nodes[3 * node + a]);
+      const double steps = static_cast<double>((place - in.from[a]) * in.scale);
+      EXPECT_LE(in.low[a][r % 16], steps);
+      EXPECT_LT(steps, in.high[a][r % 16] + 1);
+      if (!runs.packed(r)) continue;
+      ++packed;
+      EXPECT_NEAR(boxes.runs[r].node[3 * std::size_t{runs.corners(r)[16 * c + i]} + a],
+                  (steps - in.low[a][r % 16]) * static_cast<double>(boxes.runs[r].finer), 0.501);
+    }
+    EXPECT_GT(packed, 1000U);
+  }
+  hwy::SetSupportedTargetsForTest(0);
 }
 
 TEST(TetPalettes, BytesFindTheCornersOfEveryTet) {
@@ -121,6 +195,33 @@ TEST(TissueColumns, ColumnsThroughVerticesAndEdgesCrossOnce) {
       }
     }
   }
+}
+
+TEST(TissueCells, SayWhatTheColumnsSay) {
+  const Model model = test::toy_model();
+  const TissueColumns columns(model);
+  const TissueCells cells(columns);
+  std::mt19937 random(6);
+  std::vector<std::array<float, 3>> points{
+      {std::nanf(""), 0, 0}, {INFINITY, 0, 100}, {0, -INFINITY, 100}, {0, 3e38F, -3e38F}};
+  for (const Tissue& tissue : model.tissues) {
+    const Eigen::RowVector3f low = tissue.V.colwise().minCoeff(), high = tissue.V.colwise().maxCoeff();
+    for (Eigen::Index v = 0; v < tissue.V.rows(); ++v)
+      points.push_back({tissue.V(v, 0), tissue.V(v, 1), tissue.V(v, 2)});
+    for (int i = 0; i < 3000; ++i) {
+      std::array<float, 3> point{};
+      for (int a = 0; a < 3; ++a)
+        point[static_cast<std::size_t>(a)] = std::uniform_real_distribution(low[a] - 5, high[a] + 5)(random);
+      points.push_back(point);
+    }
+  }
+  std::set<std::int32_t> found;
+  for (const std::array<float, 3>& point : points) {
+    const std::int32_t row = columns.at(point);
+    EXPECT_EQ(cells.at(point), row) << point[0] << ' ' << point[1] << ' ' << point[2];
+    found.insert(row);
+  }
+  EXPECT_GT(found.size(), 2U);
 }
 
 }  // namespace
