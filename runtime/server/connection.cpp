@@ -19,7 +19,8 @@ namespace {
 constexpr std::size_t kMostAnswers = 64;
 // Frames of one write.
 constexpr std::size_t kMostTogether = 16;
-// Of the time until a client is dropped that acknowledges nothing, where frames fill the memory for them.
+// Of the time until a client is dropped that acknowledges nothing, where frames fill half of the memory for
+// them.
 constexpr double kLessPatience = 0.25;
 // How long an ending connection may take to read its last words.
 constexpr double kLastWordsSeconds = 1;
@@ -131,7 +132,7 @@ Clock::duration Connection::check(Clock::time_point now) {
   } else if (!greeted_ && longer(born_, limits.hello_seconds)) {
     hit("hello", {StatusCode::deadline_exceeded,
                   "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
-  } else if (const double stall = limits.stall_seconds * (house_.memory().full() ? kLessPatience : 1);
+  } else if (const double stall = limits.stall_seconds * (house_.memory().half_full() ? kLessPatience : 1);
              longer(writing_since_, stall) || longer(outbox_.oldest_in_flight(), stall)) {
     spdlog::info("{}: dropped: stopped reading", peer_);
     house_.metrics().hit("stall");

@@ -12,14 +12,16 @@
 namespace ecorche::server {
 
 /// A frame counts from the start of its job until the last connection lets go of it, once however many share
-/// it. Above the limit no subscription gets its first frame, and who keeps frames without acknowledging them
-/// has a quarter of the usual time to do so (docs/protocol.md, "Limits"). From any thread.
+/// it. Above the limit no subscription gets its first frame; who keeps frames without acknowledging them
+/// has a quarter of the usual time to do so, from half of the limit on (docs/protocol.md, "Limits"). From any
+/// thread.
 class FrameMemory {
  public:
   explicit FrameMemory(std::uint64_t limit) : limit_(limit) {}
 
   std::uint64_t bytes() const { return sum_->load(std::memory_order_relaxed); }
   bool full() const { return bytes() > limit_; }
+  bool half_full() const { return bytes() > limit_ / 2; }
 
   /// So many bytes more, for as long as it lives: of frames that a job is going to make.
   class Room {

@@ -281,5 +281,33 @@ TEST(LimitsTest, WhereFramesFillTheMemoryNewOnesWaitAndPatienceIsShort) {
   EXPECT_GT(sequence, 10U);
 }
 
+TEST(LimitsTest, WhereFramesFillHalfOfTheMemoryPatienceIsShort) {
+  std::uint64_t frame_bytes = 0;
+  {
+    const TestServer server;
+    TestClient client(server);
+    client.subscribe_mesh();
+    frame_bytes = client.next_mesh(0).payload.size();
+  }
+  for (const bool half : {true, false}) {
+    SCOPED_TRACE(half);
+    Options options;
+    options.limits.queued_bytes = half ? frame_bytes * 3 / 2 : frame_bytes * 3;
+    options.limits.stall_seconds = 1.6;
+    const TestServer server(
+        options, {.transport = [](std::unique_ptr<Transport> transport) -> std::unique_ptr<Transport> {
+                    return std::make_unique<HeldTransport>(std::move(transport));
+                  },
+                  .timer_fails = {},
+                  .handling = {}});
+    RawClient sleeper(server);
+    subscribe_and_sleep(sleeper, "");
+    const auto start = client::Clock::now();
+    EXPECT_TRUE(sleeper.hung_up());
+    const double waited = std::chrono::duration<double>(client::Clock::now() - start).count();
+    EXPECT_EQ(waited < 1.5, half) << waited << " s of 1.6";
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::server
