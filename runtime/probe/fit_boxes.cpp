@@ -131,7 +131,9 @@ HWY_INLINE void pack(const RunWords& words, float finer, PackedRun& out) {
                                                  _mm512_load_si512(words.of + 16));
   std::uint32_t bits = 0;
   std::memcpy(&bits, &finer, sizeof bits);
-  _mm512_store_si512(&out, _mm512_mask_set1_epi32(bytes, 1U << 15U, static_cast<int>(bits)));
+  // Past the caches: a whole line, which need not be read first, of which a pose's points see few.
+  _mm512_stream_si512(reinterpret_cast<__m512i*>(&out),
+                      _mm512_mask_set1_epi32(bytes, 1U << 15U, static_cast<int>(bits)));
 #else
   for (std::size_t n = 0; n < PackedRun::most; ++n) std::memcpy(&out.node[3 * n], words.of + n, 3);
   out.finer = finer;
@@ -216,6 +218,7 @@ void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std
       }
     }
   }
+  hwy::FlushStream();  // what went past the caches, before another thread looks
 }
 
 }  // namespace ecorche::runtime::HWY_NAMESPACE
