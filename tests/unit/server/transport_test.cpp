@@ -3,7 +3,10 @@
 #include "runtime/server/transport.hpp"
 
 #include <gtest/gtest.h>
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
 
+#include <algorithm>
 #include <boost/asio/read.hpp>
 #include <boost/asio/socket_base.hpp>
 #include <random>
@@ -19,6 +22,7 @@ using Bytes = std::vector<std::byte>;
 struct Pair {
   net::io_context io{1};
   tcp::socket client{io};
+  int server = -1;  // the transport's
   std::unique_ptr<Transport> transport;
   boost::system::error_code ec;
   bool written = false;
@@ -26,7 +30,9 @@ struct Pair {
   Pair() {
     tcp::acceptor acceptor(io, tcp::endpoint(net::ip::address_v4::loopback(), 0));
     client.connect(acceptor.local_endpoint());
-    transport = tcp_transport(acceptor.accept());
+    tcp::socket accepted = acceptor.accept();
+    server = accepted.native_handle();
+    transport = tcp_transport(std::move(accepted));
   }
   void write(std::vector<net::const_buffer> frame) {
     net::co_spawn(
@@ -79,6 +85,26 @@ TEST(TcpTransport, NothingToWrite) {
   pair.io.run();
   EXPECT_TRUE(pair.written);
   EXPECT_FALSE(pair.ec);
+}
+
+// However much the socket takes, a turn of the I/O thread gives it half a megabyte of a large frame.
+TEST(TcpTransport, ATurnIsShort) {
+  Pair pair;
+  const Bytes sent(std::size_t{16} << 20);
+  Bytes got(sent.size());
+  pair.write({net::buffer(sent)});
+  std::thread reader([&] { net::read(pair.client, net::buffer(got)); });
+  pair.io.run();  // the kernel has made its buffers larger meanwhile
+  reader.join();
+  pair.io.restart();
+  pair.write({net::buffer(sent)});
+  const auto on_its_way = [&] {
+    int unacknowledged = 0;
+    EXPECT_EQ(ioctl(pair.server, SIOCOUTQ, &unacknowledged), 0);
+    return std::max(pair.client.available(), static_cast<std::size_t>(unacknowledged));
+  };
+  while (on_its_way() == 0) ASSERT_EQ(pair.io.poll_one(), 1U);
+  EXPECT_LE(on_its_way(), 512U << 10);
 }
 
 // A large frame does not keep the I/O thread to itself, however fast its client reads.
