@@ -31,7 +31,7 @@ namespace ecorche::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kWarmUp = 1;
+constexpr double kWarmUp = 4;  // as the bench that starts this
 
 Error broken(const char* what) {
   return Error(ErrorKind::temporary, "bench", what, "run it again");

@@ -19,7 +19,8 @@ namespace ecorche::bench {
 namespace {
 
 using client::Clock;
-constexpr double kRate = 20, kWarmUp = 1;
+constexpr double kRate = 20;
+constexpr double kWarmUp = 4;  // until the levels of detail are made
 
 struct Times {
   double p50 = 0, p99 = 0, megabytes = 0, cpu_ms = 0;
