@@ -17,7 +17,10 @@ namespace ecorche::runtime {
 namespace {
 
 constexpr std::size_t kBoneVerticesPerBlock = 2048;  // a multiple of any vector
-constexpr std::size_t kSpansPerThread = 8;           // few, since cells reach across their ends
+// Of the mask of clusters.
+constexpr std::size_t kWordsPerSlab = NodeClusters::slab / NodeClusters::size / 64;
+static_assert(kWordsPerSlab * 64 * NodeClusters::size == NodeClusters::slab);
+constexpr std::size_t kSpansPerThread = 8;  // few, since cells reach across their ends
 
 std::span<const float> floats(const PointsF& points) {
   return {points.data(), static_cast<std::size_t>(points.size())};
@@ -141,7 +144,7 @@ void BodyParts::add_runs(std::uint32_t tissue, std::vector<std::vector<Run>>& of
 
 void BodyParts::make_scratch(PosedBody::Scratch& scratch) const {
   scratch.lanes.assign(lane_floats(), 0.0F);
-  scratch.mask.resize(clusters_.slabs());
+  scratch.mask.resize(kWordsPerSlab * clusters_.slabs());
   scratch.asked.resize(tissues_.size());
   scratch.begun.resize(clusters_.slabs());
   scratch.late.reserve(runs_.size());
@@ -163,10 +166,11 @@ struct BodyParts::Frame {
 
 void BodyParts::choose(std::span<const std::uint32_t> tissues, NodesOf nodes,
                        PosedBody::Scratch& scratch) const {
-  std::fill(scratch.mask.begin(), scratch.mask.end(),
-            nodes == NodesOf::body ? ~std::uint64_t{0} : std::uint64_t{0});
-  if (nodes == NodesOf::body && clusters_.clusters() % 64 != 0) {
-    scratch.mask.back() = (std::uint64_t{1} << clusters_.clusters() % 64) - 1;
+  std::fill(scratch.mask.begin(), scratch.mask.end(), std::uint64_t{0});
+  if (nodes == NodesOf::body) {
+    const std::size_t whole = clusters_.clusters() / 64, rest = clusters_.clusters() % 64;
+    std::fill_n(scratch.mask.begin(), whole, ~std::uint64_t{0});
+    if (rest != 0) scratch.mask[whole] = (std::uint64_t{1} << rest) - 1;
   }
   std::fill(scratch.asked.begin(), scratch.asked.end(), std::uint8_t{0});
   scratch.bones.clear();
@@ -179,14 +183,15 @@ void BodyParts::choose(std::span<const std::uint32_t> tissues, NodesOf nodes,
 }
 
 void BodyParts::pose_slab(const Frame& frame, std::size_t slab, std::size_t begun) const {
-  static_assert(NodeClusters::slab == 64 * NodeClusters::size, "a word of the mask is a slab");
   PosedBody::Scratch& scratch = frame.out.scratch;
   scratch.begun[slab] = static_cast<std::uint32_t>(begun);
-  std::array<std::uint32_t, 64> clusters;
+  std::array<std::uint32_t, 64 * kWordsPerSlab> clusters;
   std::size_t count = 0;
-  for (std::uint64_t bits = scratch.mask[slab]; bits != 0; bits &= bits - 1) {
-    clusters[count++] =
-        static_cast<std::uint32_t>(64 * slab) + static_cast<std::uint32_t>(std::countr_zero(bits));
+  for (std::size_t word = kWordsPerSlab * slab; word < kWordsPerSlab * (slab + 1); ++word) {
+    for (std::uint64_t bits = scratch.mask[word]; bits != 0; bits &= bits - 1) {
+      clusters[count++] =
+          static_cast<std::uint32_t>(64 * word) + static_cast<std::uint32_t>(std::countr_zero(bits));
+    }
   }
   if (count == 0) return;
   SkinClusters job = frame.job;
@@ -236,8 +241,8 @@ void BodyParts::pose(const Model& model, Skinning skinning, std::span<const std:
                          nodes == NodesOf::body ? std::span<float>(out.nodes) : std::span<float>()};
   const Frame frame{model, job, kernel_of(skinning), out};
 
-  // Threads take spans of slabs one after another, then blocks of bones. What reaches from a span into one
-  // before it waits until both are there, but where the same thread has just posed that.
+  // Threads take spans of slabs, then blocks of bones. What reaches from a span into one before it waits
+  // until both are there. The last span is taken first, so that this is so whichever thread is how quick.
   std::size_t work = 0;
   for (const std::uint64_t bits : scratch.mask)
     work += NodeClusters::size * static_cast<std::size_t>(std::popcount(bits));
@@ -247,20 +252,25 @@ void BodyParts::pose(const Model& model, Skinning skinning, std::span<const std:
   const std::size_t slabs = clusters_.slabs();
   const std::size_t span = std::max<std::size_t>(1, slabs / (kSpansPerThread * threads));
   const std::size_t spans = (slabs + span - 1) / span;
+  const auto pose_span = [&](std::size_t first, std::size_t end) {
+    for (std::size_t slab = first; slab < end; ++slab) pose_slab(frame, slab, first);
+  };
+  if (threads == 1) {
+    pose_span(0, slabs);
+    for (const std::uint32_t bone : scratch.bones) move_bone(frame, bones_[bone]);
+    return;
+  }
   std::atomic<std::size_t> next{0};
   const auto take_part = [&](std::size_t) {
-    std::size_t begun = 0, end = 0;
     for (std::size_t i = next++; i < spans + scratch.bones.size(); i = next++) {
-      if (i >= spans) {
+      if (i < spans) {
+        const std::size_t first = (spans - 1 - i) * span;
+        pose_span(first, std::min(slabs, first + span));
+      } else {
         move_bone(frame, bones_[scratch.bones[i - spans]]);
-        continue;
       }
-      if (i * span != end) begun = i * span;
-      end = std::min(slabs, (i + 1) * span);
-      for (std::size_t slab = i * span; slab < end; ++slab) pose_slab(frame, slab, begun);
     }
   };
-  if (threads == 1) return take_part(0);
   tbb::parallel_for(std::size_t{0}, threads, take_part, tbb::simple_partitioner());
 
   scratch.late.clear();

@@ -58,7 +58,7 @@ struct PosedBody {
   struct Scratch {
     std::vector<SegmentMotion> motions;  // #segments, as the kernels read them
     Aligned<float> lanes;                // posed nodes in the order of NodeClusters, and one float more
-    std::vector<std::uint64_t> mask;     // a bit per cluster that is skinned; a word a slab
+    std::vector<std::uint64_t> mask;     // a bit per cluster that is skinned
     std::vector<std::uint8_t> asked;     // #tissues
     std::vector<std::uint32_t> begun;    // per slab, where its thread had begun
     std::vector<std::uint32_t> late;     // runs of cells that reach across where two threads met

@@ -119,11 +119,11 @@ void sort_along(const Model& model, std::span<std::uint32_t> nodes) {
   for (const std::uint32_t node : before) nodes[next[place(node)]++] = node;
 }
 
-// Nodes of one kind, and of these such as hang on the same segments, next to each other within each run: a
-// frame of few tissues skins few clusters, and these share shorter palettes.
+// Nodes that hang on the same segments, and of these such as are of one kind, next to each other within each
+// run: clusters share short palettes, and a frame of few tissues skins few of them.
 void sort_runs(const Model& model, std::span<const std::uint32_t> kind, std::span<std::uint32_t> nodes,
                std::size_t run) {
-  std::vector<std::tuple<std::uint32_t, std::uint64_t, std::uint32_t>> keyed;
+  std::vector<std::tuple<std::uint64_t, std::uint32_t, std::uint32_t>> keyed;
   for (std::size_t first = 0; first < nodes.size(); first += run) {
     const std::span<std::uint32_t> part = nodes.subspan(first, std::min(run, nodes.size() - first));
     keyed.clear();
@@ -133,7 +133,7 @@ void sort_runs(const Model& model, std::span<const std::uint32_t> kind, std::spa
         if (model.weights.weight[e] >= kSmallestWeight)
           segments |= std::uint64_t{1} << model.weights.segment[e] % 64U;
       }
-      keyed.emplace_back(kind[node], segments, node);
+      keyed.emplace_back(segments, kind[node], node);
     }
     std::sort(keyed.begin(), keyed.end());
     for (std::size_t i = 0; i < part.size(); ++i) part[i] = std::get<2>(keyed[i]);

@@ -13,13 +13,13 @@ namespace ecorche::runtime {
 
 /// Clusters of 64 nodes with one palette of segments each and a dense planar weight for every pair of them:
 /// no index per node, no gather. First the nodes that some tissue hangs on (those not of kind 0), in slabs
-/// across the longest side of the box about them, nodes of one kind together within each; then the others in
-/// the model's own order (Morton), in runs of 2048. Then by the segments that they hang on. A *lane* is a
-/// place in this order: node `node[lane]`. The last cluster repeats its last node.
+/// across the longest side of the box about them; then the others in the model's own order (Morton), in runs
+/// of 2048. Slabs and runs are sorted by the segments that nodes hang on, then by kind. A *lane* is a place
+/// in this order: node `node[lane]`. The last cluster repeats its last node.
 struct NodeClusters {
   static constexpr std::size_t size = 64;
-  /// Of 64 clusters. What hangs on its nodes reaches into a few others: posed, they stay in a core's cache.
-  static constexpr std::size_t slab = 64 * size;
+  /// Of 128 clusters. What hangs on its nodes reaches into a few others: posed, they stay in a core's cache.
+  static constexpr std::size_t slab = 128 * size;
 
   std::size_t nodes = 0;   ///< lanes that count
   std::size_t needed = 0;  ///< of them, those not of kind 0 come first
