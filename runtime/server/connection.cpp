@@ -132,7 +132,7 @@ Clock::duration Connection::check(Clock::time_point now) {
   } else if (!greeted_ && longer(born_, limits.hello_seconds)) {
     hit("hello", {StatusCode::deadline_exceeded,
                   "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
-  } else if (const double stall = limits.stall_seconds * (house_.memory().half_full() ? kLessPatience : 1);
+  } else if (const double stall = limits.stall_seconds * (house_.crowded(now) ? kLessPatience : 1);
              longer(writing_since_, stall) || longer(outbox_.oldest_in_flight(), stall)) {
     spdlog::info("{}: dropped: stopped reading", peer_);
     house_.metrics().hit("stall");

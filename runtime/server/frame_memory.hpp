@@ -12,9 +12,8 @@
 namespace ecorche::server {
 
 /// A frame counts from the start of its job until the last connection lets go of it, once however many share
-/// it. Above the limit no subscription gets its first frame; who keeps frames without acknowledging them
-/// has a quarter of the usual time to do so, from half of the limit on (docs/protocol.md, "Limits"). From any
-/// thread.
+/// it. Above the limit no subscription gets its first frame; from half of it on, who keeps frames without
+/// acknowledging them has a quarter of the usual time to do so (docs/protocol.md, "Limits"). From any thread.
 class FrameMemory {
  public:
   explicit FrameMemory(std::uint64_t limit) : limit_(limit) {}

@@ -60,6 +60,11 @@ House::~House() {
   leaving_ = true;
 }
 
+bool House::crowded(Clock::time_point now) {
+  if (memory_.half_full()) crowded_ = now;
+  return crowded_ && now - *crowded_ < duration(limits().stall_seconds);
+}
+
 void House::stop() {
   leaving_ = true;
   judging_.stop();

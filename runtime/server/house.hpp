@@ -75,6 +75,9 @@ class House {
 
   Metrics& metrics() { return metrics_; }
   const FrameMemory& memory() const { return memory_; }
+  /// Frames fill half of the memory for them, or did within the time that a stalled client has: else the
+  /// first to be dropped would save the others, and they would keep theirs.
+  bool crowded(Clock::time_point now);
   const Seams& seams() const { return seams_; }
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
@@ -109,7 +112,8 @@ class House {
   Metrics metrics_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
   std::uint64_t unnamed_ = 0;
-  std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
+  std::optional<Clock::time_point> crowded_;  ///< when it was last
+  std::atomic<bool> leaving_ = false;         ///< no more levels of detail are made before somebody asks
   Workers aside_;
 };
 

@@ -289,10 +289,16 @@ TEST(LimitsTest, WhereFramesFillHalfOfTheMemoryPatienceIsShort) {
     client.subscribe_mesh();
     frame_bytes = client.next_mesh(0).payload.size();
   }
-  for (const bool half : {true, false}) {
-    SCOPED_TRACE(half);
+  // Half of the memory holds less than a frame, more than one, and, for two clients, less than both.
+  struct Case {
+    std::uint64_t halves;
+    int clients;
+    bool soon;
+  };
+  for (const auto& [halves, clients, soon] : {Case{3, 1, true}, {6, 1, false}, {6, 2, true}}) {
+    SCOPED_TRACE(std::to_string(halves) + " halves, clients: " + std::to_string(clients));
     Options options;
-    options.limits.queued_bytes = half ? frame_bytes * 3 / 2 : frame_bytes * 3;
+    options.limits.queued_bytes = halves * frame_bytes / 2;
     options.limits.stall_seconds = 1.6;
     const TestServer server(
         options, {.transport = [](std::unique_ptr<Transport> transport) -> std::unique_ptr<Transport> {
@@ -300,12 +306,15 @@ TEST(LimitsTest, WhereFramesFillHalfOfTheMemoryPatienceIsShort) {
                   },
                   .timer_fails = {},
                   .handling = {}});
-    RawClient sleeper(server);
-    subscribe_and_sleep(sleeper, "");
+    std::vector<std::unique_ptr<RawClient>> sleepers;
+    for (int i = 0; i < clients; ++i) {
+      sleepers.push_back(std::make_unique<RawClient>(server));
+      subscribe_and_sleep(*sleepers.back(), "");
+    }
     const auto start = client::Clock::now();
-    EXPECT_TRUE(sleeper.hung_up());
+    for (const auto& sleeper : sleepers) EXPECT_TRUE(sleeper->hung_up());
     const double waited = std::chrono::duration<double>(client::Clock::now() - start).count();
-    EXPECT_EQ(waited < 1.5, half) << waited << " s of 1.6";
+    EXPECT_EQ(waited < 1.5, soon) << waited << " s of 1.6";
   }
 }
 
