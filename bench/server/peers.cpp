@@ -10,9 +10,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 
-#include "core/values/error.hpp"
 #include "proto/framing.hpp"
 
 namespace ecorche::bench {
@@ -24,8 +25,10 @@ int connected(const wire::Address& address) {
   to.sin_family = AF_INET;
   to.sin_port = htons(address.port);
   inet_pton(AF_INET, address.host.c_str(), &to.sin_addr);
-  if (fd < 0 || connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0)
-    throw Error(ErrorKind::temporary, "bench", "cannot connect", "raise the limit of open files");
+  if (fd < 0 || connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
+    std::fprintf(stderr, "bench: cannot connect (raise the limit of open files)\n");
+    std::exit(1);
+  }
   fcntl(fd, F_SETFL, O_NONBLOCK);
   return fd;
 }
@@ -55,14 +58,24 @@ std::string asks_for_much() {
 
 Peers::Peers(const wire::Address& address, int count, Manner manner)
     : manner_(manner), alive_(static_cast<std::size_t>(count)) {
+  thread_ = std::thread([this, address, count] {
+    come(address, count);
+    run();
+  });
+}
+
+// Not on the thread of those who are served: what they wait for meanwhile would be counted as the server's.
+void Peers::come(const wire::Address& address, int count) {
   const std::string much = asks_for_much();
   for (int i = 0; i < count; ++i) {
     born_.push_back(std::chrono::steady_clock::now());
     sockets_.push_back(connected(address));
-    if (manner == Manner::stop_reading && send(sockets_.back(), much.data(), much.size(), MSG_NOSIGNAL) < 0)
-      throw Error(ErrorKind::temporary, "bench", "cannot send", "see the server");
+    if (manner_ != Manner::stop_reading) continue;
+    if (send(sockets_.back(), much.data(), much.size(), MSG_NOSIGNAL) < 0) {
+      std::fprintf(stderr, "bench: cannot send (see the server)\n");
+      std::exit(1);
+    }
   }
-  thread_ = std::thread([this] { run(); });
 }
 
 Peers::~Peers() {

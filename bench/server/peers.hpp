@@ -32,6 +32,7 @@ class Peers {
   double longest() const { return longest_; }
 
  private:
+  void come(const wire::Address& address, int count);
   void run();
 
   Manner manner_;
