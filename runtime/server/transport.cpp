@@ -1,51 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/transport.hpp"
 
+#include <netinet/tcp.h>
+
 #include <algorithm>
 #include <array>
 #include <utility>
 
+#include "runtime/server/write_turn.hpp"
+
 namespace ecorche::server {
 namespace {
 
-// Handed to the socket in one go, before others have their turn on the I/O thread: a tenth of a millisecond
-// or two.
-constexpr std::size_t kMostAtOnce = 512 << 10;
+// What the kernel keeps for a client that does not read, besides what is on its way: more is of no use to
+// anybody, and 32 clients that come and stop reading would have it clear 200 MB at once.
+using Unsent = net::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
+constexpr int kMostUnsent = 1 << 20;
 
-// The next bytes of `frame`, at most kMostAtOnce of them, in a few pieces.
+// What of `frame` has not left yet.
 class Window {
  public:
-  explicit Window(std::span<const net::const_buffer> frame) : frame_(frame) { fill(); }
+  explicit Window(std::span<const net::const_buffer> frame) : frame_(frame) { advance(0); }
 
-  std::span<const net::const_buffer> pieces() const { return std::span(pieces_).first(count_); }
-  bool empty() const { return count_ == 0; }
+  bool empty() const { return frame_.empty(); }
 
-  /// The first `n` bytes of the pieces have left.
+  /// At most `room` bytes of it, in a few pieces; good until the next call.
+  std::span<const net::const_buffer> next(std::size_t room) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < frame_.size() && count < pieces_.size() && room > 0; ++i) {
+      const net::const_buffer piece = net::buffer(frame_[i] + (i == 0 ? at_ : 0), room);
+      if (piece.size() == 0) continue;
+      pieces_[count++] = piece;
+      room -= piece.size();
+    }
+    return std::span(pieces_).first(count);
+  }
+
+  /// The first `n` bytes of it have left.
   void advance(std::size_t n) {
     at_ += n;
     while (!frame_.empty() && at_ >= frame_.front().size()) {
       at_ -= frame_.front().size();
       frame_ = frame_.subspan(1);
     }
-    fill();
   }
 
  private:
-  void fill() {
-    std::size_t room = kMostAtOnce;
-    count_ = 0;
-    for (std::size_t i = 0; i < frame_.size() && count_ < pieces_.size() && room > 0; ++i) {
-      const net::const_buffer piece = net::buffer(frame_[i] + (i == 0 ? at_ : 0), room);
-      if (piece.size() == 0) continue;
-      pieces_[count_++] = piece;
-      room -= piece.size();
-    }
-  }
-
-  std::span<const net::const_buffer> frame_;  // what has not left yet
-  std::size_t at_ = 0;                        // of its first buffer: so much has
+  std::span<const net::const_buffer> frame_;
+  std::size_t at_ = 0;                        // of its first buffer: so much has left
   std::array<net::const_buffer, 64> pieces_;  // Asio takes so many
-  std::size_t count_ = 0;
 };
 
 class TcpTransport final : public Transport {
@@ -54,6 +57,7 @@ class TcpTransport final : public Transport {
     boost::system::error_code ec;
     socket_.set_option(tcp::no_delay(true), ec);
     socket_.non_blocking(true, ec);  // write() waits by itself
+    socket_.set_option(Unsent(kMostUnsent), ec);
   }
 
   net::any_io_executor executor() override { return socket_.get_executor(); }
@@ -71,14 +75,15 @@ class TcpTransport final : public Transport {
   net::awaitable<void> write(std::span<const net::const_buffer> frame,
                              boost::system::error_code& ec) override {
     Window left(frame);
+    WriteTurn turn(socket_.get_executor());
     ec = {};
     while (!left.empty()) {
-      const std::size_t sent = socket_.write_some(left.pieces(), ec);
+      const std::size_t sent = socket_.write_some(left.next(WriteTurn::room()), ec);
       left.advance(sent);
       if (ec == net::error::would_block) {
         co_await socket_.async_wait(tcp::socket::wait_write, quietly(ec));
       } else if (!ec && !left.empty()) {
-        co_await net::post(socket_.get_executor(), net::use_awaitable);
+        co_await turn.next();
       }
       if (ec) co_return;
     }

@@ -20,14 +20,18 @@ using Bytes = std::vector<std::byte>;
 
 // A transport and the client at its other end; nothing runs until run().
 struct Pair {
-  net::io_context io{1};
+  net::io_context own{1};
+  net::io_context& io = own;
   tcp::socket client{io};
   int server = -1;  // the transport's
   std::unique_ptr<Transport> transport;
   boost::system::error_code ec;
   bool written = false;
 
-  Pair() {
+  Pair() { connect(); }
+  explicit Pair(net::io_context& with) : io(with) { connect(); }
+
+  void connect() {
     tcp::acceptor acceptor(io, tcp::endpoint(net::ip::address_v4::loopback(), 0));
     client.connect(acceptor.local_endpoint());
     tcp::socket accepted = acceptor.accept();
@@ -123,6 +127,64 @@ TEST(TcpTransport, OthersHaveTheirTurns) {
   pair.io.run();
   reader.join();
   EXPECT_GE(turns, 30);
+}
+
+// However many large frames are written at once, all else comes between any two parts of them.
+TEST(TcpTransport, OnePartOfAllLargeFramesATurn) {
+  const Bytes sent(std::size_t{16} << 20);
+  net::io_context io{1};
+  std::vector<std::unique_ptr<Pair>> pairs;
+  for (int i = 0; i < 8; ++i) {
+    pairs.push_back(std::make_unique<Pair>(io));
+    pairs.back()->write({net::buffer(sent)});
+  }
+  const auto on_its_way = [&] {
+    std::size_t all = 0;
+    for (const auto& pair : pairs) {
+      int unacknowledged = 0;
+      EXPECT_EQ(ioctl(pair->server, SIOCOUTQ, &unacknowledged), 0);
+      all += pair->client.available() + static_cast<std::size_t>(unacknowledged);
+    }
+    return all;
+  };
+  int turns = 0;
+  std::size_t before = 0, most = 0;
+  std::function<void()> other = [&] {
+    const std::size_t now = on_its_way();
+    if (turns > 1) most = std::max(most, now - std::min(now, before));  // once all have begun
+    before = now;
+    if (++turns < 20) net::post(io, other);
+  };
+  net::post(io, other);
+  while (turns < 20) ASSERT_GT(io.poll_one(), 0U);
+  EXPECT_GT(most, 0U);
+  EXPECT_LE(most, 200U << 10);
+  // Whoever stops waits for nobody, and nobody for it.
+  pairs[3]->transport->close();
+  pairs[5]->transport->close();
+  std::vector<std::thread> readers;
+  for (const auto& pair : pairs) {
+    readers.emplace_back([&pair] {
+      Bytes got(std::size_t{16} << 20);
+      boost::system::error_code ec;
+      net::read(pair->client, net::buffer(got), ec);
+    });
+  }
+  io.run();
+  for (std::thread& reader : readers) reader.join();
+  for (std::size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(!pairs[i]->ec, i != 3 && i != 5) << i;
+}
+
+// What the kernel holds for who does not read is a few parts, not what its buffers could grow to.
+TEST(TcpTransport, LittleIsKeptForWhoDoesNotRead) {
+  Pair pair;
+  const Bytes sent(std::size_t{16} << 20);
+  pair.write({net::buffer(sent)});
+  pair.io.run_for(std::chrono::milliseconds(200));
+  int unsent = 0;
+  ASSERT_EQ(ioctl(pair.server, SIOCOUTQNSD, &unsent), 0);
+  EXPECT_GT(unsent, 0);
+  EXPECT_LE(unsent, 2 << 20);
 }
 
 TEST(TcpTransport, ClientGoesAway) {
