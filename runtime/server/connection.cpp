@@ -110,6 +110,10 @@ void Connection::close(const char* why) {
     }
   }
   if (session) session->leave(*this, place.has_value());
+  try {
+    house_.let_go(outbox_.clear());
+  } catch (const std::bad_alloc&) {  // then it goes with the connection
+  }
   house_.left(resume_token_, std::move(place));
 }
 
@@ -280,6 +284,7 @@ net::awaitable<void> Connection::write_frames() {
     co_await transport_->write(buffers, ec);
     writing_since_.reset();
     if (ec) {
+      house_.let_go(std::make_shared<std::vector<SharedFrame>>(std::move(frames)));
       close("client left");
       co_return;
     }

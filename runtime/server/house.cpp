@@ -68,6 +68,7 @@ bool House::crowded(Clock::time_point now) {
 void House::stop() {
   leaving_ = true;
   judging_.stop();
+  openings_.stop();
 }
 
 // Levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a
@@ -122,7 +123,7 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
   out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits, memory_, judging_,
-                                  metrics_);
+                                  openings_, metrics_);
   sessions_.emplace(name, out);
   return {};
 }
@@ -311,6 +312,13 @@ void House::offload(std::function<void()> work, std::function<void()> then) {
 
 void House::set_aside(std::function<void()> work, std::function<void()> then) {
   hand_over(aside_, std::move(work), std::move(then));
+}
+
+void House::let_go(std::shared_ptr<const void> what) noexcept {
+  try {
+    aside_.submit([what = std::move(what)]() mutable { what = nullptr; });
+  } catch (const std::exception&) {  // no memory to say so: it goes here
+  }
 }
 
 void House::hand_over(Workers& to, std::function<void()> work, std::function<void()> then) {

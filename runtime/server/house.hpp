@@ -15,6 +15,7 @@
 #include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"
 #include "runtime/server/named_model.hpp"
+#include "runtime/server/openings.hpp"
 #include "runtime/server/seams.hpp"
 #include "runtime/server/session.hpp"
 #include "runtime/server/workers.hpp"
@@ -73,6 +74,9 @@ class House {
   /// As offload, but on one thread that gives way to all others.
   void set_aside(std::function<void()> work, std::function<void()> then);
 
+  /// Lets go of what a client had to be sent, on that thread: giving back a GiB takes longer than a frame.
+  void let_go(std::shared_ptr<const void> what) noexcept;
+
   Metrics& metrics() { return metrics_; }
   const FrameMemory& memory() const { return memory_; }
   /// Frames fill half of the memory for them, or did within the time that a stalled client has: else the
@@ -101,6 +105,7 @@ class House {
   Options options_;
   FrameMemory memory_;
   Judging judging_;
+  Openings openings_;
   std::vector<std::shared_ptr<const ServedModel>> models_;
   std::map<std::string, std::function<ModelParts()>> sources_;
   bool reloading_ = false;

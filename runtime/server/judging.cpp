@@ -22,7 +22,7 @@ Clock::duration processor_time() {
 
 }  // namespace
 
-Judging::Judging(net::io_context& io) : timer_(io), aside_(1, giving_way) {}
+Judging::Judging(net::io_context& io) : timer_(io), aside_(1, last_of_all) {}
 
 void Judging::ask(const std::shared_ptr<Session>& session) {
   if (!session->await_judgement()) waiting_.push_back(session);
@@ -54,6 +54,12 @@ void Judging::done(Clock::duration cost) {
   });
 }
 
+bool judged_by(const v1::PoseQuality& quality, const runtime::QualityThresholds& thresholds) {
+  return quality.max_inverted_share() == thresholds.max_inverted_share &&
+         quality.max_volume_change() == thresholds.max_volume_change &&
+         quality.max_bone_rigidity() == thresholds.max_bone_rigidity_mm;
+}
+
 v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,
                          std::uint64_t pose) {
   v1::PoseQuality out;
@@ -81,7 +87,7 @@ void run(JudgeJob& job) {
   const Clock::duration start = processor_time();
   const auto judge = [&job] {
     const runtime::BodyPoser& poser = job.model->poser();
-    const BodyPool::Lease body = job.model->bodies.take();
+    const BodyPool::Lease body = job.model->bodies_aside.take();
     std::vector<std::uint32_t> tissues;
     for (std::size_t t = 0; t < body->tissues.size(); ++t) {
       const bool shown = std::any_of(job.rows.begin(), job.rows.end(), [&](const JudgeJob::Row& row) {

@@ -62,6 +62,8 @@ struct JudgeJob {
 /// Poses and measures, on the calling thread alone: the other cores are for frames. Throws nothing.
 void run(JudgeJob& job);
 
+bool judged_by(const v1::PoseQuality& quality, const runtime::QualityThresholds& thresholds);
+
 /// `pose`: the sequence number that was judged.
 v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,
                          std::uint64_t pose);

@@ -42,6 +42,17 @@ void Outbox::acknowledge(std::uint32_t subscription, std::uint64_t number, Clock
   if (found != lanes_.end()) found->second.flow.arrived(number, now);
 }
 
+std::shared_ptr<const void> Outbox::clear() {
+  struct All {
+    std::deque<SharedFrame> answers;
+    std::map<std::uint32_t, Lane> lanes;
+  };
+  auto all = std::make_shared<All>();
+  all->answers.swap(answers_);
+  all->lanes.swap(lanes_);
+  return all;
+}
+
 SharedFrame Outbox::next(Clock::time_point now) {
   last_was_posed_ = false;
   if (!answers_.empty()) {

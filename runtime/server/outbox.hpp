@@ -38,6 +38,9 @@ class Outbox {
   /// Drops what waits for the subscription.
   void forget(std::uint32_t subscription) { lanes_.erase(subscription); }
 
+  /// Drops everything; it goes with the last who holds the result. Throws bad_alloc, and drops nothing.
+  std::shared_ptr<const void> clear();
+
   /// What to write next; answers first, then the subscriptions in turn. Null when nothing may go now.
   SharedFrame next(Clock::time_point now);
 

@@ -73,8 +73,8 @@ struct Wanted {
 bool measured(const PoseJob& job, const Subscription& subscription) {
   const auto* mesh = std::get_if<MeshWant>(&subscription.want);
   if (!mesh) return false;
-  const bool known = subscription.quality && subscription.quality->pose_sequence() == job.request.sequence;
-  return mesh->quality || !subscription.quality || (job.judge && !known);
+  if (!subscription.quality) return true;
+  return (mesh->quality || job.judge) && subscription.quality->pose_sequence() != job.request.sequence;
 }
 
 // Quality, probes and volumes by tets look at every tet; meshes only at those that their vertices hang on,
@@ -117,7 +117,9 @@ Status pose(const PoseJob& job, runtime::PosedBody& body, bool everywhere = fals
   const runtime::BodyPoser& poser = job.model->poser();
   Wanted wanted(poser.model().tissues.size());
   for (const Subscription& subscription : job.subscriptions) {
-    if (!subscription.streams.empty()) wanted.add(*subscription.streams[0], measured(job, subscription));
+    const bool measures = measured(job, subscription);
+    if (subscription.streams.empty() || (subscription.rest && !measures)) continue;
+    wanted.add(*subscription.streams[0], measures);
   }
   if (everywhere) wanted.positions = wanted.shown;
   wanted.shape(poser.model(), body);
@@ -150,6 +152,25 @@ bool lone(const PoseJob& job) {
   return frames == 1 && !job.digests;
 }
 
+// Of a plain frame that shows the rest pose, as all others of these tissues.
+std::shared_ptr<const Positions> at_rest(const PoseJob& job, const Subscription& subscription,
+                                         runtime::PosedBody& body) {
+  if (subscription.rest) return subscription.rest;
+  const MeshStream& stream = *subscription.streams.front();
+  const std::vector<std::uint32_t>& wanted = stream.want().tissues;
+  if (auto shown = job.model->rest_pose.positions(wanted)) return shown;  // by this job
+  std::shared_ptr<const Positions> shown;
+  if (lone(job)) {
+    shown = give(job, stream, body);
+  } else {
+    const auto copied = std::make_shared<Positions>(body.tissues.size());
+    for (const std::uint32_t t : wanted) (*copied)[t] = body.tissues[t];
+    shown = copied;
+  }
+  job.model->rest_pose.know(wanted, shown);
+  return shown;
+}
+
 PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std::size_t at,
                       runtime::PosedBody& body, const v1::ServerTimings& timings, const Judged& judged) {
   MeshStream& stream = *subscription.streams[at];
@@ -168,7 +189,9 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
   const auto start = Clock::now();
   wire::Pieces pieces;
   std::shared_ptr<wire::Payload> payload;
-  if (stream.plain() && lone(job)) {
+  if (stream.plain() && job.request.sequence == 0 && !job.digests) {
+    pieces = stream.show(at_rest(job, subscription, body), frame);
+  } else if (stream.plain() && lone(job)) {
     pieces = stream.show(give(job, stream, body), frame);
   } else {
     payload = job.model->payloads->take();
@@ -273,7 +296,7 @@ Status run(const PoseJob& job) {
   BodyPool::Lease body;
   const auto pose_all = [&] {
     outcome.status = guarded([&] {
-      body = job.model->bodies.take();
+      body = (job.aside ? job.model->bodies_aside : job.model->bodies).take();
       return pose(job, *body);
     });
     outcome.timings.set_posed(microseconds(Clock::now() - start));
@@ -287,7 +310,7 @@ Status run(const PoseJob& job) {
     job.on_outcome(std::move(outcome));
     if (posed) status = guarded([&] { return show(job, *body, timings); });
   };
-  if (small(job)) {
+  if (job.aside || small(job)) {
     serially(all);
   } else {
     all();

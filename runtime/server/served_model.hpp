@@ -16,6 +16,7 @@
 #include "runtime/server/clip.hpp"
 #include "runtime/server/mesh_rows.hpp"
 #include "runtime/server/payload_pool.hpp"
+#include "runtime/server/rest_pose.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/volume_poser.hpp"
@@ -58,7 +59,9 @@ struct ServedModel {
   std::unique_ptr<const runtime::BodyPoser> poser_;
 
  public:
-  mutable BodyPool bodies;  ///< for jobs to pose into
+  mutable BodyPool bodies;        ///< for jobs to pose into
+  mutable BodyPool bodies_aside;  ///< for those beside streams, which then never wait for a body to be made
+  mutable RestPose rest_pose;
   /// For the frames of meshes.
   std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);
   std::shared_ptr<PositionsPool> positions = std::make_shared<PositionsPool>(4);

@@ -17,11 +17,12 @@ void Skipped::add(std::uint64_t sequence) {
 
 Session::Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model,
                  std::string name, bool named, const Limits& limits, const FrameMemory& memory,
-                 Judging& judging, Metrics& metrics)
+                 Judging& judging, Openings& openings, Metrics& metrics)
     : io_(io),
       metrics_(metrics),
       memory_(memory),
       judging_(judging),
+      openings_(openings),
       workers_(workers),
       model_(std::move(model)),
       name_(std::move(name)),

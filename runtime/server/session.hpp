@@ -16,6 +16,7 @@
 #include "runtime/server/frame_memory.hpp"
 #include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"
+#include "runtime/server/openings.hpp"
 #include "runtime/server/options.hpp"
 #include "runtime/server/pose_job.hpp"
 #include "runtime/server/recording.hpp"
@@ -61,7 +62,8 @@ struct Asked {
 class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model, std::string name,
-          bool named, const Limits& limits, const FrameMemory& memory, Judging& judging, Metrics& metrics);
+          bool named, const Limits& limits, const FrameMemory& memory, Judging& judging, Openings& openings,
+          Metrics& metrics);
   ~Session();
 
   const std::string& name() const { return name_; }
@@ -120,6 +122,12 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Its turn: has the present pose judged, and Judging::done() called then; false where nobody looks.
   bool judge();
 
+  /// From now on its turn at Openings is awaited; whether it was already.
+  bool await_opening() { return std::exchange(awaits_opening_, true); }
+  /// Its turn: has the present pose shown to who has not seen it, and Openings::done() called then; false
+  /// where nobody waits for that any more.
+  bool open_up();
+
   /// Its model's name means another one now: nobody joins any more, and it ends with its last member.
   void retire(std::uint64_t identity);
   bool retired() const { return retired_; }
@@ -142,11 +150,13 @@ class Session : public std::enable_shared_from_this<Session> {
   class Teller;
   void tell_control();
   void judged(const JudgeJob& job);
-  bool by_present_thresholds(const v1::PoseQuality& quality) const;
+  std::shared_ptr<const v1::PoseQuality> known_quality(const MeshWant& want, bool refresh) const;
   std::shared_ptr<ProbeFrame> spare_probe();
   void probe_ready(const std::shared_ptr<ProbeFrame>& frame);
   void take(PoseRequest request);
   void start_job();
+  void start(Clock::time_point now, bool aside);
+  bool soon_posed(Clock::time_point now);
   void submit(std::shared_ptr<PoseJob> job, bool refresh);
   void take_up(PoseJob& job);
   bool held_back(Row& row, Clock::time_point now) const;
@@ -160,6 +170,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Metrics& metrics_;
   const FrameMemory& memory_;
   Judging& judging_;
+  Openings& openings_;
   Workers& workers_;
   std::shared_ptr<const ServedModel> model_;
   std::string name_;
@@ -175,6 +186,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool retired_ = false;
   bool unjudged_ = false;  ///< the present pose, once it has arrived somewhere
   bool awaits_judgement_ = false;
+  bool awaits_opening_ = false;
 
   std::vector<Row> rows_;
   std::uint32_t last_subscription_ = 0;
@@ -190,6 +202,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool pacing_ = false;
   net::steady_timer clock_;  ///< for the rows' refresh_at
   std::optional<Clock::time_point> clock_at_;
+  Clock::time_point posed_{};               ///< when the last pose was taken up
   Clock::time_point stirred_{};             ///< when the last pose came, or the last job ended
   bool rested_ = false;                     ///< the waiting pose came after a rest
   Clock::time_point moved_ = Clock::now();  ///< when the pose last became another one

@@ -19,6 +19,8 @@ constexpr std::chrono::milliseconds kKeyframePause{100};
 // Without another pose for so long, the body stands still: it is shown in full detail, and what comes next is
 // judged at once.
 constexpr std::chrono::milliseconds kStill{150};
+// Within a stream the next pose comes so soon.
+constexpr std::chrono::milliseconds kNextPose{50};
 
 double rate_of(const Want& want) {
   return std::visit([](const auto& w) { return w.max_rate; }, want);
@@ -92,6 +94,10 @@ void Session::start_job() {
   const bool fresh = !fresh_.empty() && !memory_.full();
   if (busy_ || (!slot_ && !fresh && probes_.empty())) return;
   const auto now = Clock::now();
+  if (!slot_ && probes_.empty() && openings_.beside_streams(now)) {
+    if (!soon_posed(now)) openings_.ask(shared_from_this());
+    return;
+  }
   if (now < next_start_) {
     if (std::exchange(pacing_, true)) return;
     pace_.expires_at(next_start_);
@@ -103,9 +109,18 @@ void Session::start_job() {
     });
     return;
   }
+  start(now, false);
+}
+
+void Session::start(Clock::time_point now, bool aside) {
   next_start_ = now + duration(1 / limits_.poses_per_second);
   const bool refresh = !slot_;
+  if (!refresh) {
+    posed_ = now;
+    openings_.streamed(now);
+  }
   auto job = std::make_shared<PoseJob>();
+  job->aside = aside;
   take_up(*job);
   busy_ = true;
   try {
@@ -114,6 +129,24 @@ void Session::start_job() {
     busy_ = false;
     throw;
   }
+}
+
+// A stream of its own: what newcomers are shown comes with the next pose, or where there is none after all.
+bool Session::soon_posed(Clock::time_point now) {
+  if (now - posed_ >= kNextPose) return false;
+  for (Row& row : rows_) {
+    if (fresh_.contains(row.subscription.id) && !row.refresh_at) row.refresh_at = posed_ + kNextPose;
+  }
+  keep_time();
+  return true;
+}
+
+bool Session::open_up() {
+  awaits_opening_ = false;
+  const auto now = Clock::now();
+  if (busy_ || slot_ || fresh_.empty() || memory_.full() || soon_posed(now)) return false;
+  start(now, true);
+  return true;
 }
 
 void Session::catch_up() {
@@ -129,21 +162,27 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
   job->on_frame = [teller](PosedFrame frame) { teller->frame(std::move(frame)); };
   // The guard keeps the I/O thread waiting for the job's end. All that the job holds goes back with it, so
   // that no worker ever destroys a session.
-  workers_.submit(
-      [self = std::move(self), job = std::move(job), teller, guard = net::make_work_guard(io_)]() mutable {
-        const Status status = run(*job);
-        teller->tell_outcome();  // where no frame could be made
-        net::io_context& io = self->io_;
-        net::post(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
-                       guard = std::move(guard), status] {
-          if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
-          self->busy_ = false;
-          self->stirred_ = Clock::now();
-          // Asked for, and not made: the pose could not be.
-          if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
-          self->start_job();
-        });
-      });
+  const bool aside = job->aside;
+  Job work = [self = std::move(self), job = std::move(job), teller,
+              guard = net::make_work_guard(io_)]() mutable {
+    const Status status = run(*job);
+    teller->tell_outcome();  // where no frame could be made
+    net::io_context& io = self->io_;
+    net::post(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
+                   guard = std::move(guard), status] {
+      if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
+      self->busy_ = false;
+      self->stirred_ = Clock::now();
+      // Asked for, and not made: the pose could not be.
+      if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
+      if (job->aside) self->openings_.done();
+      self->start_job();
+    });
+  };
+  if (aside)
+    openings_.submit(std::move(work));
+  else
+    workers_.submit(std::move(work));
 }
 
 // Nothing comes, and nothing is being made: where frames lag behind poses, however far, each would lag
@@ -177,10 +216,15 @@ void Session::take_up(PoseJob& job) {
       continue;
     }
     ask_levels(row, still, now);
+    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
+    if (mesh && !row.subscription.quality) row.subscription.quality = known_quality(*mesh, refresh);
     if (const double rate = rate_of(row.subscription.want); rate > 0)
       row.next_due = std::max(row.next_due + duration(1 / rate), now);
     const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
     job.subscriptions.push_back(row.subscription);
+    const auto& streams = row.subscription.streams;
+    if (refresh && present_.sequence == 0 && !job.digests && streams.size() == 1 && streams[0]->plain())
+      job.subscriptions.back().rest = model_->rest_pose.positions(mesh->tissues);
     if (asked == 0) continue;
     if (refresh || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) {
       row.subscription.keyframes &= ~asked;
@@ -271,7 +315,11 @@ void Session::publish(const PosedFrame& frame) {
   if (row == rows_.end()) return;
   if (recording_ && frame.number == recorded_job_ && frame.keyframe == 0)
     recording_->add(frame, row->request);
-  if (frame.judged && by_present_thresholds(*frame.judged)) row->subscription.quality = frame.judged;
+  if (frame.judged && judged_by(*frame.judged, thresholds_)) {
+    row->subscription.quality = frame.judged;
+    if (frame.judged->pose_sequence() == 0)
+      model_->rest_pose.know(std::get<MeshWant>(row->subscription.want).tissues, frame.judged);
+  }
   const bool mesh = !row->subscription.streams.empty();
   if (mesh && (!row->subscription.quality || row->subscription.quality->pose_sequence() != present_.sequence))
     unjudged_ = true;
@@ -288,10 +336,18 @@ void Session::arrived() {
   if (std::exchange(unjudged_, false)) judging_.ask(shared_from_this());
 }
 
-bool Session::by_present_thresholds(const v1::PoseQuality& quality) const {
-  return quality.max_inverted_share() == thresholds_.max_inverted_share &&
-         quality.max_volume_change() == thresholds_.max_volume_change &&
-         quality.max_bone_rigidity() == thresholds_.max_bone_rigidity_mm;
+// Of these tissues, what was measured before: of the present pose where that is shown again, else of another
+// one, which will do within a stream.
+std::shared_ptr<const v1::PoseQuality> Session::known_quality(const MeshWant& want, bool refresh) const {
+  for (const Row& row : rows_) {
+    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
+    const auto& quality = row.subscription.quality;
+    if (mesh && quality && mesh->tissues == want.tissues &&
+        (!refresh || quality->pose_sequence() == present_.sequence))
+      return quality;
+  }
+  if (refresh && present_.sequence != 0) return nullptr;
+  return model_->rest_pose.quality(want.tissues, thresholds_);
 }
 
 bool Session::judge() {
@@ -320,7 +376,7 @@ void Session::judged(const JudgeJob& job) {
   for (const JudgeJob::Row& done : job.rows) {
     const auto row = std::find_if(rows_.begin(), rows_.end(),
                                   [&](const Row& r) { return r.subscription.id == done.subscription; });
-    if (row != rows_.end() && done.quality && by_present_thresholds(*done.quality))
+    if (row != rows_.end() && done.quality && judged_by(*done.quality, thresholds_))
       row->subscription.quality = done.quality;
   }
 }

@@ -52,8 +52,9 @@ struct Subscription {
   Want want;
   std::vector<std::shared_ptr<MeshStream>> streams;  ///< of a mesh, one per level, finest first
   std::shared_ptr<VolumeStream> volume;
-  std::uint32_t levels = 1;                        ///< bit i: a frame of streams[i] is wanted
-  std::shared_ptr<const v1::PoseQuality> quality;  ///< of a mesh, newest; null: none yet
+  std::uint32_t levels = 1;                                     ///< bit i: a frame of streams[i] is wanted
+  std::shared_ptr<const v1::PoseQuality> quality;               ///< of a mesh, newest; null: none yet
+  std::shared_ptr<const std::vector<std::vector<float>>> rest;  ///< positions of all that a job is to show
   std::uint32_t keyframes = 0;  ///< bit i: somebody cannot read deltas of streams[i] before the next keyframe
 };
 

@@ -2,6 +2,7 @@
 #include "runtime/server/workers.hpp"
 
 #ifdef __linux__
+#include <sched.h>
 #include <sys/resource.h>
 #include <unistd.h>
 #endif
@@ -64,6 +65,17 @@ void giving_way(const Job& job) {
   constexpr int kNice = 10;
   thread_local const int lowered = setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   static_cast<void>(lowered);  // where it may not, it does not
+#endif
+  job();
+}
+
+// To what wakes, a core that runs only such a thread is an idle one; with another priority it is not, and
+// what wakes may wait for as long as a turn takes (3 ms).
+void last_of_all(const Job& job) {
+#ifdef __linux__
+  constexpr sched_param kNone{};
+  thread_local const int lowered = sched_setscheduler(0, SCHED_IDLE, &kNone);
+  static_cast<void>(lowered);
 #endif
   job();
 }

@@ -45,4 +45,8 @@ class Workers {
 /// elsewhere it does not). For Workers of their own.
 void giving_way(const Job& job);
 
+/// As giving_way, but runs only where a core would else be idle: a thread that wakes takes its core at once.
+/// For what nobody waits for, and what takes no locks that others want for long.
+void last_of_all(const Job& job);
+
 }  // namespace ecorche::server

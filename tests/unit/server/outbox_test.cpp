@@ -116,5 +116,20 @@ TEST(Outbox, FramesOfAnotherLevelAreForOthers) {
   EXPECT_EQ(next(outbox), "key 6");
 }
 
+// What a client that is gone was to be sent goes with who holds it, wherever that is.
+TEST(Outbox, LetsGoOfEverything) {
+  Outbox outbox(2);
+  const SharedFrame shown = frame("mesh");
+  outbox.answer({.head = "answer", .payload = nullptr});
+  EXPECT_TRUE(outbox.offer(7, 0, 1, 0, shown));
+  EXPECT_EQ(shown.use_count(), 2);
+  std::shared_ptr<const void> all = outbox.clear();
+  EXPECT_EQ(shown.use_count(), 2);
+  EXPECT_EQ(outbox.next(Clock::now()), nullptr);
+  EXPECT_EQ(outbox.answers(), 0U);
+  all = nullptr;
+  EXPECT_EQ(shown.use_count(), 1);
+}
+
 }  // namespace
 }  // namespace ecorche::server

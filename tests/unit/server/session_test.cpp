@@ -1,138 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A session without a server: which poses it takes to come after a rest, when it makes keyframes, when
 // judges.
-#include <gtest/gtest.h>
-
-#include <condition_variable>
-#include <mutex>
-#include <optional>
-#include <utility>
-#include <vector>
-
-#include "proto/framing.hpp"
-#include "runtime/server/session.hpp"
-#include "tests/support/toy_model.hpp"
+#include "tests/unit/server/session_stage.hpp"
 
 namespace ecorche::server {
 namespace {
-
-using std::chrono::milliseconds;
-
-// Keeps of every frame that it is shown whether its own quality came with it, and whether it is a keyframe.
-class Watcher final : public Member {
- public:
-  const std::vector<bool>& judged() const { return judged_; }
-  const std::vector<bool>& keyframes() const { return keyframes_; }
-  // As if it had not got what the next frame is against.
-  void lose_next() { loses_ = true; }
-  Clock::time_point last() const { return last_; }
-
- private:
-  bool deliver(const PosedFrame& frame) override {
-    judged_.push_back(frame.judged != nullptr);
-    keyframes_.push_back(frame.keyframe == frame.number);
-    last_ = Clock::now();
-    return !std::exchange(loses_, false);
-  }
-  std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
-    return finest;
-  }
-  void pose_done(const PoseOutcome&, const Skipped&) override {}
-  void control_changed(v1::Role, bool) override {}
-  void model_changed(std::uint64_t) override {}
-
-  std::vector<bool> judged_, keyframes_;
-  bool loses_ = false;
-  Clock::time_point last_{};
-};
-
-// A worker that can be kept from its jobs.
-class Gate {
- public:
-  void close() { set(false); }
-  void open() { set(true); }
-  void pass() {
-    std::unique_lock lock(mutex_);
-    opened_.wait(lock, [this] { return open_; });
-  }
-
- private:
-  void set(bool open) {
-    const std::lock_guard lock(mutex_);
-    open_ = open;
-    opened_.notify_all();
-  }
-  std::mutex mutex_;
-  std::condition_variable opened_;
-  bool open_ = true;
-};
-
-struct Stage {
-  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32)
-      : model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(test::toy_model()))),
-        workers(1,
-                [this](const Job& job) {
-                  gate.pass();
-                  job();
-                }),
-        session(std::make_shared<Session>(io, workers, model, "a", true, limits, memory, judging, metrics)) {
-    session->join(watcher);
-    MeshWant want;
-    want.tissues = {0};
-    want.encoding = encoding;
-    session->subscribe(watcher, {.id = 0, .want = want, .request = {}});
-  }
-  ~Stage() {
-    gate.open();
-    session->leave(watcher, false);
-    judging.stop();
-    run_until([] { return false; }, milliseconds(50));
-    session.reset();
-  }
-
-  void pose(std::uint64_t sequence) {
-    PoseRequest request;
-    request.sequence = sequence;
-    request.pose = Pose::rest(model->model().segment_count());
-    request.pose.root_translation.x() = static_cast<double>(sequence);
-    session->pose(std::move(request));
-  }
-  template <class Done>
-  void run_until(Done&& done, Clock::duration most = std::chrono::seconds(20)) {
-    const auto until = Clock::now() + most;
-    while (!done() && Clock::now() < until) {
-      io.restart();
-      io.run_for(milliseconds(5));
-    }
-  }
-  void wait(milliseconds time) {
-    run_until([] { return false; }, time);
-  }
-  // Whether the next frame came with its own quality, measured for it.
-  std::optional<bool> next_is_judged() {
-    run_until([&] { return watcher.judged().size() > seen; });
-    if (watcher.judged().size() == seen) return std::nullopt;
-    return watcher.judged()[seen++];
-  }
-
-  // So short after the last frame that nothing is a rest yet, however busy the machine is.
-  bool in_time() const { return Clock::now() - watcher.last() < milliseconds(100); }
-
-  net::io_context io;
-  Limits limits;
-  FrameMemory memory{std::uint64_t{1} << 30};
-  Judging judging{io};
-  Metrics metrics;
-  Gate gate;
-  std::shared_ptr<const ServedModel> model;
-  Workers workers;
-  Watcher watcher;
-  std::size_t seen = 0;  // of its frames
-  std::shared_ptr<Session> session;
-};
-
-constexpr milliseconds kLong{250}, kShort{5};
-constexpr int kTrials = 10;
 
 // Poses after a rest, which takes so long on its way, and again right behind that frame: whether the second
 // pose is taken to come after a rest.
@@ -230,8 +102,7 @@ TEST(Session, AQualityByFormerThresholdsIsNotKept) {
 
 TEST(Session, AnUnnamedOneWaitsOnlyForWhoMayComeBack) {
   Stage stage;
-  const auto own = std::make_shared<Session>(stage.io, stage.workers, stage.model, "-1", false, stage.limits,
-                                             stage.memory, stage.judging, stage.metrics);
+  const auto own = stage.open("-1");
   Watcher guest;
   own->join(guest);
   EXPECT_FALSE(own->over(Clock::now()));

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// A session without a server, on a worker that can be kept from its jobs.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/framing.hpp"
+#include "runtime/server/session.hpp"
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::server {
+
+using std::chrono::milliseconds;
+
+inline constexpr milliseconds kLong{250}, kShort{5};
+inline constexpr int kTrials = 10;
+
+// Keeps of every frame that it is shown whether its own quality came with it, and whether it is a keyframe.
+class Watcher final : public Member {
+ public:
+  const std::vector<bool>& judged() const { return judged_; }
+  const std::vector<bool>& keyframes() const { return keyframes_; }
+  // The last frame, and where its positions lie; null where they were copied.
+  const v1::MeshFrame& frame() const { return envelope_.mesh_frame(); }
+  const void* positions() const { return positions_; }
+  const std::shared_ptr<const wire::EncodedFrame>& bytes() const { return bytes_; }
+  // As if it had not got what the next frame is against.
+  void lose_next() { loses_ = true; }
+  Clock::time_point last() const { return last_; }
+
+ private:
+  bool deliver(const PosedFrame& frame) override {
+    judged_.push_back(frame.judged != nullptr);
+    keyframes_.push_back(frame.keyframe == frame.number);
+    bytes_ = frame.bytes;
+    const auto& pieces = frame.bytes->pieces.parts;
+    positions_ = pieces.empty() ? nullptr : pieces.front().data();
+    std::uint32_t bytes = 0;
+    std::memcpy(&bytes, frame.bytes->head.data(), sizeof bytes);
+    EXPECT_TRUE(envelope_.ParseFromArray(frame.bytes->head.data() + 8, static_cast<int>(bytes)));
+    last_ = Clock::now();
+    return !std::exchange(loses_, false);
+  }
+  std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
+    return finest;
+  }
+  void pose_done(const PoseOutcome&, const Skipped&) override {}
+  void control_changed(v1::Role, bool) override {}
+  void model_changed(std::uint64_t) override {}
+
+  std::vector<bool> judged_, keyframes_;
+  std::shared_ptr<const wire::EncodedFrame> bytes_;
+  v1::Envelope envelope_;
+  const void* positions_ = nullptr;
+  bool loses_ = false;
+  Clock::time_point last_{};
+};
+
+// A worker that can be kept from its jobs.
+class Gate {
+ public:
+  void close() { set(false); }
+  void open() { set(true); }
+  void pass() {
+    std::unique_lock lock(mutex_);
+    opened_.wait(lock, [this] { return open_; });
+  }
+
+ private:
+  void set(bool open) {
+    const std::lock_guard lock(mutex_);
+    open_ = open;
+    opened_.notify_all();
+  }
+  std::mutex mutex_;
+  std::condition_variable opened_;
+  bool open_ = true;
+};
+
+struct Stage {
+  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32)
+      : model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(test::toy_model()))),
+        workers(1,
+                [this](const Job& job) {
+                  gate.pass();
+                  job();
+                }),
+        session(open("a", true)) {
+    session->join(watcher);
+    MeshWant want;
+    want.tissues = {0};
+    want.encoding = encoding;
+    session->subscribe(watcher, {.id = 0, .want = want, .request = {}});
+  }
+  ~Stage() {
+    gate.open();
+    session->leave(watcher, false);
+    judging.stop();
+    run_until([] { return false; }, milliseconds(50));
+    session.reset();
+  }
+
+  std::shared_ptr<Session> open(const std::string& name, bool named = false) {
+    return std::make_shared<Session>(io, workers, model, name, named, limits, memory, judging, openings,
+                                     metrics);
+  }
+  void pose(std::uint64_t sequence) {
+    PoseRequest request;
+    request.sequence = sequence;
+    request.pose = Pose::rest(model->model().segment_count());
+    request.pose.root_translation.x() = static_cast<double>(sequence);
+    session->pose(std::move(request));
+  }
+  template <class Done>
+  void run_until(Done&& done, Clock::duration most = std::chrono::seconds(20)) {
+    const auto until = Clock::now() + most;
+    while (!done() && Clock::now() < until) {
+      io.restart();
+      io.run_for(milliseconds(5));
+    }
+  }
+  void wait(milliseconds time) {
+    run_until([] { return false; }, time);
+  }
+  // Whether the next frame came with its own quality, measured for it.
+  std::optional<bool> next_is_judged() {
+    run_until([&] { return watcher.judged().size() > seen; });
+    if (watcher.judged().size() == seen) return std::nullopt;
+    return watcher.judged()[seen++];
+  }
+
+  // So short after the last frame that nothing is a rest yet, however busy the machine is.
+  bool in_time() const { return Clock::now() - watcher.last() < milliseconds(100); }
+
+  net::io_context io;
+  Limits limits;
+  FrameMemory memory{std::uint64_t{1} << 30};
+  Judging judging{io};
+  Openings openings;
+  Metrics metrics;
+  Gate gate;
+  std::shared_ptr<const ServedModel> model;
+  Workers workers;
+  Watcher watcher;
+  std::size_t seen = 0;  // of its frames
+  std::shared_ptr<Session> session;
+};
+
+// Another session of the model, with who watches it.
+struct Guest {
+  explicit Guest(Stage& on, const runtime::QualityThresholds& thresholds = {})
+      : stage(on), session(on.open("-1")) {
+    session->set_thresholds(thresholds);
+    session->join(watcher);
+    ask(v1::ENCODING_F32);
+  }
+  ~Guest() { session->leave(watcher, false); }
+  void ask(v1::Encoding encoding, bool quality = false) {
+    MeshWant want;
+    want.tissues = {0};
+    want.encoding = encoding;
+    want.quality = quality;
+    session->subscribe(watcher, {.id = 0, .want = want, .request = {}});
+  }
+  std::size_t frames() const { return watcher.judged().size(); }
+  bool sees(std::size_t count, Clock::duration most) {
+    stage.run_until([&] { return frames() >= count; }, most);
+    return frames() >= count;
+  }
+
+  Stage& stage;
+  Watcher watcher;
+  std::shared_ptr<Session> session;
+};
+
+}  // namespace ecorche::server
