@@ -211,10 +211,10 @@ class Descent {
 // of a level costs each point less than its own way down from the top.
 class Entry {
  public:
-  // The lowest level of floats of at most so many nodes.
+  // The lowest level of at most so many nodes above the blocks.
   static constexpr std::size_t kMost = 64;
   static std::size_t level_of(const TetRuns& runs) {
-    std::size_t level = 1;
+    std::size_t level = runs.levels() > 2 ? 2 : 1;
     while (runs.nodes(level) > kMost) ++level;
     return level;
   }
@@ -293,6 +293,9 @@ void find_tets(const FindTets& where, std::span<const float> points, std::span<c
         search.wait_for(kWidth * at.node + i, at.point, node, i, steps);
       });
     } else {
+      if (at.level == 1 &&
+          where.tree.blocks[at.node].load(std::memory_order_acquire) != BoxTree::State::fitted)
+        fit_block(where, at.node);
       for_bits(
           children_around(where.tree.above[where.runs.first(at.level) + at.node], point),
           [&](std::size_t i) HWY_ATTR {

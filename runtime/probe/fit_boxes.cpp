@@ -44,6 +44,21 @@ HWY_INLINE Box bound_run(const float* nodes, std::span<const std::uint32_t> rows
   }
   return box;
 }
+HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, float* padded, std::size_t b) {
+  Box box{{kFar, kFar, kFar, 0}, {-kFar, -kFar, -kFar, 0}};
+  const auto take = [&](std::uint32_t node, float* to) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const float x = nodes[3 * std::size_t{node} + a];
+      if (to != nullptr) to[a] = x;
+      box.low[a] = std::min(box.low[a], x);
+      box.high[a] = std::max(box.high[a], x);
+    }
+  };
+  for (std::size_t n = runs.own(b); n < runs.own(b + 1); ++n)
+    take(runs.order()[n], padded + TetRuns::stride * n);
+  for (const std::uint32_t node : runs.shared(b)) take(node, nullptr);
+  return box;
+}
 HWY_INLINE void count_nodes(const float* nodes, std::span<const std::uint32_t> rows, const float (&from)[4],
                             float scale, std::uint32_t low, float finer, RunWords& out) {
   for (std::size_t n = 0; n < rows.size(); ++n) {
@@ -81,6 +96,35 @@ HWY_INLINE Box bound_run(const float* nodes, std::span<const std::uint32_t> rows
   auto low = hn::LoadU(F4(), nodes + rows[0]), high = low;
   for (const std::uint32_t row : rows) {
     const auto x = hn::LoadU(F4(), nodes + row);
+    low = hn::Min(low, x);
+    high = hn::Max(high, x);
+  }
+  Box box;
+  hn::Store(low, F4(), box.low);
+  hn::Store(high, F4(), box.high);
+  return box;
+}
+
+// A node of the mesh, of which nothing follows the last, and a zero.
+HWY_INLINE hn::Vec<F4> mesh_node(std::span<const float> nodes, std::size_t node) {
+  const float* from = nodes.data() + 3 * node;
+  if (HWY_UNLIKELY(3 * node + 4 > nodes.size())) {
+    HWY_ALIGN const float last[4] = {from[0], from[1], from[2], 0};
+    return hn::Load(F4(), last);
+  }
+  return hn::IfThenElseZero(hn::FirstN(F4(), 3), hn::LoadU(F4(), from));
+}
+HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, float* padded, std::size_t b) {
+  const std::span<const std::uint32_t> order = runs.order();
+  auto low = hn::Set(F4(), kFar), high = hn::Set(F4(), -kFar);
+  for (std::size_t n = runs.own(b); n < runs.own(b + 1); ++n) {
+    const auto x = mesh_node(nodes, order[n]);
+    hn::Store(x, F4(), padded + TetRuns::stride * n);
+    low = hn::Min(low, x);
+    high = hn::Max(high, x);
+  }
+  for (const std::uint32_t node : runs.shared(b)) {
+    const auto x = mesh_node(nodes, node);
     low = hn::Min(low, x);
     high = hn::Max(high, x);
   }
@@ -206,19 +250,28 @@ struct Below {
   }
 };
 
-void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
-               std::size_t end) {
-  Below below{runs, nodes, tree, {}, {}, {}};
-  for (std::size_t above = begin; above < end; ++above) {
-    for (std::size_t node = kWidth * above; node < std::min(runs.nodes(0), kWidth * (above + 1)); ++node) {
-      const Box box = below.fit(node);
-      for (std::size_t a = 0; a < 3; ++a) {
-        tree.above[above].low[a][node % kWidth] = box.low[a];
-        tree.above[above].high[a][node % kWidth] = box.high[a];
-      }
+void fit_block(const FindTets& where, std::size_t b) {
+  Below below{where.runs, where.nodes, where.tree, {}, {}, {}};
+  BoxNode& above = where.tree.above[b];
+  for (std::size_t node = kWidth * b; node < std::min(where.runs.nodes(0), kWidth * (b + 1)); ++node) {
+    const Box box = below.fit(node);
+    for (std::size_t a = 0; a < 3; ++a) {
+      above.low[a][node % kWidth] = box.low[a];
+      above.high[a][node % kWidth] = box.high[a];
     }
   }
   hwy::FlushStream();  // what went past the caches, before another thread looks
+}
+
+void bound_block(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
+                 std::size_t b) {
+  const Box box = bound_nodes(runs, nodes, padded.data(), b);
+  if (runs.levels() == 2) return;
+  BoxNode& above = tree.above[runs.first(2) + b / kWidth];
+  for (std::size_t a = 0; a < 3; ++a) {
+    above.low[a][b % kWidth] = box.low[a];
+    above.high[a][b % kWidth] = box.high[a];
+  }
 }
 
 }  // namespace ecorche::runtime::HWY_NAMESPACE
@@ -227,11 +280,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ecorche::runtime::kernels {
 
-HWY_EXPORT(fit_boxes);
+HWY_EXPORT(fit_block);
+HWY_EXPORT(bound_block);
 
-void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
-               std::size_t end) {
-  HWY_DYNAMIC_DISPATCH(fit_boxes)(runs, nodes, tree, begin, end);
+void fit_block(const FindTets& where, std::size_t b) {
+  HWY_DYNAMIC_DISPATCH(fit_block)(where, b);
+}
+
+void bound_block(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
+                 std::size_t b) {
+  HWY_DYNAMIC_DISPATCH(bound_block)(runs, nodes, padded, tree, b);
 }
 
 }  // namespace ecorche::runtime::kernels

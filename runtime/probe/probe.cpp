@@ -112,13 +112,17 @@ struct Probe::Way {
 
 Probe::Probe(std::shared_ptr<const Model> model)
     : model_(std::move(model)), runs_(model_->tets, model_->nodes), columns_(*model_) {
-  pad_nodes(runs_, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_);
-  fit_boxes(runs_, rest_nodes_, rest_);
+  runtime::follow(runs_, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_,
+                  rest_);
+  fit_blocks({runs_, rest_nodes_, rest_});
 }
 
 void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
-  pad_nodes(runs_, nodes, tree.nodes);
-  fit_boxes(runs_, tree.nodes, tree.boxes);
+  runtime::follow(runs_, nodes, tree.nodes, tree.boxes);
+}
+
+void Probe::fit(const PosedTree& tree) const {
+  fit_blocks({runs_, tree.nodes, tree.boxes});
 }
 
 void Probe::posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,

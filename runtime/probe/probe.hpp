@@ -55,13 +55,16 @@ class Probe {
   explicit Probe(std::shared_ptr<const Model> model);
 
   /// The tree about one posed body. Kept from pose to pose, so that nothing of the body's size is allocated
-  /// again; one writer at a time.
+  /// again. Blocks of it are fitted by who first asks for a point in them.
   struct PosedTree {
     PaddedNodes nodes;
-    BoxTree boxes;
+    mutable BoxTree boxes;
   };
-  /// Must follow every new pose. `nodes`: 3 * #nodes, LPS mm, finite. O(#nodes), parallel.
+  /// Must follow every new pose; nobody may ask meanwhile. `nodes`: 3 * #nodes, LPS mm, finite. O(#nodes),
+  /// parallel.
   void follow(std::span<const float> nodes, PosedTree& tree) const;
+  /// All of the tree, several times the work of follow(), so that no point waits for its block. Parallel.
+  void fit(const PosedTree& tree) const;
 
   /// `points`: 3 * #P, LPS mm; those that are not finite lie outside. Any number of threads may ask the same
   /// tree. Throws Error{usage} for a volume that the model has not.
@@ -79,7 +82,7 @@ class Probe {
   std::shared_ptr<const Model> model_;
   TetRuns runs_;
   PaddedNodes rest_nodes_;
-  BoxTree rest_;
+  mutable BoxTree rest_;  // all of it fitted
   TissueColumns columns_;
   mutable std::once_flag cells_made_;
   mutable std::unique_ptr<const TissueCells> cells_;  // made by the first who asks for tissues

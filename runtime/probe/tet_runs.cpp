@@ -12,7 +12,7 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::size_t kWidth = TetRuns::width;
+constexpr std::size_t kWidth = TetRuns::width, kRunsOfBlock = kWidth * kWidth;
 static_assert(kWidth == TetPalettes::width && sizeof(PackedRun) == 64 && sizeof(ByteBoxes) == 128);
 
 BoxNode empty_node() {
@@ -44,8 +44,11 @@ TetRuns::TetRuns(const Tets& tets, const PointsF& nodes) : tet_(halving_order(te
     order_.push_back(node);
   };
   for (std::size_t r = 0; r < runs; ++r) {
+    if (r % kRunsOfBlock == 0) own_.push_back(static_cast<std::uint32_t>(order_.size()));
     for (const std::uint32_t row : palettes.rows_of(r)) come_to(row / stride);
   }
+  if (runs == 0) own_.push_back(0);
+  own_.push_back(static_cast<std::uint32_t>(order_.size()));
   for (std::uint32_t node = 0; node < count; ++node) come_to(node);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, runs, 1024), [&](const auto& range) {
     for (std::size_t r = range.begin(); r < range.end(); ++r) {
@@ -62,32 +65,45 @@ TetRuns::TetRuns(const Tets& tets, const PointsF& nodes) : tet_(halving_order(te
     nodes_[levels_] = level;
     first_[levels_ + 1] = levels_ == 0 ? 0 : first_[levels_] + level;
     ++levels_;
-  } while (level > 1 || levels_ < 2);  // what is fitted in parallel always has a node above it
+  } while (level > 1 || levels_ < 2);  // there is a block
+  find_shared();
 }
 
-void pad_nodes(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& out) {
-  const std::span<const std::uint32_t> order = runs.order();
-  out.resize(4 * order.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 16384), [&](const auto& range) {
-    // Not std::copy_n, which calls a function for every node.
-    for (std::size_t n = range.begin(); n < range.end(); ++n) {
-      const float* from = &nodes[std::size_t{3} * order[n]];
-      for (std::size_t a = 0; a < 3; ++a) out[4 * n + a] = from[a];
+void TetRuns::find_shared() {
+  std::vector<std::vector<std::uint32_t>> shared(blocks());
+  tbb::parallel_for(std::size_t{0}, blocks(), [&](std::size_t b) {
+    for (std::size_t r = kRunsOfBlock * b; r < std::min(runs(), kRunsOfBlock * (b + 1)); ++r) {
+      for (const std::uint32_t row : rows(r)) {
+        if (row / stride < own_[b]) shared[b].push_back(order_[row / stride]);
+      }
     }
+    std::sort(shared[b].begin(), shared[b].end());
+    shared[b].erase(std::unique(shared[b].begin(), shared[b].end()), shared[b].end());
   });
+  first_shared_.push_back(0);
+  for (const std::vector<std::uint32_t>& nodes : shared) {
+    shared_.insert(shared_.end(), nodes.begin(), nodes.end());
+    first_shared_.push_back(static_cast<std::uint32_t>(shared_.size()));
+  }
 }
 
-void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree) {
+void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree) {
   const std::size_t levels = runs.levels(), above = runs.first(levels);
   if (tree.above.size() != above || tree.runs.size() != runs.runs() + 1) {
     tree.above.assign(above, empty_node());
     tree.lowest.resize(runs.nodes(0));
     tree.runs.resize(runs.runs() + 1);
+    tree.blocks = std::vector<std::atomic<BoxTree::State>>(runs.blocks());
   }
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, runs.nodes(1), 4), [&](const auto& range) {
-    kernels::fit_boxes(runs, nodes, tree, range.begin(), range.end());
+  padded.resize(TetRuns::stride * runs.order().size());
+  for (auto& block : tree.blocks) block.store(BoxTree::State::stale, std::memory_order_relaxed);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, runs.blocks(), 8), [&](const auto& range) {
+    for (std::size_t b = range.begin(); b < range.end(); ++b)
+      kernels::bound_block(runs, nodes, padded, tree, b);
   });
-  for (std::size_t level = 2; level < levels; ++level) {
+  // Points are sorted by the box of the top.
+  if (runs.blocks() == 1) return fit_block({runs, padded, tree}, 0);
+  for (std::size_t level = 3; level < levels; ++level) {
     for (std::size_t i = 0; i < runs.nodes(level - 1); ++i) {
       const BoxNode& child = tree.above[runs.first(level - 1) + i];
       BoxNode& parent = tree.above[runs.first(level) + i / kWidth];
@@ -97,6 +113,24 @@ void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree) {
       }
     }
   }
+}
+
+void fit_block(const FindTets& where, std::size_t b) {
+  std::atomic<BoxTree::State>& state = where.tree.blocks[b];
+  BoxTree::State seen = BoxTree::State::stale;
+  if (state.compare_exchange_strong(seen, BoxTree::State::being_fitted, std::memory_order_acquire)) {
+    kernels::fit_block(where, b);
+    state.store(BoxTree::State::fitted, std::memory_order_release);
+    state.notify_all();
+  } else if (seen == BoxTree::State::being_fitted) {
+    state.wait(seen, std::memory_order_acquire);
+  }
+}
+
+void fit_blocks(const FindTets& where) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, where.runs.blocks(), 4), [&](const auto& range) {
+    for (std::size_t b = range.begin(); b < range.end(); ++b) fit_block(where, b);
+  });
 }
 
 }  // namespace ecorche::runtime

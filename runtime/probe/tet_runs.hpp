@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which tets hold points: a tree of boxes over runs of tets, refitted to every pose.
+// Which tets hold points: a tree of boxes over runs of tets, refitted to every pose where points come to.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -21,7 +22,8 @@ struct alignas(64) PackedRun {
 };
 
 /// Made once per mesh. Sixteen tets that follow each other in halving_order are a run, sixteen runs a node of
-/// the tree's level 0, sixteen nodes one of the next level.
+/// the tree's level 0, sixteen nodes one of the next level. A *block* is what lies beneath a node of level 1:
+/// 4096 tets.
 class TetRuns {
  public:
   static constexpr std::size_t width = 16;
@@ -34,11 +36,18 @@ class TetRuns {
   /// At least two; the last is one node.
   std::size_t levels() const { return levels_; }
   std::size_t nodes(std::size_t level) const { return nodes_[level]; }
+  std::size_t blocks() const { return nodes_[1]; }
   /// Of the levels above 0, where `level` begins.
   std::size_t first(std::size_t level) const { return first_[level]; }
 
   /// #nodes: those of the mesh in the order in which runs come to them, so that those of a run lie together.
   std::span<const std::uint32_t> order() const { return order_; }
+  /// Block `b` is the first to have the nodes order()[own(b) .. own(b + 1)); own(blocks()): nodes of tets.
+  std::size_t own(std::size_t b) const { return own_[b]; }
+  /// The others that it has, of the mesh, each once.
+  std::span<const std::uint32_t> shared(std::size_t b) const {
+    return {shared_.data() + first_shared_[b], first_shared_[b + 1] - first_shared_[b]};
+  }
   /// Where the nodes of run `r` begin in PaddedNodes, each once; filled up with the last to a multiple of
   /// eight.
   std::span<const std::uint32_t> rows(std::size_t r) const {
@@ -60,8 +69,11 @@ class TetRuns {
  private:
   static constexpr std::uint8_t unpacked = 64;  // added to the bytes of a run whose nodes do not fit
 
+  void find_shared();
+
   std::vector<std::uint32_t> tet_;
   std::vector<std::uint32_t> order_;
+  std::vector<std::uint32_t> own_, first_shared_, shared_;
   std::vector<std::uint32_t> begin_, rows_;
   Aligned<std::array<std::uint8_t, 4 * width>> corners_;
   std::size_t levels_ = 0;
@@ -86,26 +98,33 @@ struct alignas(64) ByteBoxes {
 /// Nodes as x, y, z and a zero, so that each is one load; 4 * #nodes, in TetRuns::order.
 using PaddedNodes = Aligned<float>;
 
-/// The tree about one place of the nodes.
+/// The tree about one place of the nodes. What lies in a block is fitted when a search first comes there: of
+/// a pose's tets few points see few.
 struct BoxTree {
-  Aligned<BoxNode> above;     ///< of levels 1 and more
+  enum class State : std::uint8_t { stale, being_fitted, fitted };
+
+  Aligned<BoxNode> above;     ///< of levels 1 and more; those of level 1 are of their blocks
   Aligned<ByteBoxes> lowest;  ///< of level 0
   Aligned<PackedRun> runs;    ///< and one more, so that vectors may be read beyond the last
+  std::vector<std::atomic<State>> blocks;
 };
 
-/// Where to look. `tree` is what fit_boxes made of `nodes`.
+/// Where to look. `tree` follows `nodes`; blocks of it are written, each by one of all who look.
 struct FindTets {
   const TetRuns& runs;
   const PaddedNodes& nodes;
-  const BoxTree& tree;
+  BoxTree& tree;
 };
 
-/// Boxes of every run and every node of the tree about `nodes`. Allocates only where `tree` was not made for
-/// these runs yet. Parallel.
-void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree);
+/// Brings the tree to `nodes` (3 * #nodes of the mesh, finite), of which `padded` gets those of tets: boxes
+/// of all blocks and of what lies above them; the blocks themselves become stale, but for an only one. Nobody
+/// may look meanwhile. Allocates only where `padded` and `tree` were not made for these runs yet. Parallel.
+void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree);
 
-/// `nodes`: 3 * #nodes, finite. Allocates only where `out` has another size. Parallel.
-void pad_nodes(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& out);
+/// The block `b`, unless it is fitted already; returns once it is. Any number of threads.
+void fit_block(const FindTets& where, std::size_t b);
+/// All of them, parallel.
+void fit_blocks(const FindTets& where);
 
 /// Where a point lies in a mesh.
 struct TetPlace {
@@ -117,9 +136,13 @@ struct TetPlace {
 };
 
 namespace kernels {
-/// The runs under nodes [begin, end) of level 1 of the tree, their boxes, and those of the nodes.
-void fit_boxes(const TetRuns& runs, const PaddedNodes& nodes, BoxTree& tree, std::size_t begin,
-               std::size_t end);
+/// Fits block `b`: its runs, their boxes, and the node of level 1 itself.
+void fit_block(const FindTets& where, std::size_t b);
+
+/// Pads the block's own nodes and puts the box of all of its nodes into the tree above it, where there is
+/// one.
+void bound_block(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
+                 std::size_t b);
 
 /// `out`: #which; the tet that holds each of the points `which` (rows of `points`, 3 each). Where several do:
 /// those of positive volume before inverted ones, then the lowest index, as volumes are posed (resample.hpp).

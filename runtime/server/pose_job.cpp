@@ -246,7 +246,9 @@ void hand_over(const PoseJob& job, PosedFrame frame) {
 // Every frame of the posed body.
 Status show(const PoseJob& job, runtime::PosedBody& body, const v1::ServerTimings& timings) {
   if (job.probe) {
-    job.model->probe().follow(body.nodes, job.probe->tree);
+    const runtime::Probe& probe = job.model->probe();
+    probe.follow(body.nodes, job.probe->tree);
+    if (job.probe_many) probe.fit(job.probe->tree);
     job.probe->sequence = job.request.sequence;
     job.on_probe();
   }

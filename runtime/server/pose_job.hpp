@@ -46,7 +46,7 @@ struct PosedFrame {
   std::shared_ptr<const v1::PoseQuality> judged = {};  ///< where it was measured with this frame
 };
 
-/// A posed body as probes ask it. Not written once it is shown to them.
+/// A posed body as probes ask it, any number of them at a time.
 struct ProbeFrame {
   std::uint64_t sequence = 0;
   runtime::Probe::PosedTree tree;
@@ -65,6 +65,7 @@ struct PoseJob {
   const FrameMemory* memory = nullptr;  ///< counts the frames
   FrameMemory::Room room;               ///< about what they will take
   std::shared_ptr<ProbeFrame> probe;    ///< to be filled; null where nobody probes
+  bool probe_many = false;              ///< points: the first must not wait until all is fitted that they see
   /// Called on the worker, in this order: the outcome once, `probe` once it is filled, then every frame,
   /// meshes before volumes (which take longer).
   std::function<void(PoseOutcome)> on_outcome;

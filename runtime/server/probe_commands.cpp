@@ -107,15 +107,16 @@ void Connection::handle_probe(const wire::Frame& frame) {
     status = {StatusCode::resource_exhausted, "probe: four wait already (read their answers first)"};
   if (!status.ok()) return answer_status(id, status);
   ++probing_;
-  session_->probe([weak = weak_from_this(), asked, id,
-                   model = session_->model()](const std::shared_ptr<const ProbeFrame>& body) {
+  const bool few = asked->points.size() <= 3 * kFewPoints;
+  const auto ready = [weak = weak_from_this(), asked, id, few,
+                      model = session_->model()](const std::shared_ptr<const ProbeFrame>& body) {
     const auto self = weak.lock();
     if (!self) return;
     if (!body) {
       asked->status = {StatusCode::unavailable, "probe: the body could not be posed (see the last PoseAck)"};
       return self->answer_probe(id, asked, std::make_shared<const ProbeFrame>());
     }
-    if (asked->points.size() <= 3 * kFewPoints && !asked->wants.tissue) {
+    if (few && !asked->wants.tissue) {
       ask(*model, *body, *asked);
       return self->answer_probe(id, asked, body);
     }
@@ -123,7 +124,8 @@ void Connection::handle_probe(const wire::Frame& frame) {
                          [weak, id, asked, body] {
                            if (const auto still = weak.lock()) still->answer_probe(id, asked, body);
                          });
-  });
+  };
+  session_->probe(ready, !few);
 }
 
 void Connection::answer_probe(std::uint64_t id, const std::shared_ptr<ProbeAsked>& asked,

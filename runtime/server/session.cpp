@@ -190,8 +190,9 @@ std::optional<Clock::time_point> Session::waiting() const {
   return last_seen_;
 }
 
-void Session::probe(Ready ready) {
+void Session::probe(Ready ready, bool many) {
   probed_ = Clock::now();
+  if (many) probed_many_ = probed_;
   if (probe_frame_) return ready(probe_frame_);
   probes_.push_back(std::move(ready));
   start_job();

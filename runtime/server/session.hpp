@@ -104,9 +104,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void set_thresholds(const runtime::QualityThresholds& thresholds);
 
   /// Calls `ready` with the posed body, at once where it is at hand; null where it cannot be posed. As long
-  /// as somebody asks every second, every pose is made ready.
+  /// as somebody asks every second, every pose is made ready: all of it where `many` points are asked.
   using Ready = std::function<void(const std::shared_ptr<const ProbeFrame>&)>;
-  void probe(Ready ready);
+  void probe(Ready ready, bool many);
 
   /// What is shown from now on goes into it, until it is taken away.
   void record(std::shared_ptr<Recording> recording) { recording_ = std::move(recording); }
@@ -214,7 +214,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::vector<std::shared_ptr<ProbeFrame>> probe_frames_;  ///< to be filled again once nobody asks them
   std::shared_ptr<const ProbeFrame> probe_frame_;          ///< of the pose that is shown
   std::vector<Ready> probes_;                              ///< wait for one
-  std::optional<Clock::time_point> probed_;
+  std::optional<Clock::time_point> probed_, probed_many_;
 
   std::uint64_t recorded_job_ = 0;  ///< PoseJob::number of the last recorded pose
 };

@@ -200,8 +200,10 @@ void Session::take_up(PoseJob& job) {
   job.thresholds = thresholds_;
   job.digests = recording_ != nullptr;
   job.memory = &memory_;
-  const bool probing = !probes_.empty() || (probed_ && Clock::now() - *probed_ < kProbing);
+  const auto lately = [](const auto& then) { return then && Clock::now() - *then < kProbing; };
+  const bool probing = !probes_.empty() || lately(probed_);
   if (probing) job.probe = spare_probe();
+  job.probe_many = lately(probed_many_);
   if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
   const auto now = Clock::now();
   job.judge = refresh ? rests(now) : rested_;

@@ -121,8 +121,8 @@ TEST(TetRuns, StepsAreTheNearestToTheNodes) {
     hwy::SetSupportedTargetsForTest(target);
     PaddedNodes padded;
     BoxTree boxes;
-    pad_nodes(runs, nodes, padded);
-    fit_boxes(runs, padded, boxes);
+    follow(runs, nodes, padded, boxes);
+    fit_blocks({runs, padded, boxes});
     std::size_t packed = 0;
     for (std::size_t x = 0; x < 192 * runs.runs(); ++x) {
       const std::size_t r = x / 192, i = x / 12 % 16, c = x / 3 % 4, a = x % 3;
