@@ -110,10 +110,14 @@ struct Probe::Way {
   }
 };
 
-Probe::Probe(std::shared_ptr<const Model> model)
-    : model_(std::move(model)), runs_(model_->tets, model_->nodes), columns_(*model_) {
-  runtime::follow(runs_, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())}, rest_nodes_,
-                  rest_);
+Probe::Probe(std::shared_ptr<const Model> model, std::span<const std::uint32_t> given)
+    : model_(std::move(model)), runs_(model_->tets, model_->nodes, given), columns_(*model_) {
+  const std::span nodes(model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size()));
+  std::vector<float> rows(
+      given.empty() ? 0 : 3 * (std::size_t{1} + *std::max_element(given.begin(), given.end())));
+  for (std::size_t n = 0; n < given.size(); ++n)
+    std::copy_n(&nodes[3 * n], 3, &rows[3 * std::size_t{given[n]}]);
+  runtime::follow(runs_, given.empty() ? nodes : std::span<const float>(rows), rest_nodes_, rest_);
   fit_blocks({runs_, rest_nodes_, rest_});
 }
 

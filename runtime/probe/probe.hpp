@@ -52,7 +52,9 @@ struct Probed {
 /// one, then the lowest index. Results are the same for any number of threads.
 class Probe {
  public:
-  explicit Probe(std::shared_ptr<const Model> model);
+  /// `given`: #nodes, the row of a node in what follow() is given (as BodyPoser::lanes tells of its lanes);
+  /// empty: its own.
+  explicit Probe(std::shared_ptr<const Model> model, std::span<const std::uint32_t> given = {});
 
   /// The tree about one posed body. Kept from pose to pose, so that nothing of the body's size is allocated
   /// again. Blocks of it are fitted by who first asks for a point in them.
@@ -60,8 +62,8 @@ class Probe {
     PaddedNodes nodes;
     mutable BoxTree boxes;
   };
-  /// Must follow every new pose; nobody may ask meanwhile. `nodes`: 3 * #nodes, LPS mm, finite. O(#nodes),
-  /// parallel.
+  /// Must follow every new pose; nobody may ask meanwhile. `nodes`: 3 a row, LPS mm, those of nodes finite.
+  /// O(#nodes), parallel.
   void follow(std::span<const float> nodes, PosedTree& tree) const;
   /// All of the tree, several times the work of follow(), so that no point waits for its block. Parallel.
   void fit(const PosedTree& tree) const;

@@ -25,7 +25,8 @@ BoxNode empty_node() {
 
 }  // namespace
 
-TetRuns::TetRuns(const Tets& tets, const PointsF& nodes) : tet_(halving_order(tets, nodes, width)) {
+TetRuns::TetRuns(const Tets& tets, const PointsF& nodes, std::span<const std::uint32_t> given)
+    : tet_(halving_order(tets, nodes, width)) {
   const TetPalettes palettes(tets, tet_, stride);
   const std::size_t runs = palettes.runs();
   if (!tet_.empty()) tet_.resize(width * runs, tet_.back());
@@ -66,6 +67,9 @@ TetRuns::TetRuns(const Tets& tets, const PointsF& nodes) : tet_(halving_order(te
     first_[levels_ + 1] = levels_ == 0 ? 0 : first_[levels_] + level;
     ++levels_;
   } while (level > 1 || levels_ < 2);  // there is a block
+  if (!given.empty()) {
+    for (std::uint32_t& node : order_) node = given[node];
+  }
   find_shared();
 }
 

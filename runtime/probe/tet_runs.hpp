@@ -30,7 +30,8 @@ class TetRuns {
   static constexpr std::size_t most_levels = 8;  ///< 16^8 tets: beyond 32 bits
   static constexpr std::uint32_t stride = 4;     ///< of PaddedNodes
 
-  TetRuns(const Tets& tets, const PointsF& nodes);
+  /// `given`: #nodes, the row at which follow() is given a node; empty: its own.
+  TetRuns(const Tets& tets, const PointsF& nodes, std::span<const std::uint32_t> given = {});
 
   std::size_t runs() const { return corners_.size(); }
   /// At least two; the last is one node.
@@ -41,10 +42,11 @@ class TetRuns {
   std::size_t first(std::size_t level) const { return first_[level]; }
 
   /// #nodes: those of the mesh in the order in which runs come to them, so that those of a run lie together.
+  /// By the rows at which they are given.
   std::span<const std::uint32_t> order() const { return order_; }
   /// Block `b` is the first to have the nodes order()[own(b) .. own(b + 1)); own(blocks()): nodes of tets.
   std::size_t own(std::size_t b) const { return own_[b]; }
-  /// The others that it has, of the mesh, each once.
+  /// The others that it has, each once, by the rows at which they are given.
   std::span<const std::uint32_t> shared(std::size_t b) const {
     return {shared_.data() + first_shared_[b], first_shared_[b + 1] - first_shared_[b]};
   }
@@ -116,9 +118,10 @@ struct FindTets {
   BoxTree& tree;
 };
 
-/// Brings the tree to `nodes` (3 * #nodes of the mesh, finite), of which `padded` gets those of tets: boxes
-/// of all blocks and of what lies above them; the blocks themselves become stale, but for an only one. Nobody
-/// may look meanwhile. Allocates only where `padded` and `tree` were not made for these runs yet. Parallel.
+/// Brings the tree to `nodes` (3 for each row that may be given, finite), of which `padded` gets those of
+/// tets: boxes of all blocks and of what lies above them; the blocks themselves become stale, but for an only
+/// one. Nobody may look meanwhile. Allocates only where `padded` and `tree` were not made for these runs yet.
+/// Parallel.
 void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree);
 
 /// The block `b`, unless it is fitted already; returns once it is. Any number of threads.

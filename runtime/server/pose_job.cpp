@@ -77,17 +77,16 @@ bool measured(const PoseJob& job, const Subscription& subscription) {
   return (mesh->quality || job.judge) && subscription.quality->pose_sequence() != job.request.sequence;
 }
 
-// Quality, probes and volumes by tets look at every tet; meshes only at those that their vertices hang on,
-// spheres at none.
+// Quality and volumes by tets look at every tet, probes, too, but find their own way to its nodes; meshes
+// only at those that their vertices hang on, spheres at none.
 runtime::NodesOf nodes_wanted(const PoseJob& job) {
-  if (job.probe) return runtime::NodesOf::body;
   for (const Subscription& subscription : job.subscriptions) {
     const auto* mesh = std::get_if<MeshWant>(&subscription.want);
     const auto* volume = std::get_if<VolumeWant>(&subscription.want);
     if ((mesh && (measured(job, subscription) || mesh->control_nodes)) || (volume && !volume->by_spheres))
       return runtime::NodesOf::body;
   }
-  return runtime::NodesOf::tissues;
+  return job.probe ? runtime::NodesOf::lanes : runtime::NodesOf::tissues;
 }
 
 void describe(const ClampedJoint& clamped, const Skeleton& skeleton, v1::ClampedJoint& out) {
@@ -247,7 +246,7 @@ void hand_over(const PoseJob& job, PosedFrame frame) {
 Status show(const PoseJob& job, runtime::PosedBody& body, const v1::ServerTimings& timings) {
   if (job.probe) {
     const runtime::Probe& probe = job.model->probe();
-    probe.follow(body.nodes, job.probe->tree);
+    probe.follow(body.scratch.lanes, job.probe->tree);
     if (job.probe_many) probe.fit(job.probe->tree);
     job.probe->sequence = job.request.sequence;
     job.on_probe();

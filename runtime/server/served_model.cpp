@@ -151,7 +151,8 @@ void ServedModel::make_levels(const std::vector<std::uint32_t>& tissues) const {
 }
 
 const runtime::Probe& ServedModel::probe() const {
-  once(probe_made_, [this] { probe_ = std::make_unique<const runtime::Probe>(poser_->shared_model()); });
+  once(probe_made_,
+       [this] { probe_ = std::make_unique<const runtime::Probe>(poser_->shared_model(), poser_->lanes()); });
   return *probe_;
 }
 

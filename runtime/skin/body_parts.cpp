@@ -167,7 +167,7 @@ struct BodyParts::Frame {
 void BodyParts::choose(std::span<const std::uint32_t> tissues, NodesOf nodes,
                        PosedBody::Scratch& scratch) const {
   std::fill(scratch.mask.begin(), scratch.mask.end(), std::uint64_t{0});
-  if (nodes == NodesOf::body) {
+  if (nodes != NodesOf::tissues) {
     const std::size_t whole = clusters_.clusters() / 64, rest = clusters_.clusters() % 64;
     std::fill_n(scratch.mask.begin(), whole, ~std::uint64_t{0});
     if (rest != 0) scratch.mask[whole] = (std::uint64_t{1} << rest) - 1;

@@ -142,6 +142,10 @@ std::span<const std::uint32_t> BodyPoser::all_tissues() const {
   return impl_->all_tissues;
 }
 
+std::span<const std::uint32_t> BodyPoser::lanes() const {
+  return impl_->parts.clusters().lane;
+}
+
 PosedBody BodyPoser::make_frame(const FrameParts& parts) const {
   const Model& model = *impl_->model;
   PosedBody frame;

@@ -38,6 +38,7 @@ struct FrameParts {
 /// Which nodes a pose is worked out for.
 enum class NodesOf : std::uint8_t {
   body,     ///< all; quality and volumes need them
+  lanes,    ///< all, in PosedBody::Scratch::lanes alone: PosedBody::nodes is not written
   tissues,  ///< those that the asked tissues hang on: about half of the work. PosedBody::nodes is not written
 };
 
@@ -54,15 +55,15 @@ struct PosedBody {
   QuantiseBox box;  ///< a cube about the body's middle as its root carries it, twice the body's diagonal wide
   std::vector<ClampedJoint> clamped;  ///< reserved for all joints; what limits took away
 
-  /// Of `run`; means nothing to others.
+  /// Of `run`; but for the lanes it means nothing to others.
   struct Scratch {
     std::vector<SegmentMotion> motions;  // #segments, as the kernels read them
-    Aligned<float> lanes;                // posed nodes in the order of NodeClusters, and one float more
-    std::vector<std::uint64_t> mask;     // a bit per cluster that is skinned
-    std::vector<std::uint8_t> asked;     // #tissues
-    std::vector<std::uint32_t> begun;    // per slab, where its thread had begun
-    std::vector<std::uint32_t> late;     // runs of cells that reach across where two threads met
-    std::vector<std::uint32_t> bones;    // blocks of bones
+    Aligned<float> lanes;  // posed nodes, x, y, z in the order of BodyPoser::lanes, and one float more
+    std::vector<std::uint64_t> mask;   // a bit per cluster that is skinned
+    std::vector<std::uint8_t> asked;   // #tissues
+    std::vector<std::uint32_t> begun;  // per slab, where its thread had begun
+    std::vector<std::uint32_t> late;   // runs of cells that reach across where two threads met
+    std::vector<std::uint32_t> bones;  // blocks of bones
   } scratch;
 };
 
@@ -92,6 +93,9 @@ class BodyPoser {
 
   /// All tissues of the model.
   std::span<const std::uint32_t> all_tissues() const;
+
+  /// #nodes: which row of PosedBody::Scratch::lanes holds a node.
+  std::span<const std::uint32_t> lanes() const;
 
  private:
   struct Impl;

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <memory>
@@ -386,6 +387,34 @@ TEST_F(ProbeTest, SameAnswersForAnyNumberOfThreads) {
   EXPECT_EQ(out.tet, four.tet);
   EXPECT_EQ(out.barycentric, four.barycentric);
   EXPECT_EQ(out.tissue, four.tissue);
+}
+
+TEST_F(ProbeTest, LanesAreAsGoodAsNodes) {
+  bend(1.1);
+  const BodyPoser poser(model);
+  const Probe by_lanes(model, poser.lanes());
+  PosedBody body = poser.make_frame();
+  const std::vector<float> before = body.nodes, points = random_points(nodes, 1000);
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] = Eigen::AngleAxisd(1.1, Vector3d::UnitX());
+  pose.rotation[2] = Eigen::AngleAxisd(0.6, Vector3d::UnitZ());
+  ASSERT_TRUE(poser.run(pose, Skinning::cor, {}, body, NodesOf::lanes).ok());
+  EXPECT_EQ(body.nodes, before) << "not written";
+  Probe::PosedTree of_lanes;
+  by_lanes.follow(body.scratch.lanes, of_lanes);
+  const auto same = [](const std::vector<float>& x, const std::vector<float>& y) {
+    return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(float)) == 0;
+  };
+  Probed other;
+  probe.posed_to_rest(tree, points, {.gradient = true}, out);
+  by_lanes.posed_to_rest(of_lanes, points, {.gradient = true}, other);
+  EXPECT_EQ(out.tet, other.tet);
+  EXPECT_TRUE(same(out.points, other.points) && same(out.gradient, other.gradient));
+  EXPECT_GT(std::count_if(out.tet.begin(), out.tet.end(), [](std::int32_t t) { return t >= 0; }), 100);
+  probe.rest_to_posed(tree, points, {.gradient = true}, out);
+  by_lanes.rest_to_posed(of_lanes, points, {.gradient = true}, other);
+  EXPECT_EQ(out.tet, other.tet);
+  EXPECT_TRUE(same(out.points, other.points) && same(out.gradient, other.gradient));
 }
 
 TEST_F(ProbeTest, HugeTinyAndFlatBodiesAreSearchedTheSame) {
