@@ -19,16 +19,15 @@ class FrameMemory {
   explicit FrameMemory(std::uint64_t limit) : limit_(limit) {}
 
   std::uint64_t bytes() const { return sum_->load(std::memory_order_relaxed); }
-  bool full() const { return bytes() > limit_; }
+  /// `more`: beside what is counted.
+  bool full(std::uint64_t more = 0) const { return bytes() + more > limit_; }
   bool half_full() const { return bytes() > limit_ / 2; }
 
   /// So many bytes more, for as long as it lives: of frames that a job is going to make.
   class Room {
    public:
     Room() = default;
-    Room(const FrameMemory& memory, std::uint64_t bytes) : bytes_(bytes), sum_(memory.sum_) {
-      sum_->fetch_add(bytes_, std::memory_order_relaxed);
-    }
+    Room(const FrameMemory& memory, std::uint64_t bytes) : Room(memory.sum_, bytes) {}
     ~Room() {
       if (sum_) sum_->fetch_sub(bytes_, std::memory_order_relaxed);
     }
@@ -40,9 +39,21 @@ class FrameMemory {
     }
 
    private:
+    friend FrameMemory;
+    Room(std::shared_ptr<std::atomic<std::uint64_t>> sum, std::uint64_t bytes)
+        : bytes_(bytes), sum_(std::move(sum)) {
+      sum_->fetch_add(bytes_, std::memory_order_relaxed);
+    }
     std::uint64_t bytes_ = 0;
     std::shared_ptr<std::atomic<std::uint64_t>> sum_;
   };
+
+  /// What lattices of volumes have grown by since the rest pose may take as much again, and is counted for
+  /// itself: streams keep them, so that they would never make way.
+  bool lattices_full(std::uint64_t more) const {
+    return lattices_->load(std::memory_order_relaxed) + more > limit_;
+  }
+  Room lattice(std::uint64_t bytes) const { return Room(lattices_, bytes); }
 
   /// The frame, shared and counted.
   std::shared_ptr<const wire::EncodedFrame> hold(wire::EncodedFrame frame) const {
@@ -65,6 +76,7 @@ class FrameMemory {
 
   std::uint64_t limit_;
   std::shared_ptr<Sum> sum_ = std::make_shared<Sum>(0);
+  std::shared_ptr<Sum> lattices_ = std::make_shared<Sum>(0);
 };
 
 }  // namespace ecorche::server

@@ -132,6 +132,8 @@ void MeshStream::write_nodes(const runtime::PosedBody& body, v1::MeshFrame& fram
 }
 
 bool MeshStream::keyframe_due(std::uint64_t frame) const {
+  // The last keyframe was never made ready for deltas: its job found no memory.
+  if (unsettled_) return true;
   // Deltas that have grown to half a keyframe: the pose is another one by now. Those of a small mesh are as
   // large from the first.
   const bool grown = 2 * last_bytes_ > keyframe_bytes_ && 2 * last_bytes_ > 3 * first_bytes_;
@@ -194,12 +196,14 @@ wire::Pieces MeshStream::show(const std::shared_ptr<const Positions>& positions,
 }
 
 void MeshStream::settle(const runtime::PosedBody& body) {
-  if (!std::exchange(unsettled_, false)) return;
+  if (!unsettled_) return;
   if (keys_.empty()) {
+    std::vector<wire::DeltaKey> keys;
+    runs_.clear();
     for (std::uint32_t t = 0; t < want_.tissues.size(); ++t) {
-      keys_.emplace_back(numbers(body, t).size() / 3);
-      for (std::size_t b = 0; b < keys_[t].blocks(); b += kBlocksPerRun) {
-        const std::size_t end = std::min(keys_[t].blocks(), b + kBlocksPerRun);
+      keys.emplace_back(numbers(body, t).size() / 3);
+      for (std::size_t b = 0; b < keys[t].blocks(); b += kBlocksPerRun) {
+        const std::size_t end = std::min(keys[t].blocks(), b + kBlocksPerRun);
         const std::size_t room = wire::delta::most_bytes(end - b);
         runs_.push_back({.tissue = t,
                          .first = static_cast<std::uint32_t>(b),
@@ -208,11 +212,13 @@ void MeshStream::settle(const runtime::PosedBody& body) {
                          .bytes = std::make_unique_for_overwrite<std::byte[]>(room)});
       }
     }
+    keys_ = std::move(keys);
   }
   tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t r) {
     const Run& run = runs_[r];
     keys_[run.tissue].prepare(numbers(body, run.tissue), run.first, run.end);
   });
+  unsettled_ = false;
 }
 
 bool MeshStream::write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) {

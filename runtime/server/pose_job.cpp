@@ -222,10 +222,17 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
   frame.set_volume(subscription.volume->want().volume);
   const std::shared_ptr<wire::Payload> payload = subscription.volume->payload();
   const Status status = guarded([&] {
-    return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
-                                      frame, *payload);
+    return subscription.volume->write(*job.model, body, job.volume_voxels, *job.memory,
+                                      (subscription.keyframes & 1) != 0, frame, *payload);
   });
-  if (!status.ok()) payload->clear();
+  if (!status.ok()) {
+    payload->clear();
+    frame.clear_grid();
+    frame.clear_voxels();
+    frame.clear_bricks();
+    frame.clear_content();
+    frame.clear_keyframe();
+  }
   wire::to_proto(status, *frame.mutable_status());
   *frame.mutable_timings() = timings;
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
@@ -307,9 +314,11 @@ Status run(const PoseJob& job) {
     pose_all();
     const v1::ServerTimings timings = outcome.timings;
     const bool posed = outcome.status.ok();
-    if (posed) outcome.clamped = body->clamped;
-    job.on_outcome(std::move(outcome));
-    if (posed) status = guarded([&] { return show(job, *body, timings); });
+    status = guarded([&] {
+      if (posed) outcome.clamped = body->clamped;
+      job.on_outcome(std::move(outcome));
+      return posed ? show(job, *body, timings) : Status{};
+    });
   };
   if (job.aside || small(job)) {
     serially(all);

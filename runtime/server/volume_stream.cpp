@@ -18,13 +18,6 @@ namespace {
 // Faster than the network; the next levels give a tenth for twice the time.
 constexpr int kZstdLevel = 1;
 
-Status check_size(const ImageGrid& grid, std::uint64_t most) {
-  if (grid.voxels() <= most) return {};
-  return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(grid.voxels()) +
-                                              " voxels (at most " + std::to_string(most) +
-                                              "; keep the body nearer to the scan)"};
-}
-
 // The voxels of a brick, i fastest.
 void append_brick(const Image& image, const runtime::VoxelRange& range, std::vector<std::byte>& out) {
   const std::size_t voxel = scalar_bytes(image.type) * static_cast<std::size_t>(image.components);
@@ -40,44 +33,68 @@ void append_brick(const Image& image, const runtime::VoxelRange& range, std::vec
 }  // namespace
 
 Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& body,
-                           std::uint64_t most_voxels, bool keyframe, v1::VolumeFrame& frame,
-                           wire::Payload& payload) {
+                           std::uint64_t most_voxels, const FrameMemory& memory, bool keyframe,
+                           v1::VolumeFrame& frame, wire::Payload& payload) {
   payload.clear();
+  // Until it is whole: what moved meanwhile would be forgotten.
+  const std::uint64_t last_keyframe = std::exchange(keyframe_, 0);
   if (!want_.slices.empty()) {
     write_slices(served, body, frame, payload);
     return {};
   }
-  Status status =
-      want_.by_spheres ? by_spheres(served, body, most_voxels) : by_tets(served, body, most_voxels);
-  if (!status.ok()) return status;
+  const Room room{most_voxels, memory};
+  if (Status status = want_.by_spheres ? by_spheres(served, body, room) : by_tets(served, body, room);
+      !status.ok())
+    return status;
   wire::to_proto(posed_.image->grid, *frame.mutable_grid());
   if (want_.changed_bricks) {
-    write_bricks(keyframe, frame, payload);
+    write_bricks(keyframe, last_keyframe, frame, payload);
   } else {
     put(posed_.image->bytes, *posed_.image, frame, payload);
   }
   return {};
 }
 
-Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody& body,
-                             std::uint64_t most_voxels) {
+// A body that is carried far away makes the lattice of every stream grow: what they grew by is
+// counted.
+Status VolumeStream::find_room(const ImageGrid& grid, const ImageGrid& rest, const Image& scan,
+                               const Room& room) {
+  const std::uint64_t voxels = grid.voxels();
+  if (voxels > room.most_voxels) {
+    return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(voxels) +
+                                                " voxels (at most " + std::to_string(room.most_voxels) +
+                                                "; keep the body nearer to the scan)"};
+  }
+  const std::uint64_t beyond = (voxels - std::min<std::uint64_t>(voxels, rest.voxels())) *
+                               scalar_bytes(scan.type) * static_cast<std::uint64_t>(scan.components);
+  if (beyond > beyond_ && room.memory.lattices_full(beyond - beyond_)) {
+    return {StatusCode::resource_exhausted,
+            "volume: posed grids fill the server's memory for them (keep the body nearer to the scan)"};
+  }
+  if (beyond != beyond_) held_ = room.memory.lattice(beyond);
+  beyond_ = beyond;
+  return {};
+}
+
+Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody& body, const Room& room) {
   const ModelVolume& volume = served.model().volumes[want_.volume];
   const ImageGrid& rest = volume.image.grid;
   const ImageGrid grid = want_.region
                              ? grid_of(rest, runtime::box_within(rest, want_.region->low, want_.region->high))
                              : runtime::grow_to(rest, body.nodes);
-  if (Status status = check_size(grid, most_voxels); !status.ok()) return status;
+  if (Status status = find_room(grid, rest, volume.image, room); !status.ok()) return status;
   served.volumes().follow(body.nodes, volume, want_.sampling, grid, kept_, scratch_);
   posed_ = {&kept_.image, &kept_.bricks, &kept_.moved};
   return {};
 }
 
-Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedBody& body,
-                                std::uint64_t most_voxels) {
+Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedBody& body, const Room& room) {
+  const ModelVolume& volume = served.model().volumes[want_.volume];
   runtime::BallSet set = served.balls(want_.volume).at(body.segments);
   const runtime::LatticeBox box = runtime::box_for(set, want_.region);
-  if (Status status = check_size(grid_of(set.lattice, box), most_voxels); !status.ok()) return status;
-  runtime::follow(std::move(set), box, served.model().volumes[want_.volume], want_.sampling, refilled_);
+  if (Status status = find_room(grid_of(set.lattice, box), set.lattice, volume.image, room); !status.ok())
+    return status;
+  runtime::follow(std::move(set), box, volume, want_.sampling, refilled_);
   posed_ = {&refilled_.image, &refilled_.bricks, &refilled_.moved};
   return {};
 }
@@ -100,7 +117,8 @@ void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedB
   put(pixels, slice_, frame, payload);
 }
 
-void VolumeStream::write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload) {
+void VolumeStream::write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,
+                                wire::Payload& payload) {
   const Image& image = *posed_.image;
   const std::vector<std::uint8_t>& moved = *posed_.moved;
   if (image.grid != keyframe_grid_ || changed_.size() != moved.size()) keyframe = true;
@@ -109,16 +127,16 @@ void VolumeStream::write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Pay
   }
   // Three quarters of the bricks: another keyframe pays.
   const auto changed = static_cast<std::size_t>(std::count(changed_.begin(), changed_.end(), 1));
-  if (keyframe || keyframe_ == 0 || frame.frame() - keyframe_ >= keyframe_interval ||
+  if (keyframe || last_keyframe == 0 || frame.frame() - last_keyframe >= keyframe_interval ||
       4 * changed > 3 * changed_.size()) {
-    keyframe_ = frame.frame();
+    frame.set_keyframe(frame.frame());
+    put(image.bytes, image, frame, payload);
     keyframe_grid_ = image.grid;
     changed_.assign(moved.size(), 0);
-    frame.set_keyframe(keyframe_);
-    put(image.bytes, image, frame, payload);
+    keyframe_ = frame.frame();
     return;
   }
-  frame.set_keyframe(keyframe_);
+  frame.set_keyframe(last_keyframe);
   std::vector<std::uint32_t> bricks;
   std::vector<std::byte> voxels;
   for (std::uint32_t b = 0; b < changed_.size(); ++b) {
@@ -128,6 +146,7 @@ void VolumeStream::write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Pay
   }
   *frame.mutable_bricks() = wire::append(payload, std::span<const std::uint32_t>(bricks), 1);
   put(voxels, image, frame, payload);
+  keyframe_ = last_keyframe;
 }
 
 void VolumeStream::put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,

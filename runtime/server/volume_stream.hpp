@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/framing.hpp"
+#include "runtime/server/frame_memory.hpp"
 #include "runtime/server/payload_pool.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/server/subscription.hpp"
@@ -30,17 +31,24 @@ class VolumeStream {
   std::shared_ptr<wire::Payload> payload() const { return payloads_->take(); }
 
   /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
-  /// needs one. resource_exhausted beyond `most_voxels`.
+  /// needs one. resource_exhausted beyond `most_voxels`, and where the lattice has grown since the rest pose
+  /// and finds no room in `memory`. Whatever it throws, the next frame holds everything.
   Status write(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
-               bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
+               const FrameMemory& memory, bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
 
  private:
+  struct Room {
+    std::uint64_t most_voxels;
+    const FrameMemory& memory;
+  };
   // The whole posed volume, or its region, into posed_.
-  Status by_tets(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels);
-  Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels);
+  Status by_tets(const ServedModel& model, const runtime::PosedBody& body, const Room& room);
+  Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, const Room& room);
+  Status find_room(const ImageGrid& grid, const ImageGrid& rest, const Image& scan, const Room& room);
   void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
                     wire::Payload& payload);
-  void write_bricks(bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
+  void write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,
+                    wire::Payload& payload);
   void put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,
            wire::Payload& payload) const;
 
@@ -59,6 +67,8 @@ class VolumeStream {
   std::vector<std::uint8_t> changed_;  // a brick each: since the keyframe
   ImageGrid keyframe_grid_;
   std::uint64_t keyframe_ = 0;  // number of its frame; 0: none yet
+  std::uint64_t beyond_ = 0;    // bytes of the kept volume beyond those at rest
+  FrameMemory::Room held_;      // for those
 };
 
 }  // namespace ecorche::server

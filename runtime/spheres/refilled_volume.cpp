@@ -74,6 +74,7 @@ void follow(BallSet set, const LatticeBox& box, const ModelVolume& volume, Sampl
   RefilledVolume::Shown& shown = kept.shown;
   const bool same = shown.volume == &volume && shown.sampling == sampling && shown.box == box &&
                     shown.set.lattice == set.lattice;
+  shown.volume = nullptr;
   if (!same) {
     kept.image = Image(grid_of(set.lattice, box), volume.image.type, volume.image.components);
     kept.bricks = Bricks(kept.image.grid);
@@ -84,7 +85,6 @@ void follow(BallSet set, const LatticeBox& box, const ModelVolume& volume, Sampl
     mark(shown.set, gone, box, kept);
     mark(set, come, box, kept);
   }
-  shown.volume = nullptr;
   refill_bricks(set, box, volume.image, volume.background, sampling, {kept.bricks, kept.moved.data()},
                 kept.image, context);
   shown = {&volume, sampling, box, std::move(set)};

@@ -291,4 +291,25 @@ Model toy_model() {
   return model;
 }
 
+Model fine_toy_model(int times) {
+  Model model = toy_model();
+  Image& image = model.volumes[0].image;
+  const Image coarse = image;
+  ImageGrid grid = coarse.grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    grid.size[a] *= times;
+    grid.spacing[a] /= times;
+  }
+  image = Image(grid, coarse.type, coarse.components);
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        image.scalars<std::int16_t>()[grid.offset(i, j, k)] =
+            coarse.scalars<std::int16_t>()[coarse.grid.offset(i / times, j / times, k / times)];
+      }
+    }
+  }
+  return model;
+}
+
 }  // namespace ecorche::test

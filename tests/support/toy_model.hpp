@@ -12,4 +12,7 @@ namespace ecorche::test {
 /// about each joint.
 Model toy_model();
 
+/// The same, its CT sampled so many times as finely along each axis: several bricks from 5 on.
+Model fine_toy_model(int times);
+
 }  // namespace ecorche::test

@@ -80,23 +80,7 @@ TEST(SpheresStream, VolumesAndRegionsEqualOfflineRefilling) {
 
 // Keyframes, bricks and zstd; and planes, which no pose of the whole volume is made for.
 TEST(SpheresStream, BricksAndSlicesEqualOfflineRefilling) {
-  Model model = test::toy_model();
-  // Five times as fine, so that there are bricks.
-  ModelVolume& ct = model.volumes[0];
-  const Image coarse = ct.image;
-  ImageGrid grid = coarse.grid;
-  for (std::size_t a = 0; a < 3; ++a) {
-    grid.size[a] *= 5;
-    grid.spacing[a] /= 5;
-  }
-  ct.image = Image(grid, coarse.type, coarse.components);
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      for (int i = 0; i < grid.size[0]; ++i)
-        ct.image.scalars<std::int16_t>()[grid.offset(i, j, k)] =
-            coarse.scalars<std::int16_t>()[coarse.grid.offset(i / 5, j / 5, k / 5)];
-    }
-  }
+  const Model model = test::fine_toy_model(5);
   const TestServer server({}, model);
   TestClient client(server);
   v1::Envelope bricks = request_for("ct"), slices = request_for("ct");

@@ -29,29 +29,6 @@ struct Offline {
   runtime::PosedBody body;
 };
 
-// The toy with its first volume sampled eight times as fine, so that it has more than one brick.
-Model fine_body() {
-  Model model = test::toy_model();
-  ModelVolume& volume = model.volumes[0];
-  const Image coarse = volume.image;
-  ImageGrid& grid = volume.image.grid;
-  for (std::size_t a = 0; a < 3; ++a) {
-    grid.size[a] *= 8;
-    grid.spacing[a] /= 8;
-  }
-  volume.image.bytes.clear();
-  const std::size_t voxel = scalar_bytes(coarse.type) * static_cast<std::size_t>(coarse.components);
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      for (int i = 0; i < grid.size[0]; ++i) {
-        const std::byte* from = coarse.bytes.data() + coarse.grid.offset(i / 8, j / 8, k / 8) * voxel;
-        volume.image.bytes.insert(volume.image.bytes.end(), from, from + voxel);
-      }
-    }
-  }
-  return model;
-}
-
 wire::Frame next_volume(TestClient& client, std::uint64_t sequence) {
   return client.next([=](const v1::Envelope& e) {
     return e.has_volume_frame() && e.volume_frame().pose_sequence() == sequence;
@@ -59,7 +36,7 @@ wire::Frame next_volume(TestClient& client, std::uint64_t sequence) {
 }
 
 TEST(Volumes, EveryWayOfSendingThemGivesOfflinePosing) {
-  const Model model = fine_body();
+  const Model model = test::fine_toy_model(8);
   for (const bool compressed : {false, true}) {
     for (const bool bricks : {false, true}) {
       SCOPED_TRACE(std::string(compressed ? "compressed" : "plain") + (bricks ? " bricks" : ""));
@@ -99,6 +76,44 @@ TEST(Volumes, EveryWayOfSendingThemGivesOfflinePosing) {
       }
     }
   }
+}
+
+// A body that is carried away makes the lattice grow, for every stream: as far as there is memory.
+TEST(Volumes, ALatticeGrowsOnlyAsFarAsTheMemoryGoes) {
+  const auto model = std::make_shared<const Model>(test::toy_model());
+  const ServedModel served("toy", model);
+  const std::uint64_t scan = model->volumes[0].image.bytes.size();
+  const FrameMemory memory(3 * scan);
+  const runtime::BodyPoser poser(model);
+  const auto body_at = [&](double mm) {
+    Pose pose = Pose::rest(model->segment_count());
+    pose.root_translation.z() = mm;
+    runtime::PosedBody body = poser.make_frame();
+    EXPECT_TRUE(poser.run(pose, runtime::Skinning::cor, {}, body).ok());
+    return body;
+  };
+  VolumeWant want;
+  want.changed_bricks = true;
+  VolumeStream first(want), second(want);
+  std::uint64_t number = 0;
+  const auto write = [&](VolumeStream& stream, double mm, v1::VolumeFrame& frame) {
+    frame.Clear();
+    frame.set_frame(++number);
+    wire::Payload payload;
+    return stream.write(served, body_at(mm), 1U << 28, memory, false, frame, payload);
+  };
+  v1::VolumeFrame frame;
+  EXPECT_TRUE(write(first, 0, frame).ok());
+  EXPECT_TRUE(write(second, 0, frame).ok());
+  EXPECT_TRUE(write(first, 600, frame).ok());  // about twice the scan more
+  EXPECT_EQ(write(first, 2000, frame).code, StatusCode::resource_exhausted);
+  EXPECT_EQ(write(second, 600, frame).code, StatusCode::resource_exhausted);
+  // At home there is always room, and all of it comes.
+  EXPECT_TRUE(write(second, 0, frame).ok());
+  EXPECT_EQ(frame.keyframe(), frame.frame());
+  EXPECT_TRUE(write(first, 0, frame).ok());
+  EXPECT_TRUE(write(second, 600, frame).ok());
+  EXPECT_EQ(memory.bytes(), 0U) << "frames are not counted here";
 }
 
 TEST(Volumes, SlicesArePlanesOfThePosedVolume) {
@@ -144,7 +159,7 @@ TEST(Volumes, SlicesArePlanesOfThePosedVolume) {
 }
 
 TEST(Volumes, ARegionIsThatPartOfThePosedVolume) {
-  const Model model = fine_body();
+  const Model model = test::fine_toy_model(8);
   const TestServer server({}, model);
   TestClient client(server);
   v1::Envelope request;
