@@ -186,7 +186,7 @@ bool Session::over(Clock::time_point now) const {
 }
 
 std::optional<Clock::time_point> Session::waiting() const {
-  if (named_ || !members_.empty() || busy_) return std::nullopt;
+  if (!members_.empty() || busy_) return std::nullopt;
   return last_seen_;
 }
 

@@ -67,6 +67,7 @@ class Session : public std::enable_shared_from_this<Session> {
   ~Session();
 
   const std::string& name() const { return name_; }
+  bool named() const { return named_; }
   const std::shared_ptr<const ServedModel>& model() const { return model_; }
 
   /// Gives control to the member when nobody holds it (and nobody did during the last `linger_seconds`).
@@ -145,6 +146,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<Clock::time_point> last_keyframe;  ///< when the last one was made that somebody lacked
     Clock::time_point next_due{};                    ///< of max_rate
     std::optional<Clock::time_point> refresh_at;     ///< when the present pose is to be shown (again)
+    bool shown = false;                              ///< somebody had a frame of it
   };
 
   class Teller;
@@ -161,6 +163,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void take_up(PoseJob& job);
   bool held_back(Row& row, Clock::time_point now) const;
   void ask_levels(Row& row, bool still, Clock::time_point now) const;
+  void put_off_keyframes(Clock::time_point now);
   bool rests(Clock::time_point now) const;
   void keep_time();
   void finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job, bool refresh);
@@ -205,7 +208,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Clock::time_point posed_{};               ///< when the last pose was taken up
   Clock::time_point stirred_{};             ///< when the last pose came, or the last job ended
   bool rested_ = false;                     ///< the waiting pose came after a rest
-  Clock::time_point moved_ = Clock::now();  ///< when the pose last became another one
+  Clock::time_point moved_{};                ///< when the pose last became another one
 
   std::uint64_t last_sequence_ = 0;
   std::shared_ptr<ClipPlayer> player_;

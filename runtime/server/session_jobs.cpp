@@ -22,6 +22,9 @@ constexpr std::chrono::milliseconds kStill{150};
 // Within a stream the next pose comes so soon.
 constexpr std::chrono::milliseconds kNextPose{50};
 
+// Seconds between frames of the slowest rate.
+constexpr double kLongest = 24 * 3600;
+
 double rate_of(const Want& want) {
   return std::visit([](const auto& w) { return w.max_rate; }, want);
 }
@@ -34,8 +37,13 @@ bool same(const Pose& a, const Pose& b) {
 
 // About the bytes of a frame that holds everything.
 std::uint64_t bytes_of(const Model& model, const Want& want) {
-  if (const auto* volume = std::get_if<VolumeWant>(&want))
-    return model.volumes[volume->volume].image.bytes.size();
+  if (const auto* volume = std::get_if<VolumeWant>(&want)) {
+    const Image& scan = model.volumes[volume->volume].image;
+    if (volume->slices.empty()) return scan.bytes.size();
+    std::uint64_t pixels = 0;
+    for (const ImageGrid& plane : volume->slices) pixels += plane.voxels();
+    return pixels * scalar_bytes(scan.type) * static_cast<std::uint64_t>(scan.components);
+  }
   const MeshWant& mesh = std::get<MeshWant>(want);
   std::uint64_t vertices = 0;
   for (const std::uint32_t t : mesh.tissues)
@@ -90,6 +98,7 @@ class Session::Teller {
 };
 
 void Session::start_job() {
+  if (!slot_) put_off_keyframes(Clock::now());
   // With no room for more frames, who has none yet waits (catch_up).
   const bool fresh = !fresh_.empty() && !memory_.full();
   if (busy_ || (!slot_ && !fresh && probes_.empty())) return;
@@ -191,6 +200,18 @@ bool Session::rests(Clock::time_point now) const {
   return !busy_ && now - stirred_ > kStill;
 }
 
+// While the body moves, keyframes that somebody lacks keep their distance: who comes and goes all the time
+// must not have everybody sent every pose twice.
+void Session::put_off_keyframes(Clock::time_point now) {
+  if (now - moved_ > kStill) return;
+  for (Row& row : rows_) {
+    const bool lacked = (row.subscription.keyframes & row.subscription.levels) != 0;
+    if (!lacked || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) continue;
+    if (fresh_.erase(row.subscription.id) != 0) row.refresh_at = *row.last_keyframe + kKeyframePause;
+  }
+  keep_time();
+}
+
 // The waiting pose for everyone, or the present one for those who have not seen it.
 void Session::take_up(PoseJob& job) {
   const bool refresh = !slot_;
@@ -210,18 +231,21 @@ void Session::take_up(PoseJob& job) {
   if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
   const bool still = refresh || now - moved_ > kStill;
   std::set<std::uint32_t> later;
+  std::uint64_t bytes = 0;
   for (Row& row : rows_) {
     const bool fresh = fresh_.contains(row.subscription.id);
     if (!fresh && (refresh || held_back(row, now))) continue;
-    if (fresh && refresh && memory_.full()) {  // this job is for a probe
+    if (fresh && (refresh || !row.shown) && memory_.full(bytes)) {
       later.insert(row.subscription.id);
       continue;
     }
+    bytes += bytes_of(model_->model(), row.subscription.want);
+    row.shown = true;
     ask_levels(row, still, now);
     const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
     if (mesh && !row.subscription.quality) row.subscription.quality = known_quality(*mesh, refresh);
     if (const double rate = rate_of(row.subscription.want); rate > 0)
-      row.next_due = std::max(row.next_due + duration(1 / rate), now);
+      row.next_due = std::max(row.next_due + duration(std::min(1 / rate, kLongest)), now);
     const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
     job.subscriptions.push_back(row.subscription);
     const auto& streams = row.subscription.streams;
@@ -233,12 +257,9 @@ void Session::take_up(PoseJob& job) {
       row.last_keyframe = now;
     } else {
       job.subscriptions.back().keyframes = 0;
-      later.insert(row.subscription.id);
+      row.refresh_at = *row.last_keyframe + kKeyframePause;
     }
   }
-  std::uint64_t bytes = 0;
-  for (const Subscription& subscription : job.subscriptions)
-    bytes += bytes_of(model_->model(), subscription.want);
   job.room = FrameMemory::Room(memory_, bytes);
   fresh_ = std::move(later);
   keep_time();

@@ -33,6 +33,13 @@ class Watcher final : public Member {
   const v1::MeshFrame& frame() const { return envelope_.mesh_frame(); }
   const void* positions() const { return positions_; }
   const std::shared_ptr<const wire::EncodedFrame>& bytes() const { return bytes_; }
+  const std::vector<std::uint64_t>& numbers() const { return numbers_; }
+  // Holds on to every frame, not just to the last, until it is told to let go.
+  void hold() { holds_ = true; }
+  void let_go() {
+    held_.clear();
+    bytes_.reset();
+  }
   // As if it had not got what the next frame is against.
   void lose_next() { loses_ = true; }
   Clock::time_point last() const { return last_; }
@@ -41,6 +48,8 @@ class Watcher final : public Member {
   bool deliver(const PosedFrame& frame) override {
     judged_.push_back(frame.judged != nullptr);
     keyframes_.push_back(frame.keyframe == frame.number);
+    numbers_.push_back(frame.number);
+    if (holds_) held_.push_back(frame.bytes);
     bytes_ = frame.bytes;
     const auto& pieces = frame.bytes->pieces.parts;
     positions_ = pieces.empty() ? nullptr : pieces.front().data();
@@ -61,7 +70,9 @@ class Watcher final : public Member {
   std::shared_ptr<const wire::EncodedFrame> bytes_;
   v1::Envelope envelope_;
   const void* positions_ = nullptr;
-  bool loses_ = false;
+  std::vector<std::uint64_t> numbers_;
+  std::vector<std::shared_ptr<const wire::EncodedFrame>> held_;
+  bool loses_ = false, holds_ = false;
   Clock::time_point last_{};
 };
 
@@ -87,8 +98,9 @@ class Gate {
 };
 
 struct Stage {
-  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32)
-      : model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(test::toy_model()))),
+  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32, std::uint64_t bytes = std::uint64_t{1} << 30)
+      : memory(bytes),
+        model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(test::toy_model()))),
         workers(1,
                 [this](const Job& job) {
                   gate.pass();
@@ -96,10 +108,15 @@ struct Stage {
                 }),
         session(open("a", true)) {
     session->join(watcher);
-    MeshWant want;
     want.tissues = {0};
     want.encoding = encoding;
-    session->subscribe(watcher, {.id = 0, .want = want, .request = {}});
+    subscribe(watcher);
+  }
+  // To what the watcher sees, or, with another rate, to the same once more.
+  std::uint32_t subscribe(Watcher& who, double rate = 0) {
+    MeshWant wanted = want;
+    wanted.max_rate = rate;
+    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}}).id;
   }
   ~Stage() {
     gate.open();
@@ -143,13 +160,14 @@ struct Stage {
 
   net::io_context io;
   Limits limits;
-  FrameMemory memory{std::uint64_t{1} << 30};
+  FrameMemory memory;
   Judging judging{io};
   Openings openings;
   Metrics metrics;
   Gate gate;
   std::shared_ptr<const ServedModel> model;
   Workers workers;
+  MeshWant want;
   Watcher watcher;
   std::size_t seen = 0;  // of its frames
   std::shared_ptr<Session> session;
