@@ -19,6 +19,8 @@ namespace {
 constexpr std::size_t kMostAnswers = 64;
 // Frames of one write.
 constexpr std::size_t kMostTogether = 16;
+// Of one read: a client that sends its messages in smaller pieces pays for each as for a message.
+constexpr std::size_t kLittle = 64;
 // Of the time until a client is dropped that acknowledges nothing, where frames fill half of the memory for
 // them.
 constexpr double kLessPatience = 0.25;
@@ -87,9 +89,10 @@ void Connection::end(const Status& status) {
 }
 
 void Connection::end(v1::Envelope last) {
-  if (std::exchange(ending_, true)) return;
-  ending_since_ = Clock::now();
+  if (ending_) return;
   answer(0, std::move(last));
+  ending_ = true;
+  ending_since_ = Clock::now();
 }
 
 void Connection::close(const char* why) {
@@ -183,12 +186,14 @@ net::awaitable<void> Connection::read_frames() {
     }
     heard_ = Clock::now();
     house_.metrics().read(n);
+    const bool trickles = n < kLittle;
     if (!direct && n > 0) {
       co_await take_apart(std::span<const std::byte>(inbox_).first(n));
-      continue;
+    } else {
+      take_in(n, true);
+      if (reader_.between_frames()) co_await hold_back();
     }
-    take_in(n, true);
-    if (reader_.between_frames()) co_await hold_back();
+    if (trickles && !reader_.between_frames()) co_await hold_back();
   }
   co_await discard();
 }
@@ -261,6 +266,7 @@ net::awaitable<void> Connection::write_frames() {
     const auto start = Clock::now();
     bool posed = false;
     while (frames.size() < kMostTogether && !posed) {
+      if (ending_ && outbox_.answers() == 0) break;  // nothing comes after the last words
       SharedFrame frame = outbox_.next(start);
       if (!frame) break;
       posed = outbox_.last_was_posed();
@@ -309,7 +315,7 @@ std::uint32_t Connection::ask_level(std::uint32_t subscription, std::uint32_t fi
 
 void Connection::answer(std::uint64_t request_id, v1::Envelope envelope,
                         std::shared_ptr<const wire::Payload> payload) {
-  if (closed_) return;
+  if (closed_ || ending_) return;
   envelope.set_request_id(request_id);
   outbox_.answer(wire::encode(envelope, std::move(payload)));
   wake_.cancel();

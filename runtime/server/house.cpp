@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <new>
+#include <tuple>
 #include <utility>
 
 namespace ecorche::server {
@@ -128,14 +129,17 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
   return {};
 }
 
-// The one that waits for longest, of those that only wait for a client to come back, goes.
+// The one that waits for longest, of those that only wait for a client to come back, goes; those without a
+// name first. Otherwise one client that makes sessions and leaves them would keep all others out.
 bool House::make_room() {
-  auto oldest = sessions_.end();
-  for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
-    const auto since = it->second->waiting();
-    if (since && (oldest == sessions_.end() || *since < *oldest->second->waiting())) oldest = it;
-  }
-  if (oldest == sessions_.end()) return false;
+  const auto rank = [](const Session& session) {
+    const auto since = session.waiting();
+    return std::tuple(!since, session.named(), since.value_or(Clock::time_point{}));
+  };
+  const auto oldest = std::min_element(sessions_.begin(), sessions_.end(), [&](const auto& a, const auto& b) {
+    return rank(*a.second) < rank(*b.second);
+  });
+  if (oldest == sessions_.end() || !oldest->second->waiting()) return false;
   keep_recording(*oldest->second);
   sessions_.erase(oldest);
   return true;
@@ -162,7 +166,14 @@ void House::arrived(const std::string& token, std::function<void()> give_up) {
 
 void House::left(const std::string& token, std::optional<Lost> place) {
   live_.erase(token);
-  if (place && !token.empty()) lost_.insert_or_assign(token, std::move(*place));
+  if (!place || token.empty()) return;
+  // Who comes and goes all the time leaves places faster than they are forgotten.
+  if (lost_.size() >= options_.limits.connections) {
+    lost_.erase(std::min_element(lost_.begin(), lost_.end(), [](const auto& a, const auto& b) {
+      return a.second.since < b.second.since;
+    }));
+  }
+  lost_.insert_or_assign(token, std::move(*place));
 }
 
 std::optional<Lost> House::take_up(const std::string& token) {
@@ -279,7 +290,8 @@ void House::reload(const std::string& name, std::function<void(const Status&)> d
       reading->status = {StatusCode::internal, error.what()};
     }
   };
-  offload(work, [this, reading, done = std::move(done)] {
+  // Beside all else: nobody waits for it but who asked.
+  set_aside(work, [this, reading, done = std::move(done)] {
     reloading_ = false;
     if (reading->status.ok()) replace(reading->model);
     done(reading->status);

@@ -48,7 +48,8 @@ class House {
 
   /// A connection with this resume token is there; `give_up` ends it for another that shows the token.
   void arrived(const std::string& token, std::function<void()> give_up);
-  /// It ended; a place that can be taken up again is kept for `linger_seconds`.
+  /// It ended; a place that can be taken up again is kept for `linger_seconds`, as many as there may be
+  /// connections: then the oldest is lost.
   void left(const std::string& token, std::optional<Lost> place);
   /// The place of the token, once; nothing where there is none (any more).
   std::optional<Lost> take_up(const std::string& token);

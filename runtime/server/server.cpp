@@ -83,6 +83,7 @@ struct Server::Impl {
     room = {.token = options.token,
             .origins = options.origins,
             .header_bytes = options.limits.hello_bytes,
+            .messages_per_second = options.limits.messages_per_second,
             .ready = [this] { return !stopping; },
             .metrics = [this] { return metrics(); },
             .denied = [this] { house->metrics().denied(); },

@@ -24,15 +24,22 @@ using boost::system::error_code;
 
 // A message of a WebSocket is one frame of this protocol.
 constexpr std::string_view kSubprotocol = "ecorche.v1";
+constexpr std::size_t kMostHead = 14;  // bytes before the content of a frame (RFC 6455, 5.2)
 
 // A transport as Beast wants its streams, so that its templates are made once for all of them.
 class Stream {
  public:
   using executor_type = net::any_io_executor;
 
-  explicit Stream(std::unique_ptr<Transport> transport) : transport_(std::move(transport)) {}
+  /// Of what is read and not claimed, the smallest frames may come `rate` times a second; the next ones wait.
+  Stream(std::unique_ptr<Transport> transport, double rate)
+      : transport_(std::move(transport)), a_byte_(1 / (kSmallest * rate)), pause_(transport_->executor()) {}
   executor_type get_executor() { return transport_->executor(); }
   Transport& transport() { return *transport_; }
+
+  /// So many of the bytes that were read are a client's message, or its head: those are counted elsewhere.
+  /// The others are pings, and pieces of nothing, which Beast answers and drops before anybody hears of them.
+  void claim(std::size_t bytes) { paid_until_ -= duration(a_byte_ * static_cast<double>(bytes)); }
 
   template <class Buffers, class Token>
   auto async_read_some(const Buffers& buffers, Token&& token) {
@@ -79,7 +86,13 @@ class Stream {
   net::awaitable<Done> read(net::mutable_buffer into) {
     Done done;
     if (into.size() == 0) co_return done;
+    if (paid_until_ > Clock::now() + kCredit) {
+      pause_.expires_at(paid_until_);
+      error_code ignored;
+      co_await pause_.async_wait(quietly(ignored));
+    }
     done.bytes = co_await transport_->read_some({static_cast<std::byte*>(into.data()), into.size()}, done.ec);
+    paid_until_ = std::max(paid_until_, Clock::now()) + duration(a_byte_ * static_cast<double>(done.bytes));
     co_return done;
   }
   net::awaitable<Done> write(std::vector<net::const_buffer> parts) {
@@ -105,7 +118,13 @@ class Stream {
                   });
   }
 
+  static constexpr double kSmallest = 6;  // bytes of a client's frame
+  static constexpr std::chrono::milliseconds kCredit{100};
+
   std::unique_ptr<Transport> transport_;
+  double a_byte_;  // seconds
+  net::steady_timer pause_;
+  Clock::time_point paid_until_{};
 };
 
 using Socket = websocket::stream<Stream, false>;  // without compression: payloads are dense
@@ -123,6 +142,7 @@ class WebSocketTransport final : public Transport {
 
   net::awaitable<std::size_t> read_some(std::span<std::byte> out, error_code& ec) override {
     const std::size_t n = co_await socket_->async_read_some(net::buffer(out.data(), out.size()), quietly(ec));
+    socket_->next_layer().claim(n + kMostHead);
     if (!ec && !socket_->got_binary()) ec = websocket::error::bad_opcode;
     co_return n;
   }
@@ -155,7 +175,9 @@ bool bears(std::string_view header, const std::string& token) {
 class Request final : public WebRequest {
  public:
   Request(std::unique_ptr<Transport> transport, std::string peer, const WebRoom& room)
-      : room_(room), peer_(std::move(peer)), stream_(std::make_unique<Stream>(std::move(transport))) {
+      : room_(room),
+        peer_(std::move(peer)),
+        stream_(std::make_unique<Stream>(std::move(transport), room.messages_per_second)) {
     parser_.header_limit(static_cast<std::uint32_t>(room.header_bytes));
     parser_.body_limit(0);
   }

@@ -16,6 +16,7 @@ struct WebRoom {
   std::string token;                 ///< empty: none is asked for
   std::vector<std::string> origins;  ///< pages that may connect, as browsers name them
   std::size_t header_bytes = 4 << 10;
+  double messages_per_second = 2000;  ///< of a client, pings among them
   std::function<bool()> ready;
   std::function<std::string()> metrics;
   std::function<void()> denied;

@@ -131,6 +131,54 @@ class Commands(unittest.TestCase):
             self.assertTrue(client.model_changed)
             self.assertNotEqual(client.open().message.identity, before.identity)
 
+    def test_one_of_two_models_is_read_again_while_both_are_shown(self):
+        model = self.path / "body.hdf"
+        other = self.path / "other.hdf"
+        shutil.copy(MODEL, model)
+        shutil.copy(OTHER_MODEL, other)
+        good = MODEL.read_bytes() if isinstance(MODEL, pathlib.Path) else pathlib.Path(MODEL).read_bytes()
+        flipped = bytearray(good)
+        for at in range(2048, len(flipped), 65537):
+            flipped[at] ^= 0xff
+        with Server(model, other) as server, Client("127.0.0.1", server.port) as body, Client("127.0.0.1", server.port) as beside, \
+                Client("127.0.0.1", server.port) as asks:
+            before = body.open("body").message
+            beside.open("other")
+            for client in (body, beside):
+                client.subscribe_mesh(["skin"])
+
+            def both_move():
+                for client in (body, beside):
+                    sequence = client.send_pose(client.body.rest_pose())
+                    until = time.monotonic() + 10
+                    while not any(frame.pose_sequence == sequence for frame in client.frames(0.2)):
+                        self.assertLess(time.monotonic(), until, "a frame did not come")
+
+            both_move()
+            broken = [good[:part * len(good) // 1000] for part in (0, 1, 250, 500, 999)] + [bytes(flipped), b"not a model", b"\x89HDF\r\n\x1a\n"]
+            for content in broken:
+                model.write_bytes(content)
+                with self.assertRaises(ServerError, msg=len(content)):
+                    asks.reload("body")
+                both_move()
+            model.unlink()
+            with self.assertRaises(ServerError):
+                asks.reload("body")
+            model.mkdir()
+            with self.assertRaises(ServerError):
+                asks.reload("body")
+            model.rmdir()
+            both_move()
+            self.assertFalse(body.model_changed)
+            shutil.copy(OTHER_MODEL, model)
+            asks.reload("body")
+            both_move()
+            self.assertTrue(body.model_changed)
+            self.assertFalse(beside.model_changed)
+            self.assertEqual(body.open("body").message.identity, beside.body.message.identity)
+            self.assertNotEqual(beside.body.message.identity, before.identity)
+            self.assertEqual(len(asks.models()), 2)
+
     def test_clients_of_a_killed_server_come_back(self):
         done = threading.Event()
         frames, resumed, problems = [0] * 4, [0] * 4, []

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Control, coming back, inverse kinematics, clips, thresholds and models read again.
+// Control, coming back, inverse kinematics, clips and thresholds.
 #include "core/kinematics/ik.hpp"
 #include "proto/convert.hpp"
-#include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {
@@ -271,53 +270,6 @@ TEST(Thresholds, DecideTheVerdict) {
     strict.mutable_set_thresholds()->set_max_inverted_share(wrong);
     EXPECT_EQ(error_of_call(client.client(), strict), ErrorKind::protocol);
   }
-}
-
-v1::Envelope reload(const std::string& name) {
-  v1::Envelope envelope;
-  envelope.mutable_reload_model()->set_model(name);
-  return envelope;
-}
-
-TEST(Reload, AnotherFileIsServedAndTheOldSessionsGoOn) {
-  TestServer server;
-  TestClient client(server, "shared"), twin(server);
-  client.subscribe_mesh();
-  client.next_mesh(0);
-  client.client().call(reload("toy"));  // the same file: nobody is told
-  EXPECT_FALSE(client.client().receive(client::Clock::now() + std::chrono::milliseconds(100)));
-
-  auto changed = std::make_shared<Model>(test::toy_model());
-  changed->tissues[0].V.array() += 1e-3;
-  changed->rig.skeleton.segments[1].joint.center.x() += 1;
-  server.reads([changed] { return ModelParts{changed}; });
-  twin.client().call(reload("toy"));
-  const std::uint64_t identity = client.next([](const v1::Envelope& e) { return e.has_model_changed(); })
-                                     .envelope.model_changed()
-                                     .identity();
-  EXPECT_NE(identity, client.opened().identity());
-  client.send(1, client.bent(0.3));  // the old one, still
-  client.next_mesh(1);
-
-  v1::Envelope open;
-  open.mutable_open_model()->set_model("toy");
-  open.mutable_open_model()->set_session("shared");
-  const v1::ModelOpened opened = client.client().call(open).envelope.model_opened();
-  EXPECT_EQ(opened.identity(), identity);
-  EXPECT_EQ(opened.role(), v1::ROLE_CONTROLLER);
-  EXPECT_EQ(error_of_call(client.client(), open), ErrorKind::protocol);  // once
-}
-
-TEST(Reload, WhatCannotBeReadChangesNothing) {
-  TestServer server;
-  TestClient client(server);
-  EXPECT_EQ(error_of_call(client.client(), reload("nobody")), ErrorKind::usage);
-  EXPECT_EQ(error_of_call(client.client(), reload("twin")), ErrorKind::protocol);
-  server.reads([]() -> ModelParts { throw Error(ErrorKind::data, "toy.hdf", "is cut", "copy it again"); });
-  EXPECT_NE(error_of_call(client.client(), reload("toy")), ErrorKind::internal);
-  client.subscribe_mesh();
-  client.send(1, client.bent(0.3));
-  client.next_mesh(1);
 }
 
 }  // namespace

@@ -50,6 +50,7 @@ TEST(Session, APoseBehindOneThatIsStillBeingMadeComesAfterNoRest) {
 // While the body moves, keyframes that somebody lacks keep their distance, whether a pose waits or not.
 TEST(Session, AKeyframeThatIsAskedForSoonAfterTheLastKeepsItsDistance) {
   for (int trial = 0; trial < kTrials; ++trial) {
+    const auto begun = Clock::now();
     Stage stage(v1::ENCODING_U16_DELTA);
     const auto frames = [&](std::size_t count) {
       stage.run_until([&] { return stage.watcher.keyframes().size() >= count; });
@@ -66,7 +67,7 @@ TEST(Session, AKeyframeThatIsAskedForSoonAfterTheLastKeepsItsDistance) {
     frames(3);
     if (stage.watcher.last() - first > milliseconds(90)) continue;  // a busy machine
     EXPECT_EQ(frames(4), (std::vector<bool>{true, false, false, true}));
-    EXPECT_GE(stage.watcher.last() - first, milliseconds(99));
+    EXPECT_GE(stage.watcher.last() - begun, milliseconds(99));  // since it was made, not since it came
     return;
   }
   ADD_FAILURE() << "the machine was too busy each time";

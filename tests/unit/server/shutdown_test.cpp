@@ -74,5 +74,97 @@ TEST(Start, WhatCannotBeServedIsRefused) {
   EXPECT_EQ(kind_of(same, {{"a", model}}), ErrorKind::temporary);
 }
 
+// A connection whose frames leave when they may.
+class SlowTransport final : public Transport {
+ public:
+  SlowTransport(std::unique_ptr<Transport> inner, std::atomic<bool>& held)
+      : inner_(std::move(inner)), held_(held), pause_(inner_->executor()) {}
+
+  net::any_io_executor executor() override { return inner_->executor(); }
+  net::awaitable<void> open(boost::system::error_code& ec) override { return inner_->open(ec); }
+  net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) override {
+    return inner_->read_some(out, ec);
+  }
+  net::awaitable<void> write(std::span<const net::const_buffer> frames,
+                             boost::system::error_code& ec) override {
+    while (held_) {
+      pause_.expires_after(std::chrono::milliseconds(2));
+      co_await pause_.async_wait(quietly(ec));
+    }
+    co_await inner_->write(frames, ec);
+  }
+  net::awaitable<void> finish(boost::system::error_code& ec) override { return inner_->finish(ec); }
+  void close() override { inner_->close(); }
+
+ private:
+  std::unique_ptr<Transport> inner_;
+  std::atomic<bool>& held_;
+  net::steady_timer pause_;
+};
+
+// Neither a frame that waited, nor an answer that took long.
+TEST(Shutdown, NothingComesAfterTheLastWords) {
+  for (const bool stops : {true, false}) {
+    std::atomic<bool> held = false, reads = false, ends = false;
+    TestServer server(Options{}, {.transport =
+                                      [&](std::unique_ptr<Transport> transport) {
+                                        return std::make_unique<SlowTransport>(std::move(transport), held);
+                                      },
+                                  .timer_fails = {},
+                                  .handling = {}});
+    server.reads([&]() -> ModelParts {
+      reads = true;
+      while (!ends) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      throw Error(ErrorKind::data, "toy.hdf", "is cut", "copy it again");
+    });
+    RawClient client(server);
+    const auto ask = [&](v1::Envelope envelope, std::uint64_t id) {
+      envelope.set_request_id(id);
+      client.send(envelope);
+    };
+    client.send_hello();
+    v1::Envelope open, subscribe, pose, reload;
+    open.mutable_open_model();
+    ask(open, 2);
+    subscribe.mutable_subscribe()->mutable_mesh();
+    ask(subscribe, 3);
+    std::uint64_t digest = 0;
+    while (const auto frame = client.receive()) {
+      if (frame->envelope.has_model_opened()) digest = frame->envelope.model_opened().rig_digest();
+      if (frame->envelope.has_mesh_frame()) break;  // never acknowledged: one more may be on its way
+    }
+    held = true;
+    reload.mutable_reload_model()->set_model("toy");
+    ask(reload, 4);
+    for (std::uint64_t sequence = 1; sequence <= 2; ++sequence) {
+      v1::PoseUpdate& update = *pose.mutable_pose_update();
+      update.Clear();
+      update.set_sequence(sequence);
+      update.set_rig_digest(digest);
+      for (std::size_t i = 0; i < 4 * server.model().segment_count(); ++i)
+        update.add_rotation(i % 4 == 0 ? 1 : 0);
+      client.send(pose);
+      // The first one's frame is being written, the second one's waits.
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    while (!reads) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    if (stops)
+      server.stop();
+    else
+      client.send_hello();  // a second one
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ends = true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    held = false;
+    bool ended = false;
+    while (const auto frame = client.receive()) {
+      EXPECT_FALSE(ended) << frame->envelope.message_case();
+      ended = ended || frame->envelope.has_goodbye() ||
+              (frame->envelope.has_status() && frame->envelope.request_id() == 0);
+    }
+    EXPECT_TRUE(ended);
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::server

@@ -202,6 +202,60 @@ TEST(WebSocketTest, HandshakesThatAreNotOursAreRefused) {
   EXPECT_TRUE(starts(WebClient(server.http()).get("/v1"), "HTTP/1.1 426"));
 }
 
+// Pings and empty pieces are answered and dropped below what counts messages; they wait as messages do.
+TEST(WebSocketTest, WhatIsNoMessageWaitsBeyondTheRateToo) {
+  constexpr int kMany = 1200;  // of 6 bytes; the last 1536 are read at once
+  const auto seconds = [&](double rate, int opcode) {
+    Options options = with_http();
+    options.limits.messages_per_second = rate;
+    const TestServer server(options);
+    WebClient client(server.http());
+    client.upgrade();
+    client.send_frame(hello());
+    EXPECT_TRUE(client.frame());
+    v1::Envelope ping;
+    ping.set_request_id(2);
+    ping.mutable_ping();
+    const std::string message = wire::encode(ping).head;
+    const auto start = client::Clock::now();
+    if (opcode == 0) client.send_message(message.substr(0, 8), 2, false);
+    for (int i = 0; i < kMany; ++i) client.send_message({}, opcode, opcode != 0);
+    if (opcode == 0)
+      client.send_message(message.substr(8), 0);
+    else
+      client.send_message(message);
+    const auto pong = client.frame();
+    EXPECT_TRUE(pong && pong->envelope.has_pong());
+    return std::chrono::duration<double>(client::Clock::now() - start).count();
+  };
+  for (const int opcode : {9, 0}) {
+    EXPECT_GE(seconds(1000, opcode), 0.5) << opcode;
+    EXPECT_LT(seconds(1e5, opcode), 0.5) << opcode;
+  }
+}
+
+// A message may come in as many pieces as it likes, but each counts.
+TEST(WebSocketTest, AMessageInManyPiecesCountsAsMany) {
+  Options options = with_http();
+  options.limits.messages_per_second = 50;
+  const TestServer server(options);
+  WebClient client(server.http());
+  client.upgrade();
+  client.send_frame(hello());
+  EXPECT_TRUE(client.frame());
+  v1::Envelope ping;
+  ping.set_request_id(2);
+  ping.mutable_ping()->set_data(std::string(100, 'x'));
+  const std::string message = wire::encode(ping).head;
+  const auto start = client::Clock::now();
+  for (std::size_t i = 0; i < message.size(); ++i)
+    client.send_message(message.substr(i, 1), i == 0 ? 2 : 0, i + 1 == message.size());
+  EXPECT_TRUE(client.frame());
+  // A second's worth may come at once.
+  const double most = static_cast<double>(message.size()) / 50 - 1;
+  EXPECT_GE(std::chrono::duration<double>(client::Clock::now() - start).count(), 0.8 * most);
+}
+
 TEST(WebSocketTest, FourKibibytesBeforeTheHelloAndNoMore) {
   const TestServer server(with_http());
   WebClient client(server.http());

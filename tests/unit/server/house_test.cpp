@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// What clients that come and go leave behind, without a server.
+#include "runtime/server/house.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+#include <utility>
+
+#include "tests/support/toy_model.hpp"
+
+namespace ecorche::server {
+namespace {
+
+class Guest final : public Member {
+  bool deliver(const PosedFrame&) override { return true; }
+  std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
+    return finest;
+  }
+  void pose_done(const PoseOutcome&, const Skipped&) override {}
+  void control_changed(v1::Role, bool) override {}
+  void model_changed(std::uint64_t) override {}
+};
+
+struct Open {
+  explicit Open(const Limits& limits)
+      : workers(1, [](const Job& job) { job(); }),
+        house(io, workers, options(limits), {{"toy", std::make_shared<const Model>(test::toy_model())}}, {}) {
+  }
+  ~Open() { house.stop(); }
+
+  static Options options(const Limits& limits) {
+    Options out;
+    out.limits = limits;
+    return out;
+  }
+  // Null where there is no room.
+  std::shared_ptr<Session> open(const std::string& name = {}) {
+    v1::OpenModel request;
+    request.set_session(name);
+    std::shared_ptr<Session> session;
+    const Status status = house.open(request, session);
+    EXPECT_TRUE(status.ok() || status.code == StatusCode::resource_exhausted) << status.message;
+    return session;
+  }
+  // Opened and left again; may be come back to.
+  std::weak_ptr<Session> leave(const std::string& name = {}) {
+    Guest guest;
+    const auto session = open(name);
+    if (!session) return {};
+    session->join(guest);
+    session->leave(guest, true);
+    return session;
+  }
+
+  net::io_context io;
+  Workers workers;
+  House house;
+};
+
+// As many as there may be connections; the oldest make way.
+TEST(House, KeepsFewPlacesOfThoseWhoComeAndGo) {
+  Limits limits;
+  limits.connections = 3;
+  Open open(limits);
+  Guest guest;
+  const auto session = open.open("shared");
+  session->join(guest);
+  for (const char* token : {"z", "y", "a", "b", "c"}) {
+    open.house.left(token, Lost{.session = session, .asked = {}, .controlled = false});
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_FALSE(open.house.take_up("z"));
+  EXPECT_FALSE(open.house.take_up("y"));
+  for (const char* token : {"a", "b", "c"}) EXPECT_TRUE(open.house.take_up(token)) << token;
+  EXPECT_FALSE(open.house.take_up("c"));
+  session->leave(guest, false);
+}
+
+// Sessions that only wait for somebody to come back make way for who is there: those without a name first,
+// the oldest first.
+TEST(House, WhoLeavesSessionsBehindKeepsNobodyOut) {
+  Limits limits;
+  limits.sessions = 4;
+  Open open(limits);
+  Guest guest;
+  const auto used = open.open("used");
+  used->join(guest);
+  const auto wait = [] { std::this_thread::sleep_for(std::chrono::milliseconds(2)); };
+  const auto named = open.leave("older");
+  wait();
+  const auto later = open.leave("newer");
+  wait();
+  const auto unnamed = open.leave();
+  EXPECT_FALSE(named.expired() || later.expired() || unnamed.expired());
+  std::vector<std::shared_ptr<Session>> others;
+  const auto come = [&] {
+    others.push_back(open.open());
+    if (others.back()) others.back()->join(guest);
+    return others.back() != nullptr;
+  };
+  EXPECT_TRUE(come());
+  EXPECT_TRUE(unnamed.expired());
+  EXPECT_FALSE(named.expired() || later.expired());
+  EXPECT_TRUE(come());
+  EXPECT_TRUE(named.expired());
+  EXPECT_FALSE(later.expired());
+  EXPECT_TRUE(come());
+  EXPECT_TRUE(later.expired());
+  EXPECT_FALSE(come()) << "all are in use";
+  for (const auto& session : others) {
+    if (session) session->leave(guest, false);
+  }
+  used->leave(guest, false);
+}
+
+}  // namespace
+}  // namespace ecorche::server
