@@ -85,7 +85,7 @@ std::uint32_t Flow::level(std::uint32_t finest, std::uint32_t coarsest, Clock::t
   // What is overdue is late already.
   if (!in_flight_.empty() && now - in_flight_.front().left > late() + kLeastLate)
     coarser(now - in_flight_.front().left, now);
-  if (level_ > 0 && prompt_since_ && now - *prompt_since_ > patience_ && now - changed_ > patience_) {
+  if (level_ > 0 && prompt_since_ && now - *prompt_since_ > patience_) {
     --level_;
     finer_at_ = changed_ = now;
     prompt_since_.reset();

@@ -319,7 +319,22 @@ void House::replace(std::shared_ptr<const ServedModel> model) {
 }
 
 void House::offload(std::function<void()> work, std::function<void()> then) {
-  hand_over(workers_, std::move(work), std::move(then));
+  offers_.emplace_back(std::move(work), std::move(then));
+  offer();
+}
+
+void House::offer() {
+  const std::size_t most = std::max<std::size_t>(workers_.threads(), 2) - 1;
+  while (offloaded_ < most && !offers_.empty()) {
+    auto [work, then] = std::move(offers_.front());
+    offers_.pop_front();
+    ++offloaded_;
+    hand_over(workers_, std::move(work), [this, done = std::move(then)] {
+      --offloaded_;
+      offer();
+      done();
+    });
+  }
 }
 
 void House::set_aside(std::function<void()> work, std::function<void()> then) {

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/server/frame_memory.hpp"
@@ -70,7 +72,8 @@ class House {
   /// Reads a model again, aside, and calls `done` on the I/O thread.
   void reload(const std::string& name, std::function<void(const Status&)> done);
 
-  /// `work` on a worker, then `then` on the I/O thread. Neither may throw.
+  /// `work` on a worker, then `then` on the I/O thread. Neither may throw. One worker is left for poses
+  /// (where there are two): what else is asked, however much, waits for the others.
   void offload(std::function<void()> work, std::function<void()> then);
   /// As offload, but on one thread that gives way to all others.
   void set_aside(std::function<void()> work, std::function<void()> then);
@@ -98,6 +101,7 @@ class House {
   net::io_context& io_;
   Workers& workers_;
   void hand_over(Workers& to, std::function<void()> work, std::function<void()> then);
+  void offer();
   void coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
   void replace(std::shared_ptr<const ServedModel> model);
   bool make_room();
@@ -118,8 +122,10 @@ class House {
   Metrics metrics_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
   std::uint64_t unnamed_ = 0;
-  std::optional<Clock::time_point> crowded_;  ///< when it was last
-  std::atomic<bool> leaving_ = false;         ///< no more levels of detail are made before somebody asks
+  std::optional<Clock::time_point> crowded_;                                    ///< when it was last
+  std::deque<std::pair<std::function<void()>, std::function<void()>>> offers_;  ///< wait for a worker
+  std::size_t offloaded_ = 0;                                                   ///< have one
+  std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
   Workers aside_;
 };
 

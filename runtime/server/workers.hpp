@@ -23,6 +23,7 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
+  std::size_t threads() const { return threads_.size(); }
   /// Jobs must not throw.
   void submit(Job job);
   /// Waits until no job is queued or running.

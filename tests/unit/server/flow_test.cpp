@@ -78,6 +78,45 @@ TEST(Flow, MoreThanAFewAreOnTheirWayOnlyWhileNoneIsOverdue) {
   EXPECT_FALSE(flow.may_leave(now));
 }
 
+// However long the way: what is on it is a backlog, should it become slow.
+TEST(Flow, NeverMoreThanSixteenAreOnTheirWay) {
+  Flow flow(2);
+  auto now = Clock::now();
+  flow.left(1, now);
+  now += std::chrono::seconds(1);
+  flow.arrived(1, now);
+  std::uint64_t n = 2;
+  for (; n <= 100 && flow.may_leave(now); ++n) flow.left(n, now);
+  EXPECT_EQ(n, 18U);
+}
+
+// Of frames that left before detail was lowered, lateness says nothing about the lower one.
+TEST(Flow, WhatLeftBeforeAChangeDoesNotCount) {
+  Flow flow(8);
+  auto now = Clock::now();
+  flow.level(0, 3, now);
+  flow.left(1, now);
+  flow.arrived(1, now + milliseconds(20));
+  now += milliseconds(50);
+  for (std::uint64_t n = 2; n <= 8; ++n) flow.left(n, now);
+  now += milliseconds(130);  // each late, by what one level mends
+  for (std::uint64_t n = 2; n <= 8; ++n) flow.arrived(n, now);
+  EXPECT_EQ(flow.level(0, 3, now), 1U);
+}
+
+// Late is by the delays of the last seconds: a way that has become longer is not a slow one for ever.
+TEST(Flow, AWayThatBecomesLongerIsGotUsedTo) {
+  Flow flow(2);
+  Way way{.way = milliseconds(10), .bytes = 1e6, .rate = 1e6};
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(way.send(flow), 0U);
+  way.way = milliseconds(150);
+  std::uint32_t level = 0;
+  for (int i = 0; i < 10; ++i) level = way.send(flow);
+  EXPECT_GE(level, 1U);
+  for (int i = 0; i < 400; ++i) level = way.send(flow);
+  EXPECT_EQ(level, 0U);
+}
+
 TEST(Flow, NoCoarserLevelThanThereIs) {
   Flow flow(2);
   Way way{.way = milliseconds(100), .bytes = 1e9, .rate = 1};

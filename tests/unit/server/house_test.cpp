@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <thread>
 #include <utility>
 
@@ -23,8 +25,8 @@ class Guest final : public Member {
 };
 
 struct Open {
-  explicit Open(const Limits& limits)
-      : workers(1, [](const Job& job) { job(); }),
+  explicit Open(const Limits& limits, int threads = 1)
+      : workers(threads, [](const Job& job) { job(); }),
         house(io, workers, options(limits), {{"toy", std::make_shared<const Model>(test::toy_model())}}, {}) {
   }
   ~Open() { house.stop(); }
@@ -112,6 +114,42 @@ TEST(House, WhoLeavesSessionsBehindKeepsNobodyOut) {
     if (session) session->leave(guest, false);
   }
   used->leave(guest, false);
+}
+
+// However much is asked beside the poses, and however long it takes, a worker is left for them.
+TEST(House, WhatIsAskedBesideLeavesAWorkerToPoses) {
+  for (const int threads : {1, 2, 3}) {
+    SCOPED_TRACE(threads);
+    Open open({}, threads);
+    open.workers.drain();
+    std::atomic<bool> go_on = false, posed = false;
+    std::atomic<int> begun = 0;
+    int done = 0;
+    constexpr int kAsked = 7;
+    for (int i = 0; i < kAsked; ++i) {
+      open.house.offload(
+          [&] {
+            ++begun;
+            while (!go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+          },
+          [&] { ++done; });
+    }
+    const auto wait_for = [](auto&& what) {
+      for (int i = 0; i < 5000 && !what(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return what();
+    };
+    const int most = std::max(threads - 1, 1);
+    EXPECT_TRUE(wait_for([&] { return begun == most; }));
+    open.workers.submit([&] { posed = true; });
+    if (threads > 1) {
+      EXPECT_TRUE(wait_for([&] { return posed.load(); }));
+    }
+    EXPECT_EQ(begun, most);
+    go_on = true;
+    open.io.run_for(std::chrono::seconds(5));  // until nothing is under way
+    EXPECT_EQ(done, kAsked);
+    EXPECT_TRUE(wait_for([&] { return posed.load(); }));
+  }
 }
 
 }  // namespace

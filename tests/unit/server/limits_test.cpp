@@ -143,6 +143,18 @@ TEST(LimitsTest, HalfAMessageIsNotWaitedForForever) {
   EXPECT_EQ(client.last_words(), StatusCode::deadline_exceeded);
 }
 
+TEST(LimitsTest, SilenceAfterAWholeMessageIsNoHalfOne) {
+  Limits limits;
+  limits.stall_seconds = 0.1;
+  const TestServer server(limits);
+  client::Client client(server.address(), "test");
+  v1::Envelope ping;
+  ping.mutable_ping();
+  EXPECT_TRUE(client.call(ping).envelope.has_pong());
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  EXPECT_TRUE(client.call(ping).envelope.has_pong());
+}
+
 TEST(LimitsTest, WhoSaysNothingIsDroppedInTheEnd) {
   Limits limits;
   limits.idle_seconds = 0.2;

@@ -234,6 +234,24 @@ TEST(WebSocketTest, WhatIsNoMessageWaitsBeyondTheRateToo) {
   }
 }
 
+// What is claimed as messages costs nothing more, however long they are.
+TEST(WebSocketTest, LongMessagesDoNotWait) {
+  const TestServer server(with_http());
+  WebClient client(server.http());
+  client.upgrade();
+  client.send_frame(hello());
+  EXPECT_TRUE(client.frame());
+  v1::Envelope ping;
+  ping.mutable_ping()->set_data(std::string(60'000, 'x'));
+  const auto start = client::Clock::now();
+  for (std::uint64_t i = 1; i <= 20; ++i) {
+    ping.set_request_id(i);
+    client.send_frame(ping);
+    EXPECT_TRUE(client.frame());
+  }
+  EXPECT_LT(std::chrono::duration<double>(client::Clock::now() - start).count(), 5);
+}
+
 // A message may come in as many pieces as it likes, but each counts.
 TEST(WebSocketTest, AMessageInManyPiecesCountsAsMany) {
   Options options = with_http();
