@@ -323,17 +323,21 @@ void House::offload(std::function<void()> work, std::function<void()> then) {
   offer();
 }
 
+// Without memory nothing is lost: what could not be handed over waits for the next time.
 void House::offer() {
   const std::size_t most = std::max<std::size_t>(workers_.threads(), 2) - 1;
   while (offloaded_ < most && !offers_.empty()) {
-    auto [work, then] = std::move(offers_.front());
-    offers_.pop_front();
-    ++offloaded_;
-    hand_over(workers_, std::move(work), [this, done = std::move(then)] {
+    const auto& [work, then] = offers_.front();
+    hand_over(workers_, work, [this, then = then] {
       --offloaded_;
-      offer();
-      done();
+      try {
+        offer();
+      } catch (const std::bad_alloc&) {
+      }
+      then();
     });
+    ++offloaded_;
+    offers_.pop_front();
   }
 }
 

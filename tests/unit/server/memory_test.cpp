@@ -263,20 +263,22 @@ TEST(MemoryTest, TheNthAllocationOfAPose) {
       {volume_want(true)},
   };
   for (std::size_t c = 0; c < cases.size(); ++c) {
-    for (const int at : {0, 1}) {  // the first frame, a keyframe, or one after it
+    // The first frame, a keyframe; one after it; one after it that comes on another lattice than those about
+    // it.
+    for (const int at : {0, 1, 2}) {
       int n = 0;
       bool bricks = false;
       for (bool struck = true; struck; ++n) {
         SCOPED_TRACE("case " + std::to_string(c) + ", pose " + std::to_string(at) + ", allocation " +
                      std::to_string(n));
         Posing posing(cases[c]);
-        if (at == 1) {
+        if (at > 0) {
           ASSERT_TRUE(posing.pose(0.002, -1));
         }
-        const bool good = posing.pose(0.006, n);
+        const bool good = posing.pose(at == 2 ? 0.5 : 0.006, n);
         struck = posing.struck();
         ASSERT_TRUE(good || struck);
-        posing.pose(0.004, -1);  // some may have to ask for a keyframe
+        posing.pose(0.002, -1);  // some may have to ask for a keyframe
         ASSERT_TRUE(posing.pose(0.008, -1));
         ASSERT_TRUE(posing.complete());
         bricks = bricks || posing.bricks();
@@ -284,7 +286,7 @@ TEST(MemoryTest, TheNthAllocationOfAPose) {
       }
       std::printf("case %zu, pose %d: %d allocations failed, one by one\n", c, at, n - 1);
       EXPECT_GT(n, 5);
-      EXPECT_EQ(bricks, c >= 3);
+      EXPECT_TRUE(bricks || c < 3);
     }
   }
 }

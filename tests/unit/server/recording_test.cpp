@@ -6,7 +6,9 @@
 #include <fstream>
 
 #include "proto/convert.hpp"
+#include "runtime/server/recording.hpp"
 #include "runtime/server/tls.hpp"
+#include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {
@@ -187,6 +189,23 @@ TEST_F(RecordingTest, EndsAtItsLimitAndIsWholeUpToThere) {
   EXPECT_GT(session.steps.size(), 2U);
   EXPECT_LT(session.steps.size(), 30U);
   EXPECT_LE(bytes("bow").size(), 2048U);
+}
+
+// Wherever the limit cuts: the end, which says how much there is, has its place.
+TEST_F(RecordingTest, NeverGrowsBeyondItsLimit) {
+  const ServedModel model("toy", std::make_shared<const Model>(test::toy_model()));
+  PoseRequest pose;
+  pose.pose = Pose::rest(model.model().segment_count());
+  for (std::size_t limit = 2048; limit < 2048 + 512; limit += 16) {
+    Recording recording("bow", model, "test", limit);
+    for (pose.sequence = 1; !recording.full(); ++pose.sequence) recording.add(pose);
+    recording.finish();
+    const std::string name = "bow_" + std::to_string(limit);
+    ASSERT_TRUE(recording.write(folder_ / (name + ".ecrec")).ok());
+    wire::RecordedSession session;
+    EXPECT_TRUE(read(bytes(name), session).ok());
+    EXPECT_LE(bytes(name).size(), limit);
+  }
 }
 
 std::string file_of(const std::vector<v1::Envelope>& envelopes) {
