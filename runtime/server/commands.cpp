@@ -223,10 +223,12 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
         if (!self) return;
         --self->coarsening_;
         if (self->closed_ || self->ending_) return;
-        if (made->ok() && self->session_ != session)
-          *made = {StatusCode::failed_precondition, "subscribe: another model was opened (ask again)"};
-        if (!made->ok()) return self->answer_status(id, *made);
-        self->subscribe(id, want, request);
+        self->take_back([&] {
+          if (made->ok() && self->session_ != session)
+            *made = {StatusCode::failed_precondition, "subscribe: another model was opened (ask again)"};
+          if (!made->ok()) return self->answer_status(id, *made);
+          self->subscribe(id, want, request);
+        });
       });
 }
 
@@ -288,7 +290,8 @@ Status Connection::check_sequence(std::uint64_t sequence) const {
 void Connection::handle_reload(const v1::Envelope& request) {
   house_.reload(request.reload_model().model(),
                 [weak = weak_from_this(), id = request.request_id()](const Status& status) {
-                  if (const auto self = weak.lock()) self->answer_status(id, status);
+                  if (const auto self = weak.lock())
+                    self->take_back([&] { self->answer_status(id, status); });
                 });
 }
 

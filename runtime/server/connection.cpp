@@ -228,6 +228,16 @@ void Connection::take_in(std::size_t n, bool last) {
   }
 }
 
+void Connection::take_back(const std::function<void()>& answer) {
+  const Handling handling(house_.seams());
+  try {
+    answer();
+  } catch (const std::exception& error) {
+    spdlog::error("{}: {}", peer_, error.what());
+    close("failed");
+  }
+}
+
 net::awaitable<void> Connection::hold_back() {
   const double rate = house_.limits().messages_per_second;
   boost::system::error_code ec;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -107,6 +108,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void end(const Status& status);
 
   void spawn(net::awaitable<void> work);
+  /// What was found for this connection elsewhere. Whatever goes wrong ends this connection alone.
+  void take_back(const std::function<void()>& answer);
   net::awaitable<bool> open_transport();
   void hit(const char* limit, const Status& status);
 

@@ -87,7 +87,7 @@ void Connection::handle_solve(const v1::Envelope& request) {
     }
   };
   house_.offload(work, [weak = weak_from_this(), outcome, id, solve] {
-    if (const auto self = weak.lock()) self->solved(id, solve, *outcome);
+    if (const auto self = weak.lock()) self->take_back([&] { self->solved(id, solve, *outcome); });
   });
 }
 
@@ -178,7 +178,7 @@ void Connection::finish_recording(std::uint64_t id) {
         id, {StatusCode::failed_precondition, "record: no recording runs in this session (begin one)"});
   }
   house_.finish_recording(*session_, [weak = weak_from_this(), id](const Status& status) {
-    if (const auto self = weak.lock()) self->answer_status(id, status);
+    if (const auto self = weak.lock()) self->take_back([&] { self->answer_status(id, status); });
   });
 }
 

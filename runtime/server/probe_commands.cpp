@@ -112,18 +112,22 @@ void Connection::handle_probe(const wire::Frame& frame) {
                       model = session_->model()](const std::shared_ptr<const ProbeFrame>& body) {
     const auto self = weak.lock();
     if (!self) return;
-    if (!body) {
-      asked->status = {StatusCode::unavailable, "probe: the body could not be posed (see the last PoseAck)"};
-      return self->answer_probe(id, asked, std::make_shared<const ProbeFrame>());
-    }
-    if (few && !asked->wants.tissue) {
-      ask(*model, *body, *asked);
-      return self->answer_probe(id, asked, body);
-    }
-    self->house_.offload([model, body, asked] { ask(*model, *body, *asked); },
-                         [weak, id, asked, body] {
-                           if (const auto still = weak.lock()) still->answer_probe(id, asked, body);
-                         });
+    self->take_back([&] {
+      if (!body) {
+        asked->status = {StatusCode::unavailable,
+                         "probe: the body could not be posed (see the last PoseAck)"};
+        return self->answer_probe(id, asked, std::make_shared<const ProbeFrame>());
+      }
+      if (few && !asked->wants.tissue) {
+        ask(*model, *body, *asked);
+        return self->answer_probe(id, asked, body);
+      }
+      self->house_.offload([model, body, asked] { ask(*model, *body, *asked); },
+                           [weak, id, asked, body] {
+                             const auto still = weak.lock();
+                             if (still) still->take_back([&] { still->answer_probe(id, asked, body); });
+                           });
+    });
   };
   session_->probe(ready, !few);
 }

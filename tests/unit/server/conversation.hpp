@@ -6,8 +6,8 @@
 
 namespace ecorche::server {
 
-/// Hello, a model, a subscription, two poses, inverse kinematics, a clip, goodbye. True when every answer
-/// came, each within `seconds`.
+/// Hello, a model, a subscription and one of a level of detail, two poses, inverse kinematics, a few points
+/// and many, a clip, goodbye. True when every answer came, each within `seconds`.
 inline bool converse(const TestServer& server, double seconds) {
   try {
     RawClient client(server);
@@ -23,7 +23,7 @@ inline bool converse(const TestServer& server, double seconds) {
       client.send(request);
       return receive([](const v1::Envelope& e) { return e.request_id() == 5; });
     };
-    v1::Envelope hello, open, subscribe, solve, play, ping;
+    v1::Envelope hello, open, subscribe, coarse, solve, play, ping;
     hello.mutable_client_hello()->set_protocol_min(1);
     hello.mutable_client_hello()->set_protocol_max(1);
     if (!call(hello)) return false;
@@ -32,6 +32,10 @@ inline bool converse(const TestServer& server, double seconds) {
     if (!opened || !opened->has_model_opened()) return false;
     subscribe.mutable_subscribe()->mutable_mesh()->add_tissues("skin");
     if (!call(subscribe)) return false;
+    coarse.mutable_subscribe()->mutable_mesh()->set_level(1);
+    coarse.mutable_subscribe()->mutable_mesh()->set_encoding(v1::ENCODING_U16_DELTA);
+    const auto subscribed = call(coarse);
+    if (!subscribed || !subscribed->has_subscribed()) return false;
     const int joints = opened->model_opened().skeleton().segments_size();
     for (std::uint64_t sequence = 1; sequence <= 2; ++sequence) {
       v1::Envelope pose;
@@ -52,6 +56,18 @@ inline bool converse(const TestServer& server, double seconds) {
     target.set_segment(2);
     target.mutable_target()->set_z(10);
     if (!call(solve)) return false;
+    for (const std::uint64_t count : {1, 40}) {  // at once, or on a worker
+      v1::Envelope probe;
+      probe.set_request_id(6);
+      probe.mutable_probe_points()->set_direction(v1::ProbePoints::DIRECTION_REST_TO_POSED);
+      v1::Array& points = *probe.mutable_probe_points()->mutable_points();
+      points.set_type(v1::SCALAR_TYPE_F64);
+      points.set_components(3);
+      points.set_count(count);
+      client.send(probe, std::make_shared<const wire::Payload>((24 * count + 15) / 16 * 16));
+      const auto probed = receive([](const v1::Envelope& e) { return e.request_id() == 6; });
+      if (!probed || !probed->has_probed()) return false;
+    }
     play.mutable_play_clip()->set_name("turning");
     if (!call(play)) return false;
     ping.mutable_ping();

@@ -163,8 +163,7 @@ TEST(Session, JudgingRestsAfterATurn) {
 TEST(Session, JudgingTakesOneAfterTheOther) {
   Stage stage;
   ASSERT_EQ(stage.next_is_judged(), true);
-  const auto other = std::make_shared<Session>(stage.io, stage.workers, stage.model, "b", true, stage.limits,
-                                               stage.memory, stage.judging, stage.metrics);
+  const auto other = stage.open("b", true);
   stage.judging.ask(stage.session);
   stage.judging.ask(other);
   EXPECT_TRUE(other->await_judgement()) << "its turn came beside another's";
