@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One point a millisecond through a body that streams at 90 Hz, over loopback; then 10000 points a message.
-// usage: bench_probe MODEL.hdf [SECONDS] [TISSUE...]    (10 seconds, all tissues)
+// usage: bench_probe MODEL.hdf [SECONDS] [f32|deltas] [TISSUE...]    (10 seconds, f32, all tissues)
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -48,7 +49,8 @@ v1::ModelOpened open(client::Client& client) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) return std::fprintf(stderr, "usage: bench_probe MODEL.hdf [SECONDS] [TISSUE...]\n"), 64;
+  if (argc < 2)
+    return std::fprintf(stderr, "usage: bench_probe MODEL.hdf [SECONDS] [f32|deltas] [TISSUE...]\n"), 64;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 10;
   const auto model = std::make_shared<const Model>(model_file::read(argv[1], Context{}));
   tbb::task_arena arena;
@@ -64,8 +66,10 @@ int main(int argc, char** argv) {
   client::Client poser(address, "bench_probe");
   const v1::ModelOpened opened = open(poser);
   v1::Envelope subscribe;
-  for (int i = 3; i < argc; ++i) subscribe.mutable_subscribe()->mutable_mesh()->add_tissues(argv[i]);
-  subscribe.mutable_subscribe()->mutable_mesh();
+  v1::MeshSelection& mesh = *subscribe.mutable_subscribe()->mutable_mesh();
+  const bool deltas = argc > 3 && argv[3] == std::string_view("deltas");
+  mesh.set_encoding(deltas ? v1::ENCODING_U16_DELTA : v1::ENCODING_F32);
+  for (int i = 4; i < argc; ++i) mesh.add_tissues(argv[i]);
   poser.call(subscribe);
   std::thread posing([&] {
     auto due = Clock::now();
