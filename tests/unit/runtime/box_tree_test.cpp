@@ -243,8 +243,8 @@ TEST(BoxTree, OneBlockIsFittedAtOnce) {
   ASSERT_EQ(tree.boxes.blocks.size(), 1U);
   EXPECT_EQ(tree.boxes.blocks[0].load(), BoxTree::State::fitted);
   Probed out;
-  std::vector<float> points;
-  for (int i = 0; i < 3 * 50; ++i) points.push_back(0.3F + static_cast<float>(i % 7) * 0.7F);
+  std::vector<float> points(std::size_t{3} * 50);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = 0.3F + static_cast<float>(i % 7) * 0.7F;
   probe.posed_to_rest(tree, points, {}, out);
   EXPECT_EQ(std::count(out.tet.begin(), out.tet.end(), TetPlace::none), 0);
 }
