@@ -61,6 +61,34 @@ TEST(MeshStream, WritesWhatADecoderReadsBack) {
   }
 }
 
+// What no matrix foretells, so that deltas take as many bits.
+runtime::PosedBody body_with_noise(unsigned bits, std::uint32_t seed) {
+  runtime::PosedBody body = body_at(0);
+  for (std::uint16_t& number : body.quantised[0]) {
+    seed = 1664525 * seed + 1013904223;
+    number = static_cast<std::uint16_t>(number + (seed >> (32 - bits)));
+  }
+  return body;
+}
+
+// A pose that has left its keyframe far behind gets another one; not one whose deltas were as large from the
+// first.
+TEST(MeshStream, DeltasThatHaveGrownMakeWayForAKeyframe) {
+  for (const bool grow : {true, false}) {
+    Streamed streamed(v1::ENCODING_U16_DELTA);
+    ASSERT_TRUE(streamed.write(body_at(0)));
+    streamed.stream.settle(body_at(0));
+    const std::size_t whole = streamed.payload.size();
+    ASSERT_TRUE(streamed.write(grow ? body_at(0) : body_with_noise(12, 1)));
+    EXPECT_EQ(streamed.payload.size() < whole / 2, grow);
+    ASSERT_TRUE(streamed.write(body_with_noise(12, 2)));
+    EXPECT_GT(streamed.payload.size(), whole / 2);
+    EXPECT_EQ(streamed.frame.keyframe(), 1U);
+    ASSERT_TRUE(streamed.write(body_with_noise(12, 3)));
+    EXPECT_EQ(streamed.frame.keyframe(), grow ? streamed.number : 1U);
+  }
+}
+
 // Wherever it is: every run of blocks looks at its own vertices.
 TEST(MeshStream, FindsTheVertexBeyondTheBox) {
   for (const v1::Encoding encoding : {v1::ENCODING_U16, v1::ENCODING_U16_DELTA}) {
