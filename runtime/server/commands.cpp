@@ -197,7 +197,7 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   if (const Status status = read_want(request.subscribe(), session_->model()->model(), want); !status.ok()) {
     return answer_status(id, status);
   }
-  if (subscriptions_.size() + coarsening_ >= house_.limits().subscriptions) {
+  if (subscriptions_.size() + preparing_ >= house_.limits().subscriptions) {
     house_.metrics().hit("subscriptions");
     return answer_status(
         id, {StatusCode::resource_exhausted, "subscribe: " + std::to_string(subscriptions_.size()) +
@@ -205,39 +205,55 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   }
   const auto* mesh = std::get_if<MeshWant>(&want);
   const bool coarse = mesh && (mesh->level > 0 || mesh->adaptive);
-  if (!coarse || session_->model()->has_levels(mesh->tissues))
-    return subscribe(id, want, request.subscribe());
-  // They are made after the start, beside all else: who comes before that waits, and nobody else does.
-  ++coarsening_;
-  const auto made = std::make_shared<Status>();
+  if (!coarse && !(mesh && (mesh->region || mesh->control_nodes)))
+    return subscribe(id, {.id = 0, .want = want, .request = request.subscribe()}, {}, nullptr);
+  // Of a large body it takes a tenth of a second to say what parts of it hold, and levels are made after the
+  // start, beside all else: who asks waits, and nobody else does.
+  struct Prepared {
+    Status status;
+    Asked asked;
+    v1::Subscribed told;
+    std::shared_ptr<const wire::Payload> payload;
+  };
+  ++preparing_;
+  const auto made = std::make_shared<Prepared>();
+  made->asked = {.id = 0, .want = want, .request = request.subscribe()};
   house_.set_aside(
-      [made, model = session_->model(), tissues = mesh->tissues] {
+      [made, model = session_->model(), coarse] {
         try {
-          model->make_levels(tissues);
+          const MeshWant& wanted = std::get<MeshWant>(made->asked.want);
+          if (coarse) model->make_levels(wanted.tissues);
+          made->asked.streams = open_streams(*model, wanted);
+          made->payload = describe(*model, made->asked.streams, made->told);
         } catch (const std::bad_alloc&) {
-          *made = {StatusCode::resource_exhausted, "subscribe: the server is out of memory (ask for less)"};
+          made->status = {StatusCode::resource_exhausted,
+                          "subscribe: the server is out of memory (ask for less)"};
         }
       },
-      [weak = weak_from_this(), made, id, want, session = session_, request = request.subscribe()] {
+      [weak = weak_from_this(), made, id, session = session_] {
         const auto self = weak.lock();
         if (!self) return;
-        --self->coarsening_;
+        --self->preparing_;
         if (self->closed_ || self->ending_) return;
         self->take_back([&] {
-          if (made->ok() && self->session_ != session)
-            *made = {StatusCode::failed_precondition, "subscribe: another model was opened (ask again)"};
-          if (!made->ok()) return self->answer_status(id, *made);
-          self->subscribe(id, want, request);
+          if (made->status.ok() && self->session_ != session)
+            made->status = {StatusCode::failed_precondition,
+                            "subscribe: another model was opened (ask again)"};
+          if (!made->status.ok()) return self->answer_status(id, made->status);
+          self->subscribe(id, made->asked, std::move(made->told), std::move(made->payload));
         });
       });
 }
 
-void Connection::subscribe(std::uint64_t id, const Want& want, const v1::Subscribe& request) {
+void Connection::subscribe(std::uint64_t id, const Asked& asked, v1::Subscribed told,
+                           std::shared_ptr<const wire::Payload> payload) {
   v1::Envelope envelope;
-  const Subscription& subscription = session_->subscribe(*this, {.id = 0, .want = want, .request = request});
+  const Subscription& subscription = session_->subscribe(*this, asked);
   subscriptions_.insert(subscription.id);
+  *envelope.mutable_subscribed() = std::move(told);
   envelope.mutable_subscribed()->set_subscription(subscription.id);
-  auto payload = describe(*session_->model(), subscription.streams, *envelope.mutable_subscribed());
+  if (asked.streams.empty())
+    payload = describe(*session_->model(), subscription.streams, *envelope.mutable_subscribed());
   answer(id, std::move(envelope), std::move(payload));
 }
 

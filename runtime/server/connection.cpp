@@ -17,6 +17,7 @@ namespace {
 
 // Answers that may wait before the client has to read some.
 constexpr std::size_t kMostAnswers = 64;
+constexpr std::uint64_t kMostAnswerBytes = 64 << 20;
 // Frames of one write.
 constexpr std::size_t kMostTogether = 16;
 // Of one read: a client that sends its messages in smaller pieces pays for each as for a message.
@@ -249,7 +250,8 @@ net::awaitable<void> Connection::hold_back() {
     allowance_ =
         std::min(rate, allowance_ + rate * std::chrono::duration<double>(now - allowance_at_).count());
     allowance_at_ = now;
-    if (allowance_ >= 0 && outbox_.answers() <= kMostAnswers) co_return;
+    if (allowance_ >= 0 && outbox_.answers() <= kMostAnswers && outbox_.answer_bytes() <= kMostAnswerBytes)
+      co_return;
     if (!std::exchange(held, true)) house_.metrics().hit("rate");
     pause_.expires_after(std::chrono::milliseconds(5));
     co_await house_.wait(pause_, ec);
@@ -327,7 +329,11 @@ void Connection::answer(std::uint64_t request_id, v1::Envelope envelope,
                         std::shared_ptr<const wire::Payload> payload) {
   if (closed_ || ending_) return;
   envelope.set_request_id(request_id);
-  outbox_.answer(wire::encode(envelope, std::move(payload)));
+  // What only this client reads is its frames' like: so long as it does not, it counts.
+  const bool shared = payload.use_count() != 1;
+  wire::EncodedFrame frame = wire::encode(envelope, std::move(payload));
+  outbox_.answer(shared ? std::make_shared<const wire::EncodedFrame>(std::move(frame))
+                        : house_.memory().hold(std::move(frame)));
   wake_.cancel();
 }
 

@@ -74,7 +74,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void handle_list(const v1::Envelope& request);
   void handle_open(const v1::Envelope& request);
   void handle_subscribe(const v1::Envelope& request);
-  void subscribe(std::uint64_t id, const Want& want, const v1::Subscribe& request);
+  void subscribe(std::uint64_t id, const Asked& asked, v1::Subscribed told,
+                 std::shared_ptr<const wire::Payload> payload);
   void handle_unsubscribe(const v1::Envelope& request);
   void handle_pose(const v1::PoseUpdate& update);
   void handle_reload(const v1::Envelope& request);
@@ -135,9 +136,9 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   v1::Role role_ = v1::ROLE_UNSPECIFIED;
   std::string resume_token_;
   std::set<std::uint32_t> subscriptions_;
-  std::size_t coarsening_ = 0;  ///< subscriptions that wait for levels of detail
-  int solving_ = 0;             ///< inverse kinematics under way
-  int probing_ = 0;             ///< probes that wait for a pose or a worker
+  std::size_t preparing_ = 0;  ///< subscriptions to parts, which are made aside
+  int solving_ = 0;            ///< inverse kinematics under way
+  int probing_ = 0;            ///< probes that wait for a pose or a worker
   std::uint64_t last_sequence_ = 0;
 
   const Clock::time_point born_ = Clock::now();

@@ -6,8 +6,14 @@
 
 namespace ecorche::server {
 
-void Outbox::answer(wire::EncodedFrame frame) {
-  answers_.push_back(std::make_shared<const wire::EncodedFrame>(std::move(frame)));
+void Outbox::answer(SharedFrame frame) {
+  answers_.push_back(std::move(frame));
+}
+
+std::uint64_t Outbox::answer_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const SharedFrame& frame : answers_) bytes += frame->bytes();
+  return bytes;
 }
 
 std::uint32_t Outbox::ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,

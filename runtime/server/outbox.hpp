@@ -23,7 +23,7 @@ class Outbox {
  public:
   explicit Outbox(std::uint32_t in_flight) : limit_(in_flight) {}
 
-  void answer(wire::EncodedFrame frame);
+  void answer(SharedFrame frame);
   /// The level of detail that the next frame of the subscription should have; see Flow. `still`: the finest,
   /// since nothing newer waits.
   std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
@@ -48,6 +48,7 @@ class Outbox {
   bool last_was_posed() const { return last_was_posed_; }
 
   std::size_t answers() const { return answers_.size(); }
+  std::uint64_t answer_bytes() const;
   /// When the frame left that has been on its way for longest.
   std::optional<Clock::time_point> oldest_in_flight() const;
   /// Frames that a newer one replaced before they left.

@@ -119,7 +119,8 @@ const Subscription& Session::subscribe(Member& member, const Asked& asked) {
     made.subscription.want = want;
     made.request = asked.request;
     const auto* volume = std::get_if<VolumeWant>(&want);
-    if (mesh) made.subscription.streams = open_streams(*model_, *mesh);
+    if (mesh)
+      made.subscription.streams = asked.streams.empty() ? open_streams(*model_, *mesh) : asked.streams;
     if (volume) made.subscription.volume = std::make_shared<VolumeStream>(*volume);
     row = rows_.insert(row, std::move(made));
   }
@@ -135,7 +136,7 @@ std::vector<Asked> Session::asked_by(Member& member) const {
   std::vector<Asked> out;
   for (const Row& row : rows_) {
     if (row.members.contains(&member))
-      out.push_back({row.subscription.id, row.subscription.want, row.request});
+      out.push_back({.id = row.subscription.id, .want = row.subscription.want, .request = row.request});
   }
   return out;
 }

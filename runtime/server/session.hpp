@@ -55,6 +55,7 @@ struct Asked {
   std::uint32_t id = 0;
   Want want;
   v1::Subscribe request;
+  std::vector<std::shared_ptr<MeshStream>> streams = {};  ///< of a mesh, where they are made already
 };
 
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the

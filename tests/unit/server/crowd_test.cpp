@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many who look at one body, many messages at once, numbers beyond all sense.
 #include <array>
+#include <atomic>
 #include <map>
 #include <set>
 
@@ -104,6 +105,43 @@ TEST(Crowd, CommandsBetweenPosesThatAreSkippedAreAllAnswered) {
   EXPECT_EQ(acknowledged + skipped, kPoses);
   EXPECT_TRUE(accounted.contains(kPoses)) << "the newest is shown";
   EXPECT_GT(skipped, 0U);
+}
+
+// To say what parts of a large body hold takes long: it is done where levels are made and models are read.
+TEST(Crowd, WhoAsksForPartsHoldsNobodyUp) {
+  TestServer server;
+  std::atomic<bool> reading = false, go_on = false;
+  server.reads([&]() -> ModelParts {
+    reading = true;
+    while (!go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    throw Error(ErrorKind::data, "toy.hdf", "is cut", "copy it again");
+  });
+  TestClient other(server), asks(server);
+  other.subscribe_mesh();
+  v1::Envelope reload, nodes, region;
+  reload.set_request_id(901);
+  reload.mutable_reload_model()->set_model("toy");
+  other.client().send(reload);
+  while (!reading) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  nodes.set_request_id(902);
+  nodes.mutable_subscribe()->mutable_mesh()->set_control_nodes(true);
+  region.set_request_id(903);
+  region.mutable_subscribe()->mutable_mesh()->mutable_region()->mutable_max()->set_z(50);
+  for (const v1::Envelope& request : {nodes, region}) asks.client().send(request);
+  for (std::uint64_t sequence = 1; sequence <= 10; ++sequence) {
+    other.send(sequence, other.bent(0.01 * static_cast<double>(sequence)));
+    other.next_mesh(sequence);
+  }
+  EXPECT_FALSE(asks.client().receive(client::Clock::now() + std::chrono::milliseconds(50)));
+  go_on = true;
+  std::set<std::uint32_t> numbers;
+  for (const std::uint64_t id : {902, 903}) {
+    const v1::Envelope got = asks.next([&](const v1::Envelope& e) { return e.request_id() == id; }).envelope;
+    numbers.insert(got.subscribed().subscription());
+    EXPECT_EQ(got.subscribed().bindings_size() > 0, id == 902);
+    EXPECT_EQ(got.subscribed().levels_size() > 0, id == 903);
+  }
+  EXPECT_EQ(numbers.size(), 2U);
 }
 
 // Whatever a client means by them, it gets an answer, and the server lives.

@@ -18,9 +18,11 @@ std::string next(Outbox& outbox) {
 TEST(Outbox, AnswersComeFirstAndInOrder) {
   Outbox outbox(2);
   outbox.offer(1, 0, 1, 0, frame("mesh"));
-  outbox.answer({.head = "a", .payload = nullptr});
-  outbox.answer({.head = "b", .payload = nullptr});
+  outbox.answer(frame("a"));
+  outbox.answer(frame("b"));
+  EXPECT_EQ(outbox.answer_bytes(), frame("a")->bytes() + frame("b")->bytes());
   EXPECT_EQ(next(outbox), "a");
+  EXPECT_EQ(outbox.answer_bytes(), frame("b")->bytes());
   EXPECT_EQ(next(outbox), "b");
   EXPECT_EQ(next(outbox), "mesh");
   EXPECT_EQ(next(outbox), "");
@@ -120,7 +122,7 @@ TEST(Outbox, FramesOfAnotherLevelAreForOthers) {
 TEST(Outbox, LetsGoOfEverything) {
   Outbox outbox(2);
   const SharedFrame shown = frame("mesh");
-  outbox.answer({.head = "answer", .payload = nullptr});
+  outbox.answer(frame("answer"));
   EXPECT_TRUE(outbox.offer(7, 0, 1, 0, shown));
   EXPECT_EQ(shown.use_count(), 2);
   std::shared_ptr<const void> all = outbox.clear();
