@@ -206,10 +206,10 @@ class Session : public std::enable_shared_from_this<Session> {
   bool pacing_ = false;
   net::steady_timer clock_;  ///< for the rows' refresh_at
   std::optional<Clock::time_point> clock_at_;
-  Clock::time_point posed_{};               ///< when the last pose was taken up
-  Clock::time_point stirred_{};             ///< when the last pose came, or the last job ended
-  bool rested_ = false;                     ///< the waiting pose came after a rest
-  Clock::time_point moved_{};                ///< when the pose last became another one
+  Clock::time_point posed_{};    ///< when the last pose was taken up
+  Clock::time_point stirred_{};  ///< when the last pose came, or the last job ended
+  bool rested_ = false;          ///< the waiting pose came after a rest
+  Clock::time_point moved_{};    ///< when the pose last became another one
 
   std::uint64_t last_sequence_ = 0;
   std::shared_ptr<ClipPlayer> player_;
