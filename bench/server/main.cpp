@@ -152,20 +152,23 @@ void beside(const Settings& settings, const std::string& what,
                     .rate = 90,
                     .check_each = settings.check_each};
   for (int i = 0; i < 4; ++i) crowd.join(asked);
-  measure(settings, served, "4 clients, 100 k vertices, alone", crowd, 0, 4, "");
+  const Sum alone = measure(settings, served, "4 clients, 100 k vertices, alone", crowd, 0, 4, "");
   const double before = served.rss_mib();
   const std::unique_ptr<Peers> peers = others(served);
   double most = 0;
   const auto look = [&] { most = std::max(most, served.rss_mib()); };
-  measure(settings, served, "4 clients, 100 k vertices, as they come: " + what, crowd, 0, 4, "", look,
-          peers.get(), kComing);
-  measure(settings, served, "4 clients, 100 k vertices, beside " + what, crowd, 0, 4, must, look,
-          peers.get());
+  Sum there = measure(settings, served, "4 clients, 100 k vertices, as they come: " + what, crowd, 0, 4, "",
+                      look, peers.get(), kComing);
+  there.all.add(measure(settings, served, "4 clients, 100 k vertices, beside " + what, crowd, 0, 4, must,
+                        look, peers.get())
+                    .all);
   std::printf(
       "  %s: %s after %.2f s at most, each from its own beginning, counted beside for %.1f s; server's "
-      "memory %.0f MiB before, %.0f at most\n",
+      "memory %.0f MiB before, %.0f at most; p99 of all frames while they came and were there %.2f ms, %.2f "
+      "of "
+      "that alone\n",
       what.c_str(), peers->gone() ? "all gone" : "NOT ALL GONE", peers->longest(), crowd.seconds(), before,
-      most);
+      most, there.p99(), there.p99() / alone.p99());
 }
 
 // Gagvani01's body lives at full resolution in a part of it.
