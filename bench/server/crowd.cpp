@@ -278,7 +278,9 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
 void Crowd::pose(Member& member) {
   const auto now = Clock::now();
   const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / member.asked.rate));
-  member.due = std::max(member.due + period, now);
+  member.due += period;
+  // Who is late keeps its place between the others: else all would pose at one moment after a pause.
+  if (member.due < now) member.due += period * ((now - member.due) / period + 1);
   v1::PoseUpdate rest;
   rest.set_sequence(++member.sequence);
   const Pose walk = walking(rig_, static_cast<double>(member.sequence) / kStride);
