@@ -64,7 +64,8 @@ class WriteTurn {
     WriteTurn* const next = all.waiting.front();
     all.waiting.pop_front();
     next->mine_ = true;
-    next->woken_.cancel();
+    boost::system::error_code ec;
+    next->woken_.cancel(ec);
   }
 
   net::any_io_executor executor_;
