@@ -25,7 +25,8 @@ Clock::duration processor_time() {
 Judging::Judging(net::io_context& io) : timer_(io), aside_(1, last_of_all) {}
 
 void Judging::ask(const std::shared_ptr<Session>& session) {
-  if (!session->await_judgement()) waiting_.push_back(session);
+  waiting_.push_back(session);  // before its session takes it for done: there may be no memory
+  if (session->await_judgement()) waiting_.pop_back();
   next();
 }
 

@@ -6,7 +6,8 @@
 namespace ecorche::server {
 
 void Openings::ask(const std::shared_ptr<Session>& session) {
-  if (!session->await_opening()) waiting_.push_back(session);
+  waiting_.push_back(session);  // before its session takes it for done: there may be no memory
+  if (session->await_opening()) waiting_.pop_back();
   next();
 }
 

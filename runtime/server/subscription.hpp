@@ -11,6 +11,7 @@
 #include "core/values/error.hpp"
 #include "core/values/model.hpp"
 #include "ecorche/v1/envelope.pb.h"
+#include "runtime/server/payload_pool.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/resample.hpp"
 
@@ -52,9 +53,9 @@ struct Subscription {
   Want want;
   std::vector<std::shared_ptr<MeshStream>> streams;  ///< of a mesh, one per level, finest first
   std::shared_ptr<VolumeStream> volume;
-  std::uint32_t levels = 1;                                     ///< bit i: a frame of streams[i] is wanted
-  std::shared_ptr<const v1::PoseQuality> quality;               ///< of a mesh, newest; null: none yet
-  std::shared_ptr<const std::vector<std::vector<float>>> rest;  ///< positions of all that a job is to show
+  std::uint32_t levels = 1;                        ///< bit i: a frame of streams[i] is wanted
+  std::shared_ptr<const v1::PoseQuality> quality;  ///< of a mesh, newest; null: none yet
+  std::shared_ptr<const Positions> rest;           ///< positions of all that a job is to show
   std::uint32_t keyframes = 0;  ///< bit i: somebody cannot read deltas of streams[i] before the next keyframe
 };
 
