@@ -275,6 +275,13 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
 }
 
 // The whole pose: the turns as they were encoded once, then what differs, which Protobuf merges.
+// Where the walk has come to.
+Eigen::Vector3d Crowd::place_of(const Asked& asked, std::uint64_t sequence) const {
+  Eigen::Vector3d place = walking(rig_, static_cast<double>(sequence) / kStride).root_translation;
+  if (asked.on_the_spot) place[1] = 0;
+  return place;
+}
+
 void Crowd::pose(Member& member) {
   const auto now = Clock::now();
   const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / member.asked.rate));
@@ -283,10 +290,10 @@ void Crowd::pose(Member& member) {
   if (member.due < now) member.due += period * ((now - member.due) / period + 1);
   v1::PoseUpdate rest;
   rest.set_sequence(++member.sequence);
-  const Pose walk = walking(rig_, static_cast<double>(member.sequence) / kStride);
-  rest.mutable_root_translation()->set_x(walk.root_translation[0]);
-  rest.mutable_root_translation()->set_y(walk.root_translation[1]);
-  rest.mutable_root_translation()->set_z(walk.root_translation[2]);
+  const Eigen::Vector3d place = place_of(member.asked, member.sequence);
+  rest.mutable_root_translation()->set_x(place[0]);
+  rest.mutable_root_translation()->set_y(place[1]);
+  rest.mutable_root_translation()->set_z(place[2]);
   const std::string& turns = strides_[member.sequence % kStride];
   const std::string more = rest.SerializeAsString();
   std::string frame(8, '\0');
@@ -398,8 +405,7 @@ void Crowd::check(Member& member, const Held& held) {
   Pose pose = Pose::rest(rig_.skeleton.segments.size());
   if (frame.pose_sequence() > 0) {
     pose = walking(rig_, static_cast<double>(frame.pose_sequence() % kStride) / kStride);
-    pose.root_translation =
-        walking(rig_, static_cast<double>(frame.pose_sequence()) / kStride).root_translation;
+    pose.root_translation = place_of(member.asked, frame.pose_sequence());
   }
   bool right = poser_->run(pose, runtime::Skinning::cor, rows, body_, runtime::NodesOf::tissues).ok();
   const double bound = frame.encoding() == v1::ENCODING_F32 ? 0 : frame.box().step() / 2 + kKernelRounding;

@@ -20,8 +20,9 @@ using client::Clock;
 struct Asked {
   std::size_t vertices = 0;  ///< about so many, of whole tissues; 0: all
   v1::Encoding encoding = v1::ENCODING_U16_DELTA;
-  std::string session;  ///< empty: one's own
-  double rate = 90;     ///< poses per second; 0: only watches
+  std::string session;       ///< empty: one's own
+  double rate = 90;          ///< poses per second; 0: only watches
+  bool on_the_spot = false;  ///< walks without getting anywhere: volumes stay within their scan
   /// Every so many frames one is held against offline posing, and every keyframe; 0: none. They are kept
   /// until check(): the client of a user does nothing of the kind.
   std::uint64_t check_each = 0;
@@ -70,6 +71,7 @@ class Crowd {
   struct Watched;
   void take(Member& member);
   void pose(Member& member);
+  Eigen::Vector3d place_of(const Asked& asked, std::uint64_t sequence) const;
   void finish_head(Member& member);
   void arrive(Member& member);
   struct Held;

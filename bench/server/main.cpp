@@ -17,12 +17,14 @@
 #include <sstream>
 
 #include "bench/server/crowd.hpp"
+#include "bench/server/deltas.hpp"
 #include "bench/server/peers.hpp"
 #include "bench/server/ready.hpp"
 #include "bench/server/region.hpp"
 #include "bench/server/served.hpp"
 #include "bench/server/soak.hpp"
 #include "bench/server/walking.hpp"
+#include "bench/server/watcher.hpp"
 #include "bench/server/wire.hpp"
 #include "core/model_file/model_file.hpp"
 #include "core/values/error.hpp"
@@ -181,6 +183,35 @@ void beside(const Settings& settings, const std::string& what,
   std::fflush(stdout);
 }
 
+// One who poses, alone and beside somebody who watches a volume of the same session.
+void volume(const Settings& settings) {
+  const Served served(settings.program, settings.model);
+  Crowd crowd(served.address(), settings.truth);
+  crowd.join({.vertices = 100'000,
+              .encoding = v1::ENCODING_U16_DELTA,
+              .session = "shared",
+              .rate = 90,
+              .on_the_spot = true,
+              .check_each = settings.check_each});
+  measure(settings, served, "1 client, 100 k vertices, alone", crowd, 0, 1, "");
+  v1::VolumeSelection whole, bricks;
+  whole.set_compressed(true);
+  bricks.set_changed_bricks(true);
+  for (const auto& [what, selection] : {std::pair{std::string("a plane of the CT"), middle_plane(served)},
+                                        {"the whole CT, its changed bricks", bricks},
+                                        {"the whole CT, compressed", whole}}) {
+    Watcher watcher(served, "shared", selection);
+    measure(settings, served, "1 client, 100 k vertices, beside " + what, crowd, 0, 1, "as alone");
+    watcher.stop();
+    const auto seen = static_cast<double>(watcher.frames());
+    std::printf("  %s: %.1f frames a second of %.2f MB%s%s\n", what.c_str(),
+                seen / (crowd.seconds() + kWarmUp),
+                1e-6 * static_cast<double>(watcher.bytes()) / std::max(1.0, seen),
+                watcher.error().empty() ? "" : "; ERROR: ", watcher.error().c_str());
+    std::fflush(stdout);
+  }
+}
+
 // Gagvani01's body lives at full resolution in a part of it.
 void region(const Settings& settings) {
   for (const auto& [deformer, name] :
@@ -207,6 +238,7 @@ int run(const Settings& settings) {
               "p99 ms", "MiB", "cores", "must");
   const auto chosen = [&](const char* row) { return settings.only.empty() || settings.only.contains(row); };
   if (chosen("ready")) ready(settings.program, settings.model);
+  if (chosen("deltas")) deltas(settings.truth);
   if (chosen("body"))
     posing(settings, "1 client, the whole body, delta u16, 90 Hz", 0, v1::ENCODING_U16_DELTA, 1,
            "90 fps, p50 6, p99 11");
@@ -233,6 +265,7 @@ int run(const Settings& settings) {
         settings, "1000 that send a byte a second",
         [](const Served& s) { return dripping_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
   }
+  if (chosen("volume")) volume(settings);
   if (chosen("wire")) same_frame(settings.program, settings.model, settings.peers, settings.seconds);
   if (chosen("region")) region(settings);
   if (!settings.only.contains("soak")) return 0;  // half an hour: only by its name
@@ -254,9 +287,10 @@ int main(int argc, char** argv) {
     for (std::string row; std::getline(rows, row, ',');) settings.only.insert(row);
   }
   if (words.size() < 2) {
-    std::fprintf(stderr,
-                 "usage: bench_server ECORCHE MODEL.hdf [--seconds 30] [--soak-minutes 30] [--only ROW,...]\n"
-                 "rows: ready body f32 organ posers observers stalled idle dripping wire region soak\n");
+    std::fprintf(
+        stderr,
+        "usage: bench_server ECORCHE MODEL.hdf [--seconds 30] [--soak-minutes 30] [--only ROW,...]\n"
+        "rows: ready deltas body f32 organ posers observers stalled idle dripping volume wire region soak\n");
     return 64;
   }
   settings.program = words[0];

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/server/deltas.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "bench/server/walking.hpp"
+#include "proto/delta.hpp"
+#include "runtime/skin/body_poser.hpp"
+
+namespace ecorche::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kSeconds = 0.25;  // of the walk, between keyframe and frame
+constexpr int kRuns = 31;
+constexpr std::size_t kInCaches =
+    20 * wire::delta::block_vertices;  // 60 kB of keyframe, as much of the frame
+
+// The numbers of every tissue, one behind another.
+std::vector<std::uint16_t> body_at(const runtime::BodyPoser& poser, double seconds) {
+  runtime::PosedBody body = poser.make_frame({.positions = false, .quantised = true});
+  if (!poser.run(walking(poser.model().rig, seconds), runtime::Skinning::cor, poser.all_tissues(), body).ok())
+    std::abort();  // a walk is a pose
+  std::vector<std::uint16_t> all;
+  for (const auto& tissue : body.quantised) all.insert(all.end(), tissue.begin(), tissue.end());
+  return all;
+}
+
+// Milliseconds per million vertices, median; every run does its work `times` over.
+template <class Work>
+double median(std::size_t vertices, int times, Work&& work) {
+  std::vector<double> ms;
+  for (int run = 0; run < kRuns; ++run) {
+    const auto start = Clock::now();
+    for (int i = 0; i < times; ++i) work();
+    ms.push_back(1e3 * std::chrono::duration<double>(Clock::now() - start).count() / times);
+  }
+  return 1e6 * quantile(ms, 0.5) / static_cast<double>(vertices);
+}
+
+void row(const char* what, std::span<const std::uint16_t> key, std::span<const std::uint16_t> now,
+         int times) {
+  const std::size_t vertices = key.size() / 3;
+  wire::DeltaKey prepared(vertices);
+  prepared.prepare(key, 0, prepared.blocks());
+  std::vector<std::byte> bytes(wire::delta::most_bytes(prepared.blocks()));
+  std::size_t size = 0;
+  const double encode =
+      median(vertices, times, [&] { size = prepared.encode(now, 0, prepared.blocks(), bytes).bytes; });
+  std::vector<std::uint16_t> out(key.size());
+  bool good = true;
+  const double decode = median(vertices, times, [&] {
+    good = wire::decode_delta(std::span(bytes).first(size), key, out).ok() && good;
+  });
+  good = good && std::equal(out.begin(), out.end(), now.begin());
+  std::printf(
+      "deltas of %8zu vertices, one thread, %-22s encoded %.2f, decoded %.2f ms a million, %.1f times "
+      "smaller "
+      "than float32, %s  (must: 0.6 ms, 5 times)\n",
+      vertices, what, encode, decode,
+      static_cast<double>(sizeof(float) * key.size()) / static_cast<double>(size),
+      good ? "0 wrong" : "WRONG");
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+void deltas(const std::shared_ptr<const Model>& model) {
+  const runtime::BodyPoser poser(model);
+  const std::vector<std::uint16_t> key = body_at(poser, 0), now = body_at(poser, kSeconds);
+  const std::size_t few = 3 * std::min(kInCaches, key.size() / 3);
+  row("in the caches:", std::span(key).first(few), std::span(now).first(few), 50);
+  row("the whole body:", key, now, 1);
+}
+
+}  // namespace ecorche::bench
