@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "proto/delta_kernels.hpp"
 #include "proto/triples-inl.hpp"
@@ -161,8 +162,49 @@ bool residuals(const delta::Header& header, const std::int16_t* key, const std::
   return !hn::AllTrue(U16(), hn::Gt(lowest, one));
 }
 
+// Row kRow of a lane's words in a whole block, whose every shift is then known beforehand.
+template <int kWidth, int kRow>
+HWY_INLINE void pack_row(const std::int16_t* left, V base, hn::Vec<U16>& word, std::uint16_t* out) {
+  constexpr int kFilled = kRow * kWidth % 16, kOver = kFilled + kWidth - 16;
+  const U16 d;
+  const auto e = hn::BitCast(d, hn::Sub(hn::LoadU(I16(), left + kRow * delta::lanes), base));
+  if constexpr (kFilled == 0)
+    word = e;
+  else
+    word = hn::Or(word, hn::ShiftLeft<kFilled>(e));
+  if constexpr (kOver >= 0) hn::StoreU(word, d, out + kRow * kWidth / 16 * delta::lanes);
+  if constexpr (kOver > 0) word = hn::ShiftRight<kWidth - kOver>(e);
+}
+
+template <int kWidth, std::size_t... kRows>
+HWY_INLINE void pack_block(const std::int16_t* left, std::int16_t base, std::uint16_t* out,
+                           std::index_sequence<kRows...>) {
+  const U16 d;
+  for (std::size_t lane = 0; lane < delta::lanes; lane += hn::Lanes(d)) {
+    auto word = hn::Zero(d);
+    (pack_row<kWidth, static_cast<int>(kRows)>(left + lane, hn::Set(I16(), base), word, out + lane), ...);
+  }
+}
+
+template <int kWidth>
+void pack_block(const std::int16_t* left, std::int16_t base, std::uint16_t* out) {
+  pack_block<kWidth>(left, base, out, std::make_index_sequence<delta::block_vertices / delta::lanes>());
+}
+
+template <std::size_t... kWidths>
+HWY_INLINE void pack_block(const std::int16_t* left, std::int16_t base, std::size_t width, std::uint16_t* out,
+                           std::index_sequence<kWidths...>) {
+  using Pack = void (*)(const std::int16_t*, std::int16_t, std::uint16_t*);
+  static constexpr Pack kPacks[] = {pack_block<static_cast<int>(kWidths) + 1>...};
+  kPacks[width - 1](left, base, out);
+}
+
 // One plane: lane l's words are the bits of its rows, first row lowest; word j of all lanes stands together.
 void pack(const std::int16_t* left, std::int16_t base, std::size_t rows, std::size_t width, std::byte* out) {
+  if (rows * delta::lanes == delta::block_vertices) {
+    return pack_block(left, base, width, reinterpret_cast<std::uint16_t*>(out),
+                      std::make_index_sequence<16>());
+  }
   const U16 d;
   const auto bits = static_cast<int>(width);
   for (std::size_t lane = 0; lane < delta::lanes; lane += hn::Lanes(d)) {
