@@ -41,7 +41,9 @@ House::House(net::io_context& io, Workers& workers, Options options, std::vector
       memory_(options_.limits.queued_bytes),
       judging_(io),
       seams_(std::move(seams)),
-      aside_(1, giving_way) {
+      aside_(1, giving_way),
+      volumes_(static_cast<int>(workers.threads())),
+      planes_(static_cast<int>(workers.threads())) {
   if (models.empty() || models.size() > options_.limits.models) {
     throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
                 "serve 1 to " + std::to_string(options_.limits.models) + ", or raise --max-models");
@@ -123,8 +125,9 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {StatusCode::resource_exhausted,
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
-  out = std::make_shared<Session>(io_, workers_, *model, name, named, options_.limits, memory_, judging_,
-                                  openings_, metrics_);
+  const Services services{io_,     workers_, volumes_.workers(), planes_.workers(),
+                          memory_, judging_, openings_,          metrics_};
+  out = std::make_shared<Session>(services, *model, name, named, options_.limits);
   sessions_.emplace(name, out);
   return {};
 }

@@ -20,6 +20,7 @@
 #include "runtime/server/openings.hpp"
 #include "runtime/server/seams.hpp"
 #include "runtime/server/session.hpp"
+#include "runtime/server/volume_workers.hpp"
 #include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
@@ -127,6 +128,7 @@ class House {
   std::size_t offloaded_ = 0;                                                   ///< have one
   std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
   Workers aside_;
+  VolumeWorkers volumes_, planes_;
 };
 
 }  // namespace ecorche::server

@@ -320,7 +320,7 @@ Status run(const PoseJob& job) {
       return posed ? show(job, *body, timings) : Status{};
     });
   };
-  if (job.aside || small(job)) {
+  if (job.alone || small(job)) {
     serially(all);
   } else {
     all();

@@ -61,7 +61,9 @@ struct PoseJob {
   runtime::QualityThresholds thresholds;
   bool judge = false;  ///< every frame with its own pose's quality; else Subscription::quality may be told
   bool digests = false;
-  bool aside = false;  ///< keeps to the calling thread, however large: the others are for streams
+  bool aside = false;    ///< in a body of those that streams do not use
+  bool alone = false;    ///< keeps to the calling thread, however large: the others are for streams
+  bool volumes = false;  ///< the session's volumes are shown by this job, too
   const FrameMemory* memory = nullptr;  ///< counts the frames
   FrameMemory::Room room;               ///< about what they will take
   std::shared_ptr<ProbeFrame> probe;    ///< to be filled; null where nobody probes

@@ -15,23 +15,23 @@ void Skipped::add(std::uint64_t sequence) {
   if (newest.size() > most_told) newest.pop_front();
 }
 
-Session::Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model,
-                 std::string name, bool named, const Limits& limits, const FrameMemory& memory,
-                 Judging& judging, Openings& openings, Metrics& metrics)
-    : io_(io),
-      metrics_(metrics),
-      memory_(memory),
-      judging_(judging),
-      openings_(openings),
-      workers_(workers),
+Session::Session(const Services& services, std::shared_ptr<const ServedModel> model, std::string name,
+                 bool named, const Limits& limits)
+    : io_(services.io),
+      metrics_(services.metrics),
+      memory_(services.memory),
+      judging_(services.judging),
+      openings_(services.openings),
       model_(std::move(model)),
       name_(std::move(name)),
       named_(named),
       limits_(limits),
-      pace_(io),
-      clock_(io) {
+      poses_(io_, services.workers),
+      whole_(io_, services.volume_workers),
+      planes_(io_, services.plane_workers),
+      clock_(io_) {
   present_.pose = Pose::rest(model_->model().segment_count());
-  player_ = std::make_shared<ClipPlayer>(io, [this](const Pose& pose) {
+  player_ = std::make_shared<ClipPlayer>(io_, [this](const Pose& pose) {
     PoseRequest request;
     request.sequence = last_sequence_ + 1;
     request.pose = pose;
@@ -126,9 +126,9 @@ const Subscription& Session::subscribe(Member& member, const Asked& asked) {
   }
   row->members.insert(&member);
   row->subscription.keyframes = ~0U;
-  fresh_.insert(row->subscription.id);
+  row->fresh = row->fresh.value_or(Clock::now());
   // Once the answer with the number is on its way.
-  net::post(io_, [self = shared_from_this()] { self->start_job(); });
+  net::post(io_, [self = shared_from_this()] { self->start_jobs(); });
   return row->subscription;
 }
 
@@ -158,9 +158,9 @@ void Session::set_thresholds(const runtime::QualityThresholds& thresholds) {
   for (Row& row : rows_) {
     row.subscription.quality = nullptr;  // with the next frame
     const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
-    if (mesh && mesh->quality) fresh_.insert(row.subscription.id);
+    if (mesh && mesh->quality) row.fresh = row.fresh.value_or(Clock::now());
   }
-  start_job();
+  start_jobs();
 }
 
 void Session::pose(PoseRequest request) {
@@ -177,17 +177,17 @@ void Session::take(PoseRequest request) {
     rested_ = rests(now);
   stirred_ = now;
   slot_ = std::move(request);
-  start_job();
+  start_jobs();
 }
 
 bool Session::over(Clock::time_point now) const {
-  if (!members_.empty() || busy_) return false;
+  if (!members_.empty() || poses_.busy || volumes_busy()) return false;
   if (retired_ || (!named_ && !awaited_)) return true;
   return now - last_seen_ >= duration(limits_.linger_seconds);
 }
 
 std::optional<Clock::time_point> Session::waiting() const {
-  if (!members_.empty() || busy_) return std::nullopt;
+  if (!members_.empty() || poses_.busy || volumes_busy()) return std::nullopt;
   return last_seen_;
 }
 
@@ -196,7 +196,7 @@ void Session::probe(Ready ready, bool many) {
   if (many) probed_many_ = probed_;
   if (probe_frame_) return ready(probe_frame_);
   probes_.push_back(std::move(ready));
-  start_job();
+  start_jobs();
 }
 
 // One that nobody asks any more, or a new one: the one that is shown and the one being made are two.

@@ -58,13 +58,26 @@ struct Asked {
   std::vector<std::shared_ptr<MeshStream>> streams = {};  ///< of a mesh, where they are made already
 };
 
+/// What all sessions of a server share.
+struct Services {
+  net::io_context& io;
+  Workers& workers;
+  Workers& volume_workers;  ///< give way to those
+  Workers& plane_workers;   ///< as well; planes do not wait behind other sessions' volumes
+  const FrameMemory& memory;
+  Judging& judging;
+  Openings& openings;
+  Metrics& metrics;
+};
+
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the
-/// workers until its end is posted back.
+/// workers until its end is posted back. Volumes, which take longer than all else of a pose, have a job of
+/// their own beside it, and planes of them another: each shows the newest pose that is posed when it begins,
+/// so that meshes never wait for a volume. Only what is recorded keeps together.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(net::io_context& io, Workers& workers, std::shared_ptr<const ServedModel> model, std::string name,
-          bool named, const Limits& limits, const FrameMemory& memory, Judging& judging, Openings& openings,
-          Metrics& metrics);
+  Session(const Services& services, std::shared_ptr<const ServedModel> model, std::string name, bool named,
+          const Limits& limits);
   ~Session();
 
   const std::string& name() const { return name_; }
@@ -147,7 +160,27 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<Clock::time_point> last_keyframe;  ///< when the last one was made that somebody lacked
     Clock::time_point next_due{};                    ///< of max_rate
     std::optional<Clock::time_point> refresh_at;     ///< when the present pose is to be shown (again)
+    std::optional<Clock::time_point> fresh;          ///< since when somebody waits for the present pose
     bool shown = false;                              ///< somebody had a frame of it
+    bool is_volume() const { return subscription.volume != nullptr; }
+  };
+
+  /// Jobs of one kind: one at a time, and no more in a second than poses may come.
+  struct Lane {
+    Lane(net::io_context& io, Workers& by) : workers(by), pace(io) {}
+    Workers& workers;
+    bool busy = false;
+    Clock::time_point next = Clock::now();  ///< no job begins before
+    net::steady_timer pace;
+    bool pacing = false;  ///< it runs
+  };
+
+  /// What rows are taken up for.
+  struct Taking {
+    Clock::time_point now;
+    bool refresh = false;     ///< the present pose, for who has not seen it
+    bool still = false;       ///< the body stands still
+    std::uint64_t bytes = 0;  ///< of the frames, about
   };
 
   class Teller;
@@ -157,11 +190,27 @@ class Session : public std::enable_shared_from_this<Session> {
   std::shared_ptr<ProbeFrame> spare_probe();
   void probe_ready(const std::shared_ptr<ProbeFrame>& frame);
   void take(PoseRequest request);
-  void start_job();
+  void start_jobs();
+  bool too_early(Lane& lane, Clock::time_point now);
+  bool by_pose(const Row& row) const;
+  bool anybody_waits() const;
+  void start_pose();
   void start(Clock::time_point now, bool aside);
   bool soon_posed(Clock::time_point now);
   void submit(std::shared_ptr<PoseJob> job, bool refresh);
+  void posed(const PoseJob& job, const Status& status);
+  void begin(PoseJob& job);
   void take_up(PoseJob& job);
+  void take_up(Row& row, Taking& taking, PoseJob& job);
+  // session_volumes.cpp
+  bool together() const { return recording_ != nullptr; }
+  bool volumes_busy() const { return whole_.busy || planes_.busy; }
+  void set_volumes_busy(bool busy) { whole_.busy = planes_.busy = busy; }
+  Lane& lane_of(const VolumeWant& want) { return want.slices.empty() ? whole_ : planes_; }
+  void want_volumes();
+  void want_again(const Lane& lane);
+  void start_volumes(Lane& lane);
+  void submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job);
   bool held_back(Row& row, Clock::time_point now) const;
   void ask_levels(Row& row, bool still, Clock::time_point now) const;
   void put_off_keyframes(Clock::time_point now);
@@ -175,7 +224,6 @@ class Session : public std::enable_shared_from_this<Session> {
   const FrameMemory& memory_;
   Judging& judging_;
   Openings& openings_;
-  Workers& workers_;
   std::shared_ptr<const ServedModel> model_;
   std::string name_;
   bool named_;
@@ -194,17 +242,13 @@ class Session : public std::enable_shared_from_this<Session> {
 
   std::vector<Row> rows_;
   std::uint32_t last_subscription_ = 0;
-  std::set<std::uint32_t> fresh_;  ///< subscriptions that have not seen the present pose
 
   std::optional<PoseRequest> slot_;
   Skipped skipped_;
   PoseRequest present_;
   std::uint64_t frames_ = 0;
-  bool busy_ = false;
-  net::steady_timer pace_;
-  Clock::time_point next_start_ = Clock::now();
-  bool pacing_ = false;
-  net::steady_timer clock_;  ///< for the rows' refresh_at
+  Lane poses_, whole_, planes_;  ///< meshes and probes; volumes; planes of volumes
+  net::steady_timer clock_;      ///< for the rows' refresh_at
   std::optional<Clock::time_point> clock_at_;
   Clock::time_point posed_{};    ///< when the last pose was taken up
   Clock::time_point stirred_{};  ///< when the last pose came, or the last job ended

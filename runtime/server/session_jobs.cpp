@@ -62,6 +62,7 @@ class Session::Teller {
       : session_(std::move(session)), skipped_(std::move(skipped)), refresh_(refresh) {
     shown_->number = job.number;
     shown_->request = job.request;
+    shown_->volumes = job.volumes;
     waits_ = std::any_of(job.subscriptions.begin(), job.subscriptions.end(),
                          [](const Subscription& s) { return !s.streams.empty() && s.levels != 0; });
   }
@@ -93,49 +94,72 @@ class Session::Teller {
   std::shared_ptr<const Skipped> skipped_;
   bool refresh_;
   bool waits_ = false;
-  std::shared_ptr<PoseJob> shown_ = std::make_shared<PoseJob>();  // its number and request
+  std::shared_ptr<PoseJob> shown_ = std::make_shared<PoseJob>();  // its number, request and volumes
   std::shared_ptr<const PoseOutcome> outcome_;
 };
 
-void Session::start_job() {
-  if (!slot_) put_off_keyframes(Clock::now());
-  // With no room for more frames, who has none yet waits (catch_up).
-  const bool fresh = !fresh_.empty() && !memory_.full();
-  if (busy_ || (!slot_ && !fresh && probes_.empty())) return;
+void Session::start_jobs() {
+  start_pose();
+  start_volumes(whole_);
+  start_volumes(planes_);
+}
+
+// The lane's next job has to wait: it is started then.
+bool Session::too_early(Lane& lane, Clock::time_point now) {
+  if (now >= lane.next) return false;
+  if (std::exchange(lane.pacing, true)) return true;
+  lane.pace.expires_at(lane.next);
+  lane.pace.async_wait([weak = weak_from_this(), &lane](const boost::system::error_code&) {
+    const auto self = weak.lock();
+    if (!self) return;
+    lane.pacing = false;
+    self->start_jobs();
+  });
+  return true;
+}
+
+// Whether it is shown by poses' own jobs.
+bool Session::by_pose(const Row& row) const {
+  return !row.is_volume() || together();
+}
+
+// For the present pose, which such a job would show.
+bool Session::anybody_waits() const {
+  return std::any_of(rows_.begin(), rows_.end(),
+                     [this](const Row& row) { return row.fresh && by_pose(row); });
+}
+
+void Session::start_pose() {
   const auto now = Clock::now();
+  if (!slot_) put_off_keyframes(now);
+  // With no room for more frames, who has none yet waits (catch_up).
+  const bool refresh = anybody_waits() && !memory_.full();
+  if (poses_.busy || (together() && volumes_busy()) || (!slot_ && !refresh && probes_.empty())) return;
   if (!slot_ && probes_.empty() && openings_.beside_streams(now)) {
     if (!soon_posed(now)) openings_.ask(shared_from_this());
     return;
   }
-  if (now < next_start_) {
-    if (std::exchange(pacing_, true)) return;
-    pace_.expires_at(next_start_);
-    pace_.async_wait([weak = weak_from_this()](const boost::system::error_code&) {
-      const auto self = weak.lock();
-      if (!self) return;
-      self->pacing_ = false;
-      self->start_job();
-    });
-    return;
-  }
-  start(now, false);
+  if (!too_early(poses_, now)) start(now, false);
 }
 
 void Session::start(Clock::time_point now, bool aside) {
-  next_start_ = now + duration(1 / limits_.poses_per_second);
+  poses_.next = now + duration(1 / limits_.poses_per_second);
   const bool refresh = !slot_;
   if (!refresh) {
     posed_ = now;
     openings_.streamed(now);
   }
   auto job = std::make_shared<PoseJob>();
-  job->aside = aside;
+  job->aside = job->alone = aside;
+  job->volumes = together();
   take_up(*job);
-  busy_ = true;
+  poses_.busy = true;
+  if (job->volumes) set_volumes_busy(true);
   try {
-    submit(std::move(job), refresh);
+    submit(job, refresh);
   } catch (...) {  // out of memory: this pose is lost, the next one is not
-    busy_ = false;
+    poses_.busy = false;
+    if (job->volumes) set_volumes_busy(false);
     throw;
   }
 }
@@ -144,7 +168,7 @@ void Session::start(Clock::time_point now, bool aside) {
 bool Session::soon_posed(Clock::time_point now) {
   if (now - posed_ >= kNextPose) return false;
   for (Row& row : rows_) {
-    if (fresh_.contains(row.subscription.id) && !row.refresh_at) row.refresh_at = posed_ + kNextPose;
+    if (row.fresh && !row.refresh_at && by_pose(row)) row.refresh_at = posed_ + kNextPose;
   }
   keep_time();
   return true;
@@ -153,13 +177,16 @@ bool Session::soon_posed(Clock::time_point now) {
 bool Session::open_up() {
   awaits_opening_ = false;
   const auto now = Clock::now();
-  if (busy_ || slot_ || fresh_.empty() || memory_.full() || soon_posed(now)) return false;
+  if (poses_.busy || (together() && volumes_busy()) || slot_ || !anybody_waits() || memory_.full() ||
+      soon_posed(now))
+    return false;
   start(now, true);
   return true;
 }
 
 void Session::catch_up() {
-  if (!fresh_.empty()) start_job();
+  if (std::any_of(rows_.begin(), rows_.end(), [](const Row& row) { return row.fresh.has_value(); }))
+    start_jobs();
 }
 
 void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
@@ -178,26 +205,30 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
     teller->tell_outcome();  // where no frame could be made
     net::io_context& io = self->io_;
     net::post(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
-                   guard = std::move(guard), status] {
-      if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
-      self->busy_ = false;
-      self->stirred_ = Clock::now();
-      // Asked for, and not made: the pose could not be.
-      if (job->probe && self->probe_frame_ != job->probe) self->probe_ready(nullptr);
-      if (job->aside) self->openings_.done();
-      self->start_job();
-    });
+                   guard = std::move(guard), status] { self->posed(*job, status); });
   };
   if (aside)
     openings_.submit(std::move(work));
   else
-    workers_.submit(std::move(work));
+    poses_.workers.submit(std::move(work));
+}
+
+// The job is over.
+void Session::posed(const PoseJob& job, const Status& status) {
+  if (!status.ok()) spdlog::error("session {}: {}", name_, status.message);
+  poses_.busy = false;
+  if (job.volumes) set_volumes_busy(false);
+  stirred_ = Clock::now();
+  // Asked for, and not made: the pose could not be.
+  if (job.probe && probe_frame_ != job.probe) probe_ready(nullptr);
+  if (job.aside) openings_.done();
+  start_jobs();
 }
 
 // Nothing comes, and nothing is being made: where frames lag behind poses, however far, each would lag
 // farther for being judged on its way.
 bool Session::rests(Clock::time_point now) const {
-  return !busy_ && now - stirred_ > kStill;
+  return !poses_.busy && now - stirred_ > kStill;
 }
 
 // While the body moves, keyframes that somebody lacks keep their distance: who comes and goes all the time
@@ -207,67 +238,72 @@ void Session::put_off_keyframes(Clock::time_point now) {
   for (Row& row : rows_) {
     const bool lacked = (row.subscription.keyframes & row.subscription.levels) != 0;
     if (!lacked || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) continue;
-    if (fresh_.erase(row.subscription.id) != 0) row.refresh_at = *row.last_keyframe + kKeyframePause;
+    if (!by_pose(row)) continue;
+    if (std::exchange(row.fresh, std::nullopt)) row.refresh_at = *row.last_keyframe + kKeyframePause;
   }
   keep_time();
 }
 
-// The waiting pose for everyone, or the present one for those who have not seen it.
-void Session::take_up(PoseJob& job) {
-  const bool refresh = !slot_;
+// What every job of the session has.
+void Session::begin(PoseJob& job) {
   job.model = model_;
   job.number = ++frames_;
   job.volume_voxels = limits_.volume_voxels;
   job.thresholds = thresholds_;
   job.digests = recording_ != nullptr;
   job.memory = &memory_;
-  const auto lately = [](const auto& then) { return then && Clock::now() - *then < kProbing; };
+}
+
+// The waiting pose for everyone, or the present one for those who have not seen it.
+void Session::take_up(PoseJob& job) {
+  begin(job);
+  const auto now = Clock::now();
+  const bool refresh = !slot_;
+  const auto lately = [now](const auto& then) { return then && now - *then < kProbing; };
   const bool probing = !probes_.empty() || lately(probed_);
   if (probing) job.probe = spare_probe();
   job.probe_many = lately(probed_many_);
   if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
-  const auto now = Clock::now();
   job.judge = refresh ? rests(now) : rested_;
   if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
-  const bool still = refresh || now - moved_ > kStill;
-  std::set<std::uint32_t> later;
-  std::uint64_t bytes = 0;
+  Taking taking{.now = now, .refresh = refresh, .still = refresh || now - moved_ > kStill};
   for (Row& row : rows_) {
-    const bool fresh = fresh_.contains(row.subscription.id);
-    if (!fresh && (refresh || held_back(row, now))) continue;
-    if (fresh && (refresh || !row.shown) && memory_.full(bytes)) {
-      later.insert(row.subscription.id);
-      continue;
-    }
-    bytes += bytes_of(model_->model(), row.subscription.want);
-    row.shown = true;
-    ask_levels(row, still, now);
-    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
-    if (mesh && !row.subscription.quality) row.subscription.quality = known_quality(*mesh, refresh);
-    if (const double rate = rate_of(row.subscription.want); rate > 0)
-      row.next_due = std::max(row.next_due + duration(std::min(1 / rate, kLongest)), now);
-    const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
-    job.subscriptions.push_back(row.subscription);
-    const auto& streams = row.subscription.streams;
-    if (refresh && present_.sequence == 0 && !job.digests && streams.size() == 1 && streams[0]->plain())
-      job.subscriptions.back().rest = model_->rest_pose.positions(mesh->tissues);
-    if (asked == 0) continue;
-    if (refresh || !row.last_keyframe || now - *row.last_keyframe >= kKeyframePause) {
-      row.subscription.keyframes &= ~asked;
-      row.last_keyframe = now;
-    } else {
-      job.subscriptions.back().keyframes = 0;
-      row.refresh_at = *row.last_keyframe + kKeyframePause;
-    }
+    if (!by_pose(row)) continue;
+    if (!row.fresh && (refresh || held_back(row, now))) continue;
+    if (row.fresh && (refresh || !row.shown) && memory_.full(taking.bytes)) continue;
+    take_up(row, taking, job);
   }
-  job.room = FrameMemory::Room(memory_, bytes);
-  fresh_ = std::move(later);
+  job.room = FrameMemory::Room(memory_, taking.bytes);
   keep_time();
   if (refresh) {
     job.request = present_;
-    job.request.arrived = Clock::now();
+    job.request.arrived = now;
   } else {
     job.request = *std::exchange(slot_, std::nullopt);
+  }
+}
+
+void Session::take_up(Row& row, Taking& taking, PoseJob& job) {
+  taking.bytes += bytes_of(model_->model(), row.subscription.want);
+  row.fresh.reset();
+  row.shown = true;
+  ask_levels(row, taking.still, taking.now);
+  const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
+  if (mesh && !row.subscription.quality) row.subscription.quality = known_quality(*mesh, taking.refresh);
+  if (const double rate = rate_of(row.subscription.want); rate > 0)
+    row.next_due = std::max(row.next_due + duration(std::min(1 / rate, kLongest)), taking.now);
+  const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
+  job.subscriptions.push_back(row.subscription);
+  const auto& streams = row.subscription.streams;
+  if (taking.refresh && present_.sequence == 0 && !job.digests && streams.size() == 1 && streams[0]->plain())
+    job.subscriptions.back().rest = model_->rest_pose.positions(mesh->tissues);
+  if (asked == 0) return;
+  if (taking.refresh || !row.last_keyframe || taking.now - *row.last_keyframe >= kKeyframePause) {
+    row.subscription.keyframes &= ~asked;
+    row.last_keyframe = taking.now;
+  } else {
+    job.subscriptions.back().keyframes = 0;
+    row.refresh_at = *row.last_keyframe + kKeyframePause;
   }
 }
 
@@ -310,10 +346,10 @@ void Session::keep_time() {
     for (Row& row : self->rows_) {
       if (!row.refresh_at || *row.refresh_at > Clock::now()) continue;
       row.refresh_at.reset();
-      self->fresh_.insert(row.subscription.id);
+      row.fresh = row.fresh.value_or(Clock::now());
     }
     self->keep_time();
-    self->start_job();
+    self->start_jobs();
   });
 }
 
@@ -329,6 +365,7 @@ void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, co
     recorded_job_ = job.number;
   }
   if (controller_) controller_->pose_done(outcome, skipped);
+  if (outcome.status.ok() && !job.volumes) want_volumes();
 }
 
 void Session::publish(const PosedFrame& frame) {
@@ -352,56 +389,7 @@ void Session::publish(const PosedFrame& frame) {
   // With the next pose, or, where none comes, of the present one.
   const auto& streams = row->subscription.streams;
   row->subscription.keyframes |= streams.empty() ? 1U : 1U << (frame.level - streams.front()->level());
-  fresh_.insert(row->subscription.id);
-}
-
-void Session::arrived() {
-  if (std::exchange(unjudged_, false)) judging_.ask(shared_from_this());
-}
-
-// Of these tissues, what was measured before: of the present pose where that is shown again, else of another
-// one, which will do within a stream.
-std::shared_ptr<const v1::PoseQuality> Session::known_quality(const MeshWant& want, bool refresh) const {
-  for (const Row& row : rows_) {
-    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
-    const auto& quality = row.subscription.quality;
-    if (mesh && quality && mesh->tissues == want.tissues &&
-        (!refresh || quality->pose_sequence() == present_.sequence))
-      return quality;
-  }
-  if (refresh && present_.sequence != 0) return nullptr;
-  return model_->rest_pose.quality(want.tissues, thresholds_);
-}
-
-bool Session::judge() {
-  awaits_judgement_ = false;
-  auto job = std::make_shared<JudgeJob>();
-  job->model = model_;
-  job->request = present_;
-  job->thresholds = thresholds_;
-  for (const Row& row : rows_) {
-    const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
-    if (mesh && !mesh->quality) job->rows.push_back({row.subscription.id, mesh->tissues, nullptr});
-  }
-  if (job->rows.empty()) return false;
-  judging_.submit([self = shared_from_this(), job, guard = net::make_work_guard(io_)]() mutable {
-    run(*job);
-    net::io_context& io = self->io_;
-    net::post(io, [self = std::move(self), job = std::move(job), guard = std::move(guard)] {
-      self->judging_.done(job->cost);
-      self->judged(*job);
-    });
-  });
-  return true;
-}
-
-void Session::judged(const JudgeJob& job) {
-  for (const JudgeJob::Row& done : job.rows) {
-    const auto row = std::find_if(rows_.begin(), rows_.end(),
-                                  [&](const Row& r) { return r.subscription.id == done.subscription; });
-    if (row != rows_.end() && done.quality && judged_by(*done.quality, thresholds_))
-      row->subscription.quality = done.quality;
-  }
+  row->fresh = row->fresh.value_or(Clock::now());
 }
 
 }  // namespace ecorche::server

@@ -6,6 +6,7 @@
 
 #include <condition_variable>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -34,6 +35,11 @@ class Watcher final : public Member {
   const void* positions() const { return positions_; }
   const std::shared_ptr<const wire::EncodedFrame>& bytes() const { return bytes_; }
   const std::vector<std::uint64_t>& numbers() const { return numbers_; }
+  // The poses that frames of the subscription showed, in the order of their coming.
+  std::vector<std::uint64_t> poses(std::uint32_t subscription) const {
+    const auto found = poses_.find(subscription);
+    return found == poses_.end() ? std::vector<std::uint64_t>() : found->second;
+  }
   // Holds on to every frame, not just to the last, until it is told to let go.
   void hold() { holds_ = true; }
   void let_go() {
@@ -56,6 +62,9 @@ class Watcher final : public Member {
     std::uint32_t bytes = 0;
     std::memcpy(&bytes, frame.bytes->head.data(), sizeof bytes);
     EXPECT_TRUE(envelope_.ParseFromArray(frame.bytes->head.data() + 8, static_cast<int>(bytes)));
+    const bool volume = envelope_.has_volume_frame();
+    poses_[frame.subscription].push_back(volume ? envelope_.volume_frame().pose_sequence()
+                                                : envelope_.mesh_frame().pose_sequence());
     last_ = Clock::now();
     return !std::exchange(loses_, false);
   }
@@ -71,6 +80,7 @@ class Watcher final : public Member {
   v1::Envelope envelope_;
   const void* positions_ = nullptr;
   std::vector<std::uint64_t> numbers_;
+  std::map<std::uint32_t, std::vector<std::uint64_t>> poses_;
   std::vector<std::shared_ptr<const wire::EncodedFrame>> held_;
   bool loses_ = false, holds_ = false;
   Clock::time_point last_{};
@@ -106,6 +116,16 @@ struct Stage {
                   gate.pass();
                   job();
                 }),
+        volume_workers(1,
+                       [this](const Job& job) {
+                         volume_gate.pass();
+                         job();
+                       }),
+        plane_workers(1,
+                      [this](const Job& job) {
+                        plane_gate.pass();
+                        job();
+                      }),
         session(open("a", true)) {
     session->join(watcher);
     want.tissues = {0};
@@ -118,8 +138,20 @@ struct Stage {
     wanted.max_rate = rate;
     return session->subscribe(who, {.id = 0, .want = wanted, .request = {}}).id;
   }
+  // To the CT as it is posed, or to a plane of it.
+  std::uint32_t subscribe_volume(Watcher& who, bool plane = false, double rate = 0) {
+    VolumeWant wanted;
+    wanted.max_rate = rate;
+    if (plane) {
+      ImageGrid& slice = wanted.slices.emplace_back();
+      slice.size = {16, 16, 1};
+    }
+    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}}).id;
+  }
   ~Stage() {
     gate.open();
+    volume_gate.open();
+    plane_gate.open();
     session->leave(watcher, false);
     judging.stop();
     run_until([] { return false; }, milliseconds(50));
@@ -127,8 +159,8 @@ struct Stage {
   }
 
   std::shared_ptr<Session> open(const std::string& name, bool named = false) {
-    return std::make_shared<Session>(io, workers, model, name, named, limits, memory, judging, openings,
-                                     metrics);
+    const Services services{io, workers, volume_workers, plane_workers, memory, judging, openings, metrics};
+    return std::make_shared<Session>(services, model, name, named, limits);
   }
   void pose(std::uint64_t sequence) {
     PoseRequest request;
@@ -164,9 +196,9 @@ struct Stage {
   Judging judging{io};
   Openings openings;
   Metrics metrics;
-  Gate gate;
+  Gate gate, volume_gate, plane_gate;
   std::shared_ptr<const ServedModel> model;
-  Workers workers;
+  Workers workers, volume_workers, plane_workers;
   MeshWant want;
   Watcher watcher;
   std::size_t seen = 0;  // of its frames

@@ -141,7 +141,7 @@ TEST(Session, PlanesAreCountedByTheirPixels) {
   ImageGrid plane;
   plane.size = {300, 200, 1};
   planes.slices = {plane, plane};
-  stage.gate.close();
+  stage.plane_gate.close();
   stage.session->subscribe(stage.watcher, {.id = 0, .want = planes, .request = {}});
   stage.wait(milliseconds(50));
   EXPECT_EQ(stage.memory.bytes(), 2U * 300 * 200 * sizeof(std::int16_t));

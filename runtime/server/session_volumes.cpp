@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a session's volumes show: the newest pose, as fast as they are made, beside the meshes of newer ones.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/server/session.hpp"
+
+namespace ecorche::server {
+
+// The present pose is a new one.
+void Session::want_volumes() {
+  const auto now = Clock::now();
+  for (Row& row : rows_) {
+    if (row.is_volume() && !held_back(row, now)) row.fresh = row.fresh.value_or(present_.arrived);
+  }
+  keep_time();
+  start_volumes(whole_);
+  start_volumes(planes_);
+}
+
+// What was taken up has not been shown.
+void Session::want_again(const Lane& lane) {
+  for (Row& row : rows_) {
+    const auto* want = std::get_if<VolumeWant>(&row.subscription.want);
+    if (want && &lane_of(*want) == &lane) row.fresh = row.fresh.value_or(Clock::now());
+  }
+}
+
+void Session::start_volumes(Lane& lane) {
+  if (lane.busy || together()) return;
+  const auto now = Clock::now();
+  // With no room for more frames, who has none yet waits (catch_up).
+  const auto ready = [&](const Row& row, std::uint64_t bytes) {
+    const auto* want = std::get_if<VolumeWant>(&row.subscription.want);
+    return want && &lane_of(*want) == &lane && row.fresh && (row.shown || !memory_.full(bytes));
+  };
+  if (std::none_of(rows_.begin(), rows_.end(), [&](const Row& row) { return ready(row, 0); }) ||
+      too_early(lane, now))
+    return;
+  lane.next = now + duration(1 / limits_.poses_per_second);
+  auto job = std::make_shared<PoseJob>();
+  begin(*job);
+  job->aside = true;
+  job->request = present_;
+  job->request.arrived = now;
+  Taking taking{.now = now, .refresh = rests(now), .still = true};
+  lane.busy = true;
+  try {
+    for (Row& row : rows_) {
+      if (!ready(row, taking.bytes)) continue;
+      job->request.arrived = std::min(job->request.arrived, *row.fresh);
+      take_up(row, taking, *job);
+    }
+    job->room = FrameMemory::Room(memory_, taking.bytes);
+    keep_time();
+    submit_volumes(lane, std::move(job));
+  } catch (...) {  // out of memory: catch_up() tries again
+    lane.busy = false;
+    want_again(lane);
+    throw;
+  }
+}
+
+void Session::submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job) {
+  std::shared_ptr<Session> self = shared_from_this();
+  const auto posed = std::make_shared<bool>(false);
+  job->on_outcome = [posed](const PoseOutcome& outcome) { *posed = outcome.status.ok(); };
+  job->on_frame = [self](PosedFrame frame) {
+    net::post(self->io_, [self, frame = std::move(frame)] { self->publish(frame); });
+  };
+  // As of submit(): nothing that the job holds goes on the worker.
+  lane.workers.submit([self = std::move(self), job = std::move(job), posed, &lane,
+                       guard = net::make_work_guard(io_)]() mutable {
+    const Status status = run(*job);
+    net::io_context& io = self->io_;
+    net::post(io,
+              [self = std::move(self), job = std::move(job), guard = std::move(guard), posed, &lane, status] {
+                if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
+                lane.busy = false;
+                self->start_jobs();
+                if (!*posed) self->want_again(lane);  // no memory: soon
+              });
+  });
+}
+
+}  // namespace ecorche::server
