@@ -124,12 +124,14 @@ void Connection::close(const char* why) {
 Clock::duration Connection::check(Clock::time_point now) {
   const Limits& limits = house_.limits();
   Clock::duration left = Clock::duration::max();
-  const auto longer = [&](std::optional<Clock::time_point> since, double seconds) {
-    if (!since) return false;
-    const Clock::duration allowed = duration(seconds), passed = now - *since;
-    if (passed >= allowed) return true;
-    left = std::min(left, allowed - passed);
+  const auto reached = [&](std::optional<Clock::time_point> when) {
+    if (!when) return false;
+    if (now >= *when) return true;
+    left = std::min(left, *when - now);
     return false;
+  };
+  const auto longer = [&](std::optional<Clock::time_point> since, double seconds) {
+    return since && reached(*since + duration(seconds));
   };
   if (closed_) return left;
   if (ending_) {
@@ -140,8 +142,7 @@ Clock::duration Connection::check(Clock::time_point now) {
   } else if (!greeted_ && longer(born_, limits.hello_seconds)) {
     hit("hello", {StatusCode::deadline_exceeded,
                   "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
-  } else if (const double stall = limits.stall_seconds * (house_.crowded(now) ? kLessPatience : 1);
-             longer(writing_since_, stall) || longer(outbox_.oldest_in_flight(), stall)) {
+  } else if (reached(stalls_at(now))) {
     spdlog::info("{}: dropped: stopped reading", peer_);
     house_.metrics().hit("stall");
     close("stalled");
@@ -152,6 +153,18 @@ Clock::duration Connection::check(Clock::time_point now) {
     hit("idle", {StatusCode::deadline_exceeded, "connection: nothing heard (send a Ping now and then)"});
   }
   return left;
+}
+
+// When what was sent counts as stalled, should no more be read or acknowledged until then. Where frames crowd
+// the memory it is not enough that something moves.
+std::optional<Clock::time_point> Connection::stalls_at(Clock::time_point now) const {
+  const bool crowded = house_.crowded(now);
+  const auto patience = duration(house_.limits().stall_seconds * (crowded ? kLessPatience : 1));
+  std::optional<Clock::time_point> at;
+  if (writing_) at = stalled_at(*writing_, transport_->moved(), patience, crowded);
+  if (const auto since = crowded ? outbox_.oldest_in_flight() : outbox_.oldest_written())
+    at = std::min(at.value_or(Clock::time_point::max()), *since + patience);
+  return at;
 }
 
 void Connection::hit(const char* limit, const Status& status) {
@@ -298,17 +311,19 @@ net::awaitable<void> Connection::write_frames() {
       co_await house_.wait(wake_, ec);
       continue;
     }
-    writing_since_ = start;
+    writing_ = Writing{.since = start, .bytes = net::buffer_size(buffers)};
     co_await transport_->write(buffers, ec);
-    writing_since_.reset();
+    writing_.reset();
     if (ec) {
       house_.let_go(std::make_shared<std::vector<SharedFrame>>(std::move(frames)));
       close("client left");
       co_return;
     }
+    const auto written = Clock::now();
+    outbox_.written(written);
     for (const SharedFrame& frame : frames)
       house_.metrics().wrote(frame->bytes(), posed && frame == frames.back());
-    if (posed) house_.metrics().took(Metrics::Stage::written, seconds(Clock::now() - start));
+    if (posed) house_.metrics().took(Metrics::Stage::written, seconds(written - start));
   }
 }
 

@@ -14,6 +14,7 @@
 
 #include "runtime/server/house.hpp"
 #include "runtime/server/outbox.hpp"
+#include "runtime/server/patience.hpp"
 #include "runtime/server/transport.hpp"
 
 namespace ecorche::server {
@@ -112,6 +113,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   /// What was found for this connection elsewhere. Whatever goes wrong ends this connection alone.
   void take_back(const std::function<void()>& answer);
   net::awaitable<bool> open_transport();
+  std::optional<Clock::time_point> stalls_at(Clock::time_point now) const;
   void hit(const char* limit, const Status& status);
 
   std::unique_ptr<Transport> transport_;
@@ -144,7 +146,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   const Clock::time_point born_ = Clock::now();
   Clock::time_point heard_ = born_;                 ///< last byte read
   std::optional<Clock::time_point> reading_since_;  ///< first byte of an unfinished message
-  std::optional<Clock::time_point> writing_since_;  ///< start of the present write
+  std::optional<Writing> writing_;                  ///< the present write
   std::optional<Clock::time_point> ending_since_;
 };
 

@@ -19,6 +19,11 @@ void Flow::left(std::uint64_t number, Clock::time_point now) {
   in_flight_.push_back({number, now});
 }
 
+void Flow::written(Clock::time_point now) {
+  for (auto frame = in_flight_.rbegin(); frame != in_flight_.rend() && !frame->written; ++frame)
+    frame->written = now;
+}
+
 void Flow::arrived(std::uint64_t number, Clock::time_point now) {
   while (!in_flight_.empty() && in_flight_.front().number <= number) {
     judge(now - in_flight_.front().left, now);
@@ -29,6 +34,11 @@ void Flow::arrived(std::uint64_t number, Clock::time_point now) {
 std::optional<Clock::time_point> Flow::oldest() const {
   if (in_flight_.empty()) return std::nullopt;
   return in_flight_.front().left;
+}
+
+std::optional<Clock::time_point> Flow::oldest_written() const {
+  if (in_flight_.empty()) return std::nullopt;
+  return in_flight_.front().written;
 }
 
 bool Flow::may_leave(Clock::time_point now) const {

@@ -18,6 +18,8 @@ class Flow {
   explicit Flow(std::uint32_t few) : few_(few) {}
 
   void left(std::uint64_t number, Clock::time_point now);
+  /// All that left is written.
+  void written(Clock::time_point now);
   /// Frame `number` arrived, and with it every older one.
   void arrived(std::uint64_t number, Clock::time_point now);
 
@@ -32,13 +34,17 @@ class Flow {
   /// 180 ms while there is a coarser level: the shortest delay of large frames says little about the way.
   std::uint32_t level(std::uint32_t finest, std::uint32_t coarsest, Clock::time_point now);
 
+  /// When the oldest one left that is on its way.
   std::optional<Clock::time_point> oldest() const;
+  /// When it was written; nothing while it is being written.
+  std::optional<Clock::time_point> oldest_written() const;
   static constexpr std::size_t most_in_flight = 16;
 
  private:
   struct InFlight {
     std::uint64_t number;
     Clock::time_point left;
+    std::optional<Clock::time_point> written = {};
   };
   Clock::duration late() const;
   void judge(Clock::duration delay, Clock::time_point now);

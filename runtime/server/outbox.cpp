@@ -81,11 +81,24 @@ SharedFrame Outbox::next(Clock::time_point now) {
   return nullptr;
 }
 
+void Outbox::written(Clock::time_point now) {
+  if (!last_was_posed_) return;
+  if (const auto found = lanes_.find(last_lane_); found != lanes_.end()) found->second.flow.written(now);
+}
+
 std::optional<Clock::time_point> Outbox::oldest_in_flight() const {
+  return oldest(&Flow::oldest);
+}
+
+std::optional<Clock::time_point> Outbox::oldest_written() const {
+  return oldest(&Flow::oldest_written);
+}
+
+std::optional<Clock::time_point> Outbox::oldest(std::optional<Clock::time_point> (Flow::*of)() const) const {
   std::optional<Clock::time_point> oldest;
   for (const auto& [id, waiting] : lanes_) {
-    if (const auto left = waiting.flow.oldest())
-      oldest = std::min(oldest.value_or(Clock::time_point::max()), *left);
+    if (const auto when = (waiting.flow.*of)())
+      oldest = std::min(oldest.value_or(Clock::time_point::max()), *when);
   }
   return oldest;
 }

@@ -44,6 +44,9 @@ class Outbox {
   /// What to write next; answers first, then the subscriptions in turn. Null when nothing may go now.
   SharedFrame next(Clock::time_point now);
 
+  /// The last of next() is written.
+  void written(Clock::time_point now);
+
   /// Whether the last of next() was a subscription's.
   bool last_was_posed() const { return last_was_posed_; }
 
@@ -51,6 +54,9 @@ class Outbox {
   std::uint64_t answer_bytes() const;
   /// When the frame left that has been on its way for longest.
   std::optional<Clock::time_point> oldest_in_flight() const;
+  /// When the frame was written whose acknowledgement has been awaited for longest; one that is being written
+  /// does not count.
+  std::optional<Clock::time_point> oldest_written() const;
   /// Frames that a newer one replaced before they left.
   std::uint64_t replaced() const { return replaced_; }
 
@@ -67,6 +73,7 @@ class Outbox {
     Flow flow;
   };
   Lane& lane(std::uint32_t subscription) { return lanes_.try_emplace(subscription, limit_).first->second; }
+  std::optional<Clock::time_point> oldest(std::optional<Clock::time_point> (Flow::*of)() const) const;
 
   std::uint32_t limit_;
   std::deque<SharedFrame> answers_;

@@ -7,6 +7,7 @@
 #include <array>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/ssl/stream.hpp>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -26,8 +27,7 @@ Digest digest(std::string_view text) {
 class TlsTransport final : public Transport {
  public:
   TlsTransport(tcp::socket socket, net::ssl::context& context) : stream_(std::move(socket), context) {
-    boost::system::error_code ec;
-    stream_.next_layer().set_option(tcp::no_delay(true), ec);
+    prepare(stream_.next_layer());
   }
 
   net::any_io_executor executor() override { return stream_.get_executor(); }
@@ -40,14 +40,17 @@ class TlsTransport final : public Transport {
     co_return co_await stream_.async_read_some(net::buffer(out.data(), out.size()), quietly(ec));
   }
 
-  // Buffer by buffer: of several at once Asio would encrypt copies of 8 KiB.
+  // Buffer by buffer: of several at once Asio would encrypt copies of 8 KiB. In parts as its async_write
+  // would send, so that it is known when the last one left.
   net::awaitable<void> write(std::span<const net::const_buffer> frame,
                              boost::system::error_code& ec) override {
     ec = {};
-    for (const net::const_buffer& part : frame) {
-      if (part.size() == 0) continue;
-      co_await net::async_write(stream_, part, quietly(ec));
-      if (ec) co_return;
+    for (net::const_buffer left : frame) {
+      while (left.size() > 0) {
+        left += co_await stream_.async_write_some(net::buffer(left, kPart), quietly(ec));
+        if (ec) co_return;
+        moved_ = Clock::now();
+      }
     }
   }
 
@@ -61,8 +64,13 @@ class TlsTransport final : public Transport {
     stream_.next_layer().close(ec);
   }
 
+  std::optional<Clock::time_point> moved() const override { return moved_; }
+
  private:
+  static constexpr std::size_t kPart = 64 << 10;
+
   net::ssl::stream<tcp::socket> stream_;
+  std::optional<Clock::time_point> moved_;
 };
 
 }  // namespace

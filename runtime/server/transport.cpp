@@ -54,10 +54,9 @@ class Window {
 class TcpTransport final : public Transport {
  public:
   explicit TcpTransport(tcp::socket socket) : socket_(std::move(socket)) {
+    prepare(socket_);
     boost::system::error_code ec;
-    socket_.set_option(tcp::no_delay(true), ec);
     socket_.non_blocking(true, ec);  // write() waits by itself
-    socket_.set_option(Unsent(kMostUnsent), ec);
   }
 
   net::any_io_executor executor() override { return socket_.get_executor(); }
@@ -80,6 +79,7 @@ class TcpTransport final : public Transport {
     while (!left.empty()) {
       const std::size_t sent = socket_.write_some(left.next(WriteTurn::room()), ec);
       left.advance(sent);
+      if (sent > 0) moved_ = Clock::now();
       if (ec == net::error::would_block) {
         co_await socket_.async_wait(tcp::socket::wait_write, quietly(ec));
       } else if (!ec && !left.empty()) {
@@ -99,14 +99,23 @@ class TcpTransport final : public Transport {
     socket_.close(ec);
   }
 
+  std::optional<Clock::time_point> moved() const override { return moved_; }
+
  private:
   tcp::socket socket_;
+  std::optional<Clock::time_point> moved_;
 };
 
 }  // namespace
 
 std::unique_ptr<Transport> tcp_transport(tcp::socket socket) {
   return std::make_unique<TcpTransport>(std::move(socket));
+}
+
+void prepare(tcp::socket& socket) {
+  boost::system::error_code ec;
+  socket.set_option(tcp::no_delay(true), ec);
+  socket.set_option(Unsent(kMostUnsent), ec);
 }
 
 std::string peer_of(const tcp::socket& socket) {

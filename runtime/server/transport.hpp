@@ -29,6 +29,10 @@ class Transport {
   virtual net::awaitable<void> finish(boost::system::error_code& ec) = 0;
   virtual void close() = 0;
 
+  /// When bytes of a write last went on their way, parts of the one under way included: TCP and TLS tell it
+  /// of parts of 512 KiB at most. Nothing before the first, or where the carrier cannot tell.
+  virtual std::optional<Clock::time_point> moved() const { return std::nullopt; }
+
   /// Where the carrier has messages, and one must be one frame: whether the last byte read ended one.
   virtual std::optional<bool> message_ended() const { return std::nullopt; }
   /// Without messages, frames may leave in one write.
@@ -36,6 +40,10 @@ class Transport {
 };
 
 std::unique_ptr<Transport> tcp_transport(tcp::socket socket);
+
+/// As every client's socket is: nothing waits to be joined with what comes later, and the kernel keeps a MiB
+/// for who does not read.
+void prepare(tcp::socket& socket);
 
 /// `127.0.0.1:4711`, or `?` once it has gone.
 std::string peer_of(const tcp::socket& socket);

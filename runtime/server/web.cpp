@@ -159,6 +159,10 @@ class WebSocketTransport final : public Transport {
 
   std::optional<bool> message_ended() const override { return socket_->is_message_done(); }
 
+  std::optional<Clock::time_point> moved() const override {
+    return socket_->next_layer().transport().moved();
+  }
+
  private:
   std::unique_ptr<Socket> socket_;
 };

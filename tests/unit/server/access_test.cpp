@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // TLS and tokens: who may connect, and who sees what is said.
-#include <cstdlib>
 #include <filesystem>
 
 #include "runtime/server/tls.hpp"
 #include "tests/support/toy_model.hpp"
+#include "tests/unit/server/certificate.hpp"
 #include "tests/unit/server/test_server.hpp"
 #include "tests/unit/server/web_client.hpp"
 
@@ -13,20 +13,13 @@ namespace {
 
 const std::string kToken = "0123456789abcdef-test";
 
-// A certificate for 127.0.0.1 by the openssl command, made once.
+// Certificates, made once.
 class Access : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder() = std::filesystem::temp_directory_path() / ("ecorche_tls_" + random_token());
     std::filesystem::create_directories(folder());
-    for (const char* name : {"ours", "other"}) {
-      const std::string file = (folder() / name).string();
-      const std::string command =
-          "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=test "
-          "-addext subjectAltName=IP:127.0.0.1 -keyout " +
-          file + ".key -out " + file + ".pem 2>/dev/null";
-      ASSERT_EQ(std::system(command.c_str()), 0);
-    }
+    for (const char* name : {"ours", "other"}) ASSERT_TRUE(make_certificate(file(name)));
   }
   static void TearDownTestSuite() { std::filesystem::remove_all(folder()); }
   static std::filesystem::path& folder() {
