@@ -82,6 +82,15 @@ void Connection::say_goodbye(const Status& status) {
   end(std::move(last));
 }
 
+void Connection::make_way(bool told) {
+  if (told && open_) {
+    return hit("hello", {StatusCode::resource_exhausted,
+                         "hello: none came, and another client took the place (send it at once)"});
+  }
+  house_.metrics().hit("hello");
+  close("made way");
+}
+
 void Connection::end(const Status& status) {
   spdlog::info("{}: ended: {}", peer_, status.message);
   v1::Envelope last;

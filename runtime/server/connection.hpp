@@ -45,6 +45,12 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   /// Second step: now.
   void close(const char* why);
 
+  /// No hello came since `born()`.
+  bool silent() const { return !greeted_ && !ending_ && !closed_; }
+  Clock::time_point born() const { return born_; }
+  /// A silent one's place goes to another client; it is told so where `told` and possible.
+  void make_way(bool told);
+
   /// Drops the connection when it broke a deadline; how long until the next one could be.
   Clock::duration check(Clock::time_point now);
   bool closed() const { return closed_; }

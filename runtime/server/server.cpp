@@ -18,6 +18,10 @@ constexpr Clock::duration kTick = std::chrono::milliseconds(100);
 constexpr Clock::duration kShortTick = std::chrono::milliseconds(5);
 // Connections beyond the limit that may be told so at one time; the next ones are closed without a word.
 constexpr std::size_t kMostRefusals = 32;
+// After so long without a hello a connection makes way for the next one, where there is no room for both. A
+// hello comes with the first packets, after TLS or a WebSocket's handshake one or two ways there and back
+// later; and the longer this is, the fewer connections a second keep all others out: here 2560 of 256 places.
+constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
 
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   boost::system::error_code ec;
@@ -100,6 +104,8 @@ struct Server::Impl {
   Clock::duration look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool web);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven);
+  bool make_way(Clock::time_point now);
+  bool room_for_request(Clock::time_point now);
   void begin_shutdown();
   std::string metrics();
 
@@ -180,9 +186,20 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
   std::unique_ptr<Transport> transport = carrier->carry(std::move(socket));
   if (wrap) transport = wrap(std::move(transport));
   if (!web) return welcome(std::move(transport), std::move(peer), false);
-  if (requests.size() >= house->limits().connections) return house->metrics().hit("connections");
+  if (!room_for_request(Clock::now())) return house->metrics().hit("connections");
   requests.push_back(web_request(std::move(transport), std::move(peer), room));
   requests.back()->start();
+}
+
+// Of requests, too, the oldest makes way.
+bool Server::Impl::room_for_request(Clock::time_point now) {
+  std::erase_if(requests, [](const auto& request) { return request->over(); });
+  if (requests.size() < house->limits().connections) return true;
+  if (now - requests.front()->born() < kTimeToGreet) return false;
+  house->metrics().hit("hello");
+  requests.front()->close();
+  requests.erase(requests.begin());
+  return true;
 }
 
 // At most a second's worth in one go.
@@ -199,17 +216,30 @@ bool Server::Impl::admit(Clock::time_point now) {
 }
 
 void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven) {
+  if (stopping) return;
   const auto limit = house->limits().connections;
-  const auto alive = static_cast<std::size_t>(std::count_if(
+  auto alive = static_cast<std::size_t>(std::count_if(
       connections.begin(), connections.end(), [](const auto& c) { return !c->closed() && !c->ending(); }));
+  if (alive >= limit && make_way(Clock::now())) --alive;
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   if (alive >= limit) house->metrics().hit("connections");
-  if (stopping || connections.size() >= limit + kMostRefusals) return;
+  if (connections.size() >= limit + kMostRefusals) return;
   connections.push_back(std::make_shared<Connection>(std::move(transport), std::move(peer), proven, *house));
   if (alive < limit) return connections.back()->start();
   connections.back()->start_refused(
       {StatusCode::resource_exhausted,
        "connection: " + std::to_string(limit) + " clients are connected (try again later)"});
+}
+
+// The oldest connection that had time for a hello, and sent none.
+bool Server::Impl::make_way(Clock::time_point now) {
+  const auto silent = std::find_if(connections.begin(), connections.end(), [&](const auto& c) {
+    return c->silent() && now - c->born() >= kTimeToGreet;
+  });
+  if (silent == connections.end()) return false;
+  // Whoever is told why stays for a moment.
+  (*silent)->make_way(connections.size() + 1 < house->limits().connections + kMostRefusals);
+  return true;
 }
 
 // Deadlines, ended sessions and, once stopping, the end of the last connection.
