@@ -146,8 +146,9 @@ void Connection::handle_hello(const v1::Envelope& request) {
   resume_token_ = random_token();
   hello.set_resume_token(resume_token_);
   house_.arrived(resume_token_, [this] { close("its place was taken up again"); });
-  if (!request.client_hello().resume_token().empty()) resume(request.client_hello().resume_token(), hello);
-  answer(request.request_id(), std::move(envelope));
+  const std::string& place = request.client_hello().resume_token();
+  if (place.empty()) return answer(request.request_id(), std::move(envelope));
+  come_back(request.request_id(), place, std::move(envelope));
 }
 
 void Connection::handle_list(const v1::Envelope& request) {
@@ -204,11 +205,9 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
                                                  " subscriptions already (Unsubscribe one first)"});
   }
   const auto* mesh = std::get_if<MeshWant>(&want);
-  const bool coarse = mesh && (mesh->level > 0 || mesh->adaptive);
-  if (!coarse && !(mesh && (mesh->region || mesh->control_nodes)))
+  if (!mesh || !takes_long(*mesh))
     return subscribe(id, {.id = 0, .want = want, .request = request.subscribe()}, {}, nullptr);
-  // Of a large body it takes a tenth of a second to say what parts of it hold, and levels are made after the
-  // start, beside all else: who asks waits, and nobody else does.
+  // Beside all else: who asks waits, and nobody else does.
   struct Prepared {
     Status status;
     Asked asked;
@@ -219,11 +218,9 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   const auto made = std::make_shared<Prepared>();
   made->asked = {.id = 0, .want = want, .request = request.subscribe()};
   house_.set_aside(
-      [made, model = session_->model(), coarse] {
+      [made, model = session_->model()] {
         try {
-          const MeshWant& wanted = std::get<MeshWant>(made->asked.want);
-          if (coarse) model->make_levels(wanted.tissues);
-          made->asked.streams = open_streams(*model, wanted);
+          made->asked.streams = open_streams(*model, std::get<MeshWant>(made->asked.want));
           made->payload = describe(*model, made->asked.streams, made->told);
         } catch (const std::bad_alloc&) {
           made->status = {StatusCode::resource_exhausted,

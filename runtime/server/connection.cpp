@@ -272,9 +272,9 @@ net::awaitable<void> Connection::hold_back() {
     allowance_ =
         std::min(rate, allowance_ + rate * std::chrono::duration<double>(now - allowance_at_).count());
     allowance_at_ = now;
-    if (allowance_ >= 0 && outbox_.answers() <= kMostAnswers && outbox_.answer_bytes() <= kMostAnswerBytes)
-      co_return;
-    if (!std::exchange(held, true)) house_.metrics().hit("rate");
+    const bool few = outbox_.answers() <= kMostAnswers && outbox_.answer_bytes() <= kMostAnswerBytes;
+    if (!returning_ && allowance_ >= 0 && few) co_return;
+    if (!returning_ && !std::exchange(held, true)) house_.metrics().hit("rate");
     pause_.expires_after(std::chrono::milliseconds(5));
     co_await house_.wait(pause_, ec);
   }

@@ -57,6 +57,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   bool ending() const { return ending_; }
 
  private:
+  struct Returning;
+
   net::awaitable<void> read_frames();
   net::awaitable<void> write_frames();
   /// Takes the bytes apart that were read.
@@ -64,7 +66,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   /// `n` bytes are where the reader wants them, the last ones that were read or not; a whole message is
   /// handled. Whatever goes wrong ends this connection alone.
   void take_in(std::size_t n, bool last);
-  /// Waits while the client asks faster than it may or reads.
+  /// Waits while the client asks faster than it may or reads, or its hello is not answered yet.
   net::awaitable<void> hold_back();
   net::awaitable<void> discard();
 
@@ -87,7 +89,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   void handle_pose(const v1::PoseUpdate& update);
   void handle_reload(const v1::Envelope& request);
   // control.cpp
-  void resume(const std::string& token, v1::ServerHello& hello);
+  void come_back(std::uint64_t id, const std::string& token, v1::Envelope answer);
+  void resume(const std::shared_ptr<Returning>& back);
   void handle_claim(const v1::Envelope& request);
   void handle_release(const v1::Envelope& request);
   void handle_thresholds(const v1::Envelope& request);
@@ -144,6 +147,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   v1::Role role_ = v1::ROLE_UNSPECIFIED;
   std::string resume_token_;
   std::set<std::uint32_t> subscriptions_;
+  bool returning_ = false;     ///< the hello is answered once the place's streams are made
   std::size_t preparing_ = 0;  ///< subscriptions to parts, which are made aside
   int solving_ = 0;            ///< inverse kinematics under way
   int probing_ = 0;            ///< probes that wait for a pose or a worker

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Who poses, who comes back, and by what poses are judged.
 #include <cmath>
+#include <new>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "runtime/server/connection.hpp"
+#include "runtime/server/mesh_streams.hpp"
 
 namespace ecorche::server {
 
@@ -18,25 +22,75 @@ Status Connection::may(const char* what, bool control) const {
   return {};
 }
 
-void Connection::resume(const std::string& token, v1::ServerHello& hello) {
-  const std::optional<Lost> place = house_.take_up(token);
-  if (!place) return;
-  session_ = place->session.lock();
-  if (!session_) return;
+// A client that had a place, and what it is to be told of it.
+struct Connection::Returning {
+  std::uint64_t id = 0;  // of its hello
+  std::string token;
+  v1::Envelope answer;
+  std::vector<Asked> asked;  // of the place, with the streams that were made meanwhile
+  bool no_memory = false;
+};
+
+void Connection::come_back(std::uint64_t id, const std::string& token, v1::Envelope answer) {
+  auto back = std::make_shared<Returning>();
+  back->id = id;
+  back->token = token;
+  back->answer = std::move(answer);
+  resume(back);
+}
+
+// What nobody else watches is made again, aside where that takes long: kept for who only might come back, it
+// would be memory that no limit counts. Meanwhile the place stays what it is.
+void Connection::resume(const std::shared_ptr<Returning>& back) {
+  returning_ = false;
+  const Lost* const place = house_.place_of(back->token);
+  const std::shared_ptr<Session> session = place ? place->session.lock() : nullptr;
+  if (!session) return answer(back->id, std::move(back->answer));
+  if (back->asked.empty()) back->asked = place->asked;
+  std::vector<Asked*> lacking;
+  for (Asked& asked : back->asked) {
+    const auto* mesh = std::get_if<MeshWant>(&asked.want);
+    if (mesh && takes_long(*mesh) && asked.streams.empty() && !session->shows(asked.want))
+      lacking.push_back(&asked);
+  }
+  if (!lacking.empty()) {
+    house_.set_aside(
+        [back, lacking, model = session->model()] {
+          try {
+            for (Asked* asked : lacking)
+              asked->streams = open_streams(*model, std::get<MeshWant>(asked->want));
+          } catch (const std::bad_alloc&) {
+            back->no_memory = true;
+          }
+        },
+        [weak = weak_from_this(), back] {
+          const auto self = weak.lock();
+          if (!self || self->closed_ || self->ending_) return;
+          self->take_back([&] {
+            if (back->no_memory) throw std::bad_alloc();
+            self->resume(back);
+          });
+        });
+    returning_ = true;
+    return;
+  }
+  session_ = session;
   role_ = session_->rejoin(*this, place->controlled);
+  house_.take_up(back->token);
   last_sequence_ = session_->last_sequence();
-  v1::Resumed& resumed = *hello.mutable_resumed();
+  v1::Resumed& resumed = *back->answer.mutable_server_hello()->mutable_resumed();
   resumed.set_model(session_->model()->summary.name());
   resumed.set_session(session_->name());
   resumed.set_role(role_);
   resumed.set_last_sequence(last_sequence_);
-  for (const Asked& asked : place->asked) {
+  for (const Asked& asked : back->asked) {
     const std::uint32_t number = session_->subscribe(*this, asked).id;
     subscriptions_.insert(number);
     v1::ResumedSubscription& one = *resumed.add_subscriptions();
     one.set_was(asked.id);
     one.set_is(number);
   }
+  answer(back->id, std::move(back->answer));
 }
 
 void Connection::handle_claim(const v1::Envelope& request) {

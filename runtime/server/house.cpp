@@ -179,17 +179,19 @@ void House::left(const std::string& token, std::optional<Lost> place) {
   lost_.insert_or_assign(token, std::move(*place));
 }
 
-std::optional<Lost> House::take_up(const std::string& token) {
+const Lost* House::place_of(const std::string& token) {
   if (const auto live = live_.find(token); live != live_.end()) {
     const std::function<void()> give_up = live->second;
     give_up();  // leaves its place
   }
   sweep(Clock::now());
   const auto found = lost_.find(token);
-  if (found == lost_.end()) return std::nullopt;
-  Lost place = std::move(found->second);
-  lost_.erase(found);
-  return place;
+  return found == lost_.end() ? nullptr : &found->second;
+}
+
+std::optional<Lost> House::take_up(const std::string& token) {
+  if (!place_of(token)) return std::nullopt;
+  return std::move(lost_.extract(token).mapped());
 }
 
 std::vector<std::shared_ptr<const Clip>> House::clips_for(const ServedModel& model) const {

@@ -54,7 +54,10 @@ class House {
   /// It ended; a place that can be taken up again is kept for `linger_seconds`, as many as there may be
   /// connections: then the oldest is lost.
   void left(const std::string& token, std::optional<Lost> place);
-  /// The place of the token, once; nothing where there is none (any more).
+  /// The place of the token, which its connection leaves where it is still there; good until the next call.
+  /// Null where there is none (any more).
+  const Lost* place_of(const std::string& token);
+  /// The same, once.
   std::optional<Lost> take_up(const std::string& token);
 
   /// What can be played on the model.

@@ -52,6 +52,10 @@ void describe_binding(const Model& model, std::uint32_t tissue, const std::vecto
 
 }  // namespace
 
+bool takes_long(const MeshWant& want) {
+  return want.level > 0 || want.adaptive || want.region || want.control_nodes;
+}
+
 std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, const MeshWant& want) {
   std::vector<std::shared_ptr<MeshStream>> streams;
   if (want.control_nodes) {
@@ -59,6 +63,7 @@ std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, 
     return streams;
   }
   const std::uint32_t last = want.adaptive ? coarsest_level : want.level;
+  if (last > 0) model.make_levels(want.tissues);
   for (std::uint32_t level = want.level; level <= last; ++level) {
     if (level == 0 && !want.region) {
       streams.push_back(std::make_shared<MeshStream>(want, level, nullptr));

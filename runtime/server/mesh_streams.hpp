@@ -10,7 +10,11 @@
 
 namespace ecorche::server {
 
-/// A stream for every level that may come, finest first.
+/// Whether its streams take long to make: a tenth of a second for parts of a large body, more where levels of
+/// detail have to be made before.
+bool takes_long(const MeshWant& want);
+
+/// A stream for every level that may come, finest first. Throws bad_alloc.
 std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, const MeshWant& want);
 
 /// Fills all but the subscription's number: what the levels hold, how vertices hang on control nodes. Null

@@ -141,6 +141,11 @@ std::vector<Asked> Session::asked_by(Member& member) const {
   return out;
 }
 
+bool Session::shows(const Want& want) const {
+  return std::any_of(rows_.begin(), rows_.end(),
+                     [&](const Row& row) { return row.subscription.want == want; });
+}
+
 bool Session::unsubscribe(Member& member, std::uint32_t id) {
   const auto row =
       std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.subscription.id == id; });

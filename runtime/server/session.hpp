@@ -101,6 +101,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// new; good until the next call. Frames follow, the present pose first.
   const Subscription& subscribe(Member& member, const Asked& asked);
   std::vector<Asked> asked_by(Member& member) const;
+  /// Somebody has such a subscription.
+  bool shows(const Want& want) const;
   /// False where the member has no such subscription.
   bool unsubscribe(Member& member, std::uint32_t id);
 

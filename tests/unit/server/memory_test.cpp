@@ -76,6 +76,49 @@ TEST(MemoryTest, TheNthAllocation) {
   EXPECT_GT(n, 100);
 }
 
+// The token of a client that had a level of detail, and is gone.
+std::string left_place(const TestServer& server) {
+  RawClient client(server);
+  client.send_hello();
+  const auto hello = client.receive();
+  v1::Envelope open, subscribe;
+  open.mutable_open_model()->set_without_triangles(true);
+  subscribe.mutable_subscribe()->mutable_mesh()->set_level(1);
+  for (v1::Envelope* request : {&open, &subscribe}) {
+    request->set_request_id(1);
+    client.send(*request);
+    client.receive();
+  }
+  return hello ? hello->envelope.server_hello().resume_token() : "";
+}
+
+TEST(MemoryTest, TheNthAllocationOfComingBack) {
+  const TestServer server(Options{}, {.transport = {}, .timer_fails = {}, .handling = [](bool begins) {
+                                        thread_local int depth = 0;
+                                        handling = (depth += begins ? 1 : -1) > 0;
+                                      }});
+  bool struck = true, resumed = false;
+  int n = 0;
+  for (; struck && n < 2000; ++n) {
+    v1::Envelope hello;
+    hello.mutable_client_hello()->set_protocol_min(1);
+    hello.mutable_client_hello()->set_protocol_max(1);
+    hello.mutable_client_hello()->set_resume_token(left_place(server));
+    RawClient back(server);
+    allocations.set(n);
+    back.send(hello);
+    const auto answer = back.receive();  // or it is hung up
+    struck = allocations.spent();
+    allocations.off();
+    resumed = answer && answer->envelope.server_hello().resumed().subscriptions_size() == 1;
+    EXPECT_TRUE(struck || resumed) << n;
+    ASSERT_TRUE(converse(server, 10)) << n;
+  }
+  EXPECT_TRUE(resumed);
+  std::printf("%d allocations failed, one by one\n", n - 1);
+  EXPECT_GT(n, 20);
+}
+
 // A client of one subscription: it knows what it has, and that every frame that it can read is right.
 struct Reader {
   Subscription subscription;
