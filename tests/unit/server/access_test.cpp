@@ -71,10 +71,7 @@ TEST_F(Access, FramesOverTlsAreTheSame) {
   EXPECT_EQ(web.upgrade("Sec-WebSocket-Protocol: ecorche.v1\r\nAuthorization: Bearer " + kToken + "\r\n")
                 .rfind("HTTP/1.1 101", 0),
             0U);
-  v1::Envelope hello;
-  hello.mutable_client_hello()->set_protocol_min(1);
-  hello.mutable_client_hello()->set_protocol_max(1);
-  web.send_frame(hello);  // the request has shown the token
+  web.send_frame(greeting());  // the request has shown the token
   const auto answer = web.frame();
   ASSERT_TRUE(answer);
   EXPECT_TRUE(answer->envelope.has_server_hello());
@@ -111,10 +108,7 @@ TEST_F(Access, WithoutTheTokenNobodyComesIn) {
   // A browser cannot set headers: its token comes with the hello.
   WebClient browser(server.http(), file("ours.pem"));
   EXPECT_EQ(browser.upgrade().rfind("HTTP/1.1 101", 0), 0U);
-  v1::Envelope hello;
-  hello.mutable_client_hello()->set_protocol_min(1);
-  hello.mutable_client_hello()->set_protocol_max(1);
-  browser.send_frame(hello);
+  browser.send_frame(greeting());
   EXPECT_EQ(browser.frame()->envelope.status().code(),
             static_cast<std::uint32_t>(StatusCode::unauthenticated));
 }

@@ -23,10 +23,8 @@ inline bool converse(const TestServer& server, double seconds) {
       client.send(request);
       return receive([](const v1::Envelope& e) { return e.request_id() == 5; });
     };
-    v1::Envelope hello, open, subscribe, coarse, solve, play, ping;
-    hello.mutable_client_hello()->set_protocol_min(1);
-    hello.mutable_client_hello()->set_protocol_max(1);
-    if (!call(hello)) return false;
+    v1::Envelope open, subscribe, coarse, solve, play, ping;
+    if (!call(greeting())) return false;
     open.mutable_open_model();
     const auto opened = call(open);
     if (!opened || !opened->has_model_opened()) return false;

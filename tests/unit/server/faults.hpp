@@ -4,10 +4,9 @@
 
 #include <atomic>
 #include <memory>
-#include <optional>
 #include <utility>
 
-#include "runtime/server/seams.hpp"
+#include "tests/unit/server/forwarding_transport.hpp"
 
 namespace ecorche::server {
 
@@ -26,15 +25,13 @@ class Countdown {
 };
 
 /// A transport whose reads and writes break when the countdowns strike, as a connection does that is reset.
-class FaultyTransport final : public Transport {
+class FaultyTransport final : public ForwardingTransport {
  public:
   FaultyTransport(std::unique_ptr<Transport> inner, Countdown& reads, Countdown& writes)
-      : inner_(std::move(inner)), reads_(reads), writes_(writes) {}
+      : ForwardingTransport(std::move(inner)), reads_(reads), writes_(writes) {}
 
-  net::any_io_executor executor() override { return inner_->executor(); }
-  net::awaitable<void> open(boost::system::error_code& ec) override { return inner_->open(ec); }
   net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) override {
-    if (!reads_.strikes()) co_return co_await inner_->read_some(out, ec);
+    if (!reads_.strikes()) co_return co_await ForwardingTransport::read_some(out, ec);
     ec = net::error::connection_reset;
     co_return 0;
   }
@@ -43,14 +40,10 @@ class FaultyTransport final : public Transport {
     if (writes_.strikes())
       ec = net::error::broken_pipe;
     else
-      co_await inner_->write(frame, ec);
+      co_await ForwardingTransport::write(frame, ec);
   }
-  net::awaitable<void> finish(boost::system::error_code& ec) override { return inner_->finish(ec); }
-  void close() override { inner_->close(); }
-  std::optional<bool> message_ended() const override { return inner_->message_ended(); }
 
  private:
-  std::unique_ptr<Transport> inner_;
   Countdown& reads_;
   Countdown& writes_;
 };

@@ -68,10 +68,7 @@ TEST(FaultsTest, TheNthReadAndWriteBelowAWebSocket) {
     try {
       WebClient client(server.http());
       client.upgrade();
-      v1::Envelope hello;
-      hello.mutable_client_hello()->set_protocol_min(1);
-      hello.mutable_client_hello()->set_protocol_max(1);
-      client.send_frame(hello);
+      client.send_frame(greeting());
       client.message(0.5);
       client.send_message("", 8);
       client.rest(0.5);

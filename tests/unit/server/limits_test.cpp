@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every limit, and that nobody else notices when one strikes.
+#include "proto/arrays.hpp"
+#include "tests/unit/server/forwarding_transport.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {
@@ -228,33 +230,29 @@ TEST(LimitsTest, NoMoreFramesAreSentThanAreAcknowledged) {
   EXPECT_EQ(frames[2].pose_sequence(), 20U);  // the newest replaced all that waited
 }
 
-// A client whose frames never leave the server; its answers do.
-class HeldTransport final : public Transport {
+// A client whose payloads never leave the server, from the `first` on; its other messages do.
+class HeldTransport final : public ForwardingTransport {
  public:
-  explicit HeldTransport(std::unique_ptr<Transport> inner)
-      : inner_(std::move(inner)), held_(inner_->executor()) {}
+  /// The first payload is the triangles of OpenModel.
+  explicit HeldTransport(std::unique_ptr<Transport> inner, int first = 2, std::atomic<bool>* holds = nullptr)
+      : ForwardingTransport(std::move(inner)), held_(executor()), first_(first), holds_(holds) {}
 
-  net::any_io_executor executor() override { return inner_->executor(); }
-  net::awaitable<void> open(boost::system::error_code& ec) override { return inner_->open(ec); }
-  net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) override {
-    return inner_->read_some(out, ec);
-  }
   net::awaitable<void> write(std::span<const net::const_buffer> frames,
                              boost::system::error_code& ec) override {
-    // The first payload is the triangles of OpenModel.
-    if (frames.size() < 2 || ++payloads_ == 1) co_return co_await inner_->write(frames, ec);
+    if (frames.size() < 2 || ++payloads_ < first_) co_return co_await ForwardingTransport::write(frames, ec);
+    if (holds_ != nullptr) *holds_ = true;
     held_.expires_at(Clock::time_point::max());
     co_await held_.async_wait(quietly(ec));
   }
-  net::awaitable<void> finish(boost::system::error_code& ec) override { return inner_->finish(ec); }
   void close() override {
-    inner_->close();
+    ForwardingTransport::close();
     held_.cancel();
   }
 
  private:
-  std::unique_ptr<Transport> inner_;
   net::steady_timer held_;
+  int first_;
+  std::atomic<bool>* holds_;
   int payloads_ = 0;
 };
 
@@ -291,6 +289,55 @@ TEST(LimitsTest, WhereFramesFillTheMemoryNewOnesWaitAndPatienceIsShort) {
   EXPECT_GT(waited, 0.5);
   EXPECT_LT(waited, 3.5);  // a quarter of the usual, not all of it
   EXPECT_GT(sequence, 10U);
+}
+
+// An answer that its client does not read, such as a probe's; not the triangles of a model, which all share.
+TEST(LimitsTest, AnswersThatWaitAreFramesLike) {
+  for (const bool own : {true, false}) {
+    SCOPED_TRACE(own ? "a probe's" : "a model's");
+    std::atomic<bool> holds = false;
+    int clients = 0;
+    Options options;
+    options.limits.queued_bytes = 0;
+    options.limits.stall_seconds = 1000;
+    const TestServer server(
+        options, {.transport = [&](std::unique_ptr<Transport> transport) -> std::unique_ptr<Transport> {
+                    if (++clients != 1) return transport;
+                    return std::make_unique<HeldTransport>(std::move(transport), own ? 2 : 1, &holds);
+                  },
+                  .timer_fails = {},
+                  .handling = {}});
+    auto sleeper = std::make_unique<RawClient>(server);
+    sleeper->send_hello();
+    v1::Envelope open, probe;
+    open.set_request_id(1);
+    open.mutable_open_model();
+    sleeper->send(open);
+    probe.set_request_id(2);
+    probe.mutable_probe_points()->set_direction(v1::ProbePoints::DIRECTION_REST_TO_POSED);
+    auto payload = std::make_shared<wire::Payload>();
+    const std::vector<double> point{0, 0, 10};
+    *probe.mutable_probe_points()->mutable_points() =
+        wire::append(*payload, std::span<const double>(point), 3);
+    if (own) {
+      ASSERT_TRUE(sleeper->receive() && sleeper->receive());
+      sleeper->send(probe, payload);
+    }
+    while (!holds) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    TestClient other(server);
+    other.subscribe_mesh();
+    const auto sees = [&](double seconds) {
+      const auto until = client::Clock::now() + duration(seconds);
+      while (const auto frame = other.client().receive(until)) {
+        if (frame->envelope.has_mesh_frame()) return true;
+      }
+      return false;
+    };
+    EXPECT_EQ(sees(own ? 0.5 : 20), !own);
+    if (!own) continue;
+    sleeper = nullptr;
+    EXPECT_TRUE(sees(20)) << "nothing waits any more";
+  }
 }
 
 TEST(LimitsTest, WhereFramesFillHalfOfTheMemoryPatienceIsShort) {

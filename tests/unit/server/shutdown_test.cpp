@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Starting and ending.
 #include "tests/support/toy_model.hpp"
+#include "tests/unit/server/forwarding_transport.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {
@@ -75,29 +76,21 @@ TEST(Start, WhatCannotBeServedIsRefused) {
 }
 
 // A connection whose frames leave when they may.
-class SlowTransport final : public Transport {
+class SlowTransport final : public ForwardingTransport {
  public:
   SlowTransport(std::unique_ptr<Transport> inner, std::atomic<bool>& held)
-      : inner_(std::move(inner)), held_(held), pause_(inner_->executor()) {}
+      : ForwardingTransport(std::move(inner)), held_(held), pause_(executor()) {}
 
-  net::any_io_executor executor() override { return inner_->executor(); }
-  net::awaitable<void> open(boost::system::error_code& ec) override { return inner_->open(ec); }
-  net::awaitable<std::size_t> read_some(std::span<std::byte> out, boost::system::error_code& ec) override {
-    return inner_->read_some(out, ec);
-  }
   net::awaitable<void> write(std::span<const net::const_buffer> frames,
                              boost::system::error_code& ec) override {
     while (held_) {
       pause_.expires_after(std::chrono::milliseconds(2));
       co_await pause_.async_wait(quietly(ec));
     }
-    co_await inner_->write(frames, ec);
+    co_await ForwardingTransport::write(frames, ec);
   }
-  net::awaitable<void> finish(boost::system::error_code& ec) override { return inner_->finish(ec); }
-  void close() override { inner_->close(); }
 
  private:
-  std::unique_ptr<Transport> inner_;
   std::atomic<bool>& held_;
   net::steady_timer pause_;
 };

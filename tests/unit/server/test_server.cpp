@@ -119,6 +119,13 @@ void TestClient::send(std::uint64_t sequence, const Pose& pose) {
   client_.send(update(sequence, pose));
 }
 
+v1::Envelope greeting() {
+  v1::Envelope hello;
+  hello.mutable_client_hello()->set_protocol_min(1);
+  hello.mutable_client_hello()->set_protocol_max(1);
+  return hello;
+}
+
 RawClient::RawClient(const TestServer& server)
     : socket_(server.address(), within(5)), reader_({.envelope_bytes = 1 << 20, .payload_bytes = 1 << 26}) {}
 
@@ -133,10 +140,7 @@ void RawClient::send(const v1::Envelope& envelope, std::shared_ptr<const wire::P
 }
 
 void RawClient::send_hello() {
-  v1::Envelope hello;
-  hello.mutable_client_hello()->set_protocol_min(1);
-  hello.mutable_client_hello()->set_protocol_max(1);
-  send(hello);
+  send(greeting());
 }
 
 std::optional<wire::Frame> RawClient::receive(double seconds) {

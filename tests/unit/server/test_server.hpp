@@ -93,6 +93,9 @@ class TestClient {
   v1::ModelOpened opened_;
 };
 
+/// What a client says first.
+v1::Envelope greeting();
+
 /// A socket without manners. Reads what the server says; null once it hung up or said nothing for `seconds`.
 class RawClient {
  public:

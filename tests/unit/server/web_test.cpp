@@ -15,12 +15,14 @@ Options with_http() {
   return options;
 }
 
-v1::Envelope hello() {
-  v1::Envelope envelope;
-  envelope.mutable_client_hello()->set_protocol_min(1);
-  envelope.mutable_client_hello()->set_protocol_max(1);
-  return envelope;
-}
+// One that the server has greeted.
+struct Greeted : WebClient {
+  explicit Greeted(const TestServer& server) : WebClient(server.http()) {
+    upgrade();
+    send_frame(greeting());
+    EXPECT_TRUE(frame());
+  }
+};
 
 bool starts(const std::string& text, const std::string& with) {
   return text.rfind(with, 0) == 0;
@@ -136,7 +138,7 @@ TEST(WebSocketTest, CarriesTheSameFramesAsTcp) {
   EXPECT_TRUE(starts(head, "HTTP/1.1 101")) << head;
   EXPECT_NE(head.find("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="), std::string::npos);  // RFC 6455, 1.3
   EXPECT_NE(head.find("ecorche.v1"), std::string::npos);
-  web.send_frame(hello());
+  web.send_frame(greeting());
   ASSERT_TRUE(web.frame()->envelope.has_server_hello());
 
   TestClient poser(server, "shared");
@@ -165,7 +167,7 @@ TEST(WebSocketTest, CarriesTheSameFramesAsTcp) {
 
 TEST(WebSocketTest, AMessageMayComeInFragmentsButHoldsOneFrame) {
   const TestServer server(with_http());
-  const std::string frame = wire::encode(hello()).head;
+  const std::string frame = wire::encode(greeting()).head;
   WebClient fragments(server.http());
   fragments.upgrade();
   fragments.send_message(frame.substr(0, 3), 2, false);
@@ -209,10 +211,7 @@ TEST(WebSocketTest, WhatIsNoMessageWaitsBeyondTheRateToo) {
     Options options = with_http();
     options.limits.messages_per_second = rate;
     const TestServer server(options);
-    WebClient client(server.http());
-    client.upgrade();
-    client.send_frame(hello());
-    EXPECT_TRUE(client.frame());
+    Greeted client(server);
     v1::Envelope ping;
     ping.set_request_id(2);
     ping.mutable_ping();
@@ -237,10 +236,7 @@ TEST(WebSocketTest, WhatIsNoMessageWaitsBeyondTheRateToo) {
 // What is claimed as messages costs nothing more, however long they are.
 TEST(WebSocketTest, LongMessagesDoNotWait) {
   const TestServer server(with_http());
-  WebClient client(server.http());
-  client.upgrade();
-  client.send_frame(hello());
-  EXPECT_TRUE(client.frame());
+  Greeted client(server);
   v1::Envelope ping;
   ping.mutable_ping()->set_data(std::string(60'000, 'x'));
   const auto start = client::Clock::now();
@@ -257,10 +253,7 @@ TEST(WebSocketTest, AMessageInManyPiecesCountsAsMany) {
   Options options = with_http();
   options.limits.messages_per_second = 50;
   const TestServer server(options);
-  WebClient client(server.http());
-  client.upgrade();
-  client.send_frame(hello());
-  EXPECT_TRUE(client.frame());
+  Greeted client(server);
   v1::Envelope ping;
   ping.set_request_id(2);
   ping.mutable_ping()->set_data(std::string(100, 'x'));
@@ -278,7 +271,7 @@ TEST(WebSocketTest, FourKibibytesBeforeTheHelloAndNoMore) {
   const TestServer server(with_http());
   WebClient client(server.http());
   client.upgrade();
-  v1::Envelope large = hello();
+  v1::Envelope large = greeting();
   large.mutable_client_hello()->set_token(std::string(5000, 'x'));
   client.send_frame(large);
   const auto last = client.frame();
@@ -288,10 +281,7 @@ TEST(WebSocketTest, FourKibibytesBeforeTheHelloAndNoMore) {
 
 TEST(WebSocketTest, AClientThatClosesIsClosedProperly) {
   const TestServer server(with_http());
-  WebClient client(server.http());
-  client.upgrade();
-  client.send_frame(hello());
-  ASSERT_TRUE(client.frame());
+  Greeted client(server);
   client.send_message(std::string("\x03\xe8", 2), 8);
   EXPECT_EQ(client.rest(), std::string("\x88\x02\x03\xe8", 4));
 }
