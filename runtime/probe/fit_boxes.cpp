@@ -92,6 +92,12 @@ HWY_INLINE hn::Vec<Nodes> load(const float* nodes, const std::uint32_t* rows) {
 struct alignas(16) Box {
   float low[4], high[4];
 };
+HWY_INLINE Box between(hn::Vec<F4> low, hn::Vec<F4> high) {
+  Box box;
+  hn::Store(low, F4(), box.low);
+  hn::Store(high, F4(), box.high);
+  return box;
+}
 HWY_INLINE Box bound_run(const float* nodes, std::span<const std::uint32_t> rows) {
   auto low = hn::LoadU(F4(), nodes + rows[0]), high = low;
   for (const std::uint32_t row : rows) {
@@ -99,10 +105,7 @@ HWY_INLINE Box bound_run(const float* nodes, std::span<const std::uint32_t> rows
     low = hn::Min(low, x);
     high = hn::Max(high, x);
   }
-  Box box;
-  hn::Store(low, F4(), box.low);
-  hn::Store(high, F4(), box.high);
-  return box;
+  return between(low, high);
 }
 
 // A node of the mesh, of which nothing follows the last, and a zero.
@@ -128,10 +131,7 @@ HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, fl
     low = hn::Min(low, x);
     high = hn::Max(high, x);
   }
-  Box box;
-  hn::Store(low, F4(), box.low);
-  hn::Store(high, F4(), box.high);
-  return box;
+  return between(low, high);
 }
 
 HWY_INLINE hn::Vec<Nodes> repeated(hn::Vec<F4> v) {

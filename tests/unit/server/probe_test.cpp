@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points through the body over the wire, held against the same asked offline.
-#include <cstring>
+#include <algorithm>
+#include <cmath>
 
 #include "proto/arrays.hpp"
 #include "runtime/probe/probe.hpp"
 #include "runtime/skin/body_poser.hpp"
+#include "tests/unit/server/session_stage.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {
@@ -56,20 +58,62 @@ void expect_same(const std::vector<float>& a, const std::vector<float>& b) {
     EXPECT_TRUE(a[i] == b[i] || (std::isnan(a[i]) && std::isnan(b[i]))) << i;
 }
 
-// A client that poses, then probes.
+// The toy body with all of its tets so often that the tree about them has several blocks, each fitted when
+// first a point comes to it.
+Model layered() {
+  constexpr int kTimes = 20;
+  Model model = test::toy_model();
+  model.tets = Tets(model.tets.replicate(kTimes, 1));
+  const std::vector<std::uint16_t> once = model.tet_label;
+  for (int i = 1; i < kTimes; ++i) model.tet_label.insert(model.tet_label.end(), once.begin(), once.end());
+  return model;
+}
+
+// The same asked of a pose offline.
+class Offline {
+ public:
+  explicit Offline(const Model& model)
+      : model_(std::make_shared<const Model>(model)), poser_(model_), probe_(model_) {}
+
+  void pose(const Pose& pose) {
+    runtime::PosedBody body = poser_.make_frame();
+    ASSERT_TRUE(poser_.run(pose, runtime::Skinning::cor, {}, body).ok());
+    probe_.follow(body.nodes, tree_);
+  }
+  runtime::Probed ask(const std::vector<double>& points, v1::ProbePoints::Direction direction) const {
+    const runtime::ProbeWants wants{.gradient = true, .tissue = true, .volumes = {{.row = 0}, {.row = 1}}};
+    runtime::Probed found;
+    if (direction == kToRest)
+      probe_.posed_to_rest(tree_, narrowed(points), wants, found);
+    else
+      probe_.rest_to_posed(tree_, narrowed(points), wants, found);
+    return found;
+  }
+
+ private:
+  std::shared_ptr<const Model> model_;
+  runtime::BodyPoser poser_;
+  runtime::Probe probe_;
+  runtime::Probe::PosedTree tree_;
+};
+
+// A client that probes what another one poses.
 class Prober {
  public:
-  explicit Prober(const TestServer& server) : raw_(server) {
+  explicit Prober(const TestServer& server, const std::string& session = "probed") : raw_(server) {
     raw_.send_hello();
     EXPECT_TRUE(raw_.receive());
     v1::Envelope open;
     open.mutable_open_model()->set_model("toy");
-    open.mutable_open_model()->set_session("probed");
+    open.mutable_open_model()->set_session(session);
     raw_.send(open);
     EXPECT_TRUE(raw_.receive());
   }
   wire::Frame ask(const Question& question) {
     raw_.send(question.envelope, question.payload);
+    return answer();
+  }
+  wire::Frame answer() {
     while (auto frame = raw_.receive()) {
       if (frame->envelope.request_id() == 77) return std::move(*frame);
     }
@@ -88,14 +132,8 @@ TEST(ProbeTest, BothWaysAsOffline) {
   poser.send(4, poser.bent(0.6));
   poser.next_ack();
   Prober prober(server);
-
-  const auto model = std::make_shared<const Model>(server.model());
-  const runtime::BodyPoser offline(model);
-  runtime::PosedBody body = offline.make_frame();
-  ASSERT_TRUE(offline.run(poser.bent(0.6), runtime::Skinning::cor, {}, body).ok());
-  const runtime::Probe probe(model);
-  runtime::Probe::PosedTree tree;
-  probe.follow(body.nodes, tree);
+  Offline offline(server.model());
+  offline.pose(poser.bent(0.6));
 
   // Few are asked on the spot, many by a worker.
   for (const std::size_t count : {std::size_t{1}, std::size_t{16}, std::size_t{17}, std::size_t{10000}}) {
@@ -105,17 +143,12 @@ TEST(ProbeTest, BothWaysAsOffline) {
       v1::ProbePoints& request = *question.envelope.mutable_probe_points();
       request.set_deformation_gradient(true);
       request.set_tissue(true);
-      for (const ModelVolume& volume : model->volumes) request.add_volumes(volume.name);
+      for (const ModelVolume& volume : server.model().volumes) request.add_volumes(volume.name);
       const wire::Frame answer = prober.ask(question);
       const v1::Probed& probed = answer.envelope.probed();
       EXPECT_EQ(probed.pose_sequence(), 4U);
 
-      runtime::ProbeWants wants{.gradient = true, .tissue = true, .volumes = {{.row = 0}, {.row = 1}}};
-      runtime::Probed expected;
-      if (direction == kToRest)
-        probe.posed_to_rest(tree, narrowed(points), wants, expected);
-      else
-        probe.rest_to_posed(tree, narrowed(points), wants, expected);
+      const runtime::Probed expected = offline.ask(points, direction);
       expect_same(narrowed(rows<double>(probed.points(), answer.payload, 3)), expected.points);
       expect_same(narrowed(rows<double>(probed.deformation_gradient(), answer.payload, 9)),
                   expected.gradient);
@@ -125,6 +158,82 @@ TEST(ProbeTest, BothWaysAsOffline) {
         EXPECT_EQ(values[2 * i], expected.values[0][i]);
         EXPECT_EQ(values[2 * i + 1], expected.values[1][i]);
       }
+    }
+  }
+}
+
+// Where many points are asked, every pose is made ready for them as a whole, for a second.
+TEST(ProbeTest, WhoAsksManyPointsFindsTheTreeFitted) {
+  const auto fitted = [](Stage& stage, bool many) {
+    std::shared_ptr<const ProbeFrame> got;
+    stage.session->probe([&](const auto& frame) { got = frame; }, many);
+    stage.run_until([&] { return got != nullptr; });
+    const auto& blocks = got->tree.boxes.blocks;
+    EXPECT_GT(blocks.size(), 2U);
+    return std::count_if(blocks.begin(), blocks.end(), [](const auto& state) {
+             return state.load() == runtime::BoxTree::State::fitted;
+           }) == std::ssize(blocks);
+  };
+  const Model model = layered();
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Stage many(v1::ENCODING_F32, std::uint64_t{1} << 30, model);
+    const auto start = Clock::now();
+    EXPECT_TRUE(fitted(many, true));
+    many.pose(1);
+    many.run_until([&] { return many.watcher.frame().pose_sequence() == 1; });
+    const bool again = fitted(many, false);
+    const bool in_time = Clock::now() - start < std::chrono::seconds(1);
+    EXPECT_TRUE(again || !in_time);
+    Stage few(v1::ENCODING_F32, std::uint64_t{1} << 30, model);
+    EXPECT_FALSE(fitted(few, false));
+    few.pose(1);
+    few.run_until([&] { return few.watcher.frame().pose_sequence() == 1; });
+    EXPECT_FALSE(fitted(few, false));
+    if (in_time) return;
+  }
+  ADD_FAILURE() << "the machine was too busy each time";
+}
+
+// Of a fresh tree the I/O thread and a worker fit the same blocks; later ones are fitted before.
+TEST(ProbeTest, FewAndManyAtOnceWhilePosesCome) {
+  constexpr std::size_t kPoses = 4, kCount = 2000, kFew = 16;
+  const TestServer server({}, layered());
+  const std::vector<double> points = scattered(kCount);
+  std::vector<std::vector<float>> expected;  // by pose
+  const auto turned = [](std::size_t pose) {
+    Pose out = Pose::rest(3);
+    out.rotation[2] = Eigen::AngleAxisd(0.2 * static_cast<double>(pose), Eigen::Vector3d::UnitX());
+    return out;
+  };
+  Offline offline(server.model());
+  for (std::size_t pose = 0; pose < kPoses; ++pose) {
+    offline.pose(turned(pose));
+    expected.push_back(offline.ask(points, kToRest).points);
+  }
+  const auto expect_right = [&](const wire::Frame& answer, std::size_t first, std::size_t count) {
+    const v1::Probed& probed = answer.envelope.probed();
+    ASSERT_LT(probed.pose_sequence(), kPoses);
+    const auto from = expected[probed.pose_sequence()].begin() + static_cast<std::ptrdiff_t>(3 * first);
+    expect_same(narrowed(rows<double>(probed.points(), answer.payload, 3)),
+                {from, from + static_cast<std::ptrdiff_t>(3 * count)});
+  };
+  for (int trial = 0; trial < 4; ++trial) {
+    const std::string session = "s" + std::to_string(trial);
+    TestClient poser(server, session);
+    Prober few(server, session), many(server, session);
+    few.ask(ask({0, 0, 10}, kToRest));  // a tree, of which next to nothing is fitted
+    for (std::size_t pose = 0; pose < kPoses; ++pose) {
+      if (pose > 0) {
+        poser.send(pose, turned(pose));
+        poser.next_ack();
+      }
+      const Question all = ask(points, kToRest);
+      many.raw().send(all.envelope, all.payload);
+      for (std::size_t i = 0; i + kFew <= kCount; i += 97) {
+        const auto at = points.begin() + static_cast<std::ptrdiff_t>(3 * i);
+        expect_right(few.ask(ask({at, at + static_cast<std::ptrdiff_t>(3 * kFew)}, kToRest)), i, kFew);
+      }
+      expect_right(many.answer(), 0, kCount);
     }
   }
 }

@@ -108,9 +108,10 @@ class Gate {
 };
 
 struct Stage {
-  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32, std::uint64_t bytes = std::uint64_t{1} << 30)
+  explicit Stage(v1::Encoding encoding = v1::ENCODING_F32, std::uint64_t bytes = std::uint64_t{1} << 30,
+                 const Model& body = test::toy_model())
       : memory(bytes),
-        model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(test::toy_model()))),
+        model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(body))),
         workers(1,
                 [this](const Job& job) {
                   gate.pass();
