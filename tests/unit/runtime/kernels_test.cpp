@@ -268,7 +268,7 @@ TEST(Kernels, AnyNumberOfThreadsGivesTheSameBytes) {
   bone.tet.clear();
   bone.barycentric.resize(0, 4);
   model.tissues.push_back(bone);
-  Model near = model;  // its cells reach into few slabs
+  Model near = model;  // some of its cells reach into the slab before, none further
   std::vector<Eigen::Index> along(kNodes);
   std::iota(along.begin(), along.end(), 0);
   std::sort(along.begin(), along.end(), [&](auto a, auto b) { return near.nodes(a, 2) < near.nodes(b, 2); });
@@ -276,9 +276,15 @@ TEST(Kernels, AnyNumberOfThreadsGivesTheSameBytes) {
     for (int c = 0; c < 4; ++c)
       near.tets(t, c) = static_cast<int>(along[static_cast<std::size_t>(4 * t + c)]);
   }
+  near.nodes.col(2) *= 2;               // slabs lie along it
+  near.tets.row(0) = near.tets.row(1);  // or cells, of 64 nodes that follow each other, end where slabs do
   for (const Model* each : {&model, &near}) {
     const BodyParts parts(*each);
     EXPECT_GT(parts.clusters().needed, 4 * NodeClusters::slab);
+    std::size_t furthest = 0;
+    for (const auto& cell : parts.groups(0).cells)
+      furthest = std::max(furthest, parts.groups(0).last_slab(cell) - parts.groups(0).first_slab(cell));
+    EXPECT_EQ(furthest == 1, each == &near) << furthest;
     const auto segments = random_segments(9, 1, 15);
     const auto nodes = test::reference_nodes(as_kept(*each), segments, Skinning::cor, 0);
     const auto vertices = test::reference_tissue(*each, each->tissues[0], segments, nodes);
