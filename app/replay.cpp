@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/files/atomic_file.hpp"
 #include "proto/recording.hpp"
@@ -29,7 +30,11 @@ wire::RecordedSession read(const std::filesystem::path& file) {
 class Replay {
  public:
   Replay(const Program& program, Client& client, const wire::RecordedSession& session)
-      : program_(program), client_(client), session_(session) {}
+      : program_(program), client_(client), session_(session) {
+    for (std::size_t at = 0; at < session.steps.size(); ++at) {
+      for (const v1::RecordedFrame& frame : session.steps[at].frames) last_step_[frame.subscription()] = at;
+    }
+  }
 
   // False where the server's model cannot be compared.
   bool open() {
@@ -43,21 +48,16 @@ class Replay {
            opened.topology_digest() == session_.head.topology_digest();
   }
 
-  void subscribe() {
-    for (const auto& [was, subscribe] : session_.subscriptions) {
-      v1::Envelope request;
-      *request.mutable_subscribe() = subscribe;
-      request.mutable_subscribe()->set_max_rate(0);  // every pose
-      now_[client_.call(std::move(request)).envelope.subscribed().subscription()] = was;
+  void play(std::size_t at) {
+    const wire::RecordedStep& step = session_.steps[at];
+    std::map<std::uint32_t, std::uint64_t> expected;
+    for (const v1::RecordedFrame& frame : step.frames) {
+      subscribe(frame.subscription());
+      expected[frame.subscription()] = frame.digest();
     }
-  }
-
-  void play(const wire::RecordedStep& step) {
     v1::Envelope update;
     *update.mutable_pose_update() = step.pose;
     client_.send(update);
-    std::map<std::uint32_t, std::uint64_t> expected;
-    for (const v1::RecordedFrame& frame : step.frames) expected[frame.subscription()] = frame.digest();
     const auto until = Clock::now() + kPatience;
     bool acknowledged = false;
     while (!acknowledged || !expected.empty()) {
@@ -79,31 +79,61 @@ class Replay {
         compare(envelope.volume_frame(), frame->payload, step, expected);
       }
     }
+    give_up(at);
   }
 
   std::uint64_t frames() const { return frames_; }
   std::uint64_t mismatches() const { return mismatches_; }
 
  private:
+  void subscribe(std::uint32_t was) {
+    if (!subscribed_.insert(was).second) return;
+    v1::Envelope request;
+    *request.mutable_subscribe() = session_.subscriptions.at(was);
+    request.mutable_subscribe()->set_max_rate(0);  // every pose
+    now_[client_.call(std::move(request)).envelope.subscribed().subscription()].push_back(was);
+  }
+
+  // What has no frame after this step: a server allows so many subscriptions at a time, and a session may
+  // have seen any number come and go.
+  void give_up(std::size_t at) {
+    for (auto subscription = now_.begin(); subscription != now_.end();) {
+      std::erase_if(subscription->second, [&](std::uint32_t was) { return last_step_[was] <= at; });
+      if (!subscription->second.empty()) {
+        ++subscription;
+        continue;
+      }
+      v1::Envelope request;
+      request.mutable_unsubscribe()->set_subscription(subscription->first);
+      client_.call(std::move(request));
+      subscription = now_.erase(subscription);
+    }
+  }
+
   template <class Frame>
   void compare(const Frame& frame, const wire::Payload& payload, const wire::RecordedStep& step,
                std::map<std::uint32_t, std::uint64_t>& expected) {
     const auto subscription = now_.find(frame.subscription());
     if (frame.pose_sequence() != step.pose.sequence() || subscription == now_.end()) return;
-    const auto recorded = expected.find(subscription->second);
-    if (recorded == expected.end()) return;
-    ++frames_;
-    if (wire::payload_digest(payload) != recorded->second && ++mismatches_ <= 5) {
-      program_.note("mismatch: pose " + std::to_string(step.pose.sequence()) + ", subscription " +
-                    std::to_string(subscription->second));
+    for (const std::uint32_t was : subscription->second) {
+      const auto recorded = expected.find(was);
+      if (recorded == expected.end()) continue;
+      ++frames_;
+      if (wire::payload_digest(payload) != recorded->second && ++mismatches_ <= 5) {
+        program_.note("mismatch: pose " + std::to_string(step.pose.sequence()) + ", subscription " +
+                      std::to_string(was));
+      }
+      expected.erase(recorded);
     }
-    expected.erase(recorded);
   }
 
   const Program& program_;
   Client& client_;
   const wire::RecordedSession& session_;
-  std::map<std::uint32_t, std::uint32_t> now_;  // recorded numbers by present ones
+  std::map<std::uint32_t, std::size_t> last_step_;  // with a frame of it, by recorded number
+  std::set<std::uint32_t> subscribed_;              // recorded numbers
+  // Recorded numbers by present ones: several where only the rates differed.
+  std::map<std::uint32_t, std::vector<std::uint32_t>> now_;
   std::uint64_t frames_ = 0, mismatches_ = 0;
 };
 
@@ -115,10 +145,7 @@ int replay(const Program& program, const std::filesystem::path& file, const wire
   Client client(address, std::string("ecorche stream ") + ECORCHE_VERSION, access);
   Replay replay(program, client, session);
   const bool comparable = replay.open();
-  if (comparable) {
-    replay.subscribe();
-    for (const wire::RecordedStep& step : session.steps) replay.play(step);
-  }
+  for (std::size_t at = 0; comparable && at < session.steps.size(); ++at) replay.play(at);
   const bool same = comparable && replay.mismatches() == 0;
   program.result(std::to_string(session.steps.size()) + " poses, " + std::to_string(replay.frames()) +
                      " frames compared: " + std::to_string(replay.mismatches()) + " mismatches" +

@@ -245,6 +245,12 @@ class Client:
         self._set_box(volume, region)
         return self._call(request)[0].subscribed.subscription
 
+    def unsubscribe(self, subscription):
+        """Gives a subscription up; frames that came before the answer are still yielded."""
+        request = envelope_pb2.Envelope()
+        request.unsubscribe.subscription = subscription
+        self._call(request)
+
     @staticmethod
     def _set_box(selection, region):
         if region is None:

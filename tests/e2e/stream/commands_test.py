@@ -72,6 +72,28 @@ class Commands(unittest.TestCase):
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn("is not the one that was recorded", result.stderr)
 
+    def test_what_was_watched_is_replayed_however_often_it_changed(self):
+        with Server(MODEL, options=["--record-dir", str(self.path / "recordings"), "--max-subscriptions", "4"]) as server:
+            with Client("127.0.0.1", server.port) as client:
+                pose = client.open().rest_pose()
+                # The same at two rates, and more than a connection may have at a time.
+                client.subscribe_mesh(["skin"])
+                client.subscribe_mesh(["skin"], max_rate=1000)
+                client.record("many")
+                for turn in range(6):
+                    other = client.subscribe_mesh(["skin"], region=((-300, -300, 50 * turn - 300), (300, 300, 300)))
+                    pose[1] = (np.cos(0.02 * turn), np.sin(0.02 * turn), 0, 0)
+                    sequence = client.send_pose(pose)
+                    shown = {frame.subscription for frame in client.frames(0.4) if frame.pose_sequence == sequence}
+                    self.assertIn(other, shown)
+                    client.unsubscribe(other)
+                client.record(None)
+            result = run("stream", server.address, "--replay", self.path / "recordings" / "many.ecrec", "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads(result.stdout)
+            self.assertGreaterEqual(report["frames"], 2 * 6 + 6)
+            self.assertEqual(report["mismatches"], 0)
+
     def test_points_go_both_ways(self):
         with Server(MODEL) as server, Client("127.0.0.1", server.port) as client:
             body = client.open()
