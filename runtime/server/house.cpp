@@ -254,9 +254,20 @@ void House::end_recordings() {
   for (const auto& session : retired_) keep_recording(*session);
 }
 
-Status House::room_for_recording() const {
-  const auto running = std::count_if(sessions_.begin(), sessions_.end(),
-                                     [](const auto& entry) { return entry.second->recording() != nullptr; });
+Status House::room_for_recording(const std::string& name) const {
+  std::ptrdiff_t running = 0;
+  bool same = false;
+  const auto look_at = [&](const Session& session) {
+    if (!session.recording()) return;
+    ++running;
+    same = same || session.recording()->name() == name;
+  };
+  for (const auto& entry : sessions_) look_at(*entry.second);
+  for (const auto& session : retired_) look_at(*session);
+  if (same) {
+    return {StatusCode::already_exists,
+            "record: another session's recording '" + name + "' runs (choose another name)"};
+  }
   if (running >= kMostRecording) {
     return {StatusCode::resource_exhausted,
             "record: " + std::to_string(running) + " recordings run already (try again later)"};

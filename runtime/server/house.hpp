@@ -70,8 +70,9 @@ class House {
   void finish_recording(Session& session, std::function<void(const Status&)> done);
   /// As finish_recording, for all sessions, whose end is the server's.
   void end_recordings();
-  /// resource_exhausted where four run, or the folder holds 256 files.
-  Status room_for_recording() const;
+  /// resource_exhausted where four run, or the folder holds 256 files; already_exists where one of this name
+  /// runs.
+  Status room_for_recording(const std::string& name) const;
 
   /// Reads a model again, aside, and calls `done` on the I/O thread.
   void reload(const std::string& name, std::function<void(const Status&)> done);

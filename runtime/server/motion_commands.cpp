@@ -165,7 +165,8 @@ void Connection::handle_record(const v1::Envelope& request) {
     return answer_status(
         id, {StatusCode::failed_precondition, "record: a recording runs in this session (end it first)"});
   }
-  if (const Status status = house_.room_for_recording(); !status.ok()) return answer_status(id, status);
+  if (const Status status = house_.room_for_recording(request.record().name()); !status.ok())
+    return answer_status(id, status);
   session_->record(std::make_shared<Recording>(request.record().name(), *session_->model(),
                                                "ecorche " + house_.options().version,
                                                house_.limits().record_bytes));

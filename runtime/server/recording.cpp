@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/recording.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/files/atomic_file.hpp"
@@ -52,13 +53,15 @@ void Recording::add(const PoseRequest& pose) {
   v1::Envelope envelope;
   v1::RecordedPose& recorded = *envelope.mutable_recorded_pose();
   recorded.set_seconds(seconds(Clock::now() - start_));
-  recorded.mutable_pose()->set_sequence(pose.sequence);
+  // Who opens a session that nobody controls may count anew; a file goes on.
+  const std::uint64_t sequence = std::max(last_sequence_ + 1, pose.sequence);
+  recorded.mutable_pose()->set_sequence(sequence);
   recorded.mutable_pose()->set_rig_digest(rig_digest_);
   recorded.mutable_pose()->set_skinning(skinning_to_proto(pose.skinning));
   wire::to_proto(pose.pose, *recorded.mutable_pose());
   if (!append(envelope)) return;
   ++poses_;
-  last_sequence_ = pose.sequence;
+  last_sequence_ = sequence;
   if (clip_.at.empty()) first_seconds_ = recorded.seconds();
   clip_.at.push_back(recorded.seconds() - first_seconds_);
   clip_.poses.push_back(pose.pose);

@@ -208,6 +208,48 @@ TEST_F(RecordingTest, NeverGrowsBeyondItsLimit) {
   }
 }
 
+// Who takes over a session that nobody controls begins at 1, as far as it knows.
+TEST_F(RecordingTest, GoesOnWhereAnotherControllerCountsAnew) {
+  const TestServer server(options());
+  auto first = std::make_unique<TestClient>(server, "shared");
+  first->client().call(record(true, "hands"));
+  first->send(7, first->bent(0.1));
+  first->next_ack();
+  v1::Envelope release;
+  release.mutable_release_control();
+  first->client().call(release);
+  TestClient second(server, "shared");
+  second.subscribe_mesh({"skin"});
+  second.send(1, second.bent(0.2));
+  const std::uint64_t digest = wire::payload_digest(second.next_mesh(1).payload);
+  second.client().call(record(false));
+  wire::RecordedSession session;
+  const Status status = read(bytes("hands"), session);
+  ASSERT_TRUE(status.ok()) << status.message;
+  ASSERT_EQ(session.steps.size(), 2U);
+  EXPECT_EQ(session.steps[0].pose.sequence(), 7U);
+  EXPECT_EQ(session.steps[1].pose.sequence(), 8U);
+  ASSERT_EQ(session.steps[1].frames.size(), 1U);
+  EXPECT_EQ(session.steps[1].frames[0].digest(), digest);
+}
+
+// Or the second could not be ended: there is a file of its name by then.
+TEST_F(RecordingTest, TwoOfOneNameDoNotRunAtOnce) {
+  const TestServer server(options());
+  TestClient first(server), second(server);
+  first.client().call(record(true, "bow"));
+  try {
+    second.client().call(record(true, "bow"));
+    ADD_FAILURE() << "it runs";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("another session's recording 'bow' runs"), std::string::npos)
+        << error.what();
+  }
+  second.client().call(record(true, "nod"));
+  first.client().call(record(false));
+  second.client().call(record(false));
+}
+
 std::string file_of(const std::vector<v1::Envelope>& envelopes) {
   std::string out;
   for (const v1::Envelope& envelope : envelopes) out += wire::encode(envelope).head;
