@@ -14,6 +14,9 @@ namespace {
 
 // The protocol of proto/ecorche/v1.
 constexpr std::uint32_t kProtocol = 1;
+// Clips that the server plays count on from a client's poses: never to the end of all numbers, where 0 comes
+// again, which is the rest pose to every session.
+constexpr std::uint64_t kMostSequence = std::uint64_t{1} << 63U;
 constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY,    v1::FEATURE_CONTROL,
                                v1::FEATURE_RESUME,  v1::FEATURE_CLIPS,      v1::FEATURE_INVERSE_KINEMATICS,
                                v1::FEATURE_RELOAD,  v1::FEATURE_THRESHOLDS, v1::FEATURE_SPHERES,
@@ -295,6 +298,8 @@ Status Connection::check_pose(const v1::PoseUpdate& update, PoseRequest& out) co
 }
 
 Status Connection::check_sequence(std::uint64_t sequence) const {
+  if (sequence >= kMostSequence)
+    return {StatusCode::out_of_range, "pose: sequence " + std::to_string(sequence) + " (stay below 2^63)"};
   if (sequence > last_sequence_) return {};
   return {StatusCode::out_of_range, "pose: sequence " + std::to_string(sequence) + " after " +
                                         std::to_string(last_sequence_) + " (let it grow)"};

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kMostSlices = 16;
 constexpr std::uint32_t kMostPixels = 4096;
+constexpr double kFinest = 1e-9, kFarthest = 1e9;  // mm, of planes: beyond, a pixel is no number
 
 Status unimplemented(const std::string& what) {
   return {StatusCode::unimplemented, "subscribe: this server has no " + what + " (ask without)"};
@@ -108,12 +109,13 @@ Status read_slices(const v1::VolumeSelection& volume, VolumeWant& out) {
                           v = wire::from_proto(slice.v());
     const bool sized = std::min(slice.size_u(), slice.size_v()) > 0 &&
                        std::max(slice.size_u(), slice.size_v()) <= kMostPixels;
-    const bool framed = origin.allFinite() && u.allFinite() && v.allFinite() && u.norm() > 0 &&
-                        v.norm() > 0 && std::abs(u.dot(v)) <= 1e-6 * u.norm() * v.norm();
+    const auto steps = [](const Eigen::Vector3d& s) { return s.norm() >= kFinest && s.norm() <= kFarthest; };
+    const bool framed = origin.norm() <= kFarthest && steps(u) && steps(v) &&
+                        std::abs(u.dot(v)) <= 1e-6 * u.norm() * v.norm();
     if (!sized || !framed) {
-      return {
-          StatusCode::invalid_argument,
-          "subscribe: a slice is no plane (1 to 4096 pixels each way, u and v perpendicular and not zero)"};
+      return {StatusCode::invalid_argument,
+              "subscribe: a slice is no plane (1 to 4096 pixels each way, u and v perpendicular, 1e-9 to 1e9 "
+              "mm)"};
     }
     ImageGrid grid;
     grid.size = {static_cast<std::int32_t>(slice.size_u()), static_cast<std::int32_t>(slice.size_v()), 1};

@@ -148,5 +148,25 @@ TEST(Sessions, BadPosesAreAcknowledgedWithTheirReason) {
   EXPECT_EQ(code_of(client.update(6, client.bent(0.2))), StatusCode::ok);
 }
 
+// Clips count on from a client's poses, and never come to 0, which is the rest pose to every session.
+TEST(Sessions, NumbersOfPosesLeaveRoomForThoseOfClips) {
+  constexpr std::uint64_t kHalf = std::uint64_t{1} << 63U;
+  const TestServer server;
+  TestClient client(server);
+  client.subscribe_mesh();
+  for (const std::uint64_t large : {~std::uint64_t{0}, kHalf}) {
+    client.send(large, client.bent(0.1));
+    const v1::Status status = client.next_ack().status();
+    EXPECT_EQ(status.code(), static_cast<std::uint32_t>(StatusCode::out_of_range));
+    EXPECT_NE(status.message().find("(stay below 2^63)"), std::string::npos) << status.message();
+  }
+  client.send(kHalf - 1, client.bent(0.1));
+  EXPECT_EQ(client.next_ack().status().code(), 0U);
+  v1::Envelope play;
+  play.mutable_play_clip()->set_name("turning");
+  client.client().call(play);
+  EXPECT_GE(client.next_ack().sequence(), kHalf);
+}
+
 }  // namespace
 }  // namespace ecorche::server

@@ -115,5 +115,30 @@ TEST(Subscription, WhatCannotBeDoneSaysSo) {
   }
 }
 
+// Where a pixel is no number, every one of them would be asked of every sphere.
+TEST(Subscription, PlanesLieWhereNumbersReach) {
+  const Model model = test::toy_model();
+  const auto read = [&](double origin, double u, double v) {
+    v1::Subscribe request;
+    request.mutable_volume()->set_volume(model.volumes[0].name);
+    v1::Slice& slice = *request.mutable_volume()->add_slices();
+    slice.mutable_origin()->set_z(origin);
+    slice.mutable_u()->set_x(u);
+    slice.mutable_v()->set_y(v);
+    slice.set_size_u(5);
+    slice.set_size_v(5);
+    Want want;
+    return read_want(request, model, want);
+  };
+  for (const double at : {0.0, -1e9, 1e9}) EXPECT_TRUE(read(at, 1, -2).ok()) << at;
+  for (const double step : {2e-9, -5e8}) EXPECT_TRUE(read(0, step, 1).ok() && read(0, 1, step).ok()) << step;
+  for (const double at : {2e9, -1e300, double{INFINITY}, double{NAN}})
+    EXPECT_FALSE(read(at, 1, 1).ok()) << at;
+  for (const double step : {0.0, 1e-10, 1e-200, 2e9, 1e200, double{INFINITY}, double{NAN}}) {
+    EXPECT_FALSE(read(0, step, 1).ok()) << step;
+    EXPECT_NE(read(0, 1, step).message.find("a slice is no plane"), std::string::npos) << step;
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::server
