@@ -290,8 +290,10 @@ void Session::take_up(Row& row, Taking& taking, PoseJob& job) {
   ask_levels(row, taking.still, taking.now);
   const auto* mesh = std::get_if<MeshWant>(&row.subscription.want);
   if (mesh && !row.subscription.quality) row.subscription.quality = known_quality(*mesh, taking.refresh);
-  if (const double rate = rate_of(row.subscription.want); rate > 0)
-    row.next_due = std::max(row.next_due + duration(std::min(1 / rate, kLongest)), taking.now);
+  if (const double rate = rate_of(row.subscription.want); rate > 0) {
+    const Clock::duration pause = duration(std::min(1 / rate, kLongest));
+    row.next_due = std::clamp(row.next_due + pause, taking.now, taking.now + pause);
+  }
   const std::uint32_t asked = row.subscription.keyframes & row.subscription.levels;
   job.subscriptions.push_back(row.subscription);
   const auto& streams = row.subscription.streams;

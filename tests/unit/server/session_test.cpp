@@ -113,6 +113,27 @@ TEST(Session, WhoComesAndGoesAllTheTimeGetsNoMoreKeyframesThanThat) {
   EXPECT_LE(made.size(), 1 + sequence + static_cast<std::size_t>(keyframes));
 }
 
+// The first frames of others are no reason to wait for longer.
+TEST(Session, WhoComesAndGoesTakesNoFramesFromWhoWatchesAtTheSameRate) {
+  constexpr double kRate = 4;
+  Stage stage;
+  Watcher rated, guest;
+  stage.session->join(rated);
+  stage.session->join(guest);
+  stage.subscribe(rated, kRate);
+  for (std::size_t turn = 1; turn <= 12; ++turn) {
+    const std::uint32_t number = stage.subscribe(guest, kRate);
+    stage.run_until([&] { return guest.numbers().size() >= turn; });
+    stage.session->unsubscribe(guest, number);
+  }
+  stage.pose(1);
+  const auto start = Clock::now();
+  stage.run_until([&] { return rated.frame().pose_sequence() == 1; });
+  EXPECT_LT(Clock::now() - start, milliseconds(1500));  // twelve times a quarter of a second
+  stage.session->leave(guest, false);
+  stage.session->leave(rated, false);
+}
+
 // Of subscriptions that never had a frame, one job makes as many as there is room for.
 TEST(Session, FirstFramesAreMadeAsFarAsTheMemoryGoes) {
   Stage stage(v1::ENCODING_F32, 1);
