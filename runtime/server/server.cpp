@@ -20,8 +20,12 @@ constexpr Clock::duration kShortTick = std::chrono::milliseconds(5);
 constexpr std::size_t kMostRefusals = 32;
 // After so long without a hello a connection makes way for the next one, where there is no room for both. A
 // hello comes with the first packets, after TLS or a WebSocket's handshake one or two ways there and back
-// later; and the longer this is, the fewer connections a second keep all others out: here 2560 of 256 places.
+// later; and the longer this is, the fewer connections a second keep all others out: here 2560 of 256 places,
+// and a port lets in 2000.
 constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
+// From one newcomer at a port to the next, who waits in the kernel: however many come at once, those who are
+// served go on between them.
+constexpr Clock::duration kBetween = std::chrono::microseconds(500);
 
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   boost::system::error_code ec;
@@ -163,7 +167,7 @@ void Server::stop() {
 
 net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
   boost::system::error_code ec;
-  net::steady_timer retry(io);
+  net::steady_timer next(io);
   while (at.is_open()) {
     bool failed = false;
     try {
@@ -177,7 +181,7 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
       spdlog::warn("accept: {}", error.what());
       failed = true;
     }
-    if (failed) co_await pause(retry);
+    co_await pause(next, failed ? kTick : kBetween);
   }
 }
 

@@ -136,5 +136,24 @@ TEST(HalfOpen, ARequestTooManyIsRefused) {
   EXPECT_TRUE(refused);
 }
 
+// A crowd that comes at once is let in one by one, so that others have their turns between; and all are.
+TEST(Newcomers, ComeOneAfterAnother) {
+  constexpr std::size_t kCrowd = 60;
+  std::vector<Clock::time_point> came;
+  {
+    const TestServer server(few(100), {.transport =
+                                           [&](std::unique_ptr<Transport> transport) {
+                                             came.push_back(Clock::now());
+                                             return transport;
+                                           },
+                                       .timer_fails = {},
+                                       .handling = {}});
+    const auto crowd = several<RawClient>(kCrowd, server);
+    for (const auto& client : crowd) EXPECT_TRUE(greeted(*client));
+  }
+  ASSERT_EQ(came.size(), kCrowd);
+  EXPECT_GE(came.back() - came.front(), (kCrowd - 1) * std::chrono::microseconds(500));
+}
+
 }  // namespace
 }  // namespace ecorche::server
