@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The Nth allocation while messages are handled fails, for every N of a whole conversation; and while a pose
-// is shown, judged or levels are made, on a worker. In an executable of its own: it replaces operator new.
+// is shown, judged or levels are made, on a worker.
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
@@ -18,39 +18,7 @@
 #include "runtime/server/volume_stream.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/conversation.hpp"
-#include "tests/unit/server/faults.hpp"
-
-namespace {
-
-ecorche::server::Countdown allocations;
-thread_local bool handling = false;
-
-void* allocate(std::size_t size) {
-  if (handling && allocations.strikes()) throw std::bad_alloc();
-  if (void* const memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return allocate(size);
-}
-void* operator new[](std::size_t size) {
-  return allocate(size);
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
+#include "tests/unit/server/failing_new.hpp"
 
 namespace ecorche::server {
 namespace {

@@ -6,6 +6,7 @@
 
 #include <condition_variable>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -49,9 +50,17 @@ class Watcher final : public Member {
   // As if it had not got what the next frame is against.
   void lose_next() { loses_ = true; }
   Clock::time_point last() const { return last_; }
+  // Called before a frame is looked at (true), and after.
+  std::function<void(bool)> looking;
 
  private:
   bool deliver(const PosedFrame& frame) override {
+    if (looking) looking(true);
+    const bool taken = take(frame);
+    if (looking) looking(false);
+    return taken;
+  }
+  bool take(const PosedFrame& frame) {
     judged_.push_back(frame.judged != nullptr);
     keyframes_.push_back(frame.keyframe == frame.number);
     numbers_.push_back(frame.number);
