@@ -74,6 +74,7 @@ void Session::leave(Member& member, bool may_return) {
     last_seen_ = now;
     awaited_ = may_return;
     player_->stop();
+    keep_time();  // a server that stops would wait for who watches at the slowest rate
   } else if (controlled) {
     tell_control();
   }

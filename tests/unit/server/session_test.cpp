@@ -134,6 +134,22 @@ TEST(Session, WhoComesAndGoesTakesNoFramesFromWhoWatchesAtTheSameRate) {
   stage.session->leave(rated, false);
 }
 
+// Or a server that stops would wait, for a day at most.
+TEST(Session, NothingIsDueWhenNobodyIsThere) {
+  Stage stage;
+  const std::uint32_t rated = stage.subscribe(stage.watcher, 1e-3);
+  stage.run_until([&] { return !stage.watcher.poses(rated).empty(); });
+  for (const std::uint64_t pose : {1, 2}) {
+    stage.pose(pose);
+    stage.run_until([&] { return stage.watcher.frame().pose_sequence() == pose; });
+  }
+  stage.session->leave(stage.watcher, true);
+  stage.judging.stop();
+  stage.io.restart();
+  stage.io.run_for(std::chrono::seconds(10));
+  EXPECT_TRUE(stage.io.stopped());
+}
+
 // Of subscriptions that never had a frame, one job makes as many as there is room for.
 TEST(Session, FirstFramesAreMadeAsFarAsTheMemoryGoes) {
   Stage stage(v1::ENCODING_F32, 1);
