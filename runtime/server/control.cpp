@@ -45,7 +45,8 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
   returning_ = false;
   const Lost* const place = house_.place_of(back->token);
   const std::shared_ptr<Session> session = place ? place->session.lock() : nullptr;
-  if (!session) return answer(back->id, std::move(back->answer));
+  // A retired one's members were told so; who comes back now opens the new one.
+  if (!session || session->retired()) return answer(back->id, std::move(back->answer));
   if (back->asked.empty()) back->asked = place->asked;
   std::vector<Asked*> lacking;
   for (Asked& asked : back->asked) {

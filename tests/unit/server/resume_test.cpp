@@ -150,8 +150,8 @@ TEST(ComingBack, WhatOthersWatchIsThere) {
 // Of two who show the token at once, and of a session whose model has become another one.
 TEST(ComingBack, WhatIsNoMoreDoesNotComeBack) {
   TestServer server;
-  const auto left = [&] {
-    TestClient before(server);
+  const auto left = [&](const std::string& session) {
+    TestClient before(server, session);
     subscribe(before, coarse);
     return token_of(before);
   };
@@ -159,7 +159,7 @@ TEST(ComingBack, WhatIsNoMoreDoesNotComeBack) {
     const auto hello = client.receive();
     return hello && hello->envelope.has_server_hello() && hello->envelope.server_hello().has_resumed();
   };
-  const std::string token = left();
+  const std::string token = left("");
   RawClient first(server), second(server);
   {
     const Busy busy(server);
@@ -171,7 +171,8 @@ TEST(ComingBack, WhatIsNoMoreDoesNotComeBack) {
   EXPECT_TRUE(resumed(first));
   EXPECT_FALSE(resumed(second));
 
-  const std::string late = left();
+  const TestClient watches(server, "old");  // which goes on
+  const std::string late = left("old");
   RawClient third(server);
   auto changed = std::make_shared<Model>(test::toy_model());
   changed->tissues[0].V.array() += 1e-3F;
