@@ -71,8 +71,9 @@ v1::VolumeSelection middle_plane(const Served& served) {
   if (opened.volumes_size() == 0 || !wire::from_proto(opened.volumes(0).grid(), grid).ok())
     throw Error(ErrorKind::usage, "bench", "the model has no volume", "give another model");
   const auto far = [&](std::size_t a) { return grid.size[a] - 1; };
-  const auto corner = grid.point(0, 0, far(2) / 2), along = grid.point(far(0), 0, far(2) / 2),
-             across = grid.point(0, far(1), far(2) / 2);
+  const std::int32_t middle = far(2) / 2;
+  const auto corner = grid.point(0, 0, middle), along = grid.point(far(0), 0, middle),
+             across = grid.point(0, far(1), middle);
   v1::VolumeSelection selection;
   selection.set_volume(opened.volumes(0).name());
   v1::Slice& slice = *selection.add_slices();

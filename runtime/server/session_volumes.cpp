@@ -8,6 +8,11 @@
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
+namespace {
+
+constexpr std::chrono::milliseconds kSoon{100};
+
+}  // namespace
 
 // The present pose is a new one.
 void Session::want_volumes() {
@@ -79,8 +84,11 @@ void Session::submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job) {
               [self = std::move(self), job = std::move(job), guard = std::move(guard), posed, &lane, status] {
                 if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
                 lane.busy = false;
+                if (!*posed || !status.ok()) {  // no memory: once more, soon
+                  lane.next = Clock::now() + kSoon;
+                  self->want_again(lane);
+                }
                 self->start_jobs();
-                if (!*posed) self->want_again(lane);  // no memory: soon
               });
   });
 }

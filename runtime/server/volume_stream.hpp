@@ -24,7 +24,9 @@ class VolumeStream {
   static constexpr std::uint64_t keyframe_interval = 128;
 
   explicit VolumeStream(VolumeWant want)
-      : want_(std::move(want)), payloads_(std::make_shared<PayloadPool>()) {}
+      : want_(std::move(want)),
+        payloads_(want_.slices.empty() ? std::make_shared<PayloadPool>() : std::make_shared<PayloadPool>(0)) {
+  }
 
   const VolumeWant& want() const { return want_; }
   /// To write() into.
@@ -53,6 +55,7 @@ class VolumeStream {
            wire::Payload& payload) const;
 
   VolumeWant want_;
+  // Planes, which may hold far more than a volume, leave nothing behind that is not counted.
   std::shared_ptr<PayloadPool> payloads_;
   // Where the last frame lies, of one deformer or the other.
   struct Posed {
