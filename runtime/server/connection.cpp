@@ -44,7 +44,8 @@ class Handling {
 
 }  // namespace
 
-Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, House& house)
+Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven,
+                       Clock::duration waited, House& house)
     : transport_(std::move(transport)),
       house_(house),
       reader_({.envelope_bytes = house.limits().hello_bytes, .payload_bytes = 0}),
@@ -54,7 +55,8 @@ Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, b
       peer_(std::move(peer)),
       proven_(proven),
       allowance_(house.limits().messages_per_second),
-      allowance_at_(Clock::now()) {}
+      allowance_at_(Clock::now()),
+      came_(born_ - std::min(waited, duration(house.limits().hello_seconds / 2))) {}
 
 Connection::~Connection() = default;
 
@@ -145,10 +147,10 @@ Clock::duration Connection::check(Clock::time_point now) {
   if (closed_) return left;
   if (ending_) {
     if (longer(ending_since_, kLastWordsSeconds)) close("last words not read");
-  } else if (!open_ && longer(born_, limits.hello_seconds)) {
+  } else if (!open_ && longer(came_, limits.hello_seconds)) {
     house_.metrics().hit("hello");
     close("no handshake");  // nothing can be said yet
-  } else if (!greeted_ && longer(born_, limits.hello_seconds)) {
+  } else if (!greeted_ && longer(came_, limits.hello_seconds)) {
     hit("hello", {StatusCode::deadline_exceeded,
                   "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
   } else if (reached(stalls_at(now))) {

@@ -33,8 +33,10 @@ struct ProbeAsked;
 /// ten times a second (check), so that no read or write needs a timer of its own.
 class Connection final : public std::enable_shared_from_this<Connection>, private Member {
  public:
-  /// `proven`: the client has shown its right to connect already.
-  Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, House& house);
+  /// `proven`: the client has shown its right to connect already. `waited`: to be let in; half of the time
+  /// for a hello is left in any case.
+  Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited,
+             House& house);
   ~Connection() override;
 
   void start();
@@ -154,6 +156,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   std::uint64_t last_sequence_ = 0;
 
   const Clock::time_point born_ = Clock::now();
+  const Clock::time_point came_;                    ///< before it was let in
   Clock::time_point heard_ = born_;                 ///< last byte read
   std::optional<Clock::time_point> reading_since_;  ///< first byte of an unfinished message
   std::optional<Writing> writing_;                  ///< the present write

@@ -97,7 +97,7 @@ struct Server::Impl {
             .denied = [this] { house->metrics().denied(); },
             .admit = [this] { return admit(Clock::now()); },
             .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
-                              bool proven) { welcome(std::move(transport), std::move(peer), proven); }};
+                              bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
     house = std::make_unique<House>(io, workers, std::move(options), std::move(models), std::move(seams));
   }
 
@@ -107,7 +107,7 @@ struct Server::Impl {
   bool admit(Clock::time_point now);
   Clock::duration look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool web);
-  void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven);
+  void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
   bool make_way(Clock::time_point now);
   bool room_for_request(Clock::time_point now);
   void begin_shutdown();
@@ -187,9 +187,10 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
 
 void Server::Impl::receive(tcp::socket socket, bool web) {
   std::string peer = peer_of(socket);
+  const Clock::duration in_kernel = waited(socket);
   std::unique_ptr<Transport> transport = carrier->carry(std::move(socket));
   if (wrap) transport = wrap(std::move(transport));
-  if (!web) return welcome(std::move(transport), std::move(peer), false);
+  if (!web) return welcome(std::move(transport), std::move(peer), false, in_kernel);
   if (!room_for_request(Clock::now())) return house->metrics().hit("connections");
   requests.push_back(web_request(std::move(transport), std::move(peer), room));
   requests.back()->start();
@@ -219,7 +220,8 @@ bool Server::Impl::admit(Clock::time_point now) {
   return true;
 }
 
-void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven) {
+void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven,
+                           Clock::duration waited) {
   if (stopping) return;
   const auto limit = house->limits().connections;
   auto alive = static_cast<std::size_t>(std::count_if(
@@ -228,7 +230,8 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   if (alive >= limit) house->metrics().hit("connections");
   if (connections.size() >= limit + kMostRefusals) return;
-  connections.push_back(std::make_shared<Connection>(std::move(transport), std::move(peer), proven, *house));
+  connections.push_back(
+      std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *house));
   if (alive < limit) return connections.back()->start();
   connections.back()->start_refused(
       {StatusCode::resource_exhausted,

@@ -124,4 +124,14 @@ std::string peer_of(const tcp::socket& socket) {
   return ec ? "?" : peer.address().to_string() + ":" + std::to_string(peer.port());
 }
 
+Clock::duration waited(tcp::socket& socket) {
+#ifdef __linux__
+  tcp_info info{};
+  socklen_t size = sizeof info;
+  if (getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) == 0)
+    return std::chrono::milliseconds(info.tcpi_last_data_recv);
+#endif
+  return {};
+}
+
 }  // namespace ecorche::server

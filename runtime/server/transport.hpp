@@ -48,4 +48,8 @@ void prepare(tcp::socket& socket);
 /// `127.0.0.1:4711`, or `?` once it has gone.
 std::string peer_of(const tcp::socket& socket);
 
+/// How long an accepted socket stood in the kernel, to a few milliseconds, from its client's last word where
+/// that has sent some; 0 where the system does not tell.
+Clock::duration waited(tcp::socket& socket);
+
 }  // namespace ecorche::server

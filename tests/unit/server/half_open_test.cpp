@@ -155,5 +155,19 @@ TEST(Newcomers, ComeOneAfterAnother) {
   EXPECT_GE(came.back() - came.front(), (kCrowd - 1) * std::chrono::microseconds(500));
 }
 
+// What a client has waited in the kernel is of its time for a hello.
+TEST(Newcomers, HaveWaitedSinceTheyConnected) {
+  net::io_context io;
+  tcp::acceptor acceptor(io, {net::ip::address_v4::loopback(), 0});
+  tcp::socket client(io);
+  client.connect(acceptor.local_endpoint());
+  const auto begun = Clock::now();
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  tcp::socket accepted = acceptor.accept();
+  const Clock::duration time = waited(accepted);
+  EXPECT_GE(time, std::chrono::milliseconds(150));
+  EXPECT_LE(time, Clock::now() - begun + std::chrono::milliseconds(50));
+}
+
 }  // namespace
 }  // namespace ecorche::server
