@@ -154,6 +154,8 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
   limit("--frames-in-flight", limits.frames_in_flight, "unacknowledged, per subscription", 1U, 64U);
   limit("--max-queued-bytes", limits.queued_bytes, "of frames that wait for clients, all together",
         std::uint64_t{1} << 20, std::uint64_t{1} << 40);
+  limit("--max-kept-bytes", limits.kept_bytes, "that subscriptions and probes keep, all together",
+        std::uint64_t{1} << 20, std::uint64_t{1} << 40);
   limit("--stall-seconds", limits.stall_seconds, "until a client that stopped reading is dropped", 0.01,
         3600.0);
   limit("--idle-seconds", limits.idle_seconds, "until a client that says nothing is dropped", 0.01, 1e6);

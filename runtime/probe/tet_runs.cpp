@@ -91,6 +91,12 @@ void TetRuns::find_shared() {
   }
 }
 
+std::uint64_t tree_bytes(std::uint64_t tets, std::uint64_t nodes) {
+  const std::uint64_t runs = tets / kWidth + 1, lowest = runs / kWidth + 1;
+  return TetRuns::stride * sizeof(float) * nodes + sizeof(PackedRun) * runs + sizeof(ByteBoxes) * lowest +
+         sizeof(BoxNode) * (lowest / (kWidth - 1) + 1);
+}
+
 void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree) {
   const std::size_t levels = runs.levels(), above = runs.first(levels);
   if (tree.above.size() != above || tree.runs.size() != runs.runs() + 1) {

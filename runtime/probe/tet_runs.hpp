@@ -118,6 +118,9 @@ struct FindTets {
   BoxTree& tree;
 };
 
+/// What `padded` and `tree` of follow() take, about.
+std::uint64_t tree_bytes(std::uint64_t tets, std::uint64_t nodes);
+
 /// Brings the tree to `nodes` (3 for each row that may be given, finite), of which `padded` gets those of
 /// tets: boxes of all blocks and of what lies above them; the blocks themselves become stale, but for an only
 /// one. Nobody may look meanwhile. Allocates only where `padded` and `tree` were not made for these runs yet.

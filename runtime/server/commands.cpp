@@ -39,6 +39,8 @@ void describe(const Limits& limits, v1::Limits& out) {
   out.set_volume_voxels(limits.volume_voxels);
   out.set_queued_bytes(limits.queued_bytes);
   out.set_requests_per_second(limits.requests_per_second);
+  out.set_kept_bytes(limits.kept_bytes);
+  out.set_record_bytes(limits.record_bytes);
 }
 
 // Why this hello cannot be answered; ok when it can.
@@ -248,12 +250,18 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
 void Connection::subscribe(std::uint64_t id, const Asked& asked, v1::Subscribed told,
                            std::shared_ptr<const wire::Payload> payload) {
   v1::Envelope envelope;
-  const Subscription& subscription = session_->subscribe(*this, asked);
-  subscriptions_.insert(subscription.id);
+  const Subscription* const subscription = session_->subscribe(*this, asked);
+  if (!subscription) {
+    house_.metrics().hit("kept");
+    return answer_status(id, {StatusCode::resource_exhausted,
+                              "subscribe: what is kept for streams fills the server's memory for it (ask for "
+                              "less, or Unsubscribe what is not needed)"});
+  }
+  subscriptions_.insert(subscription->id);
   *envelope.mutable_subscribed() = std::move(told);
-  envelope.mutable_subscribed()->set_subscription(subscription.id);
+  envelope.mutable_subscribed()->set_subscription(subscription->id);
   if (asked.streams.empty())
-    payload = describe(*session_->model(), subscription.streams, *envelope.mutable_subscribed());
+    payload = describe(*session_->model(), subscription->streams, *envelope.mutable_subscribed());
   answer(id, std::move(envelope), std::move(payload));
 }
 

@@ -85,11 +85,15 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
   resumed.set_role(role_);
   resumed.set_last_sequence(last_sequence_);
   for (const Asked& asked : back->asked) {
-    const std::uint32_t number = session_->subscribe(*this, asked).id;
-    subscriptions_.insert(number);
+    const Subscription* const again = session_->subscribe(*this, asked);
+    if (!again) {  // others have its memory by now
+      house_.metrics().hit("kept");
+      continue;
+    }
+    subscriptions_.insert(again->id);
     v1::ResumedSubscription& one = *resumed.add_subscriptions();
     one.set_was(asked.id);
-    one.set_is(number);
+    one.set_is(again->id);
   }
   answer(back->id, std::move(back->answer));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many bytes of frames wait for clients, over the whole server.
+// How many bytes of frames wait for clients, and how many the server keeps for them, all together.
 #pragma once
 
 #include <atomic>
@@ -13,17 +13,20 @@ namespace ecorche::server {
 
 /// A frame counts from the start of its job until the last connection lets go of it, once however many share
 /// it. Above the limit no subscription gets its first frame; from half of it on, who keeps frames without
-/// acknowledging them has a quarter of the usual time to do so (docs/protocol.md, "Limits"). From any thread.
+/// acknowledging them has a quarter of the usual time to do so (docs/protocol.md, "Limits").
+///
+/// What streams and probes keep from frame to frame is counted for itself: it never makes way, so that beyond
+/// its limit there are no new ones. From any thread.
 class FrameMemory {
  public:
-  explicit FrameMemory(std::uint64_t limit) : limit_(limit) {}
+  FrameMemory(std::uint64_t limit, std::uint64_t kept_limit) : limit_(limit), kept_limit_(kept_limit) {}
 
   std::uint64_t bytes() const { return sum_->load(std::memory_order_relaxed); }
   /// `more`: beside what is counted.
   bool full(std::uint64_t more = 0) const { return bytes() + more > limit_; }
   bool half_full() const { return bytes() > limit_ / 2; }
 
-  /// So many bytes more, for as long as it lives: of frames that a job is going to make.
+  /// So many bytes more, for as long as it lives: as here, of frames that a job is going to make.
   class Room {
    public:
     Room() = default;
@@ -48,12 +51,10 @@ class FrameMemory {
     std::shared_ptr<std::atomic<std::uint64_t>> sum_;
   };
 
-  /// What lattices of volumes have grown by since the rest pose may take as much again, and is counted for
-  /// itself: streams keep them, so that they would never make way.
-  bool lattices_full(std::uint64_t more) const {
-    return lattices_->load(std::memory_order_relaxed) + more > limit_;
-  }
-  Room lattice(std::uint64_t bytes) const { return Room(lattices_, bytes); }
+  std::uint64_t kept() const { return kept_->load(std::memory_order_relaxed); }
+  /// Whether so much more may not be kept.
+  bool kept_full(std::uint64_t more) const { return more > 0 && kept() + more > kept_limit_; }
+  Room keep(std::uint64_t bytes) const { return Room(kept_, bytes); }
 
   /// The frame, shared and counted.
   std::shared_ptr<const wire::EncodedFrame> hold(wire::EncodedFrame frame) const {
@@ -74,9 +75,9 @@ class FrameMemory {
     std::shared_ptr<Sum> sum;
   };
 
-  std::uint64_t limit_;
+  std::uint64_t limit_, kept_limit_;
   std::shared_ptr<Sum> sum_ = std::make_shared<Sum>(0);
-  std::shared_ptr<Sum> lattices_ = std::make_shared<Sum>(0);
+  std::shared_ptr<Sum> kept_ = std::make_shared<Sum>(0);
 };
 
 }  // namespace ecorche::server

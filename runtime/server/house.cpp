@@ -38,7 +38,7 @@ House::House(net::io_context& io, Workers& workers, Options options, std::vector
     : io_(io),
       workers_(workers),
       options_(std::move(options)),
-      memory_(options_.limits.queued_bytes),
+      memory_(options_.limits.queued_bytes, options_.limits.kept_bytes),
       judging_(io),
       seams_(std::move(seams)),
       aside_(1, giving_way),
@@ -125,8 +125,15 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {StatusCode::resource_exhausted,
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
-  const Services services{io_,     workers_, volumes_.workers(), planes_.workers(),
-                          memory_, judging_, openings_,          metrics_};
+  const Services services{io_,
+                          workers_,
+                          volumes_.workers(),
+                          planes_.workers(),
+                          memory_,
+                          judging_,
+                          openings_,
+                          metrics_,
+                          [this](std::shared_ptr<const void> what) { let_go(std::move(what)); }};
   out = std::make_shared<Session>(services, *model, name, named, options_.limits);
   sessions_.emplace(name, out);
   return {};
@@ -150,6 +157,7 @@ bool House::make_room() {
 
 void House::sweep(Clock::time_point now) {
   const auto ends = [&](const std::shared_ptr<Session>& session) {
+    session->forget_probes(now);
     if (!session->over(now)) return false;
     keep_recording(*session);
     return true;

@@ -43,6 +43,8 @@ struct Metrics::Impl {
   prometheus::Counter& denials = counter("ecorche_denied_total", "Connections without the right token");
   prometheus::Gauge& clients = gauge("ecorche_clients", "Connections that speak the protocol");
   prometheus::Gauge& sessions = gauge("ecorche_sessions", "Sessions, also those that wait for their clients");
+  prometheus::Gauge& waiting = gauge("ecorche_waiting_bytes", "Bytes of frames that wait for clients");
+  prometheus::Gauge& kept = gauge("ecorche_kept_bytes", "Bytes that subscriptions and probes keep, about");
   prometheus::Family<prometheus::Counter>& limits = prometheus::BuildCounter()
                                                         .Name("ecorche_limits_hit_total")
                                                         .Help("How often which limit struck")
@@ -83,6 +85,11 @@ void Metrics::set_clients(std::size_t count) {
 
 void Metrics::set_sessions(std::size_t count) {
   impl_->sessions.Set(static_cast<double>(count));
+}
+
+void Metrics::set_memory(std::uint64_t waiting, std::uint64_t kept) {
+  impl_->waiting.Set(static_cast<double>(waiting));
+  impl_->kept.Set(static_cast<double>(kept));
 }
 
 std::string Metrics::text() const {

@@ -24,13 +24,15 @@ class Metrics {
   void read(std::size_t bytes);
   void wrote(std::size_t bytes, bool frame);
   void skipped(std::uint64_t poses);
-  /// A limit struck: `hello`, `frame`, `connections`, `sessions`, `subscriptions`, `rate`, `stall`, `idle`,
-  /// ...
+  /// A limit struck: `hello`, `frame`, `connections`, `sessions`, `subscriptions`, `kept`, `rate`, `stall`,
+  /// `idle`, ...
   void hit(const char* limit);
   void denied();
 
   void set_clients(std::size_t count);
   void set_sessions(std::size_t count);
+  /// Of FrameMemory, bytes.
+  void set_memory(std::uint64_t waiting, std::uint64_t kept);
 
   /// The whole page.
   std::string text() const;

@@ -24,6 +24,7 @@ struct Limits {
   double messages_per_second = 2000;  ///< per connection; 90 Hz of poses and acknowledgements are 180
   std::uint32_t frames_in_flight = 2;
   std::uint64_t queued_bytes = std::uint64_t{512} << 20;  ///< of frames that wait for clients, all together
+  std::uint64_t kept_bytes = std::uint64_t{4} << 30;      ///< by streams and probes, all together
   double requests_per_second = 100;                       ///< over HTTP, all clients together
   double stall_seconds = 10;
   double idle_seconds = 300;

@@ -50,6 +50,7 @@ struct PosedFrame {
 struct ProbeFrame {
   std::uint64_t sequence = 0;
   runtime::Probe::PosedTree tree;
+  FrameMemory::Room kept;  ///< its memory, counted
 };
 
 struct PoseJob {

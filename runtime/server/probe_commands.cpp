@@ -108,14 +108,13 @@ void Connection::handle_probe(const wire::Frame& frame) {
   if (!status.ok()) return answer_status(id, status);
   ++probing_;
   const bool few = asked->points.size() <= 3 * kFewPoints;
-  const auto ready = [weak = weak_from_this(), asked, id, few,
-                      model = session_->model()](const std::shared_ptr<const ProbeFrame>& body) {
+  const auto ready = [weak = weak_from_this(), asked, id, few, model = session_->model()](
+                         const std::shared_ptr<const ProbeFrame>& body, const Status& why) {
     const auto self = weak.lock();
     if (!self) return;
     self->take_back([&] {
       if (!body) {
-        asked->status = {StatusCode::unavailable,
-                         "probe: the body could not be posed (see the last PoseAck)"};
+        asked->status = why;
         return self->answer_probe(id, asked, std::make_shared<const ProbeFrame>());
       }
       if (few && !asked->wants.tissue) {

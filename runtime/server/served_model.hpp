@@ -23,6 +23,12 @@
 
 namespace ecorche::server {
 
+/// What posing a volume, or a plane of one, writes on the way, from pose to pose.
+struct VolumeScratch {
+  runtime::VolumePoser::Scratch tets;
+  Image slice;
+};
+
 /// Shared by every thread. Does not change after construction, but for what takes long to make and not every
 /// client wants, which is made when it is first asked for.
 struct ServedModel {
@@ -65,6 +71,8 @@ struct ServedModel {
   /// For the frames of meshes.
   std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);
   std::shared_ptr<PositionsPool> positions = std::make_shared<PositionsPool>(4);
+  /// For the jobs of volumes and planes; two are kept.
+  std::shared_ptr<SparePool<VolumeScratch>> volume_scratch = std::make_shared<SparePool<VolumeScratch>>();
 
  private:
   struct Balls {

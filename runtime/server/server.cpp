@@ -291,6 +291,7 @@ std::string Server::Impl::metrics() {
   figures.set_clients(static_cast<std::size_t>(
       std::count_if(connections.begin(), connections.end(), [](const auto& c) { return !c->closed(); })));
   figures.set_sessions(house->sessions());
+  figures.set_memory(house->memory().bytes(), house->memory().kept());
   return figures.text();
 }
 

@@ -4,10 +4,17 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/server/kept.hpp"
 #include "runtime/server/mesh_streams.hpp"
 #include "runtime/server/volume_stream.hpp"
 
 namespace ecorche::server {
+namespace {
+
+// So long after the last probe, poses are still made ready for the next; and so long what that takes is kept.
+constexpr std::chrono::seconds kProbing{1}, kForgotten{10};
+
+}  // namespace
 
 void Skipped::add(std::uint64_t sequence) {
   ++count;
@@ -22,6 +29,7 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
       memory_(services.memory),
       judging_(services.judging),
       openings_(services.openings),
+      let_go_(services.let_go),
       model_(std::move(model)),
       name_(std::move(name)),
       named_(named),
@@ -62,7 +70,10 @@ v1::Role Session::rejoin(Member& member, bool control) {
 
 void Session::leave(Member& member, bool may_return) {
   members_.erase(&member);
-  for (Row& row : rows_) row.members.erase(&member);
+  for (Row& row : rows_) {
+    row.members.erase(&member);
+    if (row.members.empty()) drop(row);
+  }
   std::erase_if(rows_, [](const Row& row) { return row.members.empty(); });
   const auto now = Clock::now();
   const bool controlled = controller_ == &member;
@@ -75,6 +86,7 @@ void Session::leave(Member& member, bool may_return) {
     awaited_ = may_return;
     player_->stop();
     keep_time();  // a server that stops would wait for who watches at the slowest rate
+    forget_probes(now);
   } else if (controlled) {
     tell_control();
   }
@@ -109,7 +121,7 @@ void Session::retire(std::uint64_t identity) {
   for (Member* member : members_) member->model_changed(identity);
 }
 
-const Subscription& Session::subscribe(Member& member, const Asked& asked) {
+const Subscription* Session::subscribe(Member& member, const Asked& asked) {
   const Want& want = asked.want;
   auto row =
       std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.subscription.want == want; });
@@ -120,9 +132,19 @@ const Subscription& Session::subscribe(Member& member, const Asked& asked) {
     made.subscription.want = want;
     made.request = asked.request;
     const auto* volume = std::get_if<VolumeWant>(&want);
-    if (mesh)
+    std::uint64_t kept = 0;
+    if (mesh) {
       made.subscription.streams = asked.streams.empty() ? open_streams(*model_, *mesh) : asked.streams;
-    if (volume) made.subscription.volume = std::make_shared<VolumeStream>(*volume);
+      kept = kept_by(model_->model(), made.subscription.streams);
+    }
+    if (volume) {
+      const std::uint64_t voxels = rest_voxels(model_->model(), *volume);
+      // Of what is too large altogether nothing is ever made.
+      if (voxels <= limits_.volume_voxels) kept = kept_by(model_->model(), *volume, voxels);
+      made.subscription.volume = std::make_shared<VolumeStream>(*volume, voxels);
+    }
+    if (memory_.kept_full(kept)) return nullptr;
+    made.kept = memory_.keep(kept);
     row = rows_.insert(row, std::move(made));
   }
   row->members.insert(&member);
@@ -130,7 +152,13 @@ const Subscription& Session::subscribe(Member& member, const Asked& asked) {
   row->fresh = row->fresh.value_or(Clock::now());
   // Once the answer with the number is on its way.
   net::post(io_, [self = shared_from_this()] { self->start_jobs(); });
-  return row->subscription;
+  return &row->subscription;
+}
+
+// Nobody watches it any more.
+void Session::drop(Row& row) const {
+  if (row.subscription.volume) let_go_(std::move(row.subscription.volume));
+  for (auto& stream : row.subscription.streams) let_go_(std::move(stream));
 }
 
 std::vector<Asked> Session::asked_by(Member& member) const {
@@ -151,7 +179,10 @@ bool Session::unsubscribe(Member& member, std::uint32_t id) {
   const auto row =
       std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.subscription.id == id; });
   if (row == rows_.end() || row->members.erase(&member) == 0) return false;
-  if (row->members.empty()) rows_.erase(row);
+  if (row->members.empty()) {
+    drop(*row);
+    rows_.erase(row);
+  }
   return true;
 }
 
@@ -200,22 +231,47 @@ std::optional<Clock::time_point> Session::waiting() const {
 void Session::probe(Ready ready, bool many) {
   probed_ = Clock::now();
   if (many) probed_many_ = probed_;
-  if (probe_frame_) return ready(probe_frame_);
+  if (probe_frame_) return ready(probe_frame_, {});
   probes_.push_back(std::move(ready));
   start_jobs();
 }
 
-// One that nobody asks any more, or a new one: the one that is shown and the one being made are two.
+void Session::take_up_probes(PoseJob& job, bool refresh) {
+  const auto now = Clock::now();
+  const auto lately = [now](const auto& then) { return then && now - *then < kProbing; };
+  if (!probes_.empty() || lately(probed_)) job.probe = spare_probe();
+  job.probe_many = lately(probed_many_);
+  if (job.probe) return;
+  if (!refresh) probe_frame_ = nullptr;  // it shows an older pose soon
+  if (probes_.empty()) return;
+  metrics_.hit("kept");
+  probe_ready(nullptr, {StatusCode::resource_exhausted,
+                        "probe: what is kept for streams and probes fills the server's memory for it (try "
+                        "again when somebody has unsubscribed)"});
+}
+
+// One that nobody asks any more, or a new one: the one that is shown and the one being made are two, and more
+// where questions about older ones wait. Null where no more may be kept.
 std::shared_ptr<ProbeFrame> Session::spare_probe() {
   for (const auto& frame : probe_frames_) {
     if (frame.use_count() == 1) return frame;
   }
-  return probe_frames_.emplace_back(std::make_shared<ProbeFrame>());
+  const std::uint64_t kept = kept_by_probe(model_->model());
+  if (memory_.kept_full(kept)) return nullptr;
+  auto frame = std::make_shared<ProbeFrame>();
+  frame->kept = memory_.keep(kept);
+  return probe_frames_.emplace_back(std::move(frame));
 }
 
-void Session::probe_ready(const std::shared_ptr<ProbeFrame>& frame) {
+void Session::probe_ready(const std::shared_ptr<ProbeFrame>& frame, const Status& status) {
   probe_frame_ = frame;
-  for (const Ready& ready : std::exchange(probes_, {})) ready(frame);
+  for (const Ready& ready : std::exchange(probes_, {})) ready(frame, status);
+}
+
+void Session::forget_probes(Clock::time_point now) {
+  if (!probes_.empty() || (!members_.empty() && probed_ && now - *probed_ < kForgotten)) return;
+  probe_frame_.reset();
+  for (auto& frame : std::exchange(probe_frames_, {})) let_go_(std::move(frame));
 }
 
 }  // namespace ecorche::server

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -68,6 +69,9 @@ struct Services {
   Judging& judging;
   Openings& openings;
   Metrics& metrics;
+  /// Has something large destroyed elsewhere than on the I/O thread, which giving back hundreds of MiB would
+  /// keep for longer than a frame. Throws nothing.
+  std::function<void(std::shared_ptr<const void>)> let_go;
 };
 
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the
@@ -98,8 +102,9 @@ class Session : public std::enable_shared_from_this<Session> {
   bool controls(const Member& member) const { return controller_ == &member; }
 
   /// The subscription, the same for equal wants, of number `asked.id` where that is not 0 and the want is
-  /// new; good until the next call. Frames follow, the present pose first.
-  const Subscription& subscribe(Member& member, const Asked& asked);
+  /// new; good until the next call. Frames follow, the present pose first. Null where what its streams keep
+  /// has no room.
+  const Subscription* subscribe(Member& member, const Asked& asked);
   std::vector<Asked> asked_by(Member& member) const;
   /// Somebody has such a subscription.
   bool shows(const Want& want) const;
@@ -120,9 +125,9 @@ class Session : public std::enable_shared_from_this<Session> {
   const runtime::QualityThresholds& thresholds() const { return thresholds_; }
   void set_thresholds(const runtime::QualityThresholds& thresholds);
 
-  /// Calls `ready` with the posed body, at once where it is at hand; null where it cannot be posed. As long
-  /// as somebody asks every second, every pose is made ready: all of it where `many` points are asked.
-  using Ready = std::function<void(const std::shared_ptr<const ProbeFrame>&)>;
+  /// Calls `ready` with the posed body, at once where it is at hand, or with null and the reason. As long as
+  /// somebody asks every second, every pose is made ready: all of it where `many` points are asked.
+  using Ready = std::function<void(const std::shared_ptr<const ProbeFrame>&, const Status&)>;
   void probe(Ready ready, bool many);
 
   /// What is shown from now on goes into it, until it is taken away.
@@ -131,6 +136,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// Makes what had to wait for memory.
   void catch_up();
+  /// Lets go of what probes need, where none has come for ten seconds, or nobody is here.
+  void forget_probes(Clock::time_point now);
   /// A client has a frame whole. The pose is judged now, if it is to be: where cores are shared with clients,
   /// not while they read.
   void arrived();
@@ -164,6 +171,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<Clock::time_point> refresh_at;     ///< when the present pose is to be shown (again)
     std::optional<Clock::time_point> fresh;          ///< since when somebody waits for the present pose
     bool shown = false;                              ///< somebody had a frame of it
+    FrameMemory::Room kept;                          ///< what its streams keep
     bool is_volume() const { return subscription.volume != nullptr; }
   };
 
@@ -189,8 +197,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void tell_control();
   void judged(const JudgeJob& job);
   std::shared_ptr<const v1::PoseQuality> known_quality(const MeshWant& want, bool refresh) const;
+  void drop(Row& row) const;
   std::shared_ptr<ProbeFrame> spare_probe();
-  void probe_ready(const std::shared_ptr<ProbeFrame>& frame);
+  void probe_ready(const std::shared_ptr<ProbeFrame>& frame, const Status& status = {});
   void take(PoseRequest request);
   void start_jobs();
   bool too_early(Lane& lane, Clock::time_point now);
@@ -203,6 +212,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void posed(const PoseJob& job, const Status& status);
   void begin(PoseJob& job);
   void take_up(PoseJob& job);
+  void take_up_probes(PoseJob& job, bool refresh);
   void take_up(Row& row, Taking& taking, PoseJob& job);
   // session_volumes.cpp
   bool together() const { return recording_ != nullptr; }
@@ -226,6 +236,7 @@ class Session : public std::enable_shared_from_this<Session> {
   const FrameMemory& memory_;
   Judging& judging_;
   Openings& openings_;
+  std::function<void(std::shared_ptr<const void>)> let_go_;
   std::shared_ptr<const ServedModel> model_;
   std::string name_;
   bool named_;

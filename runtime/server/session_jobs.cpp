@@ -12,8 +12,6 @@
 namespace ecorche::server {
 namespace {
 
-// So long after the last probe, poses are still made ready for the next.
-constexpr auto kProbing = std::chrono::seconds(1);
 // Between keyframes that laggards ask for: one must not make everybody's frames three times as large.
 constexpr std::chrono::milliseconds kKeyframePause{100};
 // Without another pose for so long, the body stands still: it is shown in full detail, and what comes next is
@@ -220,7 +218,10 @@ void Session::posed(const PoseJob& job, const Status& status) {
   if (job.volumes) set_volumes_busy(false);
   stirred_ = Clock::now();
   // Asked for, and not made: the pose could not be.
-  if (job.probe && probe_frame_ != job.probe) probe_ready(nullptr);
+  if (job.probe && probe_frame_ != job.probe) {
+    probe_ready(nullptr,
+                {StatusCode::unavailable, "probe: the body could not be posed (see the last PoseAck)"});
+  }
   if (job.aside) openings_.done();
   start_jobs();
 }
@@ -259,11 +260,7 @@ void Session::take_up(PoseJob& job) {
   begin(job);
   const auto now = Clock::now();
   const bool refresh = !slot_;
-  const auto lately = [now](const auto& then) { return then && now - *then < kProbing; };
-  const bool probing = !probes_.empty() || lately(probed_);
-  if (probing) job.probe = spare_probe();
-  job.probe_many = lately(probed_many_);
-  if (!probing && !refresh) probe_frame_ = nullptr;  // it shows an older pose soon
+  take_up_probes(job, refresh);
   job.judge = refresh ? rests(now) : rested_;
   if (!refresh && !same(slot_->pose, present_.pose)) moved_ = now;
   Taking taking{.now = now, .refresh = refresh, .still = refresh || now - moved_ > kStill};

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "proto/convert.hpp"
+#include "runtime/server/kept.hpp"
 #include "runtime/server/mesh_rows.hpp"
 
 namespace ecorche::server {
@@ -88,15 +89,9 @@ Status read_deformer(const v1::VolumeSelection& volume, const Model& model, Volu
   if (!out.slices.empty())
     return {StatusCode::invalid_argument, "subscribe: slices have no region (ask for one of the two)"};
   if (Status status = read_region(volume.region(), out.region); !status.ok()) return status;
-  const ModelVolume& shown = model.volumes[out.volume];
-  const ImageGrid lattice =
-      out.by_spheres ? runtime::posed_lattice(runtime::spheres_for(model, shown), shown) : shown.image.grid;
-  for (const std::int32_t size : runtime::box_within(lattice, out.region->low, out.region->high).size) {
-    if (size < 1)
-      return {StatusCode::invalid_argument,
-              "subscribe: no voxel centre lies in the region (make it larger than a voxel)"};
-  }
-  return {};
+  if (rest_voxels(model, out) > 0) return {};
+  return {StatusCode::invalid_argument,
+          "subscribe: no voxel centre lies in the region (make it larger than a voxel)"};
 }
 
 Status read_slices(const v1::VolumeSelection& volume, VolumeWant& out) {

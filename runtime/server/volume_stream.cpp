@@ -10,6 +10,7 @@
 
 #include "proto/arrays.hpp"
 #include "proto/convert.hpp"
+#include "runtime/server/kept.hpp"
 #include "runtime/spheres/slice.hpp"
 
 namespace ecorche::server {
@@ -57,21 +58,20 @@ Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& 
 
 // A body that is carried far away makes the lattice of every stream grow: what they grew by is
 // counted.
-Status VolumeStream::find_room(const ImageGrid& grid, const ImageGrid& rest, const Image& scan,
-                               const Room& room) {
+Status VolumeStream::find_room(const Model& model, const ImageGrid& grid, const Room& room) {
   const std::uint64_t voxels = grid.voxels();
   if (voxels > room.most_voxels) {
     return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(voxels) +
                                                 " voxels (at most " + std::to_string(room.most_voxels) +
                                                 "; keep the body nearer to the scan)"};
   }
-  const std::uint64_t beyond = (voxels - std::min<std::uint64_t>(voxels, rest.voxels())) *
-                               scalar_bytes(scan.type) * static_cast<std::uint64_t>(scan.components);
-  if (beyond > beyond_ && room.memory.lattices_full(beyond - beyond_)) {
+  const std::uint64_t beyond =
+      kept_by(model, want_, std::max(voxels, at_rest_)) - kept_by(model, want_, at_rest_);
+  if (beyond > beyond_ && room.memory.kept_full(beyond - beyond_)) {
     return {StatusCode::resource_exhausted,
-            "volume: posed grids fill the server's memory for them (keep the body nearer to the scan)"};
+            "volume: posed grids fill the server's memory for streams (keep the body nearer to the scan)"};
   }
-  if (beyond != beyond_) held_ = room.memory.lattice(beyond);
+  if (beyond != beyond_) held_ = room.memory.keep(beyond);
   beyond_ = beyond;
   return {};
 }
@@ -82,8 +82,9 @@ Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody
   const ImageGrid grid = want_.region
                              ? grid_of(rest, runtime::box_within(rest, want_.region->low, want_.region->high))
                              : runtime::grow_to(rest, body.nodes);
-  if (Status status = find_room(grid, rest, volume.image, room); !status.ok()) return status;
-  served.volumes().follow(body.nodes, volume, want_.sampling, grid, kept_, scratch_);
+  if (Status status = find_room(served.model(), grid, room); !status.ok()) return status;
+  served.volumes().follow(body.nodes, volume, want_.sampling, grid, kept_,
+                          served.volume_scratch->take()->tets);
   posed_ = {&kept_.image, &kept_.bricks, &kept_.moved};
   return {};
 }
@@ -92,8 +93,7 @@ Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedB
   const ModelVolume& volume = served.model().volumes[want_.volume];
   runtime::BallSet set = served.balls(want_.volume).at(body.segments);
   const runtime::LatticeBox box = runtime::box_for(set, want_.region);
-  if (Status status = find_room(grid_of(set.lattice, box), set.lattice, volume.image, room); !status.ok())
-    return status;
+  if (Status status = find_room(served.model(), grid_of(set.lattice, box), room); !status.ok()) return status;
   runtime::follow(std::move(set), box, volume, want_.sampling, refilled_);
   posed_ = {&refilled_.image, &refilled_.bricks, &refilled_.moved};
   return {};
@@ -104,17 +104,19 @@ void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedB
   const ModelVolume& volume = served.model().volumes[want_.volume];
   std::optional<runtime::BallSet> set;
   if (want_.by_spheres) set = served.balls(want_.volume).at(body.segments);
+  const std::shared_ptr<VolumeScratch> scratch = served.volume_scratch->take();
+  Image& slice = scratch->slice;
   std::vector<std::byte> pixels;
   for (const ImageGrid& plane : want_.slices) {
     if (set) {
-      slice_ = Image(plane, volume.image.type, volume.image.components);
-      runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice_);
+      slice = Image(plane, volume.image.type, volume.image.components);
+      runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice);
     } else {
-      served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice_, scratch_);
+      served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice, scratch->tets);
     }
-    pixels.insert(pixels.end(), slice_.bytes.begin(), slice_.bytes.end());
+    pixels.insert(pixels.end(), slice.bytes.begin(), slice.bytes.end());
   }
-  put(pixels, slice_, frame, payload);
+  put(pixels, slice, frame, payload);
 }
 
 void VolumeStream::write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,

@@ -23,8 +23,10 @@ class VolumeStream {
   /// Frames from one keyframe to the next.
   static constexpr std::uint64_t keyframe_interval = 128;
 
-  explicit VolumeStream(VolumeWant want)
+  /// `voxels`: as rest_voxels() has them, which whoever makes it counts as kept.
+  VolumeStream(VolumeWant want, std::uint64_t voxels)
       : want_(std::move(want)),
+        at_rest_(voxels),
         payloads_(want_.slices.empty() ? std::make_shared<PayloadPool>() : std::make_shared<PayloadPool>(0)) {
   }
 
@@ -34,7 +36,7 @@ class VolumeStream {
 
   /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
   /// needs one. resource_exhausted beyond `most_voxels`, and where the lattice has grown since the rest pose
-  /// and finds no room in `memory`. Whatever it throws, the next frame holds everything.
+  /// and `memory` lets no more be kept. Whatever it throws, the next frame holds everything.
   Status write(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
                const FrameMemory& memory, bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
 
@@ -46,7 +48,7 @@ class VolumeStream {
   // The whole posed volume, or its region, into posed_.
   Status by_tets(const ServedModel& model, const runtime::PosedBody& body, const Room& room);
   Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, const Room& room);
-  Status find_room(const ImageGrid& grid, const ImageGrid& rest, const Image& scan, const Room& room);
+  Status find_room(const Model& model, const ImageGrid& grid, const Room& room);
   void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
                     wire::Payload& payload);
   void write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,
@@ -55,6 +57,7 @@ class VolumeStream {
            wire::Payload& payload) const;
 
   VolumeWant want_;
+  std::uint64_t at_rest_;  // voxels
   // Planes, which may hold far more than a volume, leave nothing behind that is not counted.
   std::shared_ptr<PayloadPool> payloads_;
   // Where the last frame lies, of one deformer or the other.
@@ -65,8 +68,6 @@ class VolumeStream {
   } posed_;
   runtime::PosedVolume kept_;
   runtime::RefilledVolume refilled_;
-  Image slice_;
-  runtime::VolumePoser::Scratch scratch_;
   std::vector<std::uint8_t> changed_;  // a brick each: since the keyframe
   ImageGrid keyframe_grid_;
   std::uint64_t keyframe_ = 0;  // number of its frame; 0: none yet

@@ -177,6 +177,17 @@ TEST_F(BoxTreeTest, PointsSeeTheSameWhicheverBlockIsFittedWhen) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
+TEST_F(BoxTreeTest, ItsSizeIsKnownBeforeItIsMade) {
+  Probe::PosedTree tree;
+  probe.follow(rest, tree);
+  const auto bytes = [](const auto& all) { return static_cast<double>(all.size() * sizeof(all[0])); };
+  const double actual = bytes(tree.nodes) + bytes(tree.boxes.above) + bytes(tree.boxes.lowest) +
+                        bytes(tree.boxes.runs) + bytes(tree.boxes.blocks);
+  EXPECT_NEAR(
+      static_cast<double>(tree_bytes(static_cast<std::uint64_t>(model->tets.rows()), rest.size() / 3)),
+      actual, 0.02 * actual);
+}
+
 TEST_F(BoxTreeTest, NothingOfAnEarlierPoseIsLeft) {
   // All is asked of some poses, a corner or nothing of the others.
   Probe::PosedTree kept;

@@ -132,7 +132,7 @@ class Posing {
       if (const auto* mesh = std::get_if<MeshWant>(&want))
         reader.subscription.streams = open_streams(model(), *mesh);
       else
-        reader.subscription.volume = std::make_shared<VolumeStream>(std::get<VolumeWant>(want));
+        reader.subscription.volume = std::make_shared<VolumeStream>(std::get<VolumeWant>(want), 0);
     }
   }
 
@@ -241,7 +241,7 @@ class Posing {
     ASSERT_EQ(reader.image.bytes, expected.bytes);
   }
 
-  FrameMemory memory_{std::uint64_t{1} << 30};
+  FrameMemory memory_{std::uint64_t{1} << 30, std::uint64_t{1} << 30};
   std::vector<Reader> readers_;
   std::vector<PosedFrame> frames_;
   std::uint64_t number_ = 0;

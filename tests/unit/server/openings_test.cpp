@@ -63,7 +63,7 @@ TEST(Openings, ANewcomerComesInWithTheNextPose) {
     const auto begun = Clock::now();
     stage.pose(1);
     ASSERT_TRUE(stage.next_is_judged().has_value());
-    const std::uint32_t id = stage.session->subscribe(newcomer, {.id = 0, .want = want, .request = {}}).id;
+    const std::uint32_t id = stage.session->subscribe(newcomer, {.id = 0, .want = want, .request = {}})->id;
     stage.wait(milliseconds(10));
     const bool early = !newcomer.judged().empty();
     stage.pose(2);

@@ -184,7 +184,7 @@ TEST(ProbeTest, BothWaysAsOffline) {
 TEST(ProbeTest, WhoAsksManyPointsFindsTheTreeFitted) {
   const auto fitted = [](Stage& stage, bool many) {
     std::shared_ptr<const ProbeFrame> got;
-    stage.session->probe([&](const auto& frame) { got = frame; }, many);
+    stage.session->probe([&](const auto& frame, const Status&) { got = frame; }, many);
     stage.run_until([&] { return got != nullptr; });
     const auto& blocks = got->tree.boxes.blocks;
     EXPECT_GT(blocks.size(), 2U);

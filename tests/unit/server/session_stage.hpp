@@ -118,8 +118,8 @@ class Gate {
 
 struct Stage {
   explicit Stage(v1::Encoding encoding = v1::ENCODING_F32, std::uint64_t bytes = std::uint64_t{1} << 30,
-                 const Model& body = test::toy_model())
-      : memory(bytes),
+                 const Model& body = test::toy_model(), std::uint64_t kept = std::uint64_t{1} << 30)
+      : memory(bytes, kept),
         model(std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(body))),
         workers(1,
                 [this](const Job& job) {
@@ -146,7 +146,7 @@ struct Stage {
   std::uint32_t subscribe(Watcher& who, double rate = 0) {
     MeshWant wanted = want;
     wanted.max_rate = rate;
-    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}}).id;
+    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}})->id;
   }
   // To the CT as it is posed, or to a plane of it.
   std::uint32_t subscribe_volume(Watcher& who, bool plane = false, double rate = 0) {
@@ -156,7 +156,7 @@ struct Stage {
       ImageGrid& slice = wanted.slices.emplace_back();
       slice.size = {16, 16, 1};
     }
-    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}}).id;
+    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}})->id;
   }
   ~Stage() {
     gate.open();
@@ -169,7 +169,15 @@ struct Stage {
   }
 
   std::shared_ptr<Session> open(const std::string& name, bool named = false) {
-    const Services services{io, workers, volume_workers, plane_workers, memory, judging, openings, metrics};
+    const Services services{io,
+                            workers,
+                            volume_workers,
+                            plane_workers,
+                            memory,
+                            judging,
+                            openings,
+                            metrics,
+                            [this](std::shared_ptr<const void> what) { gone.push_back(std::move(what)); }};
     return std::make_shared<Session>(services, model, name, named, limits);
   }
   void pose(std::uint64_t sequence) {
@@ -206,6 +214,7 @@ struct Stage {
   Judging judging{io};
   Openings openings;
   Metrics metrics;
+  std::vector<std::shared_ptr<const void>> gone;  // let go of, as a server would elsewhere
   Gate gate, volume_gate, plane_gate;
   std::shared_ptr<const ServedModel> model;
   Workers workers, volume_workers, plane_workers;
