@@ -29,6 +29,7 @@ struct Settings {
   std::string token_file;
   std::string clips;
   std::string log = "info";
+  bool real_time = false;
   server::Options options;
 };
 
@@ -83,6 +84,10 @@ int run_serve(const Settings& settings, const Program& program) {
   tbb::task_arena arena(threads);
   server::Workers workers(threads, [&arena](const server::Job& job) { arena.execute(job); });
   server::Server server(std::move(options), read_models(settings, program), workers);
+  if (settings.real_time && !server::going_first()) {
+    throw Error(ErrorKind::refused, "--real-time", "the system does not let this process",
+                "give it CAP_SYS_NICE or an RLIMIT_RTPRIO of 1 (ulimit -r 1), or serve without");
+  }
 
   const std::string where = host + ":" + std::to_string(server.port());
   if (!settings.port_file.empty()) {
@@ -126,6 +131,8 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
                       "a folder for what clients have recorded; without it nothing is");
   command->add_flag("--insecure", settings->options.insecure,
                     "listen beyond loopback although TLS or the token is missing");
+  command->add_flag("--real-time", settings->real_time,
+                    "the thread that answers runs before all others of the machine, for steady latencies");
   command->add_option("--log", settings->log, "what to log on stderr")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();

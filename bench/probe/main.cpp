@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One point a millisecond through a body that streams at 90 Hz, over loopback; then 10000 points a message.
 // usage: bench_probe MODEL.hdf [SECONDS] [f32|deltas] [TISSUE...]    (10 seconds, f32, all tissues)
+// REAL_TIME=server: as under --real-time; REAL_TIME=both: and who probes likewise, as a haptic device's loop
+// does.
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -58,7 +60,15 @@ int main(int argc, char** argv) {
   server::Options options;
   options.listen.port = 0;
   server::Server server(options, {{"body", model}}, workers);
-  std::thread serving([&] { server.run(); });
+  const char* const named = std::getenv("REAL_TIME");
+  const std::string_view real_time = named ? named : "";
+  const auto go_first = [](bool wanted) {
+    if (wanted && !server::going_first()) std::fprintf(stderr, "the system lets nobody go first\n");
+  };
+  std::thread serving([&] {
+    go_first(!real_time.empty());
+    server.run();
+  });
   const wire::Address address{"127.0.0.1", server.port()};
 
   std::atomic<bool> done = false;
@@ -114,6 +124,7 @@ int main(int argc, char** argv) {
     ask(1);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+  go_first(real_time == "both");
   std::vector<double> one, many;
   const std::uint64_t before = frames;
   const auto start = Clock::now();

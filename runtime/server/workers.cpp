@@ -80,4 +80,13 @@ void last_of_all(const Job& job) {
   job();
 }
 
+bool going_first() {
+#ifdef __linux__
+  constexpr sched_param kLeast{.sched_priority = 1};
+  return sched_setscheduler(0, SCHED_RR | SCHED_RESET_ON_FORK, &kLeast) == 0;
+#else
+  return false;
+#endif
+}
+
 }  // namespace ecorche::server

@@ -50,4 +50,9 @@ void giving_way(const Job& job);
 /// For what nobody waits for, and what takes no locks that others want for long.
 void last_of_all(const Job& job);
 
+/// The calling thread runs at once where it wakes, whatever else does (on Linux: SCHED_RR, priority 1;
+/// threads that it starts do not inherit it). For a thread that sleeps most of the time. False where the
+/// system does not let it, which asks for CAP_SYS_NICE or an RLIMIT_RTPRIO of 1.
+bool going_first();
+
 }  // namespace ecorche::server

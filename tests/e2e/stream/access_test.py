@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """TLS, tokens and the HTTP port as their users meet them."""
+import ctypes
 import json
 import os
 import pathlib
+import resource
 import ssl
 import subprocess
 import tempfile
@@ -82,6 +84,26 @@ class Access(unittest.TestCase):
                 get(server, "/metrics")
             self.assertEqual(caught.exception.code, 401)
             caught.exception.close()
+
+    def test_real_time_is_for_who_may(self):
+        """One thread of the server alone, and none where the system does not let it."""
+        def drop():
+            ctypes.CDLL(None).prctl(24, 23, 0, 0, 0)  # PR_CAPBSET_DROP, CAP_SYS_NICE: as root
+            resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
+        result = subprocess.run([ECORCHE, "serve", MODEL, "--listen", "127.0.0.1:0", "--real-time"], capture_output=True, text=True,
+                                timeout=60, preexec_fn=drop)
+        self.assertEqual(result.returncode, 77, result.stderr)
+        self.assertIn("the system does not let this process", result.stderr)
+        self.assertEqual(result.stdout, "")
+        if subprocess.run(["chrt", "-r", "1", "true"], capture_output=True).returncode != 0:
+            self.skipTest("this system lets nobody")
+        with Server(MODEL, options=["--real-time"]) as server:
+            result = run("stream", server.address, "--seconds", 0.3, "--model", MODEL, "--json")
+            self.assertEqual(json.loads(result.stdout)["mismatches"], 0)
+            threads = {int(name): os.sched_getscheduler(int(name)) for name in os.listdir(f"/proc/{server.process.pid}/task")}
+        first = [thread for thread, policy in threads.items() if policy & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR]
+        self.assertEqual(first, [server.process.pid])
+        self.assertGreater(len(threads), 2)
 
     def test_what_cannot_be_served(self):
         empty = pathlib.Path(self.folder.name) / "empty"
