@@ -18,6 +18,7 @@ Options few(std::uint32_t connections) {
 template <class Client>
 std::vector<std::unique_ptr<Client>> several(int count, const auto& where) {
   std::vector<std::unique_ptr<Client>> clients;
+  clients.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) clients.push_back(std::make_unique<Client>(where));
   return clients;
 }
