@@ -72,6 +72,8 @@ void House::stop() {
   leaving_ = true;
   judging_.stop();
   openings_.stop();
+  for (const auto& [name, session] : sessions_) session->stop_volumes();
+  for (const auto& session : retired_) session->stop_volumes();
 }
 
 // Levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a

@@ -95,7 +95,7 @@ class House {
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
 
-  /// Nothing is made or judged beside the stream any more.
+  /// Nothing is made or judged beside the stream any more; volumes under way end early.
   void stop();
 
   std::size_t sessions() const { return sessions_.size() + retired_.size(); }

@@ -211,8 +211,14 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
           .judged = judged.now ? judged.quality : nullptr};
 }
 
-PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, const runtime::PosedBody& body,
-                        const v1::ServerTimings& timings) {
+void hand_over(const PoseJob& job, PosedFrame frame) {
+  if (job.digests) frame.digest = digest_of(*frame.bytes);
+  job.on_frame(std::move(frame));
+}
+
+// The frame says why there is no volume. `cancelled`: the job was stopped, and there is no frame.
+Status show_volume(const PoseJob& job, const Subscription& subscription, const runtime::PosedBody& body,
+                   const v1::ServerTimings& timings) {
   const auto start = Clock::now();
   v1::Envelope envelope;
   v1::VolumeFrame& frame = *envelope.mutable_volume_frame();
@@ -221,10 +227,13 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
   frame.set_pose_sequence(job.request.sequence);
   frame.set_volume(subscription.volume->want().volume);
   const std::shared_ptr<wire::Payload> payload = subscription.volume->payload();
-  const Status status = guarded([&] {
+  Context context;
+  context.stop = job.stop;
+  Status status = guarded([&] {
     return subscription.volume->write(*job.model, body, job.volume_voxels, *job.memory,
-                                      (subscription.keyframes & 1) != 0, frame, *payload);
+                                      (subscription.keyframes & 1) != 0, frame, *payload, context);
   });
+  if (status.code == StatusCode::cancelled) return status;
   if (!status.ok()) {
     payload->clear();
     frame.clear_grid();
@@ -236,17 +245,13 @@ PosedFrame volume_frame(const PoseJob& job, const Subscription& subscription, co
   wire::to_proto(status, *frame.mutable_status());
   *frame.mutable_timings() = timings;
   frame.mutable_timings()->set_encoded(microseconds(Clock::now() - start));
-  return {.subscription = subscription.id,
-          .level = 0,
-          .number = job.number,
-          .keyframe = frame.keyframe(),
-          .encoded = frame.timings().encoded(),
-          .bytes = job.memory->hold(wire::encode(envelope, payload))};
-}
-
-void hand_over(const PoseJob& job, PosedFrame frame) {
-  if (job.digests) frame.digest = digest_of(*frame.bytes);
-  job.on_frame(std::move(frame));
+  hand_over(job, {.subscription = subscription.id,
+                  .level = 0,
+                  .number = job.number,
+                  .keyframe = frame.keyframe(),
+                  .encoded = frame.timings().encoded(),
+                  .bytes = job.memory->hold(wire::encode(envelope, payload))});
+  return {};
 }
 
 // Every frame of the posed body.
@@ -270,7 +275,8 @@ Status show(const PoseJob& job, runtime::PosedBody& body, const v1::ServerTiming
     }
   }
   for (const Subscription& subscription : job.subscriptions) {
-    if (subscription.volume) hand_over(job, volume_frame(job, subscription, body, timings));
+    if (!subscription.volume) continue;
+    if (Status status = show_volume(job, subscription, body, timings); !status.ok()) return status;
   }
   // Once everything is on its way.
   for (const Subscription& subscription : job.subscriptions) {
@@ -297,6 +303,7 @@ bool small(const PoseJob& job) {
 }  // namespace
 
 Status run(const PoseJob& job) {
+  if (job.stop.stop_requested()) return {StatusCode::cancelled, {}};  // where it waited long
   const auto start = Clock::now();
   PoseOutcome outcome;
   outcome.sequence = job.request.sequence;

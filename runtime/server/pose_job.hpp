@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "proto/framing.hpp"
@@ -65,6 +66,7 @@ struct PoseJob {
   bool aside = false;    ///< in a body of those that streams do not use
   bool alone = false;    ///< keeps to the calling thread, however large: the others are for streams
   bool volumes = false;  ///< the session's volumes are shown by this job, too
+  std::stop_token stop;  ///< nobody wants its volumes any more
   const FrameMemory* memory = nullptr;  ///< counts the frames
   FrameMemory::Room room;               ///< about what they will take
   std::shared_ptr<ProbeFrame> probe;    ///< to be filled; null where nobody probes
@@ -77,7 +79,8 @@ struct PoseJob {
 };
 
 /// Throws nothing. The status is that of the frames: the first that could not be made (out of memory) while
-/// the pose itself was good. A small job keeps to the calling thread.
+/// the pose itself was good; `cancelled` where `stop` was asked for before the last volume was made, of which
+/// no frame comes. A small job keeps to the calling thread.
 Status run(const PoseJob& job);
 
 }  // namespace ecorche::server

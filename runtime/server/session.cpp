@@ -75,6 +75,7 @@ void Session::leave(Member& member, bool may_return) {
     if (row.members.empty()) drop(row);
   }
   std::erase_if(rows_, [](const Row& row) { return row.members.empty(); });
+  stop_unwatched();
   const auto now = Clock::now();
   const bool controlled = controller_ == &member;
   if (controlled) {
@@ -183,6 +184,7 @@ bool Session::unsubscribe(Member& member, std::uint32_t id) {
     drop(*row);
     rows_.erase(row);
   }
+  stop_unwatched();
   return true;
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -138,6 +139,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void catch_up();
   /// Lets go of what probes need, where none has come for ten seconds, or nobody is here.
   void forget_probes(Clock::time_point now);
+  /// The server stops: volumes under way end early, and no more are begun, but those of a recording.
+  void stop_volumes();
   /// A client has a frame whole. The pose is judged now, if it is to be: where cores are shared with clients,
   /// not while they read.
   void arrived();
@@ -182,7 +185,8 @@ class Session : public std::enable_shared_from_this<Session> {
     bool busy = false;
     Clock::time_point next = Clock::now();  ///< no job begins before
     net::steady_timer pace;
-    bool pacing = false;  ///< it runs
+    bool pacing = false;                      ///< it runs
+    std::stop_source stop{std::nostopstate};  ///< of the job, where it makes volumes
   };
 
   /// What rows are taken up for.
@@ -221,6 +225,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Lane& lane_of(const VolumeWant& want) { return want.slices.empty() ? whole_ : planes_; }
   void want_volumes();
   void want_again(const Lane& lane);
+  void stop_unwatched();
   void start_volumes(Lane& lane);
   void submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job);
   bool held_back(Row& row, Clock::time_point now) const;
@@ -249,6 +254,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   bool awaited_ = false;  ///< the last one may come back
   bool retired_ = false;
+  bool stopping_ = false;
   bool unjudged_ = false;  ///< the present pose, once it has arrived somewhere
   bool awaits_judgement_ = false;
   bool awaits_opening_ = false;

@@ -33,8 +33,25 @@ void Session::want_again(const Lane& lane) {
   }
 }
 
+void Session::stop_volumes() {
+  stopping_ = true;
+  whole_.stop.request_stop();
+  planes_.stop.request_stop();
+}
+
+// What nobody sees any more need not be made.
+void Session::stop_unwatched() {
+  for (Lane* lane : {&whole_, &planes_}) {
+    const bool watched = std::any_of(rows_.begin(), rows_.end(), [&](const Row& row) {
+      const auto* want = std::get_if<VolumeWant>(&row.subscription.want);
+      return want && &lane_of(*want) == lane;
+    });
+    if (!watched) lane->stop.request_stop();
+  }
+}
+
 void Session::start_volumes(Lane& lane) {
-  if (lane.busy || together()) return;
+  if (lane.busy || together() || stopping_) return;
   const auto now = Clock::now();
   // With no room for more frames, who has none yet waits (catch_up).
   const auto ready = [&](const Row& row, std::uint64_t bytes) {
@@ -53,6 +70,8 @@ void Session::start_volumes(Lane& lane) {
   Taking taking{.now = now, .refresh = rests(now), .still = true};
   lane.busy = true;
   try {
+    lane.stop = std::stop_source();
+    job->stop = lane.stop.get_token();
     for (Row& row : rows_) {
       if (!ready(row, taking.bytes)) continue;
       job->request.arrived = std::min(job->request.arrived, *row.fresh);
@@ -82,9 +101,10 @@ void Session::submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job) {
     net::io_context& io = self->io_;
     net::post(io,
               [self = std::move(self), job = std::move(job), guard = std::move(guard), posed, &lane, status] {
-                if (!status.ok()) spdlog::error("session {}: {}", self->name_, status.message);
+                const bool stopped = status.code == StatusCode::cancelled;
+                if (!status.ok() && !stopped) spdlog::error("session {}: {}", self->name_, status.message);
                 lane.busy = false;
-                if (!*posed || !status.ok()) {  // no memory: once more, soon
+                if (!stopped && (!*posed || !status.ok())) {  // no memory: once more, soon
                   lane.next = Clock::now() + kSoon;
                   self->want_again(lane);
                 }

@@ -35,15 +35,15 @@ void append_brick(const Image& image, const runtime::VoxelRange& range, std::vec
 
 Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& body,
                            std::uint64_t most_voxels, const FrameMemory& memory, bool keyframe,
-                           v1::VolumeFrame& frame, wire::Payload& payload) {
+                           v1::VolumeFrame& frame, wire::Payload& payload, const Context& context) {
   payload.clear();
   // Until it is whole: what moved meanwhile would be forgotten.
   const std::uint64_t last_keyframe = std::exchange(keyframe_, 0);
   if (!want_.slices.empty()) {
-    write_slices(served, body, frame, payload);
+    write_slices(served, body, frame, payload, context);
     return {};
   }
-  const Room room{most_voxels, memory};
+  const Room room{most_voxels, memory, context};
   if (Status status = want_.by_spheres ? by_spheres(served, body, room) : by_tets(served, body, room);
       !status.ok())
     return status;
@@ -84,7 +84,7 @@ Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody
                              : runtime::grow_to(rest, body.nodes);
   if (Status status = find_room(served.model(), grid, room); !status.ok()) return status;
   served.volumes().follow(body.nodes, volume, want_.sampling, grid, kept_,
-                          served.volume_scratch->take()->tets);
+                          served.volume_scratch->take()->tets, room.context);
   posed_ = {&kept_.image, &kept_.bricks, &kept_.moved};
   return {};
 }
@@ -94,13 +94,13 @@ Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedB
   runtime::BallSet set = served.balls(want_.volume).at(body.segments);
   const runtime::LatticeBox box = runtime::box_for(set, want_.region);
   if (Status status = find_room(served.model(), grid_of(set.lattice, box), room); !status.ok()) return status;
-  runtime::follow(std::move(set), box, volume, want_.sampling, refilled_);
+  runtime::follow(std::move(set), box, volume, want_.sampling, refilled_, room.context);
   posed_ = {&refilled_.image, &refilled_.bricks, &refilled_.moved};
   return {};
 }
 
 void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedBody& body,
-                                v1::VolumeFrame& frame, wire::Payload& payload) {
+                                v1::VolumeFrame& frame, wire::Payload& payload, const Context& context) {
   const ModelVolume& volume = served.model().volumes[want_.volume];
   std::optional<runtime::BallSet> set;
   if (want_.by_spheres) set = served.balls(want_.volume).at(body.segments);
@@ -110,9 +110,9 @@ void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedB
   for (const ImageGrid& plane : want_.slices) {
     if (set) {
       slice = Image(plane, volume.image.type, volume.image.components);
-      runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice);
+      runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice, context);
     } else {
-      served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice, scratch->tets);
+      served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice, scratch->tets, context);
     }
     pixels.insert(pixels.end(), slice.bytes.begin(), slice.bytes.end());
   }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/values/context.hpp"
 #include "proto/framing.hpp"
 #include "runtime/server/frame_memory.hpp"
 #include "runtime/server/payload_pool.hpp"
@@ -36,21 +37,24 @@ class VolumeStream {
 
   /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
   /// needs one. resource_exhausted beyond `most_voxels`, and where the lattice has grown since the rest pose
-  /// and `memory` lets no more be kept. Whatever it throws, the next frame holds everything.
+  /// and `memory` lets no more be kept. Error{interrupted} on a stop. Whatever it throws, the next frame
+  /// holds everything.
   Status write(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
-               const FrameMemory& memory, bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload);
+               const FrameMemory& memory, bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload,
+               const Context& context = {});
 
  private:
   struct Room {
     std::uint64_t most_voxels;
     const FrameMemory& memory;
+    const Context& context;
   };
   // The whole posed volume, or its region, into posed_.
   Status by_tets(const ServedModel& model, const runtime::PosedBody& body, const Room& room);
   Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, const Room& room);
   Status find_room(const Model& model, const ImageGrid& grid, const Room& room);
   void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
-                    wire::Payload& payload);
+                    wire::Payload& payload, const Context& context);
   void write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,
                     wire::Payload& payload);
   void put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,

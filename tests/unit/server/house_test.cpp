@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -15,7 +16,14 @@ namespace ecorche::server {
 namespace {
 
 class Guest final : public Member {
-  bool deliver(const PosedFrame&) override { return true; }
+ public:
+  std::set<std::uint32_t> shown;  // subscriptions
+
+ private:
+  bool deliver(const PosedFrame& frame) override {
+    shown.insert(frame.subscription);
+    return true;
+  }
   std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
     return finest;
   }
@@ -114,6 +122,36 @@ TEST(House, WhoLeavesSessionsBehindKeepsNobodyOut) {
     if (session) session->leave(guest, false);
   }
   used->leave(guest, false);
+}
+
+// The end of the server is that of every session's volumes.
+TEST(House, WhoStopsMakesNoVolumes) {
+  Open open(Limits{});
+  Guest guest;
+  const auto session = open.open("body");
+  session->join(guest);
+  const auto see = [&](const Want& want) {
+    return session->subscribe(guest, {.id = 0, .want = want, .request = {}})->id;
+  };
+  const auto run_until = [&](auto&& done) {
+    for (int i = 0; i < 2000 && !done(); ++i) {
+      open.io.restart();
+      open.io.run_for(std::chrono::milliseconds(5));
+    }
+  };
+  const std::uint32_t first = see(VolumeWant{});
+  run_until([&] { return guest.shown.contains(first); });
+  EXPECT_TRUE(guest.shown.contains(first));
+  open.house.stop();
+  VolumeWant another;
+  another.compressed = true;
+  MeshWant mesh;
+  mesh.tissues = {0};
+  const std::uint32_t second = see(another), third = see(mesh);
+  run_until([&] { return guest.shown.contains(third); });
+  for (int i = 0; i < 20; ++i) run_until([count = 0]() mutable { return ++count > 1; });
+  EXPECT_EQ(guest.shown, (std::set{first, third})) << second;
+  session->leave(guest, false);
 }
 
 // However much is asked beside the poses, and however long it takes, a worker is left for them.

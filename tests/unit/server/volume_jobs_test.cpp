@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes beside the meshes of newer poses.
+#include "runtime/server/kept.hpp"
+#include "runtime/server/pose_job.hpp"
 #include "runtime/server/recording.hpp"
+#include "runtime/server/volume_stream.hpp"
 #include "tests/unit/server/session_stage.hpp"
 
 namespace ecorche::server {
@@ -116,6 +119,88 @@ TEST(VolumeJobs, KeepTheirSession) {
     stage.run_until([&] { return guest.session->over(Clock::now()); });
     EXPECT_TRUE(guest.session->over(Clock::now()));
     EXPECT_EQ(guest.frames(), 1U);
+  }
+}
+
+// A server that stops makes none any more, and does not wait for the one that is being made.
+TEST(VolumeJobs, EndWithTheServer) {
+  VolumeStage stage;
+  const std::uint32_t volume = stage.subscribe_volume(stage.watcher),
+                      plane = stage.subscribe_volume(stage.watcher, true);
+  ASSERT_TRUE(stage.shows(volume, 0));
+  ASSERT_TRUE(stage.shows(plane, 0));
+  stage.volume_gate.close();
+  stage.plane_gate.close();
+  stage.pose(1);
+  ASSERT_TRUE(stage.shows(stage.mesh, 1));
+  stage.session->stop_volumes();
+  stage.volume_gate.open();
+  stage.plane_gate.open();
+  stage.volume_workers.drain();
+  stage.plane_workers.drain();
+  stage.pose(2);
+  ASSERT_TRUE(stage.shows(stage.mesh, 2));
+  stage.wait(milliseconds(150));
+  EXPECT_EQ(stage.watcher.poses(volume), Poses({0}));
+  EXPECT_EQ(stage.watcher.poses(plane), Poses({0}));
+  stage.session->leave(stage.watcher, false);
+  EXPECT_TRUE(stage.session->waiting().has_value()) << "a job is still under way";
+}
+
+// The same of one that nobody watches any more.
+TEST(VolumeJobs, EndWhereNobodyWatches) {
+  VolumeStage stage;
+  stage.volume_gate.close();
+  const std::uint32_t volume = stage.subscribe_volume(stage.watcher);
+  stage.wait(milliseconds(20));
+  const std::string figures = stage.metrics.text();
+  stage.session->unsubscribe(stage.watcher, volume);
+  stage.volume_gate.open();
+  stage.volume_workers.drain();
+  stage.wait(milliseconds(20));
+  EXPECT_EQ(stage.metrics.text(), figures) << "a frame was made";
+}
+
+// However a volume is made, a stop ends it where it is, and there is no frame; the next one holds everything.
+TEST(VolumeJobs, EndInTheirMidst) {
+  const Model toy = test::toy_model();
+  const auto model = std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(toy));
+  const FrameMemory memory(1 << 30, 1 << 30);
+  for (const bool by_spheres : {false, true}) {
+    for (const bool plane : {false, true}) {
+      SCOPED_TRACE(std::string(by_spheres ? "spheres" : "tets") + (plane ? ", a plane" : ""));
+      VolumeWant want;
+      want.by_spheres = by_spheres;
+      want.changed_bricks = !plane;
+      if (plane) want.slices.emplace_back().size = {16, 16, 1};
+      PoseJob job;
+      job.model = model;
+      job.request.pose = Pose::rest(toy.segment_count());
+      job.volume_voxels = std::uint64_t{1} << 28;
+      job.memory = &memory;
+      Subscription& shown = job.subscriptions.emplace_back();
+      shown.id = 1;
+      shown.want = want;
+      shown.volume = std::make_shared<VolumeStream>(want, rest_voxels(toy, want));
+      std::vector<PosedFrame> frames;
+      job.on_frame = [&](PosedFrame frame) { frames.push_back(std::move(frame)); };
+      std::stop_source stop;
+      job.stop = stop.get_token();
+      for (job.number = 1; job.number <= 2; ++job.number) {
+        job.on_outcome = [&](const PoseOutcome&) {
+          if (job.number == 2) stop.request_stop();  // once it is posed
+        };
+        EXPECT_EQ(run(job).code, job.number == 2 ? StatusCode::cancelled : StatusCode::ok);
+        ASSERT_EQ(frames.size(), 1U);
+      }
+      EXPECT_EQ(run(job).code, StatusCode::cancelled);  // not begun at all
+      ASSERT_EQ(frames.size(), 1U);
+      job.stop = {};
+      EXPECT_EQ(run(job).code, StatusCode::ok);
+      ASSERT_EQ(frames.size(), 2U);
+      EXPECT_EQ(frames[1].keyframe, plane ? 0 : job.number);
+      EXPECT_EQ(frames[1].bytes->payload_bytes(), frames[0].bytes->payload_bytes());
+    }
   }
 }
 
