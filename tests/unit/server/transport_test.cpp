@@ -11,7 +11,10 @@
 #include <boost/asio/socket_base.hpp>
 #include <random>
 #include <thread>
+#include <utility>
 #include <vector>
+
+#include "tests/unit/server/forwarding_transport.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -185,6 +188,21 @@ TEST(TcpTransport, LittleIsKeptForWhoDoesNotRead) {
   ASSERT_EQ(ioctl(pair.server, SIOCOUTQNSD, &unsent), 0);
   EXPECT_GT(unsent, 0);
   EXPECT_LE(unsent, 2 << 20);
+}
+
+// What stands between passes on when bytes left, too: without it, who takes a long write slowly would be
+// dropped in a test, and in use not.
+TEST(TcpTransport, TellsWhenBytesMoved) {
+  Pair pair;
+  pair.transport = std::make_unique<ForwardingTransport>(std::move(pair.transport));
+  EXPECT_FALSE(pair.transport->moved());
+  const auto before = Clock::now();
+  const Bytes sent(16);
+  pair.write({net::buffer(sent)});
+  pair.io.run();
+  ASSERT_TRUE(pair.transport->moved());
+  EXPECT_GE(*pair.transport->moved(), before);
+  EXPECT_LE(*pair.transport->moved(), Clock::now());
 }
 
 TEST(TcpTransport, ClientGoesAway) {
