@@ -28,20 +28,6 @@ constexpr double kLessPatience = 0.25;
 // How long an ending connection may take to read its last words.
 constexpr double kLastWordsSeconds = 1;
 
-class Handling {
- public:
-  explicit Handling(const Seams& seams) : seams_(seams) { tell(true); }
-  ~Handling() { tell(false); }
-  Handling(const Handling&) = delete;
-  Handling& operator=(const Handling&) = delete;
-
- private:
-  void tell(bool begins) const {
-    if (seams_.handling) seams_.handling(begins);
-  }
-  const Seams& seams_;
-};
-
 }  // namespace
 
 Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven,

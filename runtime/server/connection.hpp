@@ -93,6 +93,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   // control.cpp
   void come_back(std::uint64_t id, const std::string& token, v1::Envelope answer);
   void resume(const std::shared_ptr<Returning>& back);
+  void take_place(Returning& back, bool controlled);
   void handle_claim(const v1::Envelope& request);
   void handle_release(const v1::Envelope& request);
   void handle_thresholds(const v1::Envelope& request);

@@ -56,7 +56,8 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
   }
   if (!lacking.empty()) {
     house_.set_aside(
-        [back, lacking, model = session->model()] {
+        [back, lacking, model = session->model(), &seams = house_.seams()] {
+          const Handling handling(seams);
           try {
             for (Asked* asked : lacking)
               asked->streams = open_streams(*model, std::get<MeshWant>(asked->want));
@@ -68,23 +69,33 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
           const auto self = weak.lock();
           if (!self || self->closed_ || self->ending_) return;
           self->take_back([&] {
-            if (back->no_memory) throw std::bad_alloc();
-            self->resume(back);
+            if (!back->no_memory) return self->resume(back);
+            self->end({StatusCode::resource_exhausted,
+                       "hello: the server is out of memory for your place (come back once more)"});
           });
         });
     returning_ = true;
     return;
   }
   session_ = session;
-  role_ = session_->rejoin(*this, place->controlled);
-  house_.take_up(back->token);
+  try {
+    take_place(*back, place->controlled);
+  } catch (...) {  // no memory: the place stays, for another try
+    std::exchange(session_, nullptr)->leave(*this, true);
+    throw;
+  }
+  house_.forget(back->token);
+}
+
+void Connection::take_place(Returning& back, bool controlled) {
+  role_ = session_->rejoin(*this, controlled);
   last_sequence_ = session_->last_sequence();
-  v1::Resumed& resumed = *back->answer.mutable_server_hello()->mutable_resumed();
+  v1::Resumed& resumed = *back.answer.mutable_server_hello()->mutable_resumed();
   resumed.set_model(session_->model()->summary.name());
   resumed.set_session(session_->name());
   resumed.set_role(role_);
   resumed.set_last_sequence(last_sequence_);
-  for (const Asked& asked : back->asked) {
+  for (const Asked& asked : back.asked) {
     const Subscription* const again = session_->subscribe(*this, asked);
     if (!again) {  // others have its memory by now
       house_.metrics().hit("kept");
@@ -95,7 +106,7 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
     one.set_was(asked.id);
     one.set_is(again->id);
   }
-  answer(back->id, std::move(back->answer));
+  answer(back.id, std::move(back.answer));
 }
 
 void Connection::handle_claim(const v1::Envelope& request) {

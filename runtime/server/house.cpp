@@ -199,11 +199,6 @@ const Lost* House::place_of(const std::string& token) {
   return found == lost_.end() ? nullptr : &found->second;
 }
 
-std::optional<Lost> House::take_up(const std::string& token) {
-  if (!place_of(token)) return std::nullopt;
-  return std::move(lost_.extract(token).mapped());
-}
-
 std::vector<std::shared_ptr<const Clip>> House::clips_for(const ServedModel& model) const {
   std::vector<std::shared_ptr<const Clip>> clips = model.clips;
   const auto own = recorded_.find(model.opened.rig_digest());

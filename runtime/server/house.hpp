@@ -57,8 +57,8 @@ class House {
   /// The place of the token, which its connection leaves where it is still there; good until the next call.
   /// Null where there is none (any more).
   const Lost* place_of(const std::string& token);
-  /// The same, once.
-  std::optional<Lost> take_up(const std::string& token);
+  /// Somebody has it.
+  void forget(const std::string& token) noexcept { lost_.erase(token); }
 
   /// What can be played on the model.
   std::vector<std::shared_ptr<const Clip>> clips_for(const ServedModel& model) const;

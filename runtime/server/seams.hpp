@@ -15,12 +15,27 @@ struct Seams {
   std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> transport;
   /// Asked before every wait; true: the wait ends at once, with an error.
   std::function<bool()> timer_fails;
-  /// A message is being handled, from true to false. What finds no memory meanwhile ends its connection; Asio
-  /// itself, between messages, ends the process.
+  /// A message is being handled, from true to false, or what its answer waits for is made, on another thread.
+  /// What finds no memory meanwhile ends its connection; Asio itself, between messages, ends the process.
   std::function<void(bool)> handling;
   /// Asked before each tissue's levels of detail are made that nobody waits for, on the thread that makes
   /// them; false: no more of this model.
   std::function<bool()> may_coarsen = {};
+};
+
+/// Tells Seams::handling while it lives.
+class Handling {
+ public:
+  explicit Handling(const Seams& seams) : seams_(seams) { tell(true); }
+  ~Handling() { tell(false); }
+  Handling(const Handling&) = delete;
+  Handling& operator=(const Handling&) = delete;
+
+ private:
+  void tell(bool begins) const {
+    if (seams_.handling) seams_.handling(begins);
+  }
+  const Seams& seams_;
 };
 
 }  // namespace ecorche::server

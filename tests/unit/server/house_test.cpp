@@ -80,10 +80,11 @@ TEST(House, KeepsFewPlacesOfThoseWhoComeAndGo) {
     open.house.left(token, Lost{.session = session, .asked = {}, .controlled = false});
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  EXPECT_FALSE(open.house.take_up("z"));
-  EXPECT_FALSE(open.house.take_up("y"));
-  for (const char* token : {"a", "b", "c"}) EXPECT_TRUE(open.house.take_up(token)) << token;
-  EXPECT_FALSE(open.house.take_up("c"));
+  EXPECT_FALSE(open.house.place_of("z"));
+  EXPECT_FALSE(open.house.place_of("y"));
+  for (const char* token : {"a", "b", "c"}) EXPECT_TRUE(open.house.place_of(token)) << token;
+  open.house.forget("c");
+  EXPECT_FALSE(open.house.place_of("c"));
   session->leave(guest, false);
 }
 
