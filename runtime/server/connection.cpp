@@ -255,6 +255,9 @@ net::awaitable<void> Connection::hold_back() {
   bool held = false;
   allowance_ -= 1;
   while (!closed_ && !ending_) {
+    // Nothing is read meanwhile, which would tell; and who has gone must not take its place, to which it may
+    // come back.
+    if (returning_ && transport_->hung_up()) co_return close("client left");
     const auto now = Clock::now();
     // At most a second's worth in one go.
     allowance_ =

@@ -56,7 +56,8 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
   }
   if (!lacking.empty()) {
     house_.set_aside(
-        [back, lacking, model = session->model(), &seams = house_.seams()] {
+        [back, lacking, weak = weak_from_this(), model = session->model(), &seams = house_.seams()] {
+          if (weak.expired()) return;
           const Handling handling(seams);
           try {
             for (Asked* asked : lacking)

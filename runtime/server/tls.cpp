@@ -65,6 +65,7 @@ class TlsTransport final : public Transport {
   }
 
   std::optional<Clock::time_point> moved() const override { return moved_; }
+  bool hung_up() override { return server::hung_up(stream_.next_layer()); }
 
  private:
   static constexpr std::size_t kPart = 64 << 10;

@@ -2,6 +2,7 @@
 #include "runtime/server/transport.hpp"
 
 #include <netinet/tcp.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <array>
@@ -100,6 +101,7 @@ class TcpTransport final : public Transport {
   }
 
   std::optional<Clock::time_point> moved() const override { return moved_; }
+  bool hung_up() override { return server::hung_up(socket_); }
 
  private:
   tcp::socket socket_;
@@ -122,6 +124,16 @@ std::string peer_of(const tcp::socket& socket) {
   boost::system::error_code ec;
   const tcp::endpoint peer = socket.remote_endpoint(ec);
   return ec ? "?" : peer.address().to_string() + ":" + std::to_string(peer.port());
+}
+
+bool hung_up(tcp::socket& socket) {
+#ifdef POLLRDHUP
+  pollfd asked{.fd = socket.native_handle(), .events = POLLRDHUP, .revents = 0};
+  return ::poll(&asked, 1, 0) > 0;
+#else
+  static_cast<void>(socket);
+  return false;
+#endif
 }
 
 Clock::duration waited(tcp::socket& socket) {

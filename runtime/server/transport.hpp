@@ -33,6 +33,10 @@ class Transport {
   /// of parts of 512 KiB at most. Nothing before the first, or where the carrier cannot tell.
   virtual std::optional<Clock::time_point> moved() const { return std::nullopt; }
 
+  /// The client has gone, or closed its side, though what it sent before may not be read yet. False where the
+  /// system does not tell.
+  virtual bool hung_up() { return false; }
+
   /// Where the carrier has messages, and one must be one frame: whether the last byte read ended one.
   virtual std::optional<bool> message_ended() const { return std::nullopt; }
   /// Without messages, frames may leave in one write.
@@ -47,6 +51,9 @@ void prepare(tcp::socket& socket);
 
 /// `127.0.0.1:4711`, or `?` once it has gone.
 std::string peer_of(const tcp::socket& socket);
+
+/// As Transport::hung_up().
+bool hung_up(tcp::socket& socket);
 
 /// How long an accepted socket stood in the kernel, to a few milliseconds, from its client's last word where
 /// that has sent some; 0 where the system does not tell.

@@ -162,6 +162,7 @@ class WebSocketTransport final : public Transport {
   std::optional<Clock::time_point> moved() const override {
     return socket_->next_layer().transport().moved();
   }
+  bool hung_up() override { return socket_->next_layer().transport().hung_up(); }
 
  private:
   std::unique_ptr<Socket> socket_;

@@ -27,6 +27,7 @@ class ForwardingTransport : public Transport {
   net::awaitable<void> finish(boost::system::error_code& ec) override { return inner_->finish(ec); }
   void close() override { inner_->close(); }
   std::optional<Clock::time_point> moved() const override { return inner_->moved(); }
+  bool hung_up() override { return inner_->hung_up(); }
   std::optional<bool> message_ended() const override { return inner_->message_ended(); }
 
  private:

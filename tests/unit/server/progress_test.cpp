@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <thread>
 #include <vector>
 
 #include "runtime/server/outbox.hpp"
@@ -215,9 +216,9 @@ struct Sockets {
   int descriptor;
 };
 
-// As long as the client reads nothing, nothing moves; once it does, something does, long before the end.
-// `read`: has it read so many bytes.
-void expect_movement(net::io_context& io, Transport& transport, const Sockets& sockets,
+// As long as the client reads nothing, nothing moves; once it does, something does, long before the end. And
+// when it hangs up that is known, though nobody reads. `read`: has it read so many bytes.
+void expect_movement(net::io_context& io, Transport& transport, Sockets& sockets,
                      const std::function<net::awaitable<void>(std::size_t)>& read) {
   const std::vector<std::byte> sent(std::size_t{48} << 20);
   const std::vector<net::const_buffer> frame{net::buffer(sent)};
@@ -260,6 +261,11 @@ void expect_movement(net::io_context& io, Transport& transport, const Sockets& s
   while (!written && io.run_one() > 0) {
   }
   EXPECT_TRUE(written);
+  net::write(sockets.client, net::buffer("more", 4));
+  EXPECT_FALSE(transport.hung_up());
+  sockets.client.close();
+  for (int i = 0; i < 1000 && !transport.hung_up(); ++i) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_TRUE(transport.hung_up());
 }
 
 // Everything of `stream`, which nobody looks at.

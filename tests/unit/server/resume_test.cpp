@@ -147,6 +147,31 @@ TEST(ComingBack, WhatOthersWatchIsThere) {
   EXPECT_EQ(back.server().resumed().subscriptions(0).is(), subscription);
 }
 
+// Its place waits for its next try.
+TEST(ComingBack, WhoHangsUpMeanwhileDoesNotTakeItsPlace) {
+  TestServer server;
+  std::string token;
+  {
+    TestClient before(server);
+    subscribe(before, coarse);
+    token = token_of(before);
+  }
+  Busy busy(server);
+  {
+    RawClient impatient(server);
+    come_back(impatient, token);
+    EXPECT_FALSE(impatient.receive(0.1));
+  }
+  RawClient again(server);
+  come_back(again, token);
+  EXPECT_FALSE(again.receive(0.3));  // the other one has been seen to be gone
+  busy.release();
+  const auto hello = again.receive();
+  ASSERT_TRUE(hello);
+  EXPECT_EQ(hello->envelope.server_hello().resumed().subscriptions_size(), 1);
+  EXPECT_EQ(hello->envelope.server_hello().resumed().role(), v1::ROLE_CONTROLLER);
+}
+
 // Of two who show the token at once, and of a session whose model has become another one.
 TEST(ComingBack, WhatIsNoMoreDoesNotComeBack) {
   TestServer server;
