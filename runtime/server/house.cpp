@@ -231,19 +231,25 @@ void House::finish_recording(Session& session, std::function<void(const Status&)
   const std::shared_ptr<Recording> recording = session.recording();
   std::filesystem::path path;
   if (const Status status = recording_path(recording->name(), path); !status.ok()) return done(status);
-  session.record(nullptr);
+  std::erase_if(ending_, [](const auto& one) { return one.expired(); });
+  ending_.push_back(recording);
+  session.end_recording([this, recording, path, rig = session.model()->opened.rig_digest(),
+                         done = std::move(done)] { write(recording, path, rig, done); });
+}
+
+void House::write(const std::shared_ptr<Recording>& recording, const std::filesystem::path& path,
+                  std::uint64_t rig_digest, const std::function<void(const Status&)>& done) {
   const auto clip = std::make_shared<Clip>(recording->finish());
   const auto written = std::make_shared<Status>();
-  offload(
-      [recording, path, written] { *written = recording->write(path); },
-      [this, recording, clip, written, rig = session.model()->opened.rig_digest(), done = std::move(done)] {
-        if (written->ok()) add_clip(rig, std::move(*clip));
-        if (written->ok() && recording->full()) {
-          *written = {StatusCode::resource_exhausted,
-                      "record: it grew to the server's limit, and is whole up to there (record less)"};
-        }
-        done(*written);
-      });
+  offload([recording, path, written] { *written = recording->write(path); },
+          [this, recording, clip, written, rig_digest, done] {
+            if (written->ok()) add_clip(rig_digest, std::move(*clip));
+            if (written->ok() && recording->full()) {
+              *written = {StatusCode::resource_exhausted,
+                          "record: it grew to the server's limit, and is whole up to there (record less)"};
+            }
+            done(*written);
+          });
 }
 
 // Nobody ended it: it ends with its session.
@@ -262,13 +268,14 @@ void House::end_recordings() {
 Status House::room_for_recording(const std::string& name) const {
   std::ptrdiff_t running = 0;
   bool same = false;
-  const auto look_at = [&](const Session& session) {
-    if (!session.recording()) return;
+  const auto look_at = [&](const std::shared_ptr<const Recording>& recording) {
+    if (!recording) return;
     ++running;
-    same = same || session.recording()->name() == name;
+    same = same || recording->name() == name;
   };
-  for (const auto& entry : sessions_) look_at(*entry.second);
-  for (const auto& session : retired_) look_at(*session);
+  for (const auto& entry : sessions_) look_at(entry.second->recording());
+  for (const auto& session : retired_) look_at(session->recording());
+  for (const auto& recording : ending_) look_at(recording.lock());
   if (same) {
     return {StatusCode::already_exists,
             "record: another session's recording '" + name + "' runs (choose another name)"};

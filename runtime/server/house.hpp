@@ -66,12 +66,12 @@ class House {
   void add_clip(std::uint64_t rig_digest, Clip clip);
   /// Where a recording of this name goes: invalid_argument, failed_precondition, already_exists.
   Status recording_path(const std::string& name, std::filesystem::path& out) const;
-  /// Ends the session's recording, which it has, and writes it; then `done`.
+  /// Ends the session's recording, which it has, with its last pose, and writes it; then `done`.
   void finish_recording(Session& session, std::function<void(const Status&)> done);
   /// As finish_recording, for all sessions, whose end is the server's.
   void end_recordings();
   /// resource_exhausted where four run, or the folder holds 256 files; already_exists where one of this name
-  /// runs.
+  /// runs, or ends.
   Status room_for_recording(const std::string& name) const;
 
   /// Reads a model again, aside, and calls `done` on the I/O thread.
@@ -111,6 +111,8 @@ class House {
   void replace(std::shared_ptr<const ServedModel> model);
   bool make_room();
   void keep_recording(Session& session);
+  void write(const std::shared_ptr<Recording>& recording, const std::filesystem::path& path,
+             std::uint64_t rig_digest, const std::function<void(const Status&)>& done);
 
   Options options_;
   FrameMemory memory_;
@@ -123,6 +125,7 @@ class House {
   std::map<std::string, Lost> lost_;
   std::vector<std::shared_ptr<Session>> retired_;
   std::map<std::uint64_t, std::vector<std::shared_ptr<const Clip>>> recorded_;  // by rig digest
+  std::vector<std::weak_ptr<const Recording>> ending_;  ///< wait for their last frames, or are being written
   Seams seams_;
   Metrics metrics_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;

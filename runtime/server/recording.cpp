@@ -28,8 +28,8 @@ bool stands_alone(const v1::Subscribe& request) {
 }  // namespace
 
 Recording::Recording(std::string name, const ServedModel& model, const std::string& server, std::size_t limit)
-    : limit_(limit), rig_digest_(model.opened.rig_digest()) {
-  clip_.name = std::move(name);
+    : name_(std::move(name)), limit_(limit), rig_digest_(model.opened.rig_digest()) {
+  clip_.name = name_;
   v1::Envelope envelope;
   v1::RecordingHead& head = *envelope.mutable_recording_head();
   head.set_version(kVersion);
@@ -59,7 +59,8 @@ void Recording::add(const PoseRequest& pose) {
   recorded.mutable_pose()->set_rig_digest(rig_digest_);
   recorded.mutable_pose()->set_skinning(skinning_to_proto(pose.skinning));
   wire::to_proto(pose.pose, *recorded.mutable_pose());
-  if (!append(envelope)) return;
+  mark_ = Mark{.bytes = bytes_.size(), .frames = frames_, .sequence = last_sequence_, .subscriptions = {}};
+  if (!append(envelope)) return mark_.reset();
   ++poses_;
   last_sequence_ = sequence;
   if (clip_.at.empty()) first_seconds_ = recorded.seconds();
@@ -68,12 +69,13 @@ void Recording::add(const PoseRequest& pose) {
 }
 
 void Recording::add(const PosedFrame& frame, const v1::Subscribe& request) {
-  if (!frame.digest || poses_ == 0 || !stands_alone(request)) return;
+  if (!frame.digest || !mark_ || !stands_alone(request)) return;
   if (!subscriptions_.contains(frame.subscription)) {
     v1::Envelope envelope;
     envelope.mutable_recorded_subscription()->set_subscription(frame.subscription);
     *envelope.mutable_recorded_subscription()->mutable_subscribe() = request;
-    if (!append(envelope)) return;
+    mark_->subscriptions.push_back(frame.subscription);
+    if (!append(envelope)) return take_back();
     subscriptions_.insert(frame.subscription);
   }
   v1::Envelope envelope;
@@ -82,7 +84,20 @@ void Recording::add(const PosedFrame& frame, const v1::Subscribe& request) {
   recorded.set_pose_sequence(last_sequence_);
   recorded.set_digest(*frame.digest);
   recorded.set_payload_bytes(frame.bytes->payload_bytes());
-  if (append(envelope)) ++frames_;
+  if (!append(envelope)) return take_back();
+  ++frames_;
+}
+
+void Recording::take_back() {
+  if (!mark_) return;
+  bytes_.resize(mark_->bytes);
+  frames_ = mark_->frames;
+  last_sequence_ = mark_->sequence;
+  for (const std::uint32_t subscription : mark_->subscriptions) subscriptions_.erase(subscription);
+  mark_.reset();
+  --poses_;
+  clip_.at.pop_back();
+  clip_.poses.pop_back();
 }
 
 Clip Recording::finish() {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -131,8 +132,10 @@ class Session : public std::enable_shared_from_this<Session> {
   using Ready = std::function<void(const std::shared_ptr<const ProbeFrame>&, const Status&)>;
   void probe(Ready ready, bool many);
 
-  /// What is shown from now on goes into it, until it is taken away.
+  /// The poses that are taken up from now on go into it, with their frames, until it is taken away.
   void record(std::shared_ptr<Recording> recording) { recording_ = std::move(recording); }
+  /// Takes it away; `ended` is called once the pose that is being shown has all its frames in it.
+  void end_recording(std::function<void()> ended);
   const std::shared_ptr<Recording>& recording() const { return recording_; }
 
   /// Makes what had to wait for memory.
@@ -197,6 +200,14 @@ class Session : public std::enable_shared_from_this<Session> {
     std::uint64_t bytes = 0;  ///< of the frames, about
   };
 
+  /// The pose under way, where it is recorded.
+  struct Recorded {
+    std::shared_ptr<Recording> recording;             ///< null: it is not
+    std::map<std::uint32_t, v1::Subscribe> requests;  ///< of its frames, by subscription
+    std::uint64_t job = 0;                            ///< PoseJob::number, once the pose is in the recording
+    std::function<void()> ended;                      ///< the recording ends with this pose
+  };
+
   class Teller;
   void tell_control();
   void judged(const JudgeJob& job);
@@ -218,6 +229,11 @@ class Session : public std::enable_shared_from_this<Session> {
   void take_up(PoseJob& job);
   void take_up_probes(PoseJob& job, bool refresh);
   void take_up(Row& row, Taking& taking, PoseJob& job);
+  // session_recording.cpp
+  void begin_recorded();
+  void record_pose(const PoseJob& job);
+  void record_frame(const PosedFrame& frame);
+  void end_recorded(bool whole);
   // session_volumes.cpp
   bool together() const { return recording_ != nullptr; }
   bool volumes_busy() const { return whole_.busy || planes_.busy; }
@@ -278,12 +294,11 @@ class Session : public std::enable_shared_from_this<Session> {
   std::shared_ptr<ClipPlayer> player_;
   runtime::QualityThresholds thresholds_;
   std::shared_ptr<Recording> recording_;
+  Recorded recorded_;
   std::vector<std::shared_ptr<ProbeFrame>> probe_frames_;  ///< to be filled again once nobody asks them
   std::shared_ptr<const ProbeFrame> probe_frame_;          ///< of the pose that is shown
   std::vector<Ready> probes_;                              ///< wait for one
   std::optional<Clock::time_point> probed_, probed_many_;
-
-  std::uint64_t recorded_job_ = 0;  ///< PoseJob::number of the last recorded pose
 };
 
 }  // namespace ecorche::server

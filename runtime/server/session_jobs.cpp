@@ -154,9 +154,11 @@ void Session::start(Clock::time_point now, bool aside) {
   poses_.busy = true;
   if (job->volumes) set_volumes_busy(true);
   try {
+    if (!refresh) begin_recorded();
     submit(job, refresh);
   } catch (...) {  // out of memory: this pose is lost, the next one is not
     poses_.busy = false;
+    end_recorded(false);
     if (job->volumes) set_volumes_busy(false);
     throw;
   }
@@ -217,6 +219,7 @@ void Session::posed(const PoseJob& job, const Status& status) {
   poses_.busy = false;
   if (job.volumes) set_volumes_busy(false);
   stirred_ = Clock::now();
+  end_recorded(status.ok());
   // Asked for, and not made: the pose could not be.
   if (job.probe && probe_frame_ != job.probe) {
     probe_ready(nullptr,
@@ -358,10 +361,9 @@ void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, co
   metrics_.took(Metrics::Stage::waited, 1e-6 * static_cast<double>(outcome.timings.waited()));
   metrics_.took(Metrics::Stage::posed, 1e-6 * static_cast<double>(outcome.timings.posed()));
   metrics_.skipped(skipped.count);
-  if (outcome.status.ok()) present_ = job.request;
-  if (outcome.status.ok() && recording_) {
-    recording_->add(job.request);
-    recorded_job_ = job.number;
+  if (outcome.status.ok()) {
+    present_ = job.request;
+    record_pose(job);
   }
   if (controller_) controller_->pose_done(outcome, skipped);
   if (outcome.status.ok() && !job.volumes) want_volumes();
@@ -369,11 +371,10 @@ void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, co
 
 void Session::publish(const PosedFrame& frame) {
   metrics_.took(Metrics::Stage::encoded, 1e-6 * static_cast<double>(frame.encoded));
+  record_frame(frame);
   const auto row = std::find_if(rows_.begin(), rows_.end(),
                                 [&](const Row& r) { return r.subscription.id == frame.subscription; });
   if (row == rows_.end()) return;
-  if (recording_ && frame.number == recorded_job_ && frame.keyframe == 0)
-    recording_->add(frame, row->request);
   if (frame.judged && judged_by(*frame.judged, thresholds_)) {
     row->subscription.quality = frame.judged;
     if (frame.judged->pose_sequence() == 0)

@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <set>
 #include <thread>
 #include <utility>
 
+#include "runtime/server/tls.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::server {
@@ -33,15 +35,16 @@ class Guest final : public Member {
 };
 
 struct Open {
-  explicit Open(const Limits& limits, int threads = 1)
+  explicit Open(const Limits& limits, int threads = 1, const std::filesystem::path& records = {})
       : workers(threads, [](const Job& job) { job(); }),
-        house(io, workers, options(limits), {{"toy", std::make_shared<const Model>(test::toy_model())}}, {}) {
-  }
+        house(io, workers, options(limits, records),
+              {{"toy", std::make_shared<const Model>(test::toy_model())}}, {}) {}
   ~Open() { house.stop(); }
 
-  static Options options(const Limits& limits) {
+  static Options options(const Limits& limits, const std::filesystem::path& records) {
     Options out;
     out.limits = limits;
+    out.record_folder = records;
     return out;
   }
   // Null where there is no room.
@@ -153,6 +156,26 @@ TEST(House, WhoStopsMakesNoVolumes) {
   for (int i = 0; i < 20; ++i) run_until([count = 0]() mutable { return ++count > 1; });
   EXPECT_EQ(guest.shown, (std::set{first, third})) << second;
   session->leave(guest, false);
+}
+
+// A recording that has ended has its name until it is written: the next one of that name could not be ended.
+TEST(House, ARecordingsNameIsTakenUntilItIsWritten) {
+  const auto folder = std::filesystem::temp_directory_path() / ("ecorche_ends_" + random_token());
+  std::filesystem::create_directories(folder);
+  {
+    Open open({}, 1, folder);
+    const auto session = open.open("body");
+    EXPECT_TRUE(open.house.room_for_recording("bow").ok());
+    session->record(std::make_shared<Recording>("bow", *session->model(), "test", std::size_t{1} << 20));
+    bool written = false;
+    open.house.finish_recording(*session, [&](const Status& status) { written = status.ok(); });
+    EXPECT_EQ(open.house.room_for_recording("bow").code, StatusCode::already_exists);
+    EXPECT_TRUE(open.house.room_for_recording("nod").ok());
+    for (int i = 0; i < 2000 && !written; ++i) open.io.run_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(written);
+    EXPECT_TRUE(open.house.room_for_recording("bow").ok());  // a file has it now
+  }
+  std::filesystem::remove_all(folder);
 }
 
 // However much is asked beside the poses, and however long it takes, a worker is left for them.
