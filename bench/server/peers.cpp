@@ -37,7 +37,7 @@ int connected(const wire::Address& address) {
 // twice.
 std::string asks_for_much() {
   std::string bytes;
-  const auto say = [&](v1::Envelope envelope) { bytes += wire::encode(envelope).head; };
+  const auto say = [&](const v1::Envelope& envelope) { bytes += wire::encode(envelope).head; };
   v1::Envelope hello, open, subscribe;
   hello.set_request_id(1);
   hello.mutable_client_hello()->set_protocol_min(1);

@@ -101,8 +101,10 @@ TEST(Allocation, NoneInAProbe) {
   Probe::PosedTree tree;
   Probed out;
   const ProbeWants wants{.gradient = true, .tissue = true, .volumes = {{0}, {1}}};
+  constexpr int numbers = 3 * 500;
   std::vector<float> points;
-  for (int i = 0; i < 3 * 500; ++i)
+  points.reserve(numbers);
+  for (int i = 0; i < numbers; ++i)
     points.push_back(static_cast<float>(i * 37 % 300) - (i % 3 == 2 ? 0.0F : 150.0F));
   Pose pose = Pose::rest(3);
   tbb::task_arena(1).execute([&] {

@@ -410,8 +410,8 @@ TEST(Kernels, QuantisedPositionsAndNormals) {
       for (int c = 0; c < 3; ++c) {
         for (int k = 0; k < 3; ++k) {
           const auto at = [&](int corner) {
-            return static_cast<double>(
-                body.nodes[static_cast<std::size_t>(3 * model.tets(tissue.tet[v], corner) + k)]);
+            const auto node = static_cast<std::size_t>(model.tets(tissue.tet[v], corner));
+            return static_cast<double>(body.nodes[3 * node + static_cast<std::size_t>(k)]);
           };
           e[c][k] = at(c + 1) - at(0);
         }

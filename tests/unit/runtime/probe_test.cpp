@@ -294,7 +294,9 @@ TEST_F(ProbeTest, WhereTetsFoldTheLowestPositiveOneWins) {
   folded.tets << 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11;
   folded.tet_label = {7, 8, 9};
   nodes = rest_nodes(folded);
-  for (std::size_t n = 0; n < 12; ++n) nodes[3 * n] -= 100 * static_cast<float>(n / 4);
+  for (std::size_t tet = 0; tet < 3; ++tet) {
+    for (std::size_t n = 4 * tet; n < 4 * tet + 4; ++n) nodes[3 * n] -= 100 * static_cast<float>(tet);
+  }
   std::swap_ranges(&nodes[3], &nodes[6], &nodes[6]);  // tet 0 lies the wrong way round
   const Probe of(std::make_shared<const Model>(folded));
   of.follow(nodes, tree);

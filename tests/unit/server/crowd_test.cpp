@@ -23,8 +23,11 @@ TEST(Crowd, EveryFrameIsPosedAndEncodedOnceForAll) {
   options.http = Endpoint{};
   const TestServer server(options);
   TestClient poser(server, "shared");
+  constexpr std::size_t watching = 7;
   std::vector<std::unique_ptr<TestClient>> observers;
-  for (int i = 0; i < 7; ++i) observers.push_back(std::make_unique<TestClient>(server, "shared"));
+  observers.reserve(watching);
+  for (std::size_t i = 0; i < watching; ++i)
+    observers.push_back(std::make_unique<TestClient>(server, "shared"));
   const auto subscribe = [](TestClient& client) {
     v1::Envelope request;
     request.mutable_subscribe()->mutable_mesh()->set_encoding(v1::ENCODING_U16_DELTA);
@@ -149,7 +152,7 @@ TEST(Crowd, NumbersBeyondAllSenseAreRefusedOrShown) {
   const TestServer server;
   TestClient client(server);
   const std::string ct = server.model().volumes[0].name;
-  const auto sends = [&](v1::Envelope request) {
+  const auto sends = [&](const v1::Envelope& request) {
     std::uint32_t number = 0;
     try {
       number = client.client().call(request).envelope.subscribed().subscription();
