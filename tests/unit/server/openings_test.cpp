@@ -14,6 +14,7 @@ TEST(Openings, GoBesideStreamsWithoutWorkers) {
   EXPECT_FALSE(first.sees(1, kLong)) << "a worker's job, which is kept";
   stage.openings.streamed(Clock::now() + std::chrono::hours(1));
   std::vector<std::unique_ptr<Guest>> guests;
+  guests.reserve(4);
   for (int i = 0; i < 3; ++i) guests.push_back(std::make_unique<Guest>(stage));
   guests.push_back(nullptr);
   {

@@ -34,8 +34,9 @@ struct Offline {
 Tissue sheet(int n) {
   Tissue tissue;
   tissue.V.resize(n * n, 3);
-  for (int i = 0; i < n * n; ++i)
-    tissue.V.row(i) << static_cast<float>(i % n), static_cast<float>(i / n), 0.0F;
+  for (int y = 0; y < n; ++y) {
+    for (int x = 0; x < n; ++x) tissue.V.row(n * y + x) << static_cast<float>(x), static_cast<float>(y), 0.0F;
+  }
   tissue.F.resize(2 * (n - 1) * (n - 1), 3);
   int f = 0;
   for (int y = 0; y + 1 < n; ++y) {

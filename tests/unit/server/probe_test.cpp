@@ -227,6 +227,7 @@ TEST(ProbeTest, ManyThreadsAskOneFreshTree) {
     std::vector<runtime::TetPlace> places(which.size());
     runtime::kernels::find_tets({runs, padded, tree}, points, which, places);
     std::vector<std::int32_t> tets;
+    tets.reserve(places.size());
     for (const runtime::TetPlace& place : places) tets.push_back(place.tet);
     return tets;
   };
@@ -237,6 +238,7 @@ TEST(ProbeTest, ManyThreadsAskOneFreshTree) {
     runtime::follow(runs, nodes, padded, tree);
     std::vector<std::vector<std::int32_t>> found(3);
     std::vector<std::thread> threads;
+    threads.reserve(found.size());
     for (auto& mine : found) threads.emplace_back([&] { mine = ask(); });
     for (std::thread& thread : threads) thread.join();
     for (const auto& one : found) EXPECT_EQ(one, expected);
