@@ -17,7 +17,7 @@ using std::chrono::milliseconds;
 class Busy {
  public:
   // Reads another model in the end, or none.
-  explicit Busy(TestServer& server, std::shared_ptr<const Model> another = nullptr)
+  explicit Busy(TestServer& server, const std::shared_ptr<const Model>& another = nullptr)
       : asks_(server.address(), "test") {
     server.reads([state = state_, another]() -> ModelParts {
       state->reads = true;

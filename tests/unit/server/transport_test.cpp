@@ -166,6 +166,7 @@ TEST(TcpTransport, OnePartOfAllLargeFramesATurn) {
   pairs[3]->transport->close();
   pairs[5]->transport->close();
   std::vector<std::thread> readers;
+  readers.reserve(pairs.size());
   for (const auto& pair : pairs) {
     readers.emplace_back([&pair] {
       Bytes got(std::size_t{16} << 20);
