@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -25,6 +26,10 @@ Served::Served(const std::string& program, const std::string& model, const std::
   std::vector<std::string> words{program,       "serve",    model,   "--listen", "127.0.0.1:0",
                                  "--port-file", port_file_, "--log", "error"};
   words.insert(words.end(), options.begin(), options.end());
+  if (const char* more = std::getenv("SERVE_OPTIONS")) {
+    std::istringstream given(more);
+    for (std::string word; given >> word;) words.push_back(word);
+  }
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);

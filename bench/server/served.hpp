@@ -11,7 +11,8 @@
 
 namespace ecorche::bench {
 
-/// Started with the model, on a free port; stopped by SIGTERM at the end.
+/// Started with the model, on a free port; stopped by SIGTERM at the end. What the environment's
+/// SERVE_OPTIONS holds, parted by blanks, are options, too.
 class Served {
  public:
   Served(const std::string& program, const std::string& model, const std::vector<std::string>& options = {});
