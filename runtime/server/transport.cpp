@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
 
 #include "runtime/server/write_turn.hpp"
@@ -114,8 +115,25 @@ std::unique_ptr<Transport> tcp_transport(tcp::socket socket) {
   return std::make_unique<TcpTransport>(std::move(socket));
 }
 
+// Over a network that loses packets now and then, whoever takes each loss for a full line, as the usual ways
+// of TCP do, sends next to nothing. Where the system does not have BBR, or keeps it for itself, things stay
+// as they are.
+void prefer_bbr(tcp::socket& socket) {
+#ifdef TCP_CONGESTION
+  boost::system::error_code ec;
+  const tcp::endpoint peer = socket.remote_endpoint(ec);
+  if (ec || peer.address().is_loopback()) return;
+  constexpr std::string_view kBbr = "bbr";
+  static_cast<void>(setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_CONGESTION, kBbr.data(),
+                               static_cast<socklen_t>(kBbr.size())));
+#else
+  static_cast<void>(socket);
+#endif
+}
+
 void prepare(tcp::socket& socket) {
   boost::system::error_code ec;
+  prefer_bbr(socket);
   socket.set_option(tcp::no_delay(true), ec);
   socket.set_option(Unsent(kMostUnsent), ec);
 }

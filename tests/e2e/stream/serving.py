@@ -11,11 +11,11 @@ ECORCHE = os.environ["ECORCHE_BIN"]
 
 
 class Server:
-    def __init__(self, *models, options=(), port=0):
+    def __init__(self, *models, options=(), host="127.0.0.1", port=0):
         self._folder = tempfile.TemporaryDirectory()
         port_file = pathlib.Path(self._folder.name) / "port"
         self.process = subprocess.Popen(
-            [ECORCHE, "serve", *map(str, models), "--listen", f"127.0.0.1:{port}", "--port-file", str(port_file), *options],
+            [ECORCHE, "serve", *map(str, models), "--listen", f"{host}:{port}", "--port-file", str(port_file), *options],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 60
         while not port_file.exists():
@@ -25,7 +25,7 @@ class Server:
             time.sleep(0.01)
         ports = [int(line) for line in port_file.read_text().split()]
         self.port, self.http_port = ports[0], (ports[1:] or [None])[0]
-        self.address = f"127.0.0.1:{self.port}"
+        self.address = f"{host}:{self.port}"
 
     def __enter__(self):
         return self
