@@ -271,7 +271,9 @@ void Session::probe_ready(const std::shared_ptr<ProbeFrame>& frame, const Status
 }
 
 void Session::forget_probes(Clock::time_point now) {
-  if (!probes_.empty() || (!members_.empty() && probed_ && now - *probed_ < kForgotten)) return;
+  // A job may have a tree, and would take whoever asks now for one of those that it could not answer.
+  if (poses_.busy || !probes_.empty() || (!members_.empty() && probed_ && now - *probed_ < kForgotten))
+    return;
   probe_frame_.reset();
   for (auto& frame : std::exchange(probe_frames_, {})) let_go_(std::move(frame));
 }
