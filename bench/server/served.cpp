@@ -31,6 +31,7 @@ Served::Served(const std::string& program, const std::string& model, const std::
     for (std::string word; given >> word;) words.push_back(word);
   }
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t quiet;
