@@ -10,7 +10,7 @@ namespace ecorche::app {
 inline void add_bridge_option(CLI::App& command, bool& bridge) {
   command.add_flag("--bridge,!--no-bridge", bridge,
                    "of spheres: fill what opens between segments that turn against each other, halfway "
-                   "between them (the default)");
+                   "between them (the default); --no-bridge fills as Gagvani and Silver 2001 do");
 }
 
 }  // namespace ecorche::app

@@ -4,15 +4,17 @@
 
 #include <CLI/CLI.hpp>
 
+#include "app/read_budget.hpp"
 #include "io/case/case_file.hpp"
 
 namespace ecorche::app {
 
-/// `--data` and `--frame`. `options` must outlive the command line's parsing.
+/// `--data`, `--frame` and `--read-budget`. `options` must outlive the command line's parsing.
 inline void add_case_options(CLI::App& command, io::CaseOptions& options) {
   command.add_option("--data", options.data, "the folder that `root: data` paths of the case are in");
   command.add_option("--frame", options.frame,
                      "the case's frame, instead of what it says: LPS, RAS, LSA, ...");
+  add_read_budget(command, options.limits);
 }
 
 }  // namespace ecorche::app

@@ -7,23 +7,26 @@
 
 namespace ecorche::app {
 
-nlohmann::json certificate_json(const Certificate& certificate) {
+nlohmann::json certificate_json(const Certificate& certificate, const preprocess::BodySize& size) {
   nlohmann::json out = nlohmann::json::array();
-  for (const preprocess::JudgedFigure& figure : preprocess::judge(certificate)) {
+  for (const preprocess::JudgedFigure& figure : preprocess::judge(certificate, size)) {
     nlohmann::json row{{"figure", figure.figure}, {"value", figure.value}, {"kept", figure.kept}};
     row["bound"] = figure.bound != nullptr ? nlohmann::json(preprocess::said(*figure.bound)) : nullptr;
+    row["least"] = figure.least ? nlohmann::json(*figure.least) : nullptr;
+    row["most"] = figure.most ? nlohmann::json(*figure.most) : nullptr;
     row["reason"] = figure.bound != nullptr ? nlohmann::json(figure.bound->reason) : nullptr;
     out.push_back(std::move(row));
   }
   return out;
 }
 
-std::string certificate_text(const Certificate& certificate) {
-  std::string out = "figure                           value  bound      because\n";
-  for (const preprocess::JudgedFigure& figure : preprocess::judge(certificate)) {
+std::string certificate_text(const Certificate& certificate, const preprocess::BodySize& size) {
+  std::string out =
+      "figure                           value  bound                                   because\n";
+  for (const preprocess::JudgedFigure& figure : preprocess::judge(certificate, size)) {
     char line[128];
     const std::string bound = figure.bound != nullptr ? preprocess::said(*figure.bound) : "";
-    std::snprintf(line, sizeof line, "%-26s %11.6g  %-9s", std::string(figure.figure).c_str(), figure.value,
+    std::snprintf(line, sizeof line, "%-26s %11.6g  %-38s", std::string(figure.figure).c_str(), figure.value,
                   bound.c_str());
     out += line;
     if (!figure.kept) out += "  BROKEN:";

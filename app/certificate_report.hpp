@@ -5,15 +5,15 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/values/model.hpp"
+#include "preprocess/bounds.hpp"
 
 namespace ecorche::app {
 
-/// `[{figure, value, bound, kept, reason}]` in the certificate's order; `bound` and `reason` are null where a
-/// figure is told and not judged.
-nlohmann::json certificate_json(const Certificate& certificate);
+/// `[{figure, value, bound, least, most, kept, reason}]` in the certificate's order; `bound` and `reason` are
+/// null where a figure is told and not judged, `least` and `most` are what the bound says of this body.
+nlohmann::json certificate_json(const Certificate& certificate, const preprocess::BodySize& size);
 
 /// The same as a table, a line a figure.
-std::string certificate_text(const Certificate& certificate);
+std::string certificate_text(const Certificate& certificate, const preprocess::BodySize& size);
 
 }  // namespace ecorche::app

@@ -2,13 +2,19 @@
 // `ecorche check`: reads a whole case and says what is wrong with it.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include "app/case_options.hpp"
 #include "app/command.hpp"
+#include "app/drawn_surfaces.hpp"
 #include "io/case/case_file.hpp"
 #include "preprocess/check/inspect_case.hpp"
+#include "preprocess/check/joints.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
+#include "preprocess/look_ahead.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -20,6 +26,7 @@ using check::SurfaceLine;
 struct Settings {
   std::filesystem::path path;
   io::CaseOptions input;
+  bool all = false;  // a line for every surface
 };
 
 nlohmann::json to_json(const Eigen::Vector3d& p) {
@@ -52,9 +59,11 @@ nlohmann::json to_json(const SurfaceLine& line) {
                      {"high", to_json(f.high)}};
   out["holes"] = nlohmann::json::array();
   for (const check::Hole& hole : f.holes)
-    out["holes"].push_back(
-        {{"edges", hole.edges}, {"length_mm", hole.length_mm}, {"at", to_json(hole.middle)}});
-  // null: a build without GPL parts does not look.
+    out["holes"].push_back({{"edges", hole.edges},
+                            {"length_mm", hole.length_mm},
+                            {"filling_edge_mm", hole.filling_edge},
+                            {"at", to_json(hole.middle)}});
+  // null: a build without GPL parts does not look, nor anybody at what we drew ourselves.
   out["self_intersections"] = line.intersections ? to_json(*line.intersections) : nlohmann::json();
   if (line.outside) {
     out["outside_skin"] = {{"vertices", line.outside->count},
@@ -74,17 +83,46 @@ nlohmann::json to_json(const Finding& finding) {
   return out;
 }
 
-std::string text_report(const Report& report) {
-  std::string out =
-      fmt::format("{:<24} {:<9} {:>8} {:>9} {:>6} {:>6} {:>7} {:>6} {:>5} {:>10}\n", "surface", "group",
-                  "vertices", "triangles", "open", "n-man.", "flipped", "degen.", "parts", "ml");
+// Across, front to back, and tall: of the skin.
+Eigen::Vector3d body_size(const Report& report) {
+  return report.surfaces.empty()
+             ? Eigen::Vector3d::Zero()
+             : Eigen::Vector3d(report.surfaces.front().figures.high - report.surfaces.front().figures.low);
+}
+
+bool has_defect(const SurfaceLine& line) {
+  const check::SurfaceFigures& f = line.figures;
+  return f.open.count + f.nonmanifold.count + f.flipped.count + f.degenerate.count > 0;
+}
+
+// What the case holds, in a line.
+std::string summary(const Report& report) {
+  std::map<std::string, int> groups;
+  std::int64_t triangles = 0;
   for (const SurfaceLine& line : report.surfaces) {
+    ++groups[std::string(group_name(line.group))];
+    triangles += static_cast<std::int64_t>(line.figures.triangles);
+  }
+  std::string out = fmt::format("{} surfaces", report.surfaces.size());
+  for (const auto& [group, count] : groups) out += fmt::format(", {} {}", count, group);
+  return out + fmt::format("; {} triangles\n", triangles);
+}
+
+std::string text_report(const Report& report, bool all) {
+  std::string out = summary(report);
+  const auto shown = [&](const SurfaceLine& line) { return all || has_defect(line); };
+  if (std::any_of(report.surfaces.begin(), report.surfaces.end(), shown))
+    out += fmt::format("{:<24} {:<9} {:>8} {:>9} {:>6} {:>6} {:>7} {:>6} {:>5} {:>10}\n", "surface", "group",
+                       "vertices", "triangles", "open", "n-man.", "flipped", "degen.", "parts", "ml");
+  for (const SurfaceLine& line : report.surfaces) {
+    if (!shown(line)) continue;
     const check::SurfaceFigures& f = line.figures;
-    out += fmt::format("{:<24} {:<9} {:>8} {:>9} {:>6} {:>6} {:>7} {:>6} {:>5} {:>10.1f}\n", line.name,
+    out += fmt::format("{:<24} {:<9} {:>8} {:>9} {:>6} {:>6} {:>7} {:>6} {:>5} {:>10.4g}\n", line.name,
                        group_name(line.group), f.vertices, f.triangles, f.open.count, f.nonmanifold.count,
                        f.flipped.count, f.degenerate.count, f.components, f.volume_mm3 / 1000);
   }
-  out += '\n';
+  const Eigen::Vector3d size = body_size(report);
+  out += fmt::format("\nthe body is {:.4g} x {:.4g} x {:.4g} mm\n", size.x(), size.y(), size.z());
   for (const Finding& finding : report.findings) {
     out += fmt::format("{}: {}: {}", check::severity_name(finding.severity), finding.where, finding.what);
     if (finding.at)
@@ -92,7 +130,8 @@ std::string text_report(const Report& report) {
     out += fmt::format(" ({})\n", finding.mend);
   }
   if (report.findings.empty()) out += "nothing found\n";
-  if (!report.surfaces.empty() && !report.surfaces.front().intersections)
+  if (std::any_of(report.surfaces.begin(), report.surfaces.end(),
+                  [](const SurfaceLine& line) { return !line.intersections && !line.drawn; }))
     out += "this build does not look for self-intersections\n";
   if (!report.possible()) out += "this case cannot be preprocessed\n";
   return out;
@@ -100,14 +139,24 @@ std::string text_report(const Report& report) {
 
 int run(const Program& program, const Settings& settings) {
   Case patient = io::read_case(settings.path, settings.input, program.context("read"));
+  const std::set<std::string> drawn = drawn_surfaces(patient);
   label_surfaces::resolve(patient, program.context("surfaces"));
-  const Report report = check::inspect(patient, program.context("check"));
+  Report report = check::inspect(patient, program.context("check"), {drawn});
+  check::inspect_joints(patient, program.context("joints"), report);
+  if (report.possible()) {
+    for (Finding& finding : preprocess::look_ahead(patient, program.context("preparing")))
+      report.findings.push_back(std::move(finding));
+  }
   nlohmann::json object{{"ok", report.possible()}, {"name", patient.name}};
+  object["body_mm"] = to_json(body_size(report));
   object["surfaces"] = nlohmann::json::array();
   object["findings"] = nlohmann::json::array();
   for (const SurfaceLine& line : report.surfaces) object["surfaces"].push_back(to_json(line));
   for (const Finding& finding : report.findings) object["findings"].push_back(to_json(finding));
-  program.result(text_report(report), object);
+  if (std::any_of(report.findings.begin(), report.findings.end(),
+                  [](const Finding& finding) { return finding.severity == check::Severity::warning; }))
+    program.warn();
+  program.result(text_report(report, settings.all), object);
   return report.possible() ? 0 : exit_code(ErrorKind::data);
 }
 
@@ -118,6 +167,7 @@ void declare_check(CLI::App& app, Program& program, Run& chosen) {
   CLI::App* command =
       app.add_subcommand("check", "read a whole case and say what is wrong with it; changes nothing");
   command->add_option("CASE", settings->path, "a case.yaml, or the folder that holds one")->required();
+  command->add_flag("--all", settings->all, "list every surface, not only those with defects");
   add_case_options(*command, settings->input);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

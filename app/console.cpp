@@ -62,18 +62,25 @@ Context Program::context(std::string label) const {
   Context context;
   context.stop = stop;
   context.progress = [bar](double fraction) { bar->draw(fraction); };
-  context.log = [bar](LogLevel level, std::string_view text) {
+  context.log = [bar, warned = warned_](LogLevel level, std::string_view text) {
+    if (level == LogLevel::warning) *warned = true;
     bar->line(level == LogLevel::warning ? "warning: " : "", text);
   };
   return context;
 }
 
 void Program::note(std::string_view line) const {
+  if (line.starts_with("warning: ")) warn();
   std::fprintf(stderr, "%.*s\n", static_cast<int>(line.size()), line.data());
 }
 
 void Program::result(const std::string& text, const nlohmann::json& object) const {
-  const std::string out = json ? object.dump() : text;
+  std::string out = text;
+  if (json) {
+    nlohmann::json whole{{"ok", true}};
+    whole.update(object);
+    out = whole.dump();
+  }
   std::fwrite(out.data(), 1, out.size(), stdout);
   if (out.empty() || out.back() != '\n') std::fputc('\n', stdout);
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)

@@ -11,6 +11,7 @@
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
+#include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/image/image_file.hpp"
@@ -197,8 +198,7 @@ int run(const Program& program, const Settings& s) {
   const auto model = std::make_shared<const Model>(model_file::read(s.model, program.context("read")));
   const auto volume = std::find_if(model->volumes.begin(), model->volumes.end(),
                                    [&](const ModelVolume& v) { return v.name == s.volume; });
-  if (volume == model->volumes.end())
-    throw Error(ErrorKind::usage, "--volume", "the model has no '" + s.volume + "'", "see ecorche info");
+  if (volume == model->volumes.end()) throw unknown_name("--volume", s.volume, model->volumes);
   const VolumetricSkeleton& spheres = runtime::spheres_for(*model, *volume);
   if (!(runtime::posed_lattice(spheres, *volume) == volume->image.grid))
     throw Error(ErrorKind::usage, "--volume",

@@ -17,7 +17,20 @@ struct Settings {
   std::filesystem::path model;
   std::vector<std::filesystem::path> outputs;
   RigChoice rig;
+  bool weights = false;
 };
+
+// The skinning weights of every segment, dense: an array each.
+std::vector<io::GridArray> weight_arrays(const Model& model) {
+  std::vector<io::GridArray> arrays;
+  for (const Segment& segment : model.rig.skeleton.segments)
+    arrays.push_back({"weight_" + segment.name, 1, std::vector<float>(model.node_count(), 0)});
+  for (std::size_t node = 0; node < model.node_count(); ++node) {
+    for (auto i = model.weights.offsets[node]; i < model.weights.offsets[node + 1]; ++i)
+      arrays[model.weights.segment[i]].values[node] = static_cast<float>(model.weights.weight[i]);
+  }
+  return arrays;
+}
 
 std::string to_text(const nlohmann::json& rig) {
   char text[256] = "";
@@ -25,8 +38,15 @@ std::string to_text(const nlohmann::json& rig) {
     std::snprintf(text, sizeof text,
                   "; four influences a vertex instead of all: %.3f mm rms, %.3f mm at worst (LBS)",
                   rig["truncation_mm"]["rms"].get<double>(), rig["truncation_mm"]["worst"].get<double>());
-  return rig["file"].get<std::string>() + ": " + rig["joints"].dump() + " joints, " + rig["frames"].dump() +
-         " frames, " + rig["frames_clamped"].dump() + " of them within limits only" + text;
+  std::string out = rig["file"].get<std::string>() + ": " + rig["joints"].dump() + " joints, " +
+                    rig["frames"].dump() + " frames";
+  if (rig["frames_clamped"] != 0)
+    out += ", in " + rig["frames_clamped"].dump() + " of them joints were held at their limits";
+  if (rig.contains("unit")) {
+    out += "; lengths in " + rig["unit"].get<std::string>() +
+           ", which a BVH does not say: tell the program that reads it (Blender takes metres: --bvh-unit m)";
+  }
+  return out + text;
 }
 
 // A model, or a skeleton file as one that has nothing but its rig.
@@ -47,6 +67,8 @@ int run(const Program& program, const Settings& settings) {
   const Model model = read(program, settings);
   const io::TetRegions regions = tet_regions(model);
   const Context context = program.context("writing");
+  const std::vector<io::GridArray> weights =
+      settings.weights ? weight_arrays(model) : std::vector<io::GridArray>{};
   nlohmann::json written = nlohmann::json::array(), rigs = nlohmann::json::array();
   std::string text;
   for (const std::filesystem::path& output : settings.outputs) {
@@ -57,7 +79,7 @@ int run(const Program& program, const Settings& settings) {
       text += (text.empty() ? "" : "\n") + to_text(rigs.back());
       continue;
     }
-    io::write_tets(output, model.nodes, model.tets, {},
+    io::write_tets(output, model.nodes, model.tets, weights,
                    {{"label", 1, {model.tet_label.begin(), model.tet_label.end()}}}, regions);
     written.push_back(output.string());
     text += (text.empty() ? "" : "\n") + output.string();
@@ -87,7 +109,12 @@ void declare_export(CLI::App& app, Program& program, Run& chosen) {
           "(MCNP6, in cm, "
           "refuses degenerate tets), .glb (tissues skinned by four influences, with the motion), .bvh")
       ->required();
+  command->add_flag("--weights", s->weights,
+                    "put the skinning weights of every segment into a .vtu, an array each");
   add_motion_options(*command, s->rig.motion);
+  command->add_option("--bvh-unit", s->rig.bvh_unit, "of lengths in a .bvh")
+      ->check(CLI::IsMember({"mm", "cm", "m", "in"}))
+      ->capture_default_str();
   command->add_option("--tissues", s->rig.tissues, "of a .glb: names with commas between, all by default")
       ->delimiter(',');
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/unknown_name.hpp"
 #include "core/kinematics/angles.hpp"
 #include "core/kinematics/forward.hpp"
 #include "core/kinematics/rig_clip.hpp"
 #include "core/values/error.hpp"
+#include "io/case/frame.hpp"
 #include "io/motion/bvh.hpp"
 #include "io/surface/rigged_glb.hpp"
 #include "runtime/skin/four_influences.hpp"
@@ -60,8 +62,7 @@ std::vector<const Tissue*> tissues_of(const Model& model, const std::vector<std:
   for (const std::string& name : names) {
     const bool known = name == "all" ||
                        std::any_of(out.begin(), out.end(), [&](const Tissue* t) { return t->name == name; });
-    if (!known)
-      throw Error(ErrorKind::usage, "--tissues", "the model has no '" + name + "'", "see ecorche info MODEL");
+    if (!known) throw unknown_name("--tissues", name, model.tissues);
   }
   return out;
 }
@@ -82,7 +83,8 @@ nlohmann::json export_rig(const Program& program, const Model& model, const RigC
                      {"frames", played.clip.frames()},
                      {"frames_clamped", played.clamped}};
   if (bvh) {
-    io::write_bvh(path, played.clip);
+    io::write_bvh(path, played.clip, io::unit_from_name(choice.bvh_unit).value());
+    out["unit"] = choice.bvh_unit;
     return out;
   }
   std::vector<std::vector<RigidTransform>> motions;
@@ -99,6 +101,7 @@ nlohmann::json export_rig(const Program& program, const Model& model, const RigC
       worst = std::max(worst, error.worst);
     }
     surfaces.push_back({tissue->name,
+                        tissue->group,
                         {tissue->V.cast<double>(), tissue->F},
                         {std::move(four.segment), std::move(four.weight)}});
   }

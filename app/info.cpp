@@ -5,6 +5,7 @@
 
 #include "app/certificate_report.hpp"
 #include "app/command.hpp"
+#include "app/contacts_report.hpp"
 #include "app/joint_json.hpp"
 #include "core/model_file/figures.hpp"
 #include "core/model_file/model_file.hpp"
@@ -45,6 +46,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"tissues", Json::array()},
            {"volumes", Json::array()},
            {"spheres", Json::array()},
+           {"contacts", contacts_json(model)},
            {"provenance", model.provenance}};
   char identity[17];
   std::snprintf(identity, sizeof identity, "%016llx",
@@ -91,6 +93,13 @@ std::string printable(std::string text) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
   }
   return text;
+}
+
+std::string printable_lines(const std::string& text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
+    out += printable(text.substr(at, text.find('\n', at) - at)) + "\n";
+  return out;
 }
 
 template <class... Values>
@@ -148,6 +157,7 @@ std::string to_text(const Json& info) {
                 n[0].get<int>(), n[1].get<int>(), n[2].get<int>(), s[0].get<double>(), s[1].get<double>(),
                 s[2].get<double>(), text(row["type"]).c_str(), row["labels"].get<bool>() ? ", labels" : "");
   }
+  if (!info["contacts"].empty()) out += "\n" + printable_lines(contacts_text(info["contacts"]));
   out += "\ncertificate\n";
   for (const auto& [name, value] : info["certificate"].items()) {
     out += line("  %-28s %s", name.c_str(), value.dump().c_str());
@@ -171,8 +181,10 @@ void declare_info(CLI::App& app, Program& program, Run& chosen) {
     chosen = [path, certificate, &program] {
       const Model model = model_file::read(*path, program.context("reading"));
       if (*certificate) {
-        program.result(certificate_text(model.certificate) + claims,
-                       valid({{"name", model.name}, {"certificate", certificate_json(model.certificate)}}));
+        const preprocess::BodySize size = preprocess::body_size(model);
+        program.result(
+            certificate_text(model.certificate, size) + claims,
+            valid({{"name", model.name}, {"certificate", certificate_json(model.certificate, size)}}));
         return 0;
       }
       const Json info = to_json(*path, model);

@@ -5,11 +5,14 @@
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <string_view>
 
 #include "app/command.hpp"
+#include "app/command_line.hpp"
 #include "app/signals.hpp"
 
 namespace ecorche::app {
@@ -32,17 +35,17 @@ int run_command(int argc, char** argv) {
   app.set_version_flag("--version", ECORCHE_VERSION);
   app.fallthrough();
   app.add_flag("--json", program.json, "print exactly one JSON object on stdout");
+  app.add_flag("--fail-on-warn", program.fail_on_warn,
+               "exit with 1, when all is written, where anything was warned of");
   app.add_option("--threads", program.threads, "threads to use, 0: all cores")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   for (const Declare declare : kCommands) declare(app, program, chosen);
+  dress_help(app);
   try {
-    app.parse(argc, argv);
+    parse(app, argc, argv);
   } catch (const CLI::Success& e) {  // --help, --version
     return app.exit(e);
-  } catch (const CLI::ParseError& e) {
-    throw Error(ErrorKind::usage, "command line", e.what(),
-                "see ecorche --help, or ecorche SUBCOMMAND --help");
   }
   const int threads = program.threads > 0 ? program.threads : tbb::info::default_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
@@ -50,11 +53,56 @@ int run_command(int argc, char** argv) {
   tbb::task_arena arena(threads);
   int code = 0;
   arena.execute([&] { code = chosen(); });
-  return code;
+  return code == 0 && program.fail_on_warn && program.warned() ? 1 : code;
 }
 
-int fail(const Error& error) {
+// As results name it.
+const char* kind_name(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::usage:
+      return "usage";
+    case ErrorKind::data:
+      return "data";
+    case ErrorKind::missing_input:
+      return "missing_input";
+    case ErrorKind::internal:
+      return "internal";
+    case ErrorKind::cannot_create:
+      return "cannot_create";
+    case ErrorKind::io:
+      return "io";
+    case ErrorKind::temporary:
+      return "temporary";
+    case ErrorKind::protocol:
+      return "protocol";
+    case ErrorKind::refused:
+      return "refused";
+    case ErrorKind::config:
+      return "config";
+    case ErrorKind::interrupted:
+      return "interrupted";
+  }
+  return "internal";
+}
+
+// Before the command line is understood, or where it cannot be.
+bool wants_json(int argc, char** argv) {
+  return std::any_of(argv + 1, argv + argc,
+                     [](const char* word) { return std::string_view(word) == "--json"; });
+}
+
+int fail(const Error& error, bool json) {
   std::fprintf(stderr, "error: %s\n", error.what());
+  if (json) {
+    const nlohmann::json object{{"ok", false},
+                                {"error",
+                                 {{"kind", kind_name(error.kind())},
+                                  {"exit_code", exit_code(error.kind())},
+                                  {"where", error.where()},
+                                  {"what", error.problem()},
+                                  {"mend", error.mend()}}}};
+    std::puts(object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  }
   return exit_code(error.kind());
 }
 
@@ -64,15 +112,17 @@ int fail(const Error& error) {
 int main(int argc, char** argv) {
   using ecorche::Error;
   using ecorche::ErrorKind;
+  const bool json = ecorche::app::wants_json(argc, argv);
   try {
     return ecorche::app::run_command(argc, argv);
   } catch (const Error& error) {
-    return ecorche::app::fail(error);
+    return ecorche::app::fail(error, json);
   } catch (const std::bad_alloc&) {
     return ecorche::app::fail(
-        Error(ErrorKind::internal, "memory", "not enough memory", "use coarser voxels or fewer tets"));
+        Error(ErrorKind::internal, "memory", "not enough memory", "use coarser voxels or fewer tets"), json);
   } catch (const std::exception& error) {
     return ecorche::app::fail(
-        Error(ErrorKind::internal, "ecorche", error.what(), "this is a bug: report it with the command"));
+        Error(ErrorKind::internal, "ecorche", error.what(), "this is a bug: report it with the command"),
+        json);
   }
 }

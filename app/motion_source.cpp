@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "app/marker_source.hpp"
+#include "app/read_budget.hpp"
 #include "core/values/error.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/motion_map.hpp"
@@ -19,10 +20,13 @@ namespace ecorche::app {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kStrangeSize = 3, kWrongSize = 20;  // times the patient
-constexpr double kNoBody = 120 / kDegrees;           // a limb that points so far off is in no zero pose
-constexpr double kNoted = 5 / kDegrees;              // of an alignment, else any two bodies differ so
-constexpr std::size_t kTried = 64;                   // frames in which a reference and bends are looked for
+// Times the patient. Statures of adults from the 1st percentile of women (1.48 m) to the 99th of men (1.92 m,
+// ANSUR II: Gordon et al. 2014) differ by 1.3; an inch taken for a centimetre by 2.54.
+constexpr double kStrangeSize = 1.4, kWrongSize = 20;
+constexpr double kFits = 1.25;
+constexpr double kNoBody = 120 / kDegrees;  // a limb that points so far off is in no zero pose
+constexpr double kNoted = 5 / kDegrees;     // of an alignment, else any two bodies differ so
+constexpr std::size_t kTried = 64;          // frames in which a reference and bends are looked for
 
 [[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
   throw Error(ErrorKind::usage, where, what, mend);
@@ -192,16 +196,40 @@ class ClipSource final : public MotionSource {
       match_.scale = 1 / figure;
       return;
     }
-    char size[64];
-    std::snprintf(size, sizeof size, "%.3g times as long as the patient's", figure);
+    const std::string size = number(figure) + " times as long as the patient's";
     if (figure > kWrongSize || figure < 1 / kWrongSize) {
-      throw Error(ErrorKind::data, path_,
-                  std::string("the limbs of its figure are ") + size + ": its unit is another",
+      throw Error(ErrorKind::data, path_, "the limbs of its figure are " + size + ": its unit is another",
                   "say it by --motion-unit, or fit it to the patient by --motion-unit body");
     }
     if (figure > kStrangeSize || figure < 1 / kStrangeSize)
-      program.note("warning: " + path_ + ": the limbs of its figure are " + size +
-                   ": is --motion-unit right? (body fits it to the patient)");
+      program.note("warning: " + path_ + ": the limbs of its figure are " + size + read_in(choice) +
+                   other_unit(choice, figure) + ": --motion-unit body would fit them to the patient");
+  }
+
+  static std::string number(double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", x);
+    return text;
+  }
+
+  // Millimetres of the unit that it was read in, where that is not the file's own.
+  double unit_read_in(const MotionChoice& choice) const {
+    if (const auto given = motion_space(choice).unit_mm) return *given;
+    return choice.file.extension() == ".bvh" ? 10 : 0;
+  }
+  std::string read_in(const MotionChoice& choice) const {
+    if (!choice.unit.empty()) return ", read in " + choice.unit;
+    return unit_read_in(choice) > 0 ? ", read in cm" : "";
+  }
+  // The usual unit that makes the figure the patient's.
+  std::string other_unit(const MotionChoice& choice, double figure) const {
+    const double used = unit_read_in(choice);
+    for (const char* name : {"mm", "cm", "in", "m"}) {
+      const double made = used > 0 ? figure * *io::unit_from_name(name) / used : 0;
+      if (made < kFits && made > 1 / kFits)
+        return ": --motion-unit " + std::string(name) + " would make that " + number(made);
+    }
+    return "";
   }
 
   const Rig& rig_;
@@ -303,6 +331,7 @@ class SequenceSource final : public MotionSource {
 
 io::MotionSpace motion_space(const MotionChoice& choice) {
   io::MotionSpace space;
+  space.limits = choice.limits;
   if (!choice.frame.empty()) {
     const auto axes = io::axes_from_code(choice.frame);
     if (!axes)
@@ -335,6 +364,7 @@ void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file)
           "the scan most of all), FRAME, SECONDSs, CLIP:FRAME, or auto (zero, or clip where that is no "
           "pose of a body)")
       ->capture_default_str();
+  add_read_budget(command, choice.limits);
   command.add_option("--asf", choice.asf, "skeleton of an .amc; default: the one beside it");
   command.add_option("--map", choice.map,
                      "a motion map: which joint, angle or marker of the file moves what");

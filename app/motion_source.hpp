@@ -19,10 +19,11 @@ namespace ecorche::app {
 struct MotionChoice {
   std::filesystem::path file, map, asf;
   std::string unit, frame;    ///< empty: the file's own, or its format's
+  files::ReadLimits limits;   ///< of what a file may take
   std::string rest = "auto";  ///< zero, clip, a frame's number, 1.5s, CLIP:FRAME, or auto
 };
 
-/// --motion (unless `with_file` is false) and what belongs to it.
+/// --motion (unless `with_file` is false) and what belongs to it, with --read-budget.
 void add_motion_options(CLI::App& command, MotionChoice& choice, bool with_file = true);
 
 /// Frame and unit as the command line says them. Throws Error{usage} for words that are none.

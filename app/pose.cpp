@@ -9,17 +9,19 @@
 
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
+#include "app/measured_pose.hpp"
 #include "app/pose_frames.hpp"
 #include "app/pose_report.hpp"
 #include "app/posed_case.hpp"
+#include "app/posed_folder.hpp"
 #include "app/tet_regions.hpp"
+#include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "runtime/quality/pose_quality.hpp"
-#include "runtime/settle/unfold.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/volume/resample.hpp"
 #include "runtime/volume/volume_poser.hpp"
@@ -67,8 +69,6 @@ template <class Items>
 std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::string>& names,
                                    const std::string& option) {
   std::vector<std::uint32_t> rows;
-  std::string known;
-  for (const auto& item : items) known += (known.empty() ? "" : ", ") + item.name;
   for (const std::string& name : names) {
     if (name == "none" && names.size() == 1) return {};
     bool found = name == "all" && names.size() == 1;
@@ -77,9 +77,7 @@ std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::st
       rows.push_back(static_cast<std::uint32_t>(i));
       found = true;
     }
-    if (!found) {
-      usage(option, "the model has no '" + name + "'", "use all, none or names among: " + known);
-    }
+    if (!found) throw unknown_name(option, name, items);
   }
   std::sort(rows.begin(), rows.end());
   rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
@@ -116,30 +114,21 @@ Plan plan_of(const Settings& settings, const Model& model) {
   return plan;
 }
 
-// Unfolds the body; what that did.
-json unfolded_json(const Model& model, runtime::PosedBody& body, const Context& context) {
-  const runtime::Unfolding done = runtime::unfold(model, body, context);
-  return {{"inverted_tets_before", done.inverted_before},
-          {"inverted_rest_mm3_before", done.rest_mm3_before},
-          {"squeezed_by_bones", done.held},
-          {"moved_nodes", done.moved_nodes},
-          {"largest_move_mm", done.largest_move_mm}};
-}
-
 // Writes one posed body. Every file is checked for a stop request before it is begun.
 class FrameWriter {
  public:
   FrameWriter(const Settings& settings, const Plan& plan, const runtime::VolumePoser& poser,
-              const runtime::PosedBody& body, fs::path folder, const Context& context)
+              const runtime::PosedBody& body, const std::vector<float>& det_f, fs::path stage,
+              fs::path folder, const Context& context)
       : settings_(settings),
         plan_(plan),
         poser_(poser),
         model_(poser.model()),
         body_(body),
+        det_f_(det_f),
+        stage_(std::move(stage)),
         folder_(std::move(folder)),
-        context_(context) {
-    files::make_folder(folder_);
-  }
+        context_(context) {}
 
   json write(const json& quality) {
     for (const std::uint32_t row : plan_.tissues) write_tissue(row);
@@ -158,7 +147,7 @@ class FrameWriter {
                               (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) + 1;
     context_.report(static_cast<double>(written_.size()) / static_cast<double>(files));
     written_.push_back((folder_ / name).string());
-    return folder_ / name;
+    return stage_ / name;
   }
 
   void write_tissue(std::uint32_t row) {
@@ -179,8 +168,7 @@ class FrameWriter {
     const auto write = [&](const std::string& ending) {
       io::write_tets(next("body." + ending), posed, model_.tets,
                      {{"displacement", 3, {moved.data(), moved.data() + moved.size()}}},
-                     {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}},
-                      {"det_f", 1, runtime::tet_det_f(model_, body_.nodes)}},
+                     {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}}, {"det_f", 1, det_f_}},
                      tet_regions(model_));
       if (ending == "ele") written_.push_back((folder_ / "body.node").string());
     };
@@ -250,7 +238,8 @@ class FrameWriter {
   const runtime::VolumePoser& poser_;
   const Model& model_;
   const runtime::PosedBody& body_;
-  fs::path folder_;
+  const std::vector<float>& det_f_;  // of every tet
+  fs::path stage_, folder_;          // where to write, and what that becomes
   const Context& context_;
   json written_ = json::array();
 };
@@ -267,35 +256,47 @@ int run(const Program& program, const Settings& settings) {
       plan.balls.try_emplace(volume.name, *model, volume, settings.bridge, program.context("seams"));
   }
   const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
+  if (!frames.front().name.empty()) check_folder_of_frames(settings.output);
+  const std::uint64_t identity = model_file::identity(*model);
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
   const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model);
   const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
-  runtime::PosedBody body = poser.make_frame();
+  MeasuredPose posed(poser);
 
   json result{{"ok", true}, {"model", settings.model.string()}, {"skinning", settings.skinning}};
   std::string text;
   for (const Frame& frame : frames) {
     const Context context = program.context(frame.name.empty() ? "pose" : frame.name);
     // Quality looks at every tissue, whichever are written.
-    const Status status = poser.run(frame.pose, skinning, poser.all_tissues(), body);
+    const Status status = posed.run(frame.pose, skinning);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
-    const json unfolded = settings.unfold ? unfolded_json(*model, body, context) : json();
+    const json unfolded = settings.unfold ? posed.unfold(context) : json();
+    const runtime::PosedBody& body = posed.body();
+    const std::vector<float> det_f = runtime::tet_det_f(*model, posed.still().nodes);
     json quality =
-        quality_json(*model, body, runtime::measure(*model, body, poser.all_tissues(), {}, closed));
+        quality_json(*model, body, runtime::measure(*model, posed.still(), poser.all_tissues(), {}, closed),
+                     det_f, {skinning, settings.unfold});
     if (settings.unfold) quality["unfolded"] = unfolded;
+    if (quality["verdict"] == "warn") program.warn();
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
+    PosedFolder target(folder);
     if (settings.as_case)
-      io::write_case(folder,
+      io::write_case(target.stage(),
                      posed_case(volumes, body, {sampling_of(settings), settings.grid == "posed"}, context),
                      context);
-    FrameWriter writer(settings, plan, volumes, body, folder, context);
+    FrameWriter writer(settings, plan, volumes, body, det_f, target.stage(), folder, context);
     json written = writer.write(quality);
     if (settings.as_case) written.push_back((folder / "case.yaml").string());
+    const PosedAs as{identity, settings.skinning, settings.deformer, settings.unfold, plan.field};
+    for (const std::string& added : target.finish(*model, body, frame.pose, as, context))
+      written.push_back((folder / added).string());
     result["frames"].push_back({{"name", frame.name},
                                 {"folder", folder.string()},
                                 {"files", std::move(written)},
                                 {"quality", quality}});
+    if (!frame.ik.is_null()) result["frames"].back()["ik"] = frame.ik;
+    if (frame.missed) result["ok"] = false;
     text += line_of(result["frames"].back());
   }
   program.result(text, result);
@@ -309,9 +310,17 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
   CLI::App* command = app.add_subcommand(
       "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
   command->add_option("MODEL", s->model, "a model that preprocess made")->required();
-  command->add_option("-o,--output", s->output, "folder to write into, made where absent")->required();
+  command
+      ->add_option("-o,--output", s->output,
+                   "folder of the posed body: it appears whole; an earlier one in it gives way, anything "
+                   "else is refused")
+      ->required();
   add_frame_options(*command, s->frames);
-  command->add_option("--skinning", s->skinning, "how segments blend: cor, dqs or lbs")
+  command
+      ->add_option(
+          "--skinning", s->skinning,
+          "how segments blend: cor (neither collapses nor bulges, folds most), dqs (bulges, folds least) "
+          "or lbs (collapses)")
       ->check(CLI::IsMember({"cor", "dqs", "lbs"}))
       ->capture_default_str();
   const char* choice =
@@ -324,7 +333,8 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::IsMember({"tets", "spheres"}))
       ->capture_default_str();
   command->add_flag("--unfold", s->unfold,
-                    "move what lies about inverted tets until none is inverted that no bones squeeze");
+                    "relax around inverted tets, as far as no tissue loses volume for it; those squeezed by "
+                    "bones remain");
   add_bridge_option(*command, s->bridge);
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');

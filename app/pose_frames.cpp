@@ -3,11 +3,10 @@
 
 #include <charconv>
 #include <cstdio>
-#include <numbers>
 
+#include "app/solved_pose.hpp"
 #include "core/values/error.hpp"
 #include "io/case/case_file.hpp"
-#include "io/case/ik_file.hpp"
 #include "io/case/pose_library.hpp"
 
 namespace ecorche::app {
@@ -52,24 +51,6 @@ Pose named_pose(const Program& program, const std::string& name, const Rig& rig)
   return std::move(pose.pose);
 }
 
-// Says of each goal how far it was missed.
-Pose solved_pose(const Program& program, const std::filesystem::path& path, const Rig& rig) {
-  const io::IkRequest request = io::read_ik(path, rig);
-  const kinematics::IkResult result = kinematics::solve_ik(rig, request.start, request.problem);
-  char text[128];
-  for (std::size_t i = 0; i < result.away_mm.size(); ++i) {
-    const bool missed = result.away_mm[i] > request.problem.tolerance_mm;
-    std::snprintf(text, sizeof text, "%.1f mm from its goal%s", result.away_mm[i],
-                  missed ? ": beyond reach, limits or the other goals" : "");
-    program.note((missed ? "warning: " : "note: ") + request.names[i] + " is " + text);
-  }
-  for (std::size_t i = 0; i < result.off.size(); ++i) {
-    std::snprintf(text, sizeof text, " is %.1f degrees off", result.off[i] * 180 / std::numbers::pi);
-    program.note("note: " + request.names[result.away_mm.size() + i] + text);
-  }
-  return result.pose;
-}
-
 }  // namespace
 
 void add_frame_options(CLI::App& command, FrameChoice& choice) {
@@ -77,6 +58,11 @@ void add_frame_options(CLI::App& command, FrameChoice& choice) {
       "--pose", choice.pose,
       "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
   command.add_option("--ik", choice.ik, "goals of points of the body, a file (docs/motion.md)");
+  command
+      .add_option("--ik-tolerance", choice.ik_tolerance_mm,
+                  "millimetres beyond which a goal of --ik counts as missed: a warning, and ok: false")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   add_motion_options(command, choice.motion);
   command.add_option(
       "--frames", choice.frames,
@@ -94,8 +80,11 @@ std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice
                               : "--ik stands beside --pose or --motion",
           "give one of --pose FILE, --ik FILE, or --motion CLIP --frames A:B");
   }
-  if (!choice.ik.empty()) return {{"", solved_pose(program, choice.ik, rig)}};
-  if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig)}};
+  if (!choice.ik.empty()) {
+    SolvedPose solved = solve_pose(program, choice.ik, rig, choice.ik_tolerance_mm);
+    return {{"", std::move(solved.pose), !solved.reached, std::move(solved.report)}};
+  }
+  if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig), false, {}}};
   if (choice.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
   const auto motion = open_motion(program, choice.motion, rig);
   std::vector<Frame> frames;
@@ -103,7 +92,7 @@ std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice
   for (const std::size_t f : numbers) {
     char name[32] = "";
     if (numbers.size() > 1) std::snprintf(name, sizeof name, "frame_%04zu", f);
-    frames.push_back({name, motion->at(f)});
+    frames.push_back({name, motion->at(f), false, {}});
   }
   return frames;
 }

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
+#include "app/solved_pose.hpp"
 #include "core/values/pose.hpp"
 #include "core/values/skeleton.hpp"
 
@@ -18,7 +20,8 @@ struct FrameChoice {
   std::string pose;          ///< a pose file, or lib:NAME
   std::filesystem::path ik;  ///< goals of points
   MotionChoice motion;
-  std::string frames;  ///< A, A:B or A:B:STEP
+  std::string frames = {};  ///< A, A:B or A:B:STEP
+  double ik_tolerance_mm = kMissedMm;
 };
 
 /// Declares the options that fill `choice`, which must live as long as the command.
@@ -27,6 +30,8 @@ void add_frame_options(CLI::App& command, FrameChoice& choice);
 struct Frame {
   std::string name;  ///< empty for a single pose, which needs no folder of its own
   Pose pose;
+  bool missed = false;  ///< a goal of --ik
+  nlohmann::json ik;    ///< of --ik alone: what was found
 };
 
 /// The poses, in order; notes what the clip moves nothing by, and where its zero pose was aligned. Throws

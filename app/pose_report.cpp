@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/pose_report.hpp"
 
-#include <cstdio>
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <numbers>
 
 #include "app/inverted_tets.hpp"
+#include "runtime/quality/bone_tets.hpp"
+#include "runtime/quality/tissue_limits.hpp"
 
 namespace ecorche::app {
 
@@ -12,14 +16,30 @@ using nlohmann::json;
 
 namespace {
 
-double degrees(double radians) {
-  return radians * 180 / std::numbers::pi;
+json place_json(const runtime::Place& place) {
+  return {{"at_mm", {place.at.x(), place.at.y(), place.at.z()}}, {"share", place.share}};
+}
+
+json thresholds_json(const runtime::QualityThresholds& most) {
+  json tissues = json::object();
+  for (const runtime::TissueLimit& limit : runtime::tissue_limits())
+    tissues[std::string(group_name(limit.group))] = most.tissue_factor * limit.max_volume_change;
+  return {{"max_inverted_share", most.max_inverted_share},
+          {"max_place_inverted", most.max_place_inverted},
+          {"max_place_change", most.max_place_change},
+          {"max_volume_change", most.max_volume_change},
+          {"max_tissue_change", tissues},
+          {"max_doubtful_turn_deg", most.max_doubtful_turn * 180 / std::numbers::pi},
+          {"min_confidence", most.min_confidence},
+          {"max_bone_rigidity_mm", most.max_bone_rigidity_mm}};
 }
 
 }  // namespace
 
-json quality_json(const Model& model, const runtime::PosedBody& body, const runtime::PoseQuality& quality) {
-  const InvertedTets inverted = inverted_tets(model, runtime::tet_det_f(model, body.nodes));
+json quality_json(const Model& model, const runtime::PosedBody& body, const runtime::PoseQuality& quality,
+                  std::span<const float> det_f, const HowPosed& how) {
+  const runtime::BoneTets bones = runtime::measure_bone_tets(model, body.nodes);
+  const InvertedTets inverted = inverted_tets(model, det_f);
   json near = json::array();
   for (const InvertedNear& at : inverted.near)
     near.push_back({{"joint", at.joint}, {"tets", at.tets}, {"rest_mm3", at.rest_mm3}});
@@ -31,13 +51,8 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
                        {"group", group_name(model.tissues[t].group)},
                        {"rest_mm3", if_closed(change.rest_mm3)},
                        {"posed_mm3", if_closed(change.posed_mm3)},
-                       {"volume_change", if_closed(change.share)}});
-  }
-  json clamped = json::array();
-  for (const ClampedJoint& joint : quality.clamped) {
-    const auto row = static_cast<std::size_t>(joint.joint);
-    clamped.push_back(
-        {{"joint", model.rig.skeleton.segments[row].joint.name}, {"removed_deg", degrees(joint.removed)}});
+                       {"volume_change", if_closed(change.share)},
+                       {"max_change", change.max_share}});
   }
   return {{"verdict", quality.pass ? "pass" : "warn"},
           {"inverted_tets", quality.inverted_tets},
@@ -46,29 +61,66 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
           {"inverted_near", near},
           {"inverted_in_tissues", inverted.in_tissues},
           {"min_det_f", quality.min_det_f},
+          {"worst_places",
+           {{"edge_mm", quality.places.edge_mm},
+            {"inverted", place_json(quality.places.inverted)},
+            {"changed", place_json(quality.places.changed)}}},
           {"volume_change", quality.volume_change},
+          {"unsigned_volume_change", quality.unsigned_volume_change},
           {"bone_rigidity_mm", quality.bone_rigidity_mm},
+          {"bone_tets",
+           {{"count", bones.count},
+            {"inverted", bones.inverted},
+            {"changed", bones.changed},
+            {"largest_change_mm", bones.largest_change_mm}}},
           {"tissues", tissues},
-          {"clamped", clamped},
-          {"thresholds",
-           {{"max_inverted_share", quality.thresholds.max_inverted_share},
-            {"max_volume_change", quality.thresholds.max_volume_change},
-            {"max_bone_rigidity_mm", quality.thresholds.max_bone_rigidity_mm}}},
+          {"clamped", clamped_json(model.rig.skeleton, body.pose, quality.clamped)},
+          {"warnings", warnings_json(model, body, quality, det_f, how)},
+          {"thresholds", thresholds_json(quality.thresholds)},
           {"purpose", "training and education, not planning of surgery"}};
 }
 
+namespace {
+
+constexpr std::size_t kTold = 4;  // warnings of a frame; the others stand in quality.json
+
+std::string warning_line(const json& warning) {
+  std::string out = "  warning: " + warning["what"].get<std::string>();
+  if (warning.contains("at_mm")) {
+    const json& at = warning["at_mm"];
+    out += fmt::format(", at [{:.0f}, {:.0f}, {:.0f}] mm of the scan", at[0].get<double>(),
+                       at[1].get<double>(), at[2].get<double>());
+    if (warning.contains("joint")) out += " by " + warning["joint"].get<std::string>();
+  }
+  return out + " (" + warning["mend"].get<std::string>() + ")\n";
+}
+
+std::string clamped_line(const json& clamped) {
+  std::string limits;
+  for (const json& limit : clamped["limits"])
+    limits += fmt::format("{} {} stops at {:.0f}", limits.empty() ? ":" : ",",
+                          limit["angle"].get<std::string>(), limit["at_deg"].get<double>());
+  return fmt::format("  clamped: {} by {:.1f} degrees{}\n", clamped["joint"].get<std::string>(),
+                     clamped["removed_deg"].get<double>(), limits);
+}
+
+}  // namespace
+
 std::string line_of(const json& frame) {
-  char line[240];
-  std::snprintf(
-      line, sizeof line,
-      "%s: %s, %llu inverted tets, volume %+.2f %%, bones rigid within %.1e mm, %zu joints clamped, "
-      "%zu files\n",
-      frame["folder"].get<std::string>().c_str(), frame["quality"]["verdict"].get<std::string>().c_str(),
-      frame["quality"]["inverted_tets"].get<unsigned long long>(),
-      100 * frame["quality"]["volume_change"].get<double>(),
-      frame["quality"]["bone_rigidity_mm"].get<double>(), frame["quality"]["clamped"].size(),
+  const json& quality = frame["quality"];
+  std::string out = fmt::format(
+      "{}: {}, {} inverted tets, volume {:+.2f} % ({:.2f} % unsigned), bones rigid within {:.1e} mm, {} "
+      "files\n",
+      frame["folder"].get<std::string>(), quality["verdict"].get<std::string>(),
+      quality["inverted_tets"].get<unsigned long long>(), 100 * quality["volume_change"].get<double>(),
+      100 * quality["unsigned_volume_change"].get<double>(), quality["bone_rigidity_mm"].get<double>(),
       frame["files"].size());
-  return line;
+  const json& warnings = quality["warnings"];
+  for (std::size_t w = 0; w < std::min(kTold, warnings.size()); ++w) out += warning_line(warnings[w]);
+  if (warnings.size() > kTold)
+    out += fmt::format("  and {} more warnings, in quality.json\n", warnings.size() - kTold);
+  for (const json& clamped : quality["clamped"]) out += clamped_line(clamped);
+  return out;
 }
 
 }  // namespace ecorche::app

@@ -5,17 +5,20 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "app/pose_warnings.hpp"
 #include "core/values/model.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::app {
 
-/// `quality.json`.
+/// `quality.json`, every key of which docs/quality.md explains. `det_f`: of every tet, measured as `quality`.
 nlohmann::json quality_json(const Model& model, const runtime::PosedBody& body,
-                            const runtime::PoseQuality& quality);
+                            const runtime::PoseQuality& quality, std::span<const float> det_f,
+                            const HowPosed& how);
 
-/// One line of a frame's report: its folder, quality and files.
+/// A frame's report: a line of its folder, quality and files, one for each of the worst warnings, one for
+/// each clamped joint.
 std::string line_of(const nlohmann::json& frame);
 
 }  // namespace ecorche::app

@@ -11,6 +11,7 @@
 #include "app/big_heap.hpp"
 #include "app/case_options.hpp"
 #include "app/command.hpp"
+#include "app/drawn_surfaces.hpp"
 #include "app/model_report.hpp"
 #include "app/report/page.hpp"
 #include "app/stage_folder.hpp"
@@ -19,6 +20,7 @@
 #include "core/model_file/model_file.hpp"
 #include "io/case/case_file.hpp"
 #include "io/surface/surface_file.hpp"
+#include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inspect_case.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
@@ -89,8 +91,8 @@ std::string text_report(const Model& model, const Settings& settings, const std:
 
 // As `ecorche check` looks: warnings are passed on, notes left out; a case that cannot be prepared is
 // refused.
-void inspect(const Case& patient, const Context& context) {
-  const check::Report report = check::inspect(patient, context);
+void inspect(const Case& patient, const std::set<std::string>& drawn, const Context& context) {
+  const check::Report report = check::inspect(patient, context, {drawn});
   for (const check::Finding& finding : report.findings) {
     if (finding.severity == check::Severity::error)
       throw Error(ErrorKind::data, finding.where, finding.what, finding.mend);
@@ -156,11 +158,17 @@ int run(const Program& program, const Settings& settings) {
   timed(stages, "read", [&] {
     patient = io::read_case(settings.case_path, settings.input, noting(program.context("read"), warnings));
   });
+  const std::set<std::string> drawn = drawn_surfaces(patient);
   timed(stages, "surfaces",
         [&] { label_surfaces::resolve(patient, noting(program.context("surfaces"), warnings)); });
 
-  if (settings.check)
-    timed(stages, "check", [&] { inspect(patient, noting(program.context("check"), warnings)); });
+  if (settings.check) {
+    timed(stages, "check", [&] { inspect(patient, drawn, noting(program.context("check"), warnings)); });
+  } else {
+    const Context context = noting(program.context("check"), warnings);
+    for (const check::Misplaced& image : check::misplaced_images(patient))
+      context.warn(image.name + ": " + image.what + " (" + image.mend + ")");
+  }
 
   // The pipeline has one context for all stages; each stage has a bar of its own.
   Context bar = program.context("preprocess");
@@ -210,16 +218,16 @@ std::string listed(const std::vector<std::string_view>& names) {
   return out;
 }
 
-// 0, or an edge in range: told as one thing.
-CLI::Validator voxel_edge() {
-  static constexpr auto range = preprocess::Options::voxel_range;
+// 0, or a value in range: told as one thing.
+template <class T>
+CLI::Validator or_zero(const preprocess::Options::Range<T>& range, const std::string& unit) {
   std::ostringstream said;
   said << "0, or " << range.low << " to " << range.high;
-  return {[said = said.str()](std::string& text) -> std::string {
-            double edge = 0;
-            const bool number = CLI::detail::lexical_cast(text, edge);
-            if (number && (edge == 0 || (edge >= range.low && edge <= range.high))) return {};
-            return "'" + text + "' is not " + said + " mm";
+  return {[said = said.str(), range, unit](std::string& text) -> std::string {
+            T value{};
+            const bool number = CLI::detail::lexical_cast(text, value);
+            if (number && (value == T{} || (value >= range.low && value <= range.high))) return {};
+            return "'" + text + "' is not " + said + " " + unit;
           },
           said.str()};
 }
@@ -248,11 +256,15 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
       ->add_option(
           "--voxel", o.voxel_mm,
           "voxel edge, mm; 0: the finest whose image stays within 250 x 120 x 700 voxels or their number")
-      ->check(voxel_edge())
+      ->check(or_zero(Options::voxel_range, "mm"))
       ->capture_default_str();
   command
-      ->add_option("--max-tets", o.max_tets, "never more tets than this: sizes are coarsened until it holds")
-      ->check(CLI::Range(Options::tets_range.low, Options::tets_range.high))
+      ->add_option(
+          "--max-tets", o.max_tets,
+          "never more tets than this: sizes are coarsened until it holds; 0: two and a half for each "
+          "vertex of the case, or a cube of twelve for each 3 x 3 x 3 voxels of the body in its finest "
+          "image, from 300000 to 3500000")
+      ->check(or_zero(Options::tets_range, "tets"))
       ->capture_default_str();
   command->add_option("--max-nodes", o.max_nodes, "never more nodes than this")
       ->check(CLI::Range(Options::nodes_range.low, Options::nodes_range.high))

@@ -9,7 +9,9 @@
 #include "app/command.hpp"
 #include "app/point_table.hpp"
 #include "app/pose_frames.hpp"
+#include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/kinematics/forward.hpp"
 #include "core/model_file/model_file.hpp"
 #include "runtime/probe/probe.hpp"
 #include "runtime/skin/body_poser.hpp"
@@ -33,18 +35,12 @@ runtime::ProbeWants wants_of(const Settings& settings, const Model& model) {
       settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
   const bool all = settings.volumes == std::vector<std::string>{"all"};
   const std::vector<std::string> none{"none"};
-  std::string known;
-  for (std::uint32_t v = 0; v < model.volumes.size(); ++v) {
-    known += (v == 0 ? "" : ", ") + model.volumes[v].name;
-    if (all) wants.volumes.push_back({v, sampling});
-  }
+  for (std::uint32_t v = 0; all && v < model.volumes.size(); ++v) wants.volumes.push_back({v, sampling});
   if (all || settings.volumes == none) return wants;
   for (const std::string& name : settings.volumes) {
     std::uint32_t v = 0;
     while (v < model.volumes.size() && model.volumes[v].name != name) ++v;
-    if (v == model.volumes.size())
-      throw Error(ErrorKind::usage, "--volumes", "the model has no '" + name + "'",
-                  "use all, none or names among: " + known);
+    if (v == model.volumes.size()) throw unknown_name("--volumes", name, model.volumes);
     wants.volumes.push_back({v, sampling});
   }
   return wants;
@@ -107,24 +103,48 @@ json row_of(std::size_t i, std::span<const float> points, const runtime::Probed&
   return row;
 }
 
+// Each of 3 * #P, where the motion takes it.
+std::vector<float> moved(const RigidTransform& motion, std::vector<float> points) {
+  for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
+    Eigen::Map<Eigen::Vector3f> p(&points[i]);
+    p = (motion * p.cast<double>()).cast<float>();
+  }
+  return points;
+}
+
+// The body is probed with its root as scanned, where float32 is fine, whatever the root does to it.
+runtime::Probed probed_at(const runtime::BodyPoser& poser, const Pose& pose, const Settings& settings,
+                          const std::vector<float>& points, const runtime::ProbeWants& wants) {
+  runtime::PosedBody body = poser.make_frame();
+  const auto [code, what] = poser.run(pose, runtime::skinning_from_name(settings.skinning), {}, body,
+                                      runtime::NodesOf::body, runtime::Root::still);
+  if (code != StatusCode::ok) throw Error(ErrorKind::data, "pose", what, "mend the pose");
+  const RigidTransform root = kinematics::forward(poser.model().rig, body.pose)[0];
+  const runtime::Probe probe(poser.shared_model());
+  runtime::Probe::PosedTree tree;
+  probe.follow(body.nodes, tree);
+  runtime::Probed probed;
+  if (settings.direction == "posed-to-rest") {
+    probe.posed_to_rest(tree, moved(root.inverse(), points), wants, probed);
+  } else {
+    probe.rest_to_posed(tree, points, wants, probed);
+    probed.points = moved(root, std::move(probed.points));
+  }
+  using Gradient = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+  for (std::size_t i = 0; i < probed.gradient.size(); i += 9) {
+    Eigen::Map<Gradient> F(&probed.gradient[i]);
+    F = (root.q.toRotationMatrix() * F.cast<double>()).cast<float>();
+  }
+  return probed;
+}
+
 int run(const Program& program, const Settings& settings) {
   const std::vector<float> points = read_points(settings.points);
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   const runtime::ProbeWants wants = wants_of(settings, *model);
   const Pose pose = pose_of(program, settings, *model);
   const runtime::BodyPoser poser(model);
-  runtime::PosedBody body = poser.make_frame();
-  const auto [code, what] = poser.run(pose, runtime::skinning_from_name(settings.skinning), {}, body);
-  if (code != StatusCode::ok) throw Error(ErrorKind::data, "pose", what, "mend the pose");
-  const runtime::Probe probe(model);
-  runtime::Probe::PosedTree tree;
-  probe.follow(body.nodes, tree);
-  runtime::Probed probed;
-  if (settings.direction == "posed-to-rest") {
-    probe.posed_to_rest(tree, points, wants, probed);
-  } else {
-    probe.rest_to_posed(tree, points, wants, probed);
-  }
+  const runtime::Probed probed = probed_at(poser, pose, settings, points, wants);
 
   const json columns = columns_of(wants, *model);
   json rows = json::array();

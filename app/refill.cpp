@@ -10,6 +10,7 @@
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
+#include "app/read_budget.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
@@ -88,8 +89,8 @@ void apply_effects(const Settings& s, const Rig& rig, runtime::BallSet& set) {
   if (s.explode != 0) runtime::explode(set, s.time, s.explode);
 }
 
-std::size_t count_object(const fs::path& path) {
-  const Image image = io::read_image(path);
+std::size_t count_object(const fs::path& path, const files::ReadOptions& options) {
+  const Image image = io::read_image(path, options);
   std::size_t held = 0;
   with_scalar_type(image.type, [&](auto zero) {
     for (const auto v : image.scalars<decltype(zero)>()) held += v != 0;
@@ -130,9 +131,8 @@ json write_frame(const Settings& s, const runtime::BallSet& set, const Image& vo
 }
 
 json run_morph(const Settings& s, const VolumetricSkeleton& skeleton, const Image& volume,
-               const Context& context) {
+               const Image& target, const Context& context) {
   const VolumetricSkeleton other = read_skeleton_and_rig(s.morph[0], {}).first;
-  const Image target = io::read_image(s.morph[1]);
   const runtime::BallSet from = runtime::balls_at_rest(skeleton, skeleton.grid);
   const runtime::BallSet to = runtime::balls_at_rest(other, other.grid);
   const auto start = std::chrono::steady_clock::now();
@@ -146,8 +146,9 @@ json run_morph(const Settings& s, const VolumetricSkeleton& skeleton, const Imag
 }
 
 // Reconstruction loss: what the object has and no ball at rest holds.
-json loss(const Settings& s, const VolumetricSkeleton& skeleton, const Context& context) {
-  const std::size_t object = count_object(s.object);
+json loss(const Settings& s, const VolumetricSkeleton& skeleton, const files::ReadOptions& options,
+          const Context& context) {
+  const std::size_t object = count_object(s.object, options);
   const runtime::BallSet rest = runtime::balls_at_rest(skeleton, skeleton.grid);
   const auto start = std::chrono::steady_clock::now();
   const std::size_t held = runtime::covered_voxels(rest, {{0, 0, 0}, skeleton.grid.size}, context);
@@ -167,7 +168,7 @@ std::string text_of(const json& result) {
   std::string text;
   char line[400];
   for (const json& f : result["frames"]) {
-    std::snprintf(line, sizeof line, "%s: %zu balls, %.3f s", f["file"].get<std::string>().c_str(),
+    std::snprintf(line, sizeof line, "%s: %zu balls, filled in %.3f s", f["file"].get<std::string>().c_str(),
                   f["balls"].get<std::size_t>(), f["seconds"].get<double>());
     text += (text.empty() ? "" : "\n") + std::string(line);
     if (f.contains("held_voxels"))
@@ -175,6 +176,9 @@ std::string text_of(const json& result) {
     if (f.contains("triangles"))
       text += ", " + std::to_string(f["triangles"].get<std::size_t>()) + " triangles";
   }
+  std::snprintf(line, sizeof line, "\n%.3f s in all, with reading and writing",
+                result["seconds"].get<double>());
+  text += line;
   if (result.contains("loss")) {
     std::snprintf(line, sizeof line, "\nloss: %.4f %% of %zu object voxels lie in no ball",
                   result["loss"]["loss_percent"].get<double>(),
@@ -194,16 +198,19 @@ ImageGrid lattice_for(const Settings& s, const VolumetricSkeleton& skeleton, con
 }
 
 int run(const Program& program, const Settings& s) {
+  const auto start = std::chrono::steady_clock::now();
   check(s);
   { const files::AtomicFile probe(s.output); }
   const auto [skeleton, rig] = read_skeleton_and_rig(s.skeleton, s.rig);
   if (skeleton.size() == 0)
     throw Error(ErrorKind::data, s.skeleton.string(), "it has no voxel", "thin at a lower TP");
-  const Image volume = s.volume.empty() ? Image() : io::read_image(s.volume);
+  const files::ReadOptions options = reading(program, s.frames.motion.limits);
+  const Image volume = s.volume.empty() ? Image() : io::read_image(s.volume, options);
   json result{{"ok", true}, {"frames", json::array()}};
-  if (!s.object.empty()) result["loss"] = loss(s, skeleton, program.context("loss"));
+  if (!s.object.empty()) result["loss"] = loss(s, skeleton, options, program.context("loss"));
   if (!s.morph.empty()) {
-    result["frames"].push_back(run_morph(s, skeleton, volume, program.context("morph")));
+    result["frames"].push_back(
+        run_morph(s, skeleton, volume, io::read_image(s.morph[1], options), program.context("morph")));
   } else {
     const ImageGrid lattice = lattice_for(s, skeleton, volume);
     runtime::Seams seams;
@@ -211,8 +218,7 @@ int run(const Program& program, const Settings& s) {
     if (s.bridge && s.poses() && !s.back)
       seams = runtime::seams_of(runtime::balls_at_rest(skeleton, lattice), skeleton.segment, rig.skeleton,
                                 program.context("seams"));
-    const std::vector<Frame> frames =
-        s.poses() ? read_frames(program, s.frames, rig) : std::vector<Frame>{{"", {}}};
+    const std::vector<Frame> frames = s.poses() ? read_frames(program, s.frames, rig) : std::vector<Frame>(1);
     for (const Frame& frame : frames) {
       std::size_t clamped = 0;
       runtime::BallSet set = s.poses() ? posed_balls(skeleton, lattice, rig, frame.pose, seams, clamped)
@@ -223,6 +229,7 @@ int run(const Program& program, const Settings& s) {
       result["frames"].push_back(write_frame(s, set, volume, output_of(s, frame), program.context("refill")));
     }
   }
+  result["seconds"] = seconds_since(start);
   program.result(text_of(result), result);
   return 0;
 }

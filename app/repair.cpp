@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <cmath>
 #include <filesystem>
 #include <mutex>
 
@@ -11,6 +12,7 @@
 #include "core/values/error.hpp"
 #include "io/case/case_file.hpp"
 #include "preprocess/check/surface_figures.hpp"
+#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/repair/repair_surface.hpp"
 
@@ -30,6 +32,7 @@ struct Line {
   std::string name;
   repair::Done done;
   check::SurfaceFigures after;
+  geometry::LargestHole left;  // of the holes that are still there
 };
 
 // Every word of the report: its key under --json, its column, its count.
@@ -72,14 +75,14 @@ void check_output(const Settings& settings) {
 
 std::vector<Line> mend(Case& patient, const Settings& settings, const Context& context) {
   std::vector<SurfaceMesh*> meshes{&patient.skin};
-  std::vector<Line> lines{{patient.skin_name, {}, {}}};
+  std::vector<Line> lines{{patient.skin_name, {}, {}, {}}};
   for (CaseBone& bone : patient.bones) {
     meshes.push_back(&bone.surface);
-    lines.push_back({bone.name, {}, {}});
+    lines.push_back({bone.name, {}, {}, {}});
   }
   for (CaseTissue& tissue : patient.tissues) {
     meshes.push_back(&tissue.surface);
-    lines.push_back({tissue.name, {}, {}});
+    lines.push_back({tissue.name, {}, {}, {}});
   }
   std::mutex mutex;
   std::size_t finished = 0;
@@ -88,11 +91,31 @@ std::vector<Line> mend(Case& patient, const Settings& settings, const Context& c
     repair::Mended mended = repair::repair_surface(*meshes[i], settings.options, context);
     lines[i].done = mended.done;
     lines[i].after = check::measure(mended.mesh);
+    if (lines[i].after.open.count > 0) lines[i].left = geometry::largest_hole(mended.mesh);
     if (mended.done.anything()) *meshes[i] = std::move(mended.mesh);
     const std::lock_guard lock(mutex);
     context.report(static_cast<double>(++finished) / static_cast<double>(meshes.size()));
   });
   return lines;
+}
+
+// `--holes` that fills the largest hole, with room for what rounding does; 0 where none can.
+double holes_option(const geometry::LargestHole& hole) {
+  const double edge = std::ceil(1.05 * hole.filling_edge * 100) / 100;
+  return hole.filling_edge > 0 && edge <= repair::Options::hole_range.high ? edge : 0;
+}
+
+std::string left_open(const Line& line) {
+  const geometry::LargestHole& hole = line.left;
+  const double option = holes_option(hole);
+  std::string out =
+      fmt::format("{}: {} {} left", line.name, hole.holes, hole.holes == 1 ? "hole is" : "holes are");
+  if (hole.edges > 0)
+    out += fmt::format(", the largest of {} edges at [{:.2f}, {:.2f}, {:.2f}]", hole.edges, hole.middle.x(),
+                       hole.middle.y(), hole.middle.z());
+  if (option > 0) out += fmt::format(": --holes {:g} fills {}", option, hole.holes == 1 ? "it" : "them");
+  if (!hole.closed || option == 0) out += "; some of their edges form no loop, which nothing here fills";
+  return out;
 }
 
 std::string text_report(const std::vector<Line>& lines, const Settings& settings) {
@@ -109,6 +132,9 @@ std::string text_report(const std::vector<Line>& lines, const Settings& settings
     for (const Column& column : kColumns) out += fmt::format(" {:>7}", line.done.*column.count);
     out += fmt::format(" {:>10} {:>10}\n", line.after.open.count, line.after.nonmanifold.count);
   }
+  for (const Line& line : lines) {
+    if (line.after.open.count > 0) out += left_open(line) + "\n";
+  }
   out += fmt::format("{} of {} surfaces needed nothing\n", untouched, lines.size());
   out +=
       settings.dry_run ? "nothing was written (--dry-run)\n" : settings.output.string() + ": a whole case\n";
@@ -121,6 +147,7 @@ nlohmann::json json_report(const std::vector<Line>& lines) {
     nlohmann::json entry{{"name", line.name}, {"changed", line.done.anything()}};
     for (const Column& column : kColumns) entry[column.key] = line.done.*column.count;
     entry["holes_left"] = line.done.holes_left;
+    entry["holes_option"] = holes_option(line.left) > 0 ? nlohmann::json(holes_option(line.left)) : nullptr;
     entry["open_edges_left"] = line.after.open.count;
     entry["nonmanifold_edges_left"] = line.after.nonmanifold.count;
     entry["flipped_edges_left"] = line.after.flipped.count;

@@ -19,10 +19,13 @@ using client::Clock;
 constexpr std::size_t kLargest = std::size_t{1} << 30;
 constexpr std::chrono::seconds kPatience{30};
 
-wire::RecordedSession read(const std::filesystem::path& file) {
+// `cut`: its server was killed, or a copy broke off. What is whole of it is played.
+wire::RecordedSession read(const std::filesystem::path& file, bool& cut) {
   const std::string bytes = files::read_text(file, kLargest);
   wire::RecordedSession session;
-  if (const Status status = wire::read_recording(std::as_bytes(std::span(bytes)), session); !status.ok())
+  const Status status = wire::read_recording(std::as_bytes(std::span(bytes)), session);
+  cut = status.code == StatusCode::data_loss && !session.steps.empty();
+  if (!status.ok() && !cut)
     throw Error(ErrorKind::data, file.string(), status.message, "give a file of ecorche serve --record-dir");
   return session;
 }
@@ -57,6 +60,8 @@ class Replay {
     }
     v1::Envelope update;
     *update.mutable_pose_update() = step.pose;
+    // As the session counted them, the first might be farther on than a server lets a pose be.
+    update.mutable_pose_update()->set_sequence(at + 1);
     client_.send(update);
     const auto until = Clock::now() + kPatience;
     bool acknowledged = false;
@@ -74,9 +79,9 @@ class Replay {
           throw client::to_error("pose", envelope.pose_ack().status());
         acknowledged = true;
       } else if (envelope.has_mesh_frame()) {
-        compare(envelope.mesh_frame(), frame->payload, step, expected);
+        compare(envelope.mesh_frame(), frame->payload, at, expected);
       } else if (envelope.has_volume_frame()) {
-        compare(envelope.volume_frame(), frame->payload, step, expected);
+        compare(envelope.volume_frame(), frame->payload, at, expected);
       }
     }
     give_up(at);
@@ -111,17 +116,17 @@ class Replay {
   }
 
   template <class Frame>
-  void compare(const Frame& frame, const wire::Payload& payload, const wire::RecordedStep& step,
+  void compare(const Frame& frame, const wire::Payload& payload, std::size_t at,
                std::map<std::uint32_t, std::uint64_t>& expected) {
     const auto subscription = now_.find(frame.subscription());
-    if (frame.pose_sequence() != step.pose.sequence() || subscription == now_.end()) return;
+    if (frame.pose_sequence() != at + 1 || subscription == now_.end()) return;
     for (const std::uint32_t was : subscription->second) {
       const auto recorded = expected.find(was);
       if (recorded == expected.end()) continue;
       ++frames_;
       if (wire::payload_digest(payload) != recorded->second && ++mismatches_ <= 5) {
-        program_.note("mismatch: pose " + std::to_string(step.pose.sequence()) + ", subscription " +
-                      std::to_string(was));
+        program_.note("mismatch: pose " + std::to_string(session_.steps[at].pose.sequence()) +
+                      ", subscription " + std::to_string(was));
       }
       expected.erase(recorded);
     }
@@ -141,19 +146,22 @@ class Replay {
 
 int replay(const Program& program, const std::filesystem::path& file, const wire::Address& address,
            const client::Access& access) {
-  const wire::RecordedSession session = read(file);
+  bool cut = false;
+  const wire::RecordedSession session = read(file, cut);
   Client client(address, std::string("ecorche stream ") + ECORCHE_VERSION, access);
   Replay replay(program, client, session);
   const bool comparable = replay.open();
   for (std::size_t at = 0; comparable && at < session.steps.size(); ++at) replay.play(at);
   const bool same = comparable && replay.mismatches() == 0;
-  program.result(std::to_string(session.steps.size()) + " poses, " + std::to_string(replay.frames()) +
-                     " frames compared: " + std::to_string(replay.mismatches()) + " mismatches" +
-                     (session.full ? "; the recording was cut at the server's limit" : ""),
-                 {{"poses", session.steps.size()},
-                  {"frames", replay.frames()},
-                  {"mismatches", comparable ? replay.mismatches() : 1},
-                  {"cut", session.full}});
+  program.result(
+      std::to_string(session.steps.size()) + " poses, " + std::to_string(replay.frames()) +
+          " frames compared: " + std::to_string(replay.mismatches()) + " mismatches" +
+          (session.full ? "; the recording was cut at the server's limit" : "") +
+          (cut ? "; the recording has no end: its server was killed, or the copy is not whole" : ""),
+      {{"poses", session.steps.size()},
+       {"frames", replay.frames()},
+       {"mismatches", comparable ? replay.mismatches() : 1},
+       {"cut", session.full || cut}});
   return same ? 0 : 1;
 }
 

@@ -10,6 +10,7 @@
 #include "core/kinematics/posed_rest.hpp"
 #include "io/case/case_file.hpp"
 #include "io/surface/surface_file.hpp"
+#include "preprocess/check/joints.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/rig/bone_points.hpp"
 #include "preprocess/rig/fit_rig.hpp"
@@ -95,8 +96,24 @@ int run(const Program& program, const Settings& settings) {
   }
   nlohmann::json joints = nlohmann::json::array();
   for (std::size_t row = 0; row < rig.skeleton.segments.size(); ++row) joints.push_back(joint_json(rig, row));
-  program.result(to_text(joints), {{"skeleton", rig.skeleton.name}, {"rig", joints}});
-  return 0;
+  std::vector<check::Finding> findings = check::size_findings(patient);
+  for (check::Finding& finding : check::joint_findings(patient, rig, program.context("joints")))
+    findings.push_back(std::move(finding));
+  nlohmann::json told = nlohmann::json::array();
+  std::string text;
+  bool possible = true;
+  for (const check::Finding& f : findings) {
+    told.push_back({{"severity", check::severity_name(f.severity)},
+                    {"where", f.where},
+                    {"what", f.what},
+                    {"mend", f.mend}});
+    possible = possible && f.severity != check::Severity::error;
+    text += std::string(check::severity_name(f.severity)) + ": " + f.where + ": " + f.what + " (" + f.mend +
+            ")\n";
+  }
+  program.result(text + to_text(joints),
+                 {{"ok", possible}, {"skeleton", rig.skeleton.name}, {"rig", joints}, {"findings", told}});
+  return possible ? 0 : exit_code(ErrorKind::data);
 }
 
 }  // namespace

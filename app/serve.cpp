@@ -12,6 +12,7 @@
 #include "app/big_heap.hpp"
 #include "app/command.hpp"
 #include "app/served_clips.hpp"
+#include "app/signals.hpp"
 #include "app/token_file.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/model_file.hpp"
@@ -100,6 +101,7 @@ int run_serve(const Settings& settings, const Program& program) {
   program.result("listening on " + where, report);
 
   const std::stop_callback on_stop(program.stop, [&server] { server.stop(); });
+  const OnHangup on_hangup([&server] { server.reload(); });
   server.run();
   return 0;
 }
@@ -157,7 +159,9 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
   limit("--message-rate", limits.messages_per_second, "messages per second and connection; faster ones wait",
         1.0, 1e6);
   limit("--request-rate", limits.requests_per_second,
-        "HTTP requests per second, all together; others are turned away", 1.0, 1e6);
+        "HTTP requests per second of one address, by kind; others are turned away, but for /healthz and "
+        "/readyz",
+        1.0, 1e6);
   limit("--frames-in-flight", limits.frames_in_flight, "unacknowledged, per subscription", 1U, 64U);
   limit("--max-queued-bytes", limits.queued_bytes, "of frames that wait for clients, all together",
         std::uint64_t{1} << 20, std::uint64_t{1} << 40);
@@ -169,8 +173,23 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
   limit("--linger-seconds", limits.linger_seconds, "that a named session outlives its connections", 0.0, 1e6);
   limit("--max-volume-voxels", limits.volume_voxels, "of a posed volume", std::uint64_t{1},
         std::uint64_t{1} << 31);
+  limit("--max-frame-bytes", limits.frame_bytes, "of a frame, before compression", std::uint64_t{1} << 20,
+        std::uint64_t{1} << 32);
   limit("--max-record-bytes", limits.record_bytes, "of a recording", std::uint64_t{4096},
         std::uint64_t{1} << 30);
+  limit("--max-recordings", limits.recordings, "that run at once", 1U, 1024U);
+  limit("--max-recording-files", limits.recording_files, "in their folder", 1U, 1U << 20);
+  limit("--recording-rate", limits.recordings_per_minute,
+        "recordings a minute that clients of one address begin, after four in one go", 0.01, 1e6);
+  limit("--recording-days", limits.recording_days,
+        "after which a recording makes way where the folder is full", 0.0, 1e6);
+  limit("--log-rate", limits.log_lines_per_second,
+        "lines a second that clients of one address cause in the log; all together ten times as many", 0.01,
+        1e6);
+  limit("--peer-share", limits.peer_share,
+        "of connections, sessions, recordings and kept bytes: for clients of one address", 0.01, 1.0);
+  limit("--connection-share", limits.connection_share, "of queued and kept bytes: for one connection", 0.01,
+        1.0);
 
   command->callback([settings, &program, &chosen] {
     chosen = [settings, &program] { return run_serve(*settings, program); };

@@ -56,8 +56,13 @@ struct Body {
 };
 
 json frame_json(const Skeleton& rig, const std::string& name, const runtime::Tears& tears) {
-  json out{{"name", name},         {"uncovered", tears.uncovered}, {"links", tears.links},
-           {"parts", tears.parts}, {"errs", tears.errs()},         {"between", json::array()}};
+  json out{{"name", name},
+           {"uncovered", tears.uncovered},
+           {"links", tears.links},
+           {"parts", tears.parts},
+           {"rest_parts", tears.rest_parts},
+           {"errs", tears.errs()},
+           {"between", json::array()}};
   for (const std::int32_t segment : tears.between) {
     if (segment >= 0) out["between"].push_back(rig.segments[static_cast<std::size_t>(segment)].name);
   }
@@ -191,6 +196,20 @@ std::string place_of(const json& frame) {
   return " (most between " + between[0].get<std::string>() + " and " + between[1].get<std::string>() + ")";
 }
 
+// Each thing that is wrong with a frame, and none that is not.
+std::string what_is_torn(const json& frame) {
+  std::string text;
+  const auto add = [&](const char* key, const std::string& what) {
+    if (frame[key] == 0) return;
+    text += (text.empty() ? "" : ", ") + frame[key].dump() + what;
+  };
+  add("uncovered", " voxels uncovered");
+  add("links", " links torn" + place_of(frame));
+  if (frame["parts"] > frame["rest_parts"])
+    add("parts", " pieces where the scan has " + frame["rest_parts"].dump());
+  return text;
+}
+
 std::string text_of(const json& result) {
   std::string text;
   char line[240];
@@ -215,13 +234,14 @@ std::string text_of(const json& result) {
   if (result.contains("torn")) {
     for (const json& f : result["frames"]) {
       if (!f["errs"].get<bool>()) continue;
-      std::snprintf(line, sizeof line, "%s: %zu voxels uncovered, %zu links torn%s, %zu parts\n",
-                    f["name"].get<std::string>().c_str(), f["uncovered"].get<std::size_t>(),
-                    f["links"].get<std::size_t>(), place_of(f).c_str(), f["parts"].get<std::size_t>());
-      text += line;
+      text += f["name"].get<std::string>() + ": " + what_is_torn(f) + "\n";
     }
-    std::snprintf(line, sizeof line, "%zu of %zu frames err (%.2f %%)\n", result["torn"].get<std::size_t>(),
-                  result["frames"].size(), result["torn_percent"].get<double>());
+    std::snprintf(line, sizeof line, "%zu of %zu frames are torn (%.2f %%)%s\n",
+                  result["torn"].get<std::size_t>(), result["frames"].size(),
+                  result["torn_percent"].get<double>(),
+                  result["torn"] == 0
+                      ? ""
+                      : "; --bulge 0.3, or a skeleton thinned with a lower --tp, holds together longer");
     text += line;
   }
   return text;

@@ -12,6 +12,7 @@
 
 #include "app/command.hpp"
 #include "app/hang_skeleton.hpp"
+#include "app/read_budget.hpp"
 #include "app/step_clock.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
@@ -34,6 +35,7 @@ struct Settings {
   double thinness = 0.48;
   fs::path distance_map;
   HangSettings hang;
+  files::ReadLimits limits;
   std::vector<std::string> for_images;  // options that were given and have no meaning for a skeleton
 };
 
@@ -99,13 +101,25 @@ int write_distances(const Program& program, const Image& image, const thin::Segm
   return 0;
 }
 
+// Without a choice of values the object is all that is not 0: said, since it may not be what was meant.
+void note_object(const Program& program, const thin::Mask& mask) {
+  const auto object = std::count(mask.inside.begin(), mask.inside.end(), 1);
+  std::ostringstream said;
+  said.precision(3);
+  said << "the object is every value but 0, "
+       << 100.0 * static_cast<double>(object) / static_cast<double>(mask.inside.size())
+       << " % of the image; --threshold or --labels choose others";
+  program.note(said.str());
+}
+
 // A fresh skeleton of an image, and the object that it is of.
 VolumetricSkeleton from_image(const Program& program, const Settings& settings, thin::Mask& mask,
                               StepClock& clock, nlohmann::json& report) {
   thin::Segmentation how = settings.segmentation;
   read_threshold(settings.threshold, how);
   how.boundary = settings.boundary == 6 ? thin::Boundary::faces_6 : thin::Boundary::all_26;
-  Image image = clock.time("read", [&] { return io::read_image(settings.input); });
+  Image image =
+      clock.time("read", [&] { return io::read_image(settings.input, reading(program, settings.limits)); });
   if (!settings.distance_map.empty())
     clock.time("distance_map", [&] { return write_distances(program, image, how, settings.distance_map); });
   const int components = image.components;
@@ -113,6 +127,7 @@ VolumetricSkeleton from_image(const Program& program, const Settings& settings, 
   if (image.components < components) how.component = 0;  // resampling has taken the one
   const bool largest = std::exchange(how.largest, false);
   mask = clock.time("segment", [&] { return thin::segment(image, how, program.context("segmenting")); });
+  if (settings.threshold.empty() && settings.segmentation.labels.empty()) note_object(program, mask);
   image = {};
   const thin::Pieces found =
       clock.time("pieces", [&] { return thin::pieces(mask, how.boundary, program.context("pieces")); });
@@ -149,7 +164,7 @@ int run(const Program& program, const Settings& settings) {
   if (is_skeleton(settings.input)) {
     if (!settings.for_images.empty())
       refuse(settings.for_images[0].c_str(), "has no meaning for a skeleton", "thin the image again");
-    file = clock.time("read", [&] { return io::read_volumetric_skeleton(settings.input); });
+    file = clock.time("read", [&] { return io::read_volumetric_skeleton(settings.input, settings.limits); });
     file.skeleton = clock.time("thinning", [&] { return thin::thinner(file.skeleton, settings.thinness); });
   } else {
     file.skeleton = from_image(program, settings, mask, clock, report);
@@ -200,6 +215,7 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen) {
       ->add_option("IMAGE", s->input, "an image, or a skeleton (.vtp), out of which a thinner one is taken")
       ->required();
   command->add_option("-o,--output", s->output, "the skeleton to write, ending in .vtp")->required();
+  add_read_budget(*command, s->limits);
   command->add_option("--threshold", s->threshold,
                       "LOW:HIGH, values of the object with both ends; one may be left out");
   command

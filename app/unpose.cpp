@@ -7,13 +7,17 @@
 #include <set>
 
 #include "app/command.hpp"
+#include "app/images_back.hpp"
+#include "app/surfaces_back.hpp"
+#include "app/unpose_report.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/files/staged_folder.hpp"
+#include "core/model_file/model_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/mapping/bind.hpp"
-#include "preprocess/mapping/round_trip.hpp"
-#include "runtime/volume/grid_affine.hpp"
-#include "runtime/volume/resample.hpp"
+#include "preprocess/mapping/carry_back.hpp"
+#include "preprocess/mapping/most_squeezed.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -22,31 +26,27 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 struct Settings {
-  fs::path posed, output;
+  fs::path posed, output, model;
   std::vector<fs::path> files;
   std::vector<std::string> labels;
   std::string sampling = "trilinear";
 };
 
-constexpr std::string_view kTets = "body.vtu";
 const std::set<std::string> kSurfaces{".stl", ".obj", ".ply", ".off", ".vtp", ".glb"};
 const std::set<std::string> kImages{".nrrd", ".mha", ".gz"};
 
-// The posed tets and their rest.
-struct PosedTets {
-  PointsF rest, posed;
-  Tets tets;
+bool is_surface(const fs::path& file) {
+  return kSurfaces.contains(file.extension().string());
+}
 
-  runtime::Deformation way_back() const { return {tets, numbers(posed), numbers(rest)}; }
-  runtime::Deformation way_there() const { return way_back().back(); }
-
- private:
-  static std::span<const float> numbers(const PointsF& points) {
-    return {points.data(), static_cast<std::size_t>(points.size())};
-  }
-};
+bool is_body(const fs::path& file) {
+  return is_surface(file) || kImages.contains(file.extension().string());
+}
 
 PosedTets read_posed(const fs::path& file) {
+  if (!fs::exists(file))
+    throw Error(ErrorKind::missing_input, file.string(), "is not there, and the way back is in it",
+                "give a folder that pose wrote with its tets: --tets, or all of it");
   io::TetFile read = io::read_tets(file);
   const auto moved = std::find_if(
       read.point_data.begin(), read.point_data.end(),
@@ -86,132 +86,244 @@ std::string name_of(const fs::path& file) {
   return name.substr(0, name.find('.'));
 }
 
-// Everything that `pose` writes and that lies in the posed body, in the order of names.
-std::vector<fs::path> files_under(const fs::path& folder) {
-  std::vector<fs::path> out;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    const fs::path& path = entry.path();
-    const bool field = name_of(path) == "displacement" || name_of(path) == "mask";  // of pose --field
-    const std::string ending = path.extension().string();
-    if (entry.is_regular_file() && !field && (kSurfaces.contains(ending) || kImages.contains(ending)))
-      out.push_back(path);
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
+// A file that is to come back.
+struct Item {
+  fs::path from, to;
+  const PosedFile* known = nullptr;  // as pose wrote it; else drawn on the posed body
+};
 
-double first_value(const Image& image, std::size_t voxel) {
-  return with_scalar_type(image.type, [&](auto zero) {
-    const auto row = voxel * static_cast<std::size_t>(image.components);
-    return static_cast<double>(image.scalars<decltype(zero)>()[row]);
-  });
-}
-
-class WayBack {
+// What `root` says of itself, held against what lies there.
+class Source {
  public:
-  WayBack(const Settings& settings, PosedTets body, const Context& context)
-      : settings_(settings), body_(std::move(body)), context_(context) {}
-
-  void surface(const fs::path& from, const fs::path& to) {
-    if (!locator_) locator_ = std::make_unique<mapping::Locator>(body_.posed, body_.tets);
-    SurfaceMesh mesh = io::read_surface(from);
-    mapping::Binding held = locator_->bind(mesh.V, context_);
-    mapping::bind_to_most_squeezed(mesh.V, body_.rest, body_.posed, body_.tets, held, context_);
-    for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
-      Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
-      for (int c = 0; c < 4; ++c) {
-        const std::int32_t node = body_.tets(held.tet[static_cast<std::size_t>(v)], c);
-        at += static_cast<double>(held.barycentric(v, c)) * body_.rest.row(node).cast<double>();
-      }
-      mesh.V.row(v) = at;
-    }
-    io::write_surface(to, mesh);
+  Source(const Program& program, const Settings& settings)
+      : settings_(settings),
+        context_(program.context("check")),
+        tets_(fs::is_directory(settings.posed) ? settings.posed / kTets : settings.posed),
+        root_(tets_.parent_path().empty() ? fs::path(".") : tets_.parent_path()),
+        manifest_(read_manifest(root_)) {
+    if (manifest_ && tets_.filename() == kTets && fs::exists(tets_)) check(std::string(kTets));
   }
 
-  void image(const fs::path& from, const fs::path& to) {
-    ModelVolume volume;
-    volume.name = name_of(from);
-    volume.image = io::read_image(from);
-    if (!voxels_) voxels_ = volume.image.grid;
-    volume.labels = is_labels(volume.name, settings_);
-    volume.background = background_of(volume.image);
-    const runtime::Deformation back = body_.way_back();
-    const ImageGrid grid = runtime::lattice_over(volume.image.grid, back.posed);
-    if (!(back_.grid == grid)) runtime::locate(back, grid, back_, context_);
-    const bool nearest = settings_.sampling == "nearest";
-    io::write_image(to,
-                    runtime::resample(back, back_, volume,
-                                      nearest ? runtime::Sampling::nearest : runtime::Sampling::trilinear));
-  }
+  const fs::path& tets() const { return tets_; }
+  const fs::path& root() const { return root_; }
+  const PosedManifest* manifest() const { return manifest_ ? &*manifest_ : nullptr; }
 
-  // In voxels of the first image that was brought back too.
-  mapping::RoundTrip round_trip() const {
-    const Eigen::Matrix3d to_voxels =
-        voxels_ ? runtime::to_index(*voxels_).linear : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-    return mapping::round_trip(body_.rest, body_.posed, body_.tets, context_, to_voxels);
-  }
-  bool has_voxels() const { return voxels_.has_value(); }
+  std::vector<Item> items() const { return settings_.files.empty() ? found() : named(); }
 
  private:
-  // What the posed image holds where the body is not; 0 where the body fills it.
-  double background_of(const Image& image) {
-    if (!(there_.grid == image.grid)) runtime::locate(body_.way_there(), image.grid, there_, context_);
-    const auto empty = std::find(there_.tet.begin(), there_.tet.end(), runtime::InverseMap::none);
-    return empty == there_.tet.end()
-               ? 0
-               : first_value(image, static_cast<std::size_t>(empty - there_.tet.begin()));
+  // Named ones may lie anywhere and be anything.
+  std::vector<Item> named() const {
+    std::vector<Item> out;
+    for (const fs::path& file : settings_.files) {
+      if (!is_body(file))
+        throw Error(ErrorKind::usage, file.string(),
+                    "is neither a surface nor an image that can be carried back",
+                    "give .stl, .obj, .ply, .off, .vtp, .glb, .nrrd, .mha or .nii.gz");
+      std::error_code ignored;
+      const fs::path below = fs::relative(file, root_, ignored);
+      const PosedFile* known = manifest_ ? manifest_->find(below.generic_string()) : nullptr;
+      if (known != nullptr && !is_as_written(root_, *known, context_)) known = nullptr;
+      out.push_back({file, settings_.output / file.filename(), known});
+    }
+    return out;
+  }
+
+  // All of the posed body, which must be whole and its own.
+  std::vector<Item> found() const {
+    if (!manifest_)
+      throw Error(ErrorKind::data, root_.string(),
+                  "holds no " + std::string(kManifest) + ", so nothing says what its files are",
+                  "pose again into a new folder, or name the files that are to come back");
+    for (const fs::path& file : files::files_within(root_)) {
+      if (is_body(file) && manifest_->find(file.generic_string()) == nullptr)
+        throw Error(ErrorKind::data, (root_ / file).string(), "is not of this posed body",
+                    "move it elsewhere, or name it to bring it back with what lies around it");
+    }
+    std::vector<Item> out;
+    for (const PosedFile& file : manifest_->files) {
+      check(file.file);
+      const bool image = file.kind == PosedKind::image || file.kind == PosedKind::labels;
+      if (!image && file.kind != PosedKind::surface) continue;
+      if (image && manifest_->deformer != "tets")
+        throw Error(ErrorKind::data, (root_ / file.file).string(), "was filled by " + manifest_->deformer,
+                    "bring it back by ecorche refill --back, and name the other files here");
+      out.push_back({root_ / file.file, settings_.output / file.file, &file});
+    }
+    return out;
+  }
+
+  void check(const std::string& name) const {
+    const PosedFile* file = manifest_->find(name);
+    const fs::path path = root_ / name;
+    std::error_code ignored;
+    if (!fs::exists(path, ignored))
+      throw Error(ErrorKind::missing_input, path.string(), "is missing from this posed body",
+                  "pose again, or name the files that are to come back");
+    if (file == nullptr || !is_as_written(root_, *file, context_))
+      throw Error(ErrorKind::data, path.string(),
+                  "is not as pose wrote it: it was altered, or is of another pose",
+                  name == kTets ? "pose again into a new folder"
+                                : "pose again, or name it to bring it back with what lies around it");
   }
 
   const Settings& settings_;
-  PosedTets body_;
-  const Context& context_;
-  runtime::InverseMap there_, back_;
-  std::unique_ptr<mapping::Locator> locator_;
-  std::optional<ImageGrid> voxels_;
+  Context context_;
+  fs::path tets_, root_;
+  std::optional<PosedManifest> manifest_;
 };
 
-int run(const Program& program, const Settings& settings) {
-  const bool folder = fs::is_directory(settings.posed);
-  const fs::path tets = folder ? settings.posed / kTets : settings.posed;
-  const fs::path root = tets.parent_path();
-  const std::vector<fs::path> files = settings.files.empty() ? files_under(root) : settings.files;
-  for (const fs::path& file : files) {
-    if (!kSurfaces.contains(file.extension().string()) && !kImages.contains(file.extension().string()))
-      throw Error(ErrorKind::usage, file.string(),
-                  "is neither a surface nor an image that can be carried back",
-                  "give .stl, .obj, .ply, .off, .vtp, .glb, .nrrd, .mha or .nii.gz");
-  }
-  const Context context = program.context("unpose");
-  PosedTets body = read_posed(tets);
-  WayBack back(settings, std::move(body), context);
-  files::make_folder(settings.output);
-  json written = json::array();
-  for (const fs::path& file : files) {
-    context.check_stop();
-    // Named ones may lie anywhere; found ones keep their folders.
-    const fs::path to =
-        settings.output / (settings.files.empty() ? fs::relative(file, root) : file.filename());
-    files::make_folder(to.parent_path());
-    if (kSurfaces.contains(file.extension().string())) {
-      back.surface(file, to);
+class WayBack {
+ public:
+  WayBack(const Settings& settings, const Source& source, const Model* model, const Context& context)
+      : settings_(settings),
+        source_(source),
+        model_(model),
+        context_(context),
+        body_(read_posed(source.tets())),
+        images_(body_, context) {}
+
+  void bring(const Item& item) {
+    files::make_folder(item.to.parent_path());
+    if (!is_surface(item.from)) {
+      image(item);
+    } else if (item.known != nullptr && item.known->kind == PosedKind::surface) {
+      known_surface(item);
     } else {
-      back.image(file, to);
+      drawn_surface(item);
     }
-    written.push_back(to.string());
-    context.report(static_cast<double>(written.size()) / static_cast<double>(files.size()));
+    report_.files.push_back(item.to);
   }
-  const mapping::RoundTrip trip = back.round_trip();
-  char line[200];
-  std::snprintf(
-      line, sizeof line,
-      "%zu files; points come back within %.2g mm on average, %.3g %% of the body lay under another part",
-      files.size(), trip.mean_mm, 100 * trip.elsewhere_share);
-  json found{{"points", trip.points},
-             {"mean_mm", trip.mean_mm},
-             {"max_mm", trip.max_mm},
-             {"elsewhere_share", trip.elsewhere_share}};
-  if (back.has_voxels()) found["mean_voxels"] = trip.mean_voxels;
-  program.result(line, {{"ok", true}, {"files", written}, {"round_trip", std::move(found)}});
+
+  // Writes what marks the vertices in folds.
+  UnposeReport& finish() {
+    if (!folds_.empty()) {
+      files::write_text(settings_.output / "folds.csv", "file,vertex,x_mm,y_mm,z_mm\n" + folds_);
+      report_.files.push_back(settings_.output / "folds.csv");
+    }
+    return report_;
+  }
+
+ private:
+  void known_surface(const Item& item) {
+    if (!surfaces_) surfaces_ = std::make_unique<SurfacesBack>(source_.root(), *source_.manifest(), body_);
+    const SurfacesBack::Returned back =
+        surfaces_->bring(item.known->of, read_lps_surface(item.from), item.from.string(), context_);
+    write(item.to, back.mesh, back.folded);
+    report_.surfaces.push_back(back.trip);
+  }
+
+  // By the tets that hold its vertices, or are nearest.
+  void drawn_surface(const Item& item) {
+    if (!locator_) locator_ = std::make_unique<mapping::Locator>(body_.posed, body_.tets);
+    SurfaceMesh mesh = read_lps_surface(item.from);
+    mapping::Binding held = locator_->bind(mesh.V, context_);
+    mapping::bind_to_most_squeezed(mesh.V, body_.rest, body_.posed, body_.tets, held, context_);
+    std::vector<std::uint8_t> folded(held.tet.size());
+    for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
+      const std::int32_t tet = held.tet[static_cast<std::size_t>(v)];
+      Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
+      for (int c = 0; c < 4; ++c) {
+        at += static_cast<double>(held.barycentric(v, c)) * body_.rest.row(body_.tets(tet, c)).cast<double>();
+      }
+      mesh.V.row(v) = at;
+      const bool fold = mapping::is_folded({body_.rest, body_.posed, body_.tets}, tet);
+      folded[static_cast<std::size_t>(v)] = fold ? 1 : 0;
+      report_.drawn.folded += fold ? 1 : 0;
+    }
+    report_.drawn.vertices += held.tet.size();
+    report_.drawn.outside += held.outside;
+    report_.drawn.max_outside_mm = std::max(report_.drawn.max_outside_mm, held.max_outside_mm);
+    write(item.to, mesh, folded);
+  }
+
+  // A .vtp holds the mark itself; for all formats the folded vertices stand in folds.csv.
+  void write(const fs::path& to, const SurfaceMesh& mesh, const std::vector<std::uint8_t>& folded) {
+    io::write_surface(to, mesh, {{"folded", 1, {folded.begin(), folded.end()}}});
+    char line[120];
+    for (std::size_t v = 0; v < folded.size(); ++v) {
+      if (folded[v] == 0) continue;
+      const auto x = mesh.V.row(static_cast<Eigen::Index>(v));
+      std::snprintf(line, sizeof line, ",%zu,%.4f,%.4f,%.4f\n", v, x[0], x[1], x[2]);
+      folds_ += to.lexically_relative(settings_.output).generic_string() + line;
+    }
+  }
+
+  void image(const Item& item) {
+    const std::string name = name_of(item.from);
+    const bool labels =
+        is_labels(name, settings_) || (item.known != nullptr && item.known->kind == PosedKind::labels);
+    const Image back = images_.bring(
+        io::read_image(item.from), labels,
+        settings_.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear);
+    io::write_image(item.to, back);
+    const runtime::VoxelTrip trip = images_.trip();
+    ImageTrip told{item.to,      mask_for(back.grid, trip), trip.voxels, trip.elsewhere,
+                   trip.mean_mm, trip.mean_voxels,          trip.max_mm, {}};
+    if (model_ != nullptr && item.known != nullptr) {
+      const auto volume = std::find_if(model_->volumes.begin(), model_->volumes.end(),
+                                       [&](const ModelVolume& one) { return one.name == item.known->of; });
+      if (volume != model_->volumes.end() && volume->image.type == back.type &&
+          volume->image.components == back.components)
+        told.against_scan = held_against(*model_, *volume, back);
+    }
+    report_.images.push_back(std::move(told));
+  }
+
+  // One for each lattice.
+  fs::path mask_for(const ImageGrid& grid, const runtime::VoxelTrip& trip) {
+    const auto known =
+        std::find_if(masks_.begin(), masks_.end(), [&](const auto& one) { return one.first == grid; });
+    if (known != masks_.end()) return known->second;
+    const std::string number = masks_.empty() ? "" : "-" + std::to_string(masks_.size() + 1);
+    const fs::path file = settings_.output / ("folds-mask" + number + ".nrrd");
+    io::write_image(file, ImagesBack::mask(grid, trip));
+    report_.files.push_back(file);
+    masks_.emplace_back(grid, file);
+    return file;
+  }
+
+  const Settings& settings_;
+  const Source& source_;
+  const Model* model_;
+  const Context& context_;
+  PosedTets body_;
+  ImagesBack images_;
+  std::unique_ptr<SurfacesBack> surfaces_;
+  std::unique_ptr<mapping::Locator> locator_;
+  UnposeReport report_;
+  std::string folds_;
+  std::vector<std::pair<ImageGrid, fs::path>> masks_;
+};
+
+// The model that was posed.
+Model read_scan(const Program& program, const Settings& settings, const Source& source) {
+  Model model = model_file::read(settings.model, program.context("read"));
+  if (source.manifest() == nullptr || model_file::identity(model) != source.manifest()->identity)
+    throw Error(ErrorKind::data, settings.model.string(), "is not the model that was posed",
+                "give that one, or leave out --model");
+  return model;
+}
+
+int run(const Program& program, const Settings& settings) {
+  const Source source(program, settings);
+  std::error_code ignored;
+  if (fs::equivalent(settings.output, source.root(), ignored))
+    throw Error(ErrorKind::usage, "--output", "is the posed folder, which would be written over",
+                "name another folder");
+  std::optional<Model> model;
+  if (!settings.model.empty()) model = read_scan(program, settings, source);
+  const Context context = program.context("unpose");
+  WayBack back(settings, source, model ? &*model : nullptr, context);
+  const std::vector<Item> items = source.items();
+  files::make_folder(settings.output);
+  std::size_t done = 0;
+  for (const Item& item : items) {
+    context.check_stop();
+    back.bring(item);
+    context.report(static_cast<double>(++done) / static_cast<double>(items.size()));
+  }
+  const UnposeReport& report = back.finish();
+  program.result(text_of(report), json_of(report));
   return 0;
 }
 
@@ -224,8 +336,10 @@ void declare_unpose(CLI::App& app, Program& program, Run& chosen) {
   command->add_option("POSED", s->posed, "a folder that pose wrote, with its body.vtu; or that file")
       ->required();
   command->add_option("FILES", s->files,
-                      "surfaces and images in the posed body; without any, all that lie under POSED");
+                      "surfaces and images in the posed body; without any, all that POSED holds of it");
   command->add_option("-o,--output", s->output, "folder to write into, made where absent")->required();
+  command->add_option("--model", s->model,
+                      "the model that was posed: images that come back are held against its own");
   command->add_option("--sampling", s->sampling, "of images: nearest or trilinear; labels are always nearest")
       ->check(CLI::IsMember({"nearest", "trilinear"}))
       ->capture_default_str();

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // ecorche verify MODEL: digests, invariants and the certificate, all measured again.
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "app/command.hpp"
+#include "app/contacts_report.hpp"
 #include "app/model_report.hpp"
 #include "core/model_file/figures.hpp"
 #include "core/model_file/model_file.hpp"
@@ -24,6 +26,7 @@ struct Verdict {
   Model model;  // read only when its digests are good
   bool read = false;
   Certificate found;
+  nlohmann::json contacts = nlohmann::json::array();  // limbs that touch what they do not hang on
 };
 
 void check_digests(const std::string& path, const Program& program, Verdict& verdict) {
@@ -36,14 +39,15 @@ void check_digests(const std::string& path, const Program& program, Verdict& ver
 }
 
 // A stored figure that measuring does not find again.
-void compare(const Certificate& stored, const Certificate& found, std::vector<std::string>& faults) {
+void compare(const Certificate& stored, const Certificate& found, double length_mm,
+             std::vector<std::string>& faults) {
   std::vector<double> measured;
   model_file::for_each_figure(found,
                               [&](auto, auto value) { measured.push_back(static_cast<double>(value)); });
   std::size_t i = 0;
   model_file::for_each_figure(stored, [&](std::string_view name, auto value) {
     const double was = static_cast<double>(value), is = measured[i++];
-    const double absolute = name.ends_with("_mm") ? kLength : kAbsolute;
+    const double absolute = name.ends_with("_mm") ? length_mm : kAbsolute;
     if (was == is || std::abs(was - is) <= absolute + kRelative * std::abs(was)) return;
     faults.push_back(std::string(name) + ": the certificate says " + nlohmann::json(was).dump() +
                      ", measured " + nlohmann::json(is).dump());
@@ -63,8 +67,11 @@ Verdict verify(const std::string& path, const Program& program) {
   }
   verdict.read = true;
   verdict.found = preprocess::measure(verdict.model, program.context("certificate"));
-  for (const std::string& broken : preprocess::broken_bounds(verdict.found)) verdict.faults.push_back(broken);
-  compare(verdict.model.certificate, verdict.found, verdict.faults);
+  verdict.contacts = contacts_json(verdict.model);
+  const preprocess::BodySize size = preprocess::body_size(verdict.model);
+  for (const std::string& broken : preprocess::broken_bounds(verdict.found, size))
+    verdict.faults.push_back(broken);
+  compare(verdict.model.certificate, verdict.found, std::max(kLength, size.posed_grain_mm), verdict.faults);
   return verdict;
 }
 
@@ -78,7 +85,9 @@ std::string to_text(const Verdict& v) {
       text += "  " + std::string(name) + ": " + nlohmann::json(value).dump() + "\n";
     });
   }
-  return text + (v.faults.empty() ? "the model is good" : "the model is NOT good") +
+  text += contacts_text(v.contacts);
+  const char* good = v.contacts.empty() ? "the model is good" : "the model is good, but for limbs that touch";
+  return text + (v.faults.empty() ? good : "the model is NOT good") +
          "; for training and education, not for planning surgery";
 }
 
@@ -93,9 +102,10 @@ void declare_verify(CLI::App& app, Program& program, Run& chosen) {
     chosen = [path, &program] {
       const Verdict verdict = verify(*path, program);
       for (const std::string& fault : verdict.faults) program.note("fault: " + fault);
-      program.result(to_text(verdict),
-                     model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr,
-                                  verdict.found, verdict.checked, verdict.bad));
+      nlohmann::json report = model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr,
+                                           verdict.found, verdict.checked, verdict.bad);
+      report["contacts"] = verdict.contacts;
+      program.result(to_text(verdict), report);
       return verdict.faults.empty() ? 0 : exit_code(ErrorKind::data);
     };
   });

@@ -22,7 +22,7 @@ def both(joint, **angles):
 
 def stride(phase):
     """A walk's angles after phase turns of 2 pi: hips and shoulders swing against each other, knees bend as they come forward."""
-    out = {"lumbar": {"rotation": 4 * math.cos(phase)}, "lumbosacral": {"rotation": 4 * math.cos(phase)}}
+    out = {"lumbosacral": {"rotation": 4 * math.cos(phase)}}
     for side, at in (("left", phase), ("right", phase + math.pi)):
         out[f"hip_{side}"] = {"flexion": 8 + 22 * math.cos(at)}
         out[f"knee_{side}"] = {"flexion": 8 + 50 * max(0.0, -math.sin(at))}
@@ -37,16 +37,16 @@ def stated():
     out = {f"stride_{i + 1:02d}": stride(2 * math.pi * i / 12) for i in range(12)}
     single = [("knee_right", "flexion", 70), ("knee_left", "flexion", 45), ("hip_right", "flexion", 60), ("hip_left", "adduction", -20),
               ("hip_left", "rotation", 25), ("shoulder_right", "flexion", 60), ("shoulder_left", "adduction", -50), ("elbow_right", "flexion", 75),
-              ("elbow_left", "flexion", 110), ("wrist_right", "flexion", 40), ("ankle_left", "dorsiflexion", -25), ("neck", "rotation", 25)]
+              ("elbow_left", "flexion", 110), ("wrist_right", "flexion", 40), ("ankle_left", "dorsiflexion", -25),
+              ("cervicothoracic", "rotation", 25)]
     out.update({f"joint_{i + 1:02d}": {joint: {angle: value}} for i, (joint, angle, value) in enumerate(single)})
-    out["joint_12"]["cervicothoracic"] = {"rotation": 25}  # as some skeletons call the neck
     out["sitting"] = {**both("hip", flexion=80), **both("knee", flexion=85), **both("elbow", flexion=60)}
     out["half_squat"] = {**both("hip", flexion=55), **both("knee", flexion=65), **both("ankle", dorsiflexion=15)}
     out["step_up"] = {"hip_right": {"flexion": 70}, "knee_right": {"flexion": 80}, "elbow_left": {"flexion": 60}}
     out["arms_out"] = both("shoulder", adduction=-80)
-    out["reach"] = {"shoulder_right": {"flexion": 85}, "elbow_right": {"flexion": 20}, "thorax": {"rotation": 10}, "thoracolumbar": {"rotation": 10}}
+    out["reach"] = {"shoulder_right": {"flexion": 85}, "elbow_right": {"flexion": 20}, "thoracolumbar": {"rotation": 10}}
     out["bow"] = {joint: {"flexion": value} for joint, value in
-                  (("lumbar", 25), ("thorax", 15), ("lumbosacral", 20), ("thoracolumbar", 15), ("neck", 10), ("cervicothoracic", 10))}
+                  (("lumbosacral", 20), ("thoracolumbar", 15), ("cervicothoracic", 10))}
     return out
 
 

@@ -47,13 +47,13 @@ std::vector<Part> make_bones(const Landmarks& at) {
 
   std::vector<Part> bones;
   bones.push_back(bone("pelvis", "pelvis", pelvis, 7, 378));
-  bones.push_back(bone("lumbar_spine", "spine_lumbar", lumbar, 6, 135));
-  bones.push_back(bone("rib_cage", "spine_thoracic", ribs, 4.5, 765));
+  bones.push_back(bone("lumbar_spine", "lumbar", lumbar, 6, 135));
+  bones.push_back(bone("rib_cage", "thorax", ribs, 4.5, 765));
   bones.push_back(bone("cervical_spine", "neck", neck, 4, 117));
   bones.push_back(bone("skull", "head", skull, 5, 306));
   bones.push_back(bone("mandible", "head", mandible, 6, 63));
-  add_pair(bones, bone("clavicle", "shoulder_girdle", clavicle, 6, 31));
-  add_pair(bones, bone("scapula", "shoulder_girdle", scapula, 4, 110));
+  add_pair(bones, bone("clavicle", "girdle", clavicle, 6, 31));
+  add_pair(bones, bone("scapula", "girdle", scapula, 4, 110));
   add_pair(bones, bone("humerus", "upper_arm", humerus, 9, 110));
   add_pair(bones, bone("radius", "forearm", radius, 6.5, 51));
   add_pair(bones, bone("ulna", "forearm", ulna, 6.5, 60));

@@ -101,11 +101,11 @@ Clip make_walk(const Skeleton& truth) {
       angles["elbow" + end] = {{"flexion", 14 - 9 * s}};
     }
     angles["pelvis"] = {{"rotation", -5 * swing}, {"obliquity", 2.5 * std::sin(2 * kPi * t)}};
-    angles["lumbar"] = {
+    angles["lumbosacral"] = {
         {"flexion", 2}, {"rotation", 4 * swing}, {"lateral_bending", -2 * std::sin(2 * kPi * t)}};
-    angles["thorax"] = {{"rotation", 5 * swing}};
-    angles["neck"] = {{"rotation", -2 * swing}};
-    angles["head"] = {{"rotation", -2 * swing}};
+    angles["thoracolumbar"] = {{"rotation", 5 * swing}};
+    angles["cervicothoracic"] = {{"rotation", -2 * swing}};
+    angles["atlantooccipital"] = {{"rotation", -2 * swing}};
     // Lowest in double support, shifted over the standing leg.
     add_frame(truth, angles, rest + Vec3(12 * std::sin(2 * kPi * t), 0, -16 - 12 * std::cos(4 * kPi * t)),
               clip);
@@ -123,10 +123,10 @@ Clip make_bend(const Skeleton& truth) {
     const double look = std::sin(2 * kPi * frame / frames);
     Angles angles;
     angles["pelvis"] = {{"tilt", 22 * u}};
-    angles["lumbar"] = {{"flexion", 34 * u}};
-    angles["thorax"] = {{"flexion", 18 * u}, {"rotation", 6 * look}};
-    angles["neck"] = {{"flexion", -8 * u}, {"rotation", 18 * look}};
-    angles["head"] = {{"flexion", -6 * u}, {"rotation", 22 * look}};
+    angles["lumbosacral"] = {{"flexion", 34 * u}};
+    angles["thoracolumbar"] = {{"flexion", 18 * u}, {"rotation", 6 * look}};
+    angles["cervicothoracic"] = {{"flexion", -8 * u}, {"rotation", 18 * look}};
+    angles["atlantooccipital"] = {{"flexion", -6 * u}, {"rotation", 22 * look}};
     for (const std::string end : {"_left", "_right"}) {
       angles["hip" + end] = {{"flexion", 46 * u}};
       angles["knee" + end] = {{"flexion", 40 * u}};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual skeleton of the phantom: 21 segments, anatomical angles, normal ranges.
+// The virtual skeleton of the phantom: 21 segments with the names of the `human` template, whose jaw it
+// lacks; anatomical angles, normal ranges.
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
@@ -100,16 +101,17 @@ void add_arm(Builder& build, const Landmarks& at, bool left) {
   const Eigen::Matrix3d upper = frame_xz(at.elbow_axis, at.shoulder - at.elbow),
                         fore = frame_xz(at.elbow_axis, at.elbow - at.wrist);
 
-  build.add("shoulder_girdle" + end, "spine_thoracic", "sternoclavicular" + end, JointKind::ball,
-            point(at.sternoclavicular), Eigen::Matrix3d::Identity(),
+  build.add("girdle" + end, "thorax", "sternoclavicular" + end, JointKind::ball, point(at.sternoclavicular),
+            Eigen::Matrix3d::Identity(),
             {{"axial_rotation", 0, -1, -10, 45},
              {"depression", 1, side, -45, 10},
              {"protraction", 2, -side, -30, 30}},
             {alias + "Shoulder", small + "Shoulder", small + "Clavicle"});
   Joint& shoulder = build.add(
-      "upper_arm" + end, "shoulder_girdle" + end, "shoulder" + end, JointKind::ball, point(at.shoulder),
-      frame(upper),
-      {{"flexion", 0, -1, -60, 180}, {"adduction", 1, side, -88, 45}, {"rotation", 2, -side, -90, 90}},
+      "upper_arm" + end, "girdle" + end, "shoulder" + end, JointKind::ball, point(at.shoulder), frame(upper),
+      // Of an arm's 180 degrees of elevation 120 are the shoulder's, the others the girdle's (Inman et al.
+      // 1944).
+      {{"flexion", 0, -1, -60, 180}, {"adduction", 1, side, -120, 45}, {"rotation", 2, -side, -90, 90}},
       {alias + "Arm", small + "UpperArm"});
   rest_from_axes(shoulder);
   build.by_sphere(shoulder, "humerus" + end, "scapula" + end);
@@ -176,11 +178,11 @@ Skeleton make_skeleton(const Landmarks& at, bool patient) {
     angle.max = std::numeric_limits<double>::infinity();
   }
   root.limits_source.clear();
-  trunk("spine_lumbar", "pelvis", "lumbar", at.lumbar, 60, 25, 10, {"LowerBack"});
-  trunk("spine_thoracic", "spine_lumbar", "thorax", at.thorax, 40, 25, 35,
+  trunk("lumbar", "pelvis", "lumbosacral", at.lumbar, 60, 25, 10, {"LowerBack"});
+  trunk("thorax", "lumbar", "thoracolumbar", at.thorax, 40, 25, 35,
         {"Spine1", "Spine", "chest", "upperChest"});
-  trunk("neck", "spine_thoracic", "neck", at.neck, 40, 30, 45, {"Neck", "Neck1"});
-  trunk("head", "neck", "head", at.head, 30, 15, 45, {"Head"});
+  trunk("neck", "thorax", "cervicothoracic", at.neck, 40, 30, 45, {"Neck", "Neck1"});
+  trunk("head", "neck", "atlantooccipital", at.head, 30, 15, 45, {"Head"});
   for (const bool left : {true, false}) {
     add_arm(build, at, left);
     add_leg(build, at, left);

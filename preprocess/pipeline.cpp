@@ -14,17 +14,22 @@
 #include "core/model_file/model_file.hpp"
 #include "preprocess/bounds.hpp"
 #include "preprocess/cache/kept_stage.hpp"
+#include "preprocess/check/joints.hpp"
+#include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/cor/centres.hpp"
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/provenance.hpp"
 #include "preprocess/rig/fit_rig.hpp"
+#include "preprocess/tet/default_size.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/relax_slivers.hpp"
+#include "preprocess/tet/short_edges.hpp"
 #include "preprocess/thin/attach_by_weights.hpp"
 #include "preprocess/thin/body_spheres.hpp"
 #include "preprocess/thin/thinning.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 #include "preprocess/weights/harmonic.hpp"
+#include "preprocess/weights/rigid_bones.hpp"
 
 namespace ecorche::preprocess {
 namespace {
@@ -107,6 +112,13 @@ std::string describe(const tet::SliverReport& slivers) {
   return line.str();
 }
 
+std::string describe(const tet::ShortEdges& edges) {
+  std::ostringstream line;
+  line << edges.before << " edges were too short for single precision, the shortest " << edges.shortest_mm
+       << " mm, " << edges.after << " still are; the shortest is " << edges.then_mm << " mm now";
+  return line.str();
+}
+
 template <class T>
 void check_range(std::string_view option, T value, const Options::Range<T>& range) {
   if (value >= range.low && value <= range.high) return;  // false for NaN
@@ -119,7 +131,7 @@ void check_range(std::string_view option, T value, const Options::Range<T>& rang
 // Before anything slow starts.
 void check_options(const Options& options) {
   if (options.voxel_mm != 0) check_range("--voxel", options.voxel_mm, Options::voxel_range);
-  check_range("--max-tets", options.max_tets, Options::tets_range);
+  if (options.max_tets != 0) check_range("--max-tets", options.max_tets, Options::tets_range);
   check_range("--max-nodes", options.max_nodes, Options::nodes_range);
   check_range("--cor-sigma", options.cor_sigma, Options::sigma_range);
   constexpr Options::Range<double> tp_range{thin::least_thinness, thin::most_thinness};
@@ -213,10 +225,30 @@ std::vector<ModelVolume> gather_volumes(const Case& patient) {
   return volumes;
 }
 
+void warn_of_contacts(const Case& patient, const Model& model, const Context& context) {
+  const double cube = check::cube_mm(model.nodes, model.tets);
+  std::string line;
+  for (const check::Touch& touch : check::touching_limbs(model))
+    line += (line.empty() ? "" : "; ") + check::said(touch, model.rig.skeleton);
+  if (!line.empty()) context.warn(line + " (" + check::parting_advice(cube) + ")");
+  if (!patient.labels || !patient.labels->apart) return;
+  const double gap = patient.labels->apart->gap_mm;
+  if (gap >= 1.5 * cube) return;
+  std::ostringstream out;
+  out.precision(3);
+  out << patient.labels->apart->where << ".gap_mm: " << gap
+      << " mm are less than one and a half of the tets' cubes of " << cube
+      << " mm, which bridge it (a gap of " << 1.5 * cube << " mm, or --max-tets "
+      << std::llround(
+             std::ceil(static_cast<double>(model.tet_count()) * std::pow(1.5 * cube / gap, 3) / 1e5) * 1e5)
+      << ", keeps limbs apart)";
+  context.warn(out.str());
+}
+
 // The members that only the solver knows go first; `measure` copies them.
 Certificate certify(const Model& model, const Context& context) {
   const Certificate certificate = measure(model, context);
-  const std::vector<std::string> broken = broken_bounds(certificate);
+  const std::vector<std::string> broken = broken_bounds(certificate, body_size(model));
   if (!broken.empty()) {
     std::string what = "the model breaks its bounds: " + broken[0];
     for (std::size_t i = 1; i < std::min<std::size_t>(broken.size(), 3); ++i) what += "; " + broken[i];
@@ -258,8 +290,10 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   Stages stage(stage_names(options), context, hooks, result.stages);
 
   model.name = patient.name;
+  check::refuse(check::size_findings(patient));
   model.rig = stage.kept([&](const Context& inner) { return rig::fit(patient, inner); }, patient,
                          RigRequest{patient});
+  check::refuse(check::joint_findings(patient, model.rig, context));
   model.bone_segment = owners(patient, model.rig.skeleton);
   for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);
 
@@ -279,18 +313,26 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
         *labels, model_file::rig_digest(model.rig), *options.spheres_tp));
   }
 
-  std::optional<TetMesh> mesh = stage.kept(
+  const std::int64_t max_tets =
+      options.max_tets != 0 ? options.max_tets : tet::default_tets(patient, *labels);
+  if (options.max_tets == 0)
+    context.info("at most " + std::to_string(max_tets) +
+                 " tets, after the case's vertices and voxels (--max-tets)");
+  std::optional<weights::RigidBones> made = stage.kept(
       [&](const Context& inner) {
         tet::Options o;
-        o.max_tets = options.max_tets;
+        o.max_tets = max_tets;
         o.max_nodes = options.max_nodes;
-        TetMesh made = mesher->mesh({patient, *labels}, o, inner);
-        const tet::SliverReport slivers = tet::relax_slivers(made, {}, inner);
+        TetMesh mesh = mesher->mesh({patient, *labels}, o, inner);
+        const tet::SliverReport slivers = tet::relax_slivers(mesh, {}, inner);
         if (slivers.before > 0) inner.info(describe(slivers));
-        tet::canonicalize(made);
-        return made;
+        const tet::ShortEdges edges = tet::lengthen_short_edges(mesh);
+        if (edges.before > 0) inner.info(describe(edges));
+        tet::canonicalize(mesh);
+        return weights::rigid_bones(std::move(mesh), patient, model.bone_segment, inner);
       },
-      patient, *labels, mesher_name, options.max_tets, options.max_nodes);
+      patient, *labels, model.bone_segment, mesher_name, max_tets, options.max_nodes);
+  TetMesh* const mesh = &made->mesh;
   labels.reset();  // each value goes when its last reader is done
 
   std::string solver_name;
@@ -316,7 +358,8 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   model.nodes = mesh->V.cast<float>();
   model.tets = std::move(mesh->T);
   model.tet_label = std::move(mesh->label);
-  mesh.reset();
+  model.contested = std::move(made->contested);
+  made.reset();
   for (VolumetricSkeleton& spheres : model.spheres) {
     if (options.spheres_by == "weights") spheres.segment = thin::attach_by_weights(spheres, model, context);
   }
@@ -332,12 +375,15 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
       [&](const Context& inner) { return bind_tissues(std::move(tissues), model, voxel_mm, inner); }, tissues,
       model.nodes, model.tets, voxel_mm);
   model.volumes = gather_volumes(patient);
-  model.provenance = provenance(patient, options, mesher_name, solver_name, voxel_mm);
+  Options used = options;
+  used.max_tets = max_tets;
+  model.provenance = provenance(patient, used, mesher_name, solver_name, voxel_mm);
   model.certificate = showing_worst_tets(
       hooks, [&] { return stage([&] { return certify(model, context); }); },
       [&] {
         return TetMesh{model.nodes.cast<double>(), model.tets, model.tet_label};
       });
+  warn_of_contacts(patient, model, context);
   return result;
 }
 

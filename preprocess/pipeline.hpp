@@ -22,16 +22,16 @@ struct Options {
   struct Range {
     T low, high;
   };
-  static constexpr Range<double> voxel_range{0.05, 50};  ///< mm, or 0
+  static constexpr Range<double> voxel_range{1e-3, 500};  ///< mm, or 0
   static constexpr Range<std::int64_t> tets_range{1'000,
                                                   100'000'000};  ///< grids of int32 tets hold 2^31 / 4 nodes
   static constexpr Range<std::int64_t> nodes_range{500, 25'000'000};
   static constexpr Range<double> sigma_range{1e-3,
                                              0.0999};  ///< 0 < sigma < 0.1; the tables grow as 1 / sigma
 
-  std::string mesher;                 ///< empty: the build's default
-  double voxel_mm = 0;                ///< 0: the finest that voxel::Options allow
-  std::int64_t max_tets = 3'500'000;  ///< half as many again as Sujar18's largest mesh
+  std::string mesher;         ///< empty: the build's default
+  double voxel_mm = 0;        ///< 0: the finest that voxel::Options allow
+  std::int64_t max_tets = 0;  ///< 0: as many as the case is worth (tet/default_size.hpp)
   std::int64_t max_nodes = 800'000;
   std::string solver = "auto";
   std::string weights = "harmonic";  ///< or `quasi-harmonic`: smoother at bones (weights/conductivity.hpp)
@@ -73,9 +73,9 @@ struct Hooks {
 Result run(const Case& patient, const Options& options, const Context& context, const Hooks& hooks = {});
 
 /// Certificate of a model, measured on what is stored; members that only the solver knows are copied from
-/// `model`. `outside` counts the vertices that are more than 1e-3 mm from the tet to which they are bound,
-/// which is their nearest. The probe pose of the bones turns every joint by 0.6 rad about (1, 2, 3), all at
-/// once, and shifts the root by 0.2 m.
+/// `model`. `outside` counts the vertices that are more than 6e-7 of the body's length (0.001 mm of a
+/// man), or two grains of float32, from the tet to which they are bound, which is their nearest. The probe
+/// pose of the bones turns every joint by 0.6 rad about (1, 2, 3), all at once, and shifts the root by 0.2 m.
 Certificate measure(const Model& model, const Context& context);
 
 /// Largest resident memory of this process so far, MiB (VmHWM of Linux; 0 where that cannot be read).

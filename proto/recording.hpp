@@ -28,8 +28,8 @@ struct RecordedSession {
 };
 
 /// The whole file, trusting nothing. invalid_argument for what is no recording or breaks its order, names a
-/// subscription or pose that was not told, or counts wrong; data_loss for one that was cut; unimplemented for
-/// a newer version.
+/// subscription or pose that was not told, or counts wrong; data_loss for one that was cut, of which `out`
+/// then holds what is whole; unimplemented for a newer version.
 Status read_recording(std::span<const std::byte> file, RecordedSession& out);
 
 /// XXH64, as in RecordedFrame.

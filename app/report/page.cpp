@@ -44,7 +44,7 @@ std::string number(double value) {
 
 std::string header(const Model& model) {
   const Certificate& c = model.certificate;
-  const bool good = preprocess::broken_bounds(c).empty();
+  const bool good = preprocess::broken_bounds(c, preprocess::body_size(model)).empty();
   return "<h1>" + escaped(model.name) + "</h1>\n" +
          text("<p>%zu tets, %zu nodes, %zu segments, %zu bones, %zu tissues of %llu vertices.<br>",
               model.tet_count(), model.node_count(), model.segment_count(), model.bone_names.size(),
@@ -54,9 +54,9 @@ std::string header(const Model& model) {
          " For training and education, not for planning surgery.</p>\n";
 }
 
-std::string certificate(const Certificate& c) {
+std::string certificate(const Certificate& c, const preprocess::BodySize& size) {
   std::string out = "<h2>Certificate</h2>\n<table><tr><th>figure<th class=n>value<th>bound<th>because</tr>\n";
-  for (const preprocess::JudgedFigure& figure : preprocess::judge(c)) {
+  for (const preprocess::JudgedFigure& figure : preprocess::judge(c, size)) {
     out += text("<tr><td>%s<td class='n%s'>%s<td>", escaped(figure.figure).c_str(), figure.kept ? "" : " bad",
                 number(figure.value).c_str());
     if (figure.bound != nullptr) {
@@ -75,8 +75,9 @@ std::string slices(const Model& model) {
       "segments, mixed by their weights; bone is paler; a thin line parts where another segment weighs most."
       "</p>\n<div class=row>\n";
   const Box box = box_of(model);
-  out += picture(slice(model, View::coronal().of(box.low, box.high, kBodyPixels), kGround),
-                 "through the middle, from the front");
+  const View front = View::coronal().of(box.low, box.high, kBodyPixels);
+  out += picture(slice(model, front, kGround, depth_of_bones(model, front)),
+                 "at the bones' depth, from the front: the patient's left is on the right");
   out += picture(slice(model, View::sagittal().of(box.low, box.high, kBodyPixels), kGround),
                  "through the middle, from the left");
   for (const double share : {0.85, 0.55, 0.28}) {
@@ -166,10 +167,12 @@ std::string warned(const Model& model, const std::vector<std::string>& warnings)
 }
 
 std::string provenance(const Model& model) {
-  std::string out = "<h2>Provenance</h2>\n<table>\n";
+  // Folded: a row for every file of the case.
+  std::string out = "<h2>Provenance</h2>\n<details><summary>" + std::to_string(model.provenance.size()) +
+                    " rows: versions, options and digests of every input</summary>\n<table>\n";
   for (const auto& [key, value] : model.provenance)
     out += "<tr><td>" + escaped(key) + "<td>" + escaped(value) + "</tr>\n";
-  return out + "</table>\n";
+  return out + "</table></details>\n";
 }
 
 }  // namespace
@@ -179,8 +182,9 @@ std::string page(const Input& input) {
   return "<!doctype html>\n<html lang=en><meta charset=utf-8><meta name=viewport "
          "content='width=device-width'>\n<title>" +
          escaped(model.name) + ": how it was prepared</title>\n<style>" + kStyle + "</style>\n<body>\n" +
-         header(model) + certificate(model.certificate) + slices(model) + rig(model) + histograms(model) +
-         warned(model, input.warnings) + times(input.stages) + provenance(model) + "</body></html>\n";
+         header(model) + certificate(model.certificate, preprocess::body_size(model)) + slices(model) +
+         rig(model) + histograms(model) + warned(model, input.warnings) + times(input.stages) +
+         provenance(model) + "</body></html>\n";
 }
 
 }  // namespace ecorche::app::report

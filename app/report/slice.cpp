@@ -50,10 +50,41 @@ class Mixer {
 }  // namespace
 
 Picture slice(const Model& model, const View& view, const Colour& ground) {
+  return slice(model, view, ground, std::vector<double>(static_cast<std::size_t>(view.height), 0));
+}
+
+std::vector<double> depth_of_bones(const Model& model, const View& view) {
+  const auto rows = static_cast<std::size_t>(view.height);
+  std::vector<double> sum(rows, 0), count(rows, 0);
+  for (Eigen::Index t = 0; t < model.tets.rows(); ++t) {
+    if (model.tet_label[static_cast<std::size_t>(t)] == TetMesh::soft) continue;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (int c = 0; c < 4; ++c) centre += model.nodes.row(model.tets(t, c)).transpose().cast<double>() / 4;
+    const auto row =
+        static_cast<std::size_t>(std::clamp<long>(std::lround(view.y(centre)), 0, view.height - 1));
+    sum[row] += (centre - view.centre).dot(view.toward);
+    count[row] += 1;
+  }
+  // Each row takes the mean over its neighbourhood, which grows until there is bone in it.
+  std::vector<double> depth(rows, 0);
+  for (std::size_t row = 0; row < rows; ++row) {
+    double s = 0, n = 0;
+    for (std::size_t reach = 8; n == 0 && reach < 2 * rows; reach *= 2) {
+      s = n = 0;
+      for (std::size_t r = row - std::min(row, reach); r < std::min(rows, row + reach + 1); ++r)
+        s += sum[r], n += count[r];
+    }
+    if (n > 0) depth[row] = s / n;
+  }
+  return depth;
+}
+
+Picture slice(const Model& model, const View& view, const Colour& ground, const std::vector<double>& depths) {
   Picture picture(view.width, view.height, ground);
   std::vector<Sample> sample(picture.pixels.size());
   Mixer mixer(model);
-  const double plane = view.centre.dot(view.toward);
+  const auto [nearest, farthest] = std::minmax_element(depths.begin(), depths.end());
+  const double plane = view.centre.dot(view.toward), first = plane + *nearest, last = plane + *farthest;
   for (Eigen::Index t = 0; t < model.tets.rows(); ++t) {
     Eigen::Matrix<double, 3, 4> corner;
     Eigen::Vector4d depth;
@@ -61,7 +92,7 @@ Picture slice(const Model& model, const View& view, const Colour& ground) {
       corner.col(c) = model.nodes.row(model.tets(t, c)).transpose().cast<double>();
       depth[c] = corner.col(c).dot(view.toward);
     }
-    if (depth.minCoeff() > plane || depth.maxCoeff() < plane) continue;
+    if (depth.minCoeff() > last || depth.maxCoeff() < first) continue;
     Eigen::Matrix3d edges;
     for (int c = 0; c < 3; ++c) edges.col(c) = corner.col(c + 1) - corner.col(0);
     const Eigen::Matrix3d inverse = edges.inverse();
@@ -75,8 +106,9 @@ Picture slice(const Model& model, const View& view, const Colour& ground) {
     const int top = std::max(0, static_cast<int>(std::ceil(ys.minCoeff())));
     const int bottom = std::min(view.height - 1, static_cast<int>(std::floor(ys.maxCoeff())));
     for (int row = top; row <= bottom; ++row) {
+      const Eigen::Vector3d before = depths[static_cast<std::size_t>(row)] * view.toward;
       for (int column = left; column <= right; ++column) {
-        const Eigen::Vector3d b = inverse * (view.point(column, row) - corner.col(0));
+        const Eigen::Vector3d b = inverse * (view.point(column, row) + before - corner.col(0));
         const Eigen::Vector4d barycentric(1 - b.sum(), b[0], b[1], b[2]);
         if (barycentric.minCoeff() < -kEdge) continue;
         Sample& here = sample[static_cast<std::size_t>(row * view.width + column)];

@@ -16,6 +16,7 @@
 #include <set>
 #include <sstream>
 
+#include "bench/server/attacks.hpp"
 #include "bench/server/crowd.hpp"
 #include "bench/server/deltas.hpp"
 #include "bench/server/peers.hpp"
@@ -265,6 +266,7 @@ int run(const Settings& settings) {
         settings, "1000 that send a byte a second",
         [](const Served& s) { return dripping_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
   }
+  if (chosen("attacks")) attacks(settings.program, settings.model, settings.seconds);
   if (chosen("volume")) volume(settings);
   if (chosen("wire")) same_frame(settings.program, settings.model, settings.peers, settings.seconds);
   if (chosen("region")) region(settings);
@@ -287,10 +289,10 @@ int main(int argc, char** argv) {
     for (std::string row; std::getline(rows, row, ',');) settings.only.insert(row);
   }
   if (words.size() < 2) {
-    std::fprintf(
-        stderr,
-        "usage: bench_server ECORCHE MODEL.hdf [--seconds 30] [--soak-minutes 30] [--only ROW,...]\n"
-        "rows: ready deltas body f32 organ posers observers stalled idle dripping volume wire region soak\n");
+    std::fprintf(stderr,
+                 "usage: bench_server ECORCHE MODEL.hdf [--seconds 30] [--soak-minutes 30] [--only ROW,...]\n"
+                 "rows: ready deltas body f32 organ posers observers stalled idle dripping attacks volume "
+                 "wire region soak\n");
     return 64;
   }
   settings.program = words[0];

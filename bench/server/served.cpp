@@ -50,8 +50,8 @@ Served::Served(const std::string& program, const std::string& model, const std::
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  std::ifstream(port_file_) >> address_.port;
-  address_.host = "127.0.0.1";
+  std::ifstream(port_file_) >> address_.port >> http_.port;
+  address_.host = http_.host = "127.0.0.1";
 }
 
 Served::~Served() {

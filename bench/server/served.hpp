@@ -21,6 +21,8 @@ class Served {
   Served& operator=(const Served&) = delete;
 
   const wire::Address& address() const { return address_; }
+  /// Of --http, where that is among the options.
+  const wire::Address& http() const { return http_; }
   double rss_mib() const;
   std::size_t descriptors() const;
   /// Seconds of processor time so far.
@@ -29,7 +31,7 @@ class Served {
  private:
   pid_t pid_ = -1;
   std::string port_file_;
-  wire::Address address_;
+  wire::Address address_, http_;
 };
 
 }  // namespace ecorche::bench

@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether `file` is `.PID.part.NAME`, of a NAME that is meant, and no process has that number.
+/// Whether `file` is `.PID.RANDOM.part.NAME` (or, as written before, `.PID.part.NAME`), of a NAME that is
+/// meant, and no process has that number.
 template <class Meant>
 bool is_stale(std::string_view file, const Meant& meant) {
   constexpr std::string_view mark = ".part.";
@@ -25,32 +26,40 @@ bool is_stale(std::string_view file, const Meant& meant) {
   const auto [rest, error] = std::from_chars(file.data() + 1, end, process);
   if (error != std::errc() || process <= 0) return false;
   std::string_view own(rest, static_cast<std::size_t>(end - rest));
+  constexpr std::size_t digits = 16;
+  if (own.size() > digits + 1 && own.front() == '.' &&
+      own.substr(1, digits).find_first_not_of("0123456789abcdef") == own.npos)
+    own.remove_prefix(digits + 1);
   if (!own.starts_with(mark)) return false;
   own.remove_prefix(mark.size());
   return meant(own) && ::kill(process, 0) != 0 && errno == ESRCH;
 }
 
 template <class Meant>
-void remove(const fs::path& folder, const Meant& meant) {
+void remove(const fs::path& folder, fs::file_type type, const Meant& meant) {
   std::error_code error;
   std::vector<fs::path> stale;
   fs::directory_iterator at(folder, error);
   for (; !error && at != fs::directory_iterator(); at.increment(error)) {
-    if (is_stale(at->path().filename().string(), meant) && at->is_regular_file(error))
+    if (is_stale(at->path().filename().string(), meant) && at->symlink_status(error).type() == type)
       stale.push_back(at->path());
     error.clear();
   }
-  for (const fs::path& path : stale) fs::remove(path, error);
+  for (const fs::path& path : stale) fs::remove_all(path, error);
 }
 
 }  // namespace
 
 void remove_stale_parts(const fs::path& folder, std::string_view name) {
-  remove(folder, [&](std::string_view own) { return own == name; });
+  remove(folder, fs::file_type::regular, [&](std::string_view own) { return own == name; });
 }
 
 void remove_stale_parts_ending(const fs::path& folder, std::string_view ending) {
-  remove(folder, [&](std::string_view own) { return own.ends_with(ending); });
+  remove(folder, fs::file_type::regular, [&](std::string_view own) { return own.ends_with(ending); });
+}
+
+void remove_stale_folders(const fs::path& folder, std::string_view name) {
+  remove(folder, fs::file_type::directory, [&](std::string_view own) { return own == name; });
 }
 
 }  // namespace ecorche::files

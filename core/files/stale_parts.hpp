@@ -14,4 +14,7 @@ void remove_stale_parts(const std::filesystem::path& folder, std::string_view na
 /// The same for all names that end so.
 void remove_stale_parts_ending(const std::filesystem::path& folder, std::string_view ending);
 
+/// The same for the folders of StagedFolder, with all that is in them.
+void remove_stale_folders(const std::filesystem::path& folder, std::string_view name);
+
 }  // namespace ecorche::files

@@ -17,6 +17,20 @@ using Eigen::Vector3d;
 constexpr double kContact = 25;  // mm
 constexpr double kFloorShare = 0.05;
 
+constexpr double kBeyond = 0.5 / 57.29577951308232;  // radians: half a degree less is printed as none
+
+// What the limits of a joint took away. A hinge also drops all turns that it cannot make, which are no
+// limit's: of those the one about its own axis counts alone.
+double taken(const Joint& joint, const Quaterniond& asked, const Quaterniond& now, double removed) {
+  const bool follows = std::any_of(joint.coupled.begin(), joint.coupled.end(),
+                                   [](const Coupling& by) { return by.slides() < 0; });
+  if (joint.kind != JointKind::hinge || joint.sequence.empty() || follows) return removed;
+  const Vector3d axis = Vector3d::Unit(joint.sequence[0].axis);
+  const Vector3d along = axis * asked.vec().dot(axis);
+  const Quaterniond about(asked.w(), along.x(), along.y(), along.z());
+  return about.norm() > 0 ? about.normalized().angularDistance(now) : removed;
+}
+
 std::vector<std::size_t> feet(const Skeleton& skeleton) {
   std::vector<std::size_t> out;
   for (std::size_t s = 0; s < skeleton.segments.size(); ++s) {
@@ -48,14 +62,19 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
   };
   for (std::size_t frame = 0; frame < frames; ++frame) {
     Pose now = pose(frame);
+    const Pose asked = now;
     clamped.clear();
     constrain(rig.skeleton, now, clamped);
     for (const ClampedJoint& c : clamped) {
-      LimitViolation& limit = limits[static_cast<std::size_t>(c.joint)];
+      const auto j = static_cast<std::size_t>(c.joint);
+      LimitViolation& limit = limits[j];
+      const double removed =
+          taken(rig.skeleton.segments[j].joint, asked.rotation[j], now.rotation[j], c.removed);
+      if (removed < kBeyond) continue;
       ++limit.share;
-      limit.mean += c.removed;
-      if (c.removed > limit.worst) limit.worst_frame = frame;
-      limit.worst = std::max(limit.worst, c.removed);
+      limit.mean += removed;
+      if (removed > limit.worst) limit.worst_frame = frame;
+      limit.worst = std::max(limit.worst, removed);
     }
     forward(rig, now, motion);
     for (std::size_t f = 0; f < foot.size(); ++f) heights[f].push_back(static_cast<float>(place(f).z()));

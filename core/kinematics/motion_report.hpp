@@ -21,7 +21,8 @@ struct FootSliding {
   double worst_mm_per_s = 0;  ///< of one step
 };
 
-/// What the limits of one joint would take away.
+/// What the limits of one joint would take away; half a degree counts, less does not. Of a hinge only what is
+/// about its own axis: it has no limits for turns that it cannot make.
 struct LimitViolation {
   std::string joint;
   double share = 0;  ///< of the frames

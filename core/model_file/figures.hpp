@@ -12,6 +12,9 @@ namespace ecorche::model_file {
 template <class C, class F>
 void for_each_figure(C& certificate, F&& f) {
   f(std::string_view("solver_residual"), certificate.solver_residual);
+  f(std::string_view("first_violation"), certificate.first_violation);
+  f(std::string_view("mended_nodes"), certificate.mended_nodes);
+  f(std::string_view("mended_largest_change"), certificate.mended_largest_change);
   f(std::string_view("solved_min_weight"), certificate.solved_min_weight);
   f(std::string_view("solved_max_weight"), certificate.solved_max_weight);
   f(std::string_view("solved_row_sum_error"), certificate.solved_row_sum_error);
@@ -24,10 +27,16 @@ void for_each_figure(C& certificate, F&& f) {
   f(std::string_view("max_dihedral_deg"), certificate.max_dihedral_deg);
   f(std::string_view("inverted_tets"), certificate.inverted_tets);
   f(std::string_view("degenerate_tets"), certificate.degenerate_tets);
+  f(std::string_view("min_edge_mm"), certificate.min_edge_mm);
   f(std::string_view("positive_offdiagonal_share"), certificate.positive_offdiagonal_share);
   f(std::string_view("tissue_vertices"), certificate.tissue_vertices);
   f(std::string_view("outside_vertices"), certificate.outside_vertices);
   f(std::string_view("max_outside_mm"), certificate.max_outside_mm);
+  f(std::string_view("bone_tets"), certificate.bone_tets);
+  f(std::string_view("contested_tets"), certificate.contested_tets);
+  f(std::string_view("contested_share"), certificate.contested_share);
+  f(std::string_view("least_bone_share"), certificate.least_bone_share);
+  f(std::string_view("bone_tet_change"), certificate.bone_tet_change);
   f(std::string_view("bone_rigidity_mm"), certificate.bone_rigidity_mm);
 }
 

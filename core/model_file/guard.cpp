@@ -37,7 +37,9 @@ class Guard {
   explicit Guard(const std::filesystem::path& path) : found_{InputFile(path), {}, {}} {
     std::array<unsigned char, 8> magic{};
     if (found_.file.size() >= magic.size()) found_.file.read(0, std::as_writable_bytes(std::span(magic)));
-    if (magic != kMagic) refuse("", "is not an HDF5 file");
+    if (magic != kMagic)
+      refuse("", "is not an HDF5 file",
+             "a model is what ecorche preprocess writes; copy it again if this was one");
   }
 
   Catalogue run() && {
@@ -87,6 +89,7 @@ class Guard {
                  ", this program reads " + std::to_string(format_major) + ".x",
              "preprocess again");
     }
+    found_.minor = format[1];
   }
 
   // The contents page first, itself two datasets: paths, and the XXH64 of what they name.

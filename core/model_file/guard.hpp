@@ -52,6 +52,7 @@ struct Catalogue {
   InputFile file;
   std::map<std::string, StoredDataset> datasets;  ///< by absolute path
   std::set<std::string> groups;                   ///< looked into, by absolute path
+  std::int32_t minor = 0;                         ///< of the format
 };
 
 /// Opens what the table of digests lists, and nothing else: the table is the file's contents page, so that no

@@ -191,6 +191,25 @@ class Checker {
     for (std::size_t t = 0; t < model_.tet_label.size(); ++t) {
       require_row(model_.tet_label[t] <= bones, "/VTKHDF/CellData/label", "names no bone", t);
     }
+    check_contested();
+  }
+  // Only where there are any: models made before there were have their tets in another order.
+  void check_contested() const {
+    const std::size_t count = model_.contested.size(), tets = model_.tet_label.size();
+    if (count == 0) return;
+    const std::string_view at = "/ecorche/labels/contested";
+    const auto first =
+        static_cast<std::size_t>(std::find(model_.tet_label.begin(), model_.tet_label.end(), TetMesh::soft) -
+                                 model_.tet_label.begin());
+    require(count <= tets - first, at, "has more rows than there are soft tets");
+    for (std::size_t t = first; t < tets; ++t) {
+      require_row(model_.tet_label[t] == TetMesh::soft, "/VTKHDF/CellData/label",
+                  "is of a bone behind a soft one, although tets are contested", t);
+    }
+    for (std::size_t t = 0; t < count; ++t) {
+      const std::uint16_t label = model_.contested[t];
+      require_row(label != TetMesh::soft && label <= model_.bone_names.size(), at, "names no bone", t);
+    }
   }
   bool is_segment(std::int32_t row) const {
     return row >= 0 && static_cast<std::size_t>(row) < model_.segment_count();

@@ -34,6 +34,7 @@ void add_mesh(Layout& out, const Model& model) {
   out.view<std::uint16_t>("/VTKHDF/CellData/label", model.tet_label, {model.tet_label.size()});
   out.texts("/ecorche/labels/bone", model.bone_names);
   out.copy("/ecorche/labels/segment", model.bone_segment);
+  out.view<std::uint16_t>("/ecorche/labels/contested", model.contested, {model.contested.size()});
 }
 
 void add_segments(Layout& out, const std::vector<Segment>& segments) {

@@ -12,7 +12,7 @@
 namespace ecorche::model_file {
 
 inline constexpr int format_major = 1;
-inline constexpr int format_minor = 1;
+inline constexpr int format_minor = 2;
 
 /// Writes `model` to a temporary name beside `path`, flushes it to the disk and renames it; on failure or a
 /// stop nothing is left and an older file of that name stays whole. `path` must end in `.hdf` (ParaView asks

@@ -270,18 +270,32 @@ void read_arrays(const Source& source, Model& model) {
   run_as_in_turn(parts);
 }
 
+// What older versions did not write.
+bool lacks(const Source& source, const std::string& path) {
+  return source.catalogue().minor < format_minor && !source.catalogue().datasets.contains(path);
+}
+
+// Older models lack some of the figures: no number stands for a measure of theirs, so that it keeps no bound.
+void read_certificate(const Source& source, Certificate& certificate) {
+  for_each_figure(certificate, [&](std::string_view name, auto& value) {
+    using Figure = std::decay_t<decltype(value)>;
+    const std::string path = "/ecorche/quality/" + std::string(name);
+    value = lacks(source, path) ? std::numeric_limits<Figure>::quiet_NaN() : source.scalar<Figure>(path);
+  });
+}
+
 Model read_model(const Source& source) {
   Model model;
   model.name = source.text("/ecorche/name");
   model.rig = read_rig(source);
   model.bone_names = source.texts("/ecorche/labels/bone");
   model.bone_segment = source.vector<std::int32_t>("/ecorche/labels/segment");
+  if (!lacks(source, "/ecorche/labels/contested"))
+    model.contested = source.vector<std::uint16_t>("/ecorche/labels/contested");
   model.cor.sigma = source.scalar<double>("/ecorche/cor/sigma");
   read_arrays(source, model);
   check_vtk(source, model);
-  for_each_figure(model.certificate, [&](std::string_view name, auto& value) {
-    value = source.scalar<std::decay_t<decltype(value)>>("/ecorche/quality/" + std::string(name));
-  });
+  read_certificate(source, model.certificate);
   const auto keys = source.texts("/ecorche/provenance/key");
   const auto values = source.texts("/ecorche/provenance/value", {keys.size()});
   for (std::size_t i = 0; i < keys.size(); ++i) {

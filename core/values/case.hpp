@@ -82,7 +82,8 @@ struct CaseLabels {
 struct Case {
   std::string name;
   Skeleton skeleton;
-  std::vector<Region> regions = {};  ///< that the joints' rules name
+  std::vector<Region> regions = {};   ///< that the joints' rules name
+  std::optional<BodySize> size = {};  ///< as the skeleton's file bounds it
   bool generic = false;  ///< no skeleton was given: `skeleton` lists the segments, and proximity joins them
   std::string skin_name = "skin";
   SurfaceMesh skin;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -39,6 +40,9 @@ struct RegionUse {
   /// Of those that face another, only the ones whose normal is within 60 degrees of this direction, LPS;
   /// zero: all.
   Eigen::Vector3d looks = Eigen::Vector3d::Zero();
+  /// Of those that face another, the axis of a cylinder through them is within 60 degrees of this direction
+  /// of that bone's end (as `Region::along`); zero: any.
+  Eigen::Vector3d along = Eigen::Vector3d::Zero();
 };
 
 /// A point of the body.
@@ -67,6 +71,32 @@ struct DirectionSource {
   std::vector<DirectionSource> choices;
 };
 
+/// What anatomy allows at a joint; no bound by default.
+struct JointBounds {
+  struct Range {
+    double least = -std::numeric_limits<double>::infinity();
+    double most = std::numeric_limits<double>::infinity();
+    bool holds(double x) const { return x >= least && x <= most; }
+    bool any() const {
+      return !(least > -std::numeric_limits<double>::infinity()) &&
+             !(most < std::numeric_limits<double>::infinity());
+    }
+  };
+  Range radius_mm;      ///< of a sphere that the centre is found on
+  Range axis_to_shaft;  ///< radians, 0 to pi: from the parent bone's shaft, pointing up, to a hinge's axis
+  std::vector<std::pair<std::string, Range>> rest;  ///< radians, by angle: as a body can be scanned
+  std::string source;
+
+  bool none() const { return radius_mm.any() && axis_to_shaft.any() && rest.empty() && source.empty(); }
+};
+
+/// How long a body can be: its skin's longest extent, mm.
+struct BodySize {
+  double least = 0, most = 0;  ///< of any part of a body
+  double whole = 0;            ///< the least of one that has bones in three of four segments
+  std::string source;
+};
+
 struct JointRule {
   PointSource center;
   /// Axis (0 x, 1 y, 2 z) and where it comes from: the first keeps its direction, the second is made
@@ -74,6 +104,7 @@ struct JointRule {
   std::vector<std::pair<int, DirectionSource>> axes;
   /// The rest angles are those from the parent's axes to this joint's, instead of `AngleAxis::rest`.
   bool measured_rest = false;
+  JointBounds possible;  ///< what is found outside of these is not used
 };
 
 /// As skeleton files, `info` and `verify` name a rule.

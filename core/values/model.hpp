@@ -58,6 +58,10 @@ struct ModelVolume {
 struct Certificate {
   // As solved, in double precision, before repair.
   double solver_residual = 0;  ///< largest relative residual over the right-hand sides
+  double first_violation =
+      0;  ///< how far the equation's own solution leaves [0, 1], before any tie is mended
+  std::uint64_t mended_nodes = 0;    ///< nodes whose ties were mended, and all was solved again
+  double mended_largest_change = 0;  ///< of any weight by that
   double solved_min_weight = 0;
   double solved_max_weight = 0;
   double solved_row_sum_error = 0;
@@ -71,22 +75,34 @@ struct Certificate {
   double min_dihedral_deg = 0;
   double max_dihedral_deg = 0;
   std::uint64_t inverted_tets = 0;
-  std::uint64_t degenerate_tets = 0;
+  std::uint64_t degenerate_tets = 0;  ///< flat, or with an edge that float32 hardly resolves
+  double min_edge_mm = 0;
   double positive_offdiagonal_share = 0;
   // The tissues.
   std::uint64_t tissue_vertices = 0;
   std::uint64_t outside_vertices = 0;
   double max_outside_mm = 0;
-  // The bones: largest residual, mm, of the best rigid fit of any bone mesh in the probe pose.
+  // The bones: their tets and those that two segments contested; then the largest residual, mm, of the best
+  // rigid fit of any bone mesh in the probe pose.
+  std::uint64_t bone_tets = 0;
+  std::uint64_t contested_tets = 0;
+  double contested_share = 0;   ///< of the volume of both
+  double least_bone_share = 0;  ///< of its volume that a bone keeps in tets of its own
+  double bone_tet_change =
+      0;  ///< largest, of an edge or the volume of a bone tet in the probe pose, as a share
   double bone_rigidity_mm = 0;
 };
 
 struct Model {
   std::string name;
   Rig rig;
-  PointsF nodes;                           ///< #nodes by 3, rest, LPS mm, Morton order
-  Tets tets;                               ///< #T by 4, positive volume in the float32 nodes
-  std::vector<std::uint16_t> tet_label;    ///< #T, see TetMesh
+  PointsF nodes;                         ///< #nodes by 3, rest, LPS mm, Morton order
+  Tets tets;                             ///< #T by 4, positive volume in the float32 nodes
+  std::vector<std::uint16_t> tet_label;  ///< #T, see TetMesh; tets of bones come first
+  /// Of the soft tets that follow those of bones, in that order: the label of the bone that each lies in. A
+  /// corner of it belongs to another segment's bone, so that it cannot move rigidly with its own; drawn, it
+  /// does (runtime/volume/drawn_tets.hpp).
+  std::vector<std::uint16_t> contested;
   std::vector<std::string> bone_names;     ///< bone i has label i + 1
   std::vector<std::int32_t> bone_segment;  ///< #bones, row of the owning segment
   Weights weights;

@@ -13,6 +13,7 @@
 #include "io/case/label_sources.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_reader.hpp"
+#include "io/image/dicom.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 
@@ -31,8 +32,9 @@ constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment"
                                                      "root", "labels", "side",    "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
                                                        "root", "labels", "side",  "within", "close_mm"};
-constexpr std::array<std::string_view, 4> kVolumeKeys{"name", "file", "background", "root"};
-constexpr std::array<std::string_view, 5> kLabelKeys{"file", "table", "root", "mid_plane_mm", "apart"};
+constexpr std::array<std::string_view, 5> kVolumeKeys{"name", "file", "background", "root", "form"};
+constexpr std::array<std::string_view, 6> kLabelKeys{"file", "table",        "root",
+                                                     "form", "mid_plane_mm", "apart"};
 constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
 
 Eigen::Matrix3d parse_axes(const Value& value) {
@@ -53,7 +55,11 @@ double parse_unit(const Value& value) {
 class CaseReader {
  public:
   CaseReader(const fs::path& file, const CaseOptions& options, const Context& context)
-      : folder_(file.parent_path()), options_(options), context_(context), root_(Value::read(file)) {
+      : folder_(file.parent_path()),
+        options_(options),
+        context_(context),
+        reading_{options.limits, [this](std::string_view line) { context_.warn(line); }},
+        root_(Value::read(file)) {
     root_.allow(kCaseKeys);
     digest(file, file.filename().string());
   }
@@ -68,9 +74,10 @@ class CaseReader {
     if (labels) read_labels(*labels);
     std::optional<double> mid_plane;
     if (const auto plane = labels ? labels->find("mid_plane_mm") : std::nullopt) mid_plane = plane->number();
-    sources_.emplace(
-        out_.labels ? &*out_.labels : nullptr, mid_plane,
-        [this](const Value& entry, const Value& file) { return read_image(locate(entry, file)); });
+    sources_.emplace(out_.labels ? &*out_.labels : nullptr, mid_plane,
+                     [this](const Value& entry, const Value& file) {
+                       return read_label_image(locate(entry, file), reading_, read_form(entry));
+                     });
     if (labels && !root_.find("skin")) {
       names_.emplace(out_.skin_name, labels->where());
       out_.skin_source = sources_->everything(*labels);
@@ -139,6 +146,7 @@ class CaseReader {
     fs::path path = base / file.text();
     std::error_code ignored;
     if (!fs::is_regular_file(path, ignored)) {
+      if (is_dicom(path)) refuse_dicom(path);
       throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");
     }
     digest(path, file.text());
@@ -170,6 +178,7 @@ class CaseReader {
     PlacedSkeleton placed = in_file ? parse_skeleton(Value::read(locate(entry, file)), frame_)
                                     : parse_skeleton(Value::parse(*text, file.text() + ".yaml"), Frame{});
     out_.skeleton = std::move(placed.skeleton);
+    out_.size = placed.size;
     for (const Segment& segment : out_.skeleton.segments) segments_.push_back(segment.name);
     return placed;
   }
@@ -200,7 +209,7 @@ class CaseReader {
     const Value file = is_map ? entry.at("file") : entry;
     const auto axes = is_map ? entry.find("frame") : std::nullopt;
     const auto unit = is_map ? entry.find("unit") : std::nullopt;
-    TaggedSurface surface = read_tagged_surface(locate(entry, file));
+    TaggedSurface surface = read_tagged_surface(locate(entry, file), options_.limits);
     const auto tagged = surface.space ? axes_from_code(*surface.space) : std::nullopt;
     Frame frame = frame_;
     if (axes) frame.axes = parse_axes(*axes);
@@ -308,21 +317,22 @@ class CaseReader {
         name.fail("another volume is named '" + volume.name + "'", "give it another name");
     }
     if (const auto background = entry.find("background")) volume.background = background->number();
-    volume.image = read_image(locate(entry, entry.at("file")));
+    volume.image = read_image(locate(entry, entry.at("file")), reading_, read_form(entry));
     out_.volumes.push_back(std::move(volume));
     step();
   }
 
   void read_labels(const Value& entry) {
     entry.allow(kLabelKeys);
-    out_.labels =
-        read_label_map(entry, [this](const Value& e, const Value& file) { return locate(e, file); });
+    out_.labels = read_label_map(
+        entry, [this](const Value& e, const Value& file) { return locate(e, file); }, reading_);
     step();
   }
 
   fs::path folder_;
   const CaseOptions& options_;
   const Context& context_;
+  files::ReadOptions reading_;
   Value root_;
   Frame frame_;
   bool frame_given_ = false;
@@ -338,6 +348,12 @@ class CaseReader {
 Case read_case(const fs::path& path, const CaseOptions& options, const Context& context) {
   std::error_code ignored;
   const fs::path file = fs::is_directory(path, ignored) ? path / "case.yaml" : path;
+  const std::string ending = file.extension().string();
+  if (ending != ".yaml" && ending != ".yml" && fs::is_regular_file(file, ignored)) {
+    throw Error(
+        ErrorKind::usage, path.string(), "is no case",
+        "give a case.yaml, or the folder that holds one; surfaces and images are named in it (docs/case.md)");
+  }
   return CaseReader(file, options, context).read();
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 
+#include "core/files/budget.hpp"
 #include "core/values/case.hpp"
 #include "core/values/context.hpp"
 #include "core/values/pose.hpp"
@@ -14,8 +15,9 @@
 namespace ecorche::io {
 
 struct CaseOptions {
-  std::filesystem::path data;  ///< what `root: data` paths resolve against
-  std::string frame;           ///< overrides the case's `frame` where not empty
+  std::filesystem::path data;     ///< what `root: data` paths resolve against
+  std::string frame;              ///< overrides the case's `frame` where not empty
+  files::ReadLimits limits = {};  ///< of what one of its files may take
 };
 
 /// Reads a case: `path` is a `case.yaml` or the folder that holds one. Surfaces and images come in LPS mm.
@@ -27,7 +29,7 @@ void write_case(const std::filesystem::path& folder, const Case& patient, const 
 
 /// A skeleton file; `where` names it in messages.
 Skeleton read_skeleton(const std::filesystem::path& path);
-std::string skeleton_to_yaml(const Skeleton& skeleton);
+std::string skeleton_to_yaml(const Skeleton& skeleton, const std::optional<BodySize>& size = {});
 
 /// A pose file, in the names of `rig`: rotations or anatomical angles. Unknown joints and angles are refused.
 Pose read_pose(const std::filesystem::path& path, const Rig& rig);

@@ -24,7 +24,8 @@ class CaseWriter {
 
   void write() {
     files::make_folder(folder_);
-    if (!patient_.generic) files::write_text(folder_ / "skeleton.yaml", skeleton_to_yaml(patient_.skeleton));
+    if (!patient_.generic)
+      files::write_text(folder_ / "skeleton.yaml", skeleton_to_yaml(patient_.skeleton, patient_.size));
     yaml_ = "name: " + write_text(patient_.name) +
             "\nframe: LPS\nunit: mm\nskeleton: " + (patient_.generic ? "generic" : "skeleton.yaml") + "\n";
     surface("skin.stl", patient_.skin);

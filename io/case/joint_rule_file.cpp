@@ -57,6 +57,11 @@ RegionUse RuleReader::use(const Value& value) const {
   word("facing", use.facing, named_.bones);
   word("segment", use.segment, named_.segments);
   word("facing_segment", use.facing_segment, named_.segments);
+  if (const auto along = value.find("along")) {
+    use.along = direction_of(*along, frame_);
+    if (use.facing_segment.empty())
+      along->fail("is for vertices that face another segment", "name that segment");
+  }
   const int ways = int{!use.region.empty()} + int{!use.bone.empty()} + int{!use.segment.empty()};
   if (ways != 1) value.fail("names " + std::to_string(ways) + " places", "name one region, bone or segment");
   if ((!use.facing.empty() && use.bone.empty()) || (!use.facing_segment.empty() && use.segment.empty()))

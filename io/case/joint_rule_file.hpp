@@ -46,6 +46,14 @@ class RuleReader {
 std::string point_to_yaml(const PointSource& source);
 std::string axes_to_yaml(const std::vector<std::pair<int, DirectionSource>>& axes);
 
+/// What is possible at a joint with these angles (docs/case.md), and the size of a body.
+JointBounds read_bounds(const yaml::Value& value, const std::vector<AngleAxis>& sequence);
+BodySize read_size(const yaml::Value& value);
+
+/// As `read_bounds` and `read_size` read them back.
+std::string bounds_to_yaml(const JointBounds& bounds);
+std::string size_to_yaml(const BodySize& size);
+
 /// The regions under `value`, a map of names. `vertices` of a region are rows of its bone's surface: they are
 /// kept in `PlacedRegion` until the bones are read.
 struct PlacedRegion {

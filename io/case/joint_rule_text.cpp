@@ -21,6 +21,7 @@ std::string use_to_yaml(const RegionUse& use) {
     if (!part.empty()) out += (out.empty() ? "" : ", ") + part;
   }
   if (!use.looks.isZero()) out += ", looks: " + write_vector(use.looks);
+  if (!use.along.isZero()) out += ", along: " + write_vector(use.along);
   return "{" + out + "}";
 }
 

@@ -37,12 +37,20 @@ LabelNames read_table(const Value& entry, const Value& table, const Locate& loca
 
 }  // namespace
 
-CaseLabels read_label_map(const Value& entry, const Locate& locate) {
+NiftiForm read_form(const Value& entry) {
+  const auto form = entry.find("form");
+  if (!form) return NiftiForm::either;
+  if (form->text() == "qform") return NiftiForm::qform;
+  if (form->text() == "sform") return NiftiForm::sform;
+  form->fail("'" + form->text() + "' is no form of a NIfTI", "write qform or sform");
+}
+
+CaseLabels read_label_map(const Value& entry, const Locate& locate, const files::ReadOptions& options) {
   CaseLabels labels;
   const auto table = entry.find("table");
   if (table) labels.table = read_table(entry, *table, locate);
   const Value file = entry.at("file");
-  Segmentation read = read_segmentation(locate(entry, file));
+  Segmentation read = read_segmentation(locate(entry, file), options, read_form(entry));
   if (!table) {
     if (read.names.empty())
       entry.fail("lacks 'table', and its file names no segments",

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <functional>
 
+#include "core/files/read_options.hpp"
 #include "core/values/case.hpp"
 #include "io/case/yaml_reader.hpp"
+#include "io/image/nifti_form.hpp"
 
 namespace ecorche::io {
 
@@ -15,6 +17,9 @@ using Locate = std::function<std::filesystem::path(const yaml::Value& entry, con
 
 /// Reads `{file, table}`: the table is a map of ids to names, a file that `read_label_table` reads, or
 /// absent, and then the image's own (`.seg.nrrd`). Throws Error{config}, Error{missing_input} or Error{data}.
-CaseLabels read_label_map(const yaml::Value& entry, const Locate& locate);
+CaseLabels read_label_map(const yaml::Value& entry, const Locate& locate, const files::ReadOptions& options);
+
+/// What an entry with an image says under `form`: qform, sform, or nothing.
+NiftiForm read_form(const yaml::Value& entry);
 
 }  // namespace ecorche::io

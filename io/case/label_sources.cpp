@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "io/image/label_table.hpp"
+
 namespace ecorche::io {
 namespace {
 
@@ -13,7 +15,7 @@ using yaml::Value;
 
 constexpr std::size_t kMostIds = 65536;
 constexpr double kWidestGap = 100;  // mm; wider ones fill the space between the legs
-constexpr std::array<std::string_view, 3> kWithinKeys{"file", "ids", "root"};
+constexpr std::array<std::string_view, 4> kWithinKeys{"file", "ids", "root", "form"};
 constexpr std::array<std::string_view, 2> kApartKeys{"gap_mm", "limbs"};
 constexpr std::array<std::string_view, 3> kLimbsKeys{"labels", "segments", "joints"};
 constexpr std::array<std::string_view, 4> kRestKeys{"labels", "except", "group", "groups"};
@@ -68,6 +70,17 @@ std::string identifier_of(const std::string& name) {
   }
   while (!out.empty() && out.back() == '_') out.pop_back();
   return out.empty() ? "label" : out;
+}
+
+// The name of the table that `word` means: itself, else the one that is the same identifier, as names out of
+// a table's file become one (`vertebrae_S1` stands there, and is `vertebrae_s1`). Empty: none, or several.
+std::string named(const std::string& word, const std::vector<std::string>& names) {
+  if (std::find(names.begin(), names.end(), word) != names.end()) return word;
+  std::set<std::string> alike;
+  for (const std::string& name : names) {
+    if (identifier_from(name) == identifier_from(word)) alike.insert(name);
+  }
+  return alike.size() == 1 && !identifier_from(word).empty() ? *alike.begin() : std::string();
 }
 
 // The segment that `name` is; refuses the root, and what hangs on one of `taken`, or they on it.
@@ -144,11 +157,12 @@ void LabelSources::add_ids(const Value& value, std::vector<std::int64_t>& ids) c
     ids.push_back(*id);
   } else {
     std::vector<std::string> names;
+    for (const auto& [number, name] : labels_->table) names.push_back(name);
+    const std::string meant = named(word, names);
+    if (meant.empty()) value.fail_unknown("label", word, names);
     for (const auto& [number, name] : labels_->table) {
-      if (name == word) ids.push_back(number);
-      names.push_back(name);
+      if (name == meant) ids.push_back(number);
     }
-    if (std::find(names.begin(), names.end(), word) == names.end()) value.fail_unknown("label", word, names);
   }
 }
 
@@ -203,8 +217,7 @@ void LabelSources::read_within(const Value& within, LabelSource& source) {
                             [&](const Within& other) { return other.file == file.text(); });
   if (known == withins_.end()) {
     auto image = std::make_shared<const Image>(read_image_(within, file));
-    if (image->type == ScalarType::f32 || image->type == ScalarType::f64 || image->components != 1)
-      file.fail("its voxels are not one whole number each", "use a label map");
+    if (image->components != 1) file.fail("its voxels are not one whole number each", "use a label map");
     if (!same_place(image->grid, labels_->image.grid)) {
       file.fail("its voxels are not those of the label map: " + described(image->grid) + ", not " +
                     described(labels_->image.grid),

@@ -97,7 +97,8 @@ Pose parse_pose(const Value& file, const Rig& rig) {
     if (row < 0) {
       std::vector<std::string> known;
       for (const Segment& segment : skeleton.segments) known.push_back(segment.joint.name);
-      value.fail_unknown("joint", joint, known);
+      value.fail_unknown("joint", joint, known,
+                         "a segment without bones in the case is left out with its joint");
     }
     if (row == 0 && root_turned) value.fail("the root is turned twice", "keep root: {rotation: ...} or this");
     read_joint(value, skeleton.segments[static_cast<std::size_t>(row)].joint, static_cast<std::size_t>(row),

@@ -49,7 +49,7 @@ void keep_rule(JointRule rule, Joint& joint) {
     joint.facing_bone = center.on.facing;
   }
   const bool said = center.rule == CenterRule::given || two_bones;
-  if (!said || !rule.axes.empty() || rule.measured_rest)
+  if (!said || !rule.axes.empty() || rule.measured_rest || !rule.possible.none())
     joint.how = std::make_shared<const JointRule>(std::move(rule));
 }
 
@@ -166,6 +166,7 @@ Joint read_joint(const Value& value, const Frame& frame, NamedInRules& named, co
   }
   if (const auto limits = value.find("limits_deg")) read_limits(*limits, joint);
   if (!rule.measured_rest) check_rest(value, joint);
+  if (const auto possible = value.find("possible")) rule.possible = read_bounds(*possible, joint.sequence);
   keep_rule(std::move(rule), joint);
   return joint;
 }
@@ -290,6 +291,7 @@ PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
   PlacedSkeleton placed;
   Skeleton& skeleton = placed.skeleton;
   skeleton.name = root.at("name").text();
+  if (const auto size = root.find("size_mm")) placed.size = read_size(*size);
   const Value map = root.at("segments");
   const Named segments = map.pairs();
   if (segments.empty()) map.fail("is empty", "a skeleton has at least a root");

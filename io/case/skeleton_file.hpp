@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,14 +16,18 @@ namespace ecorche::io {
 
 // What the reader accepts; docs/skeleton.schema.json lists the same (a test compares them).
 namespace skeleton_keys {
-inline constexpr std::array<std::string_view, 4> file{"ecorche_skeleton", "name", "segments", "regions"};
+inline constexpr std::array<std::string_view, 5> file{"ecorche_skeleton", "name", "size_mm", "segments",
+                                                      "regions"};
+inline constexpr std::array<std::string_view, 4> size{"least", "whole", "most", "source"};
 inline constexpr std::array<std::string_view, 3> segment{"parent", "joint", "aliases"};
-inline constexpr std::array<std::string_view, 8> joint{"name",     "kind",     "center",     "axes",
-                                                       "sequence", "rest_deg", "limits_deg", "coupled"};
+inline constexpr std::array<std::string_view, 9> joint{
+    "name", "kind", "center", "axes", "sequence", "rest_deg", "limits_deg", "coupled", "possible"};
+inline constexpr std::array<std::string_view, 4> possible{"radius_mm", "axis_to_shaft_deg", "rest_deg",
+                                                          "source"};
 inline constexpr std::array<std::string_view, 9> center{
     "sphere_fit", "cylinder_fit", "plane_fit", "ellipse_fit", "centroid", "between", "at", "joint", "any"};
-inline constexpr std::array<std::string_view, 6> use{"region",  "bone",           "facing",
-                                                     "segment", "facing_segment", "looks"};
+inline constexpr std::array<std::string_view, 7> use{"region",         "bone",  "facing", "segment",
+                                                     "facing_segment", "looks", "along"};
 inline constexpr std::array<std::string_view, 8> direction{
     "cylinder_fit", "plane_fit", "ellipse_fit", "towards", "from", "to", "axis_of", "any"};
 inline constexpr std::array<std::string_view, 8> region{"bone", "segment", "boxes",    "of",
@@ -37,6 +42,7 @@ struct PlacedSkeleton {
   Skeleton skeleton;
   std::vector<PlacedRegion> regions;
   NamedInRules named;
+  std::optional<BodySize> size;
 };
 
 /// `frame` applies to explicit centres and axes, and to regions.

@@ -63,6 +63,8 @@ std::string joint_to_yaml(const Joint& joint) {
     const bool limited = std::isfinite(angle.min) || std::isfinite(angle.max);
     return limited ? "[" + bound(angle.min) + ", " + bound(angle.max) + "]" : "";
   });
+  if (joint.how && !joint.how->possible.none())
+    out += "      possible: " + bounds_to_yaml(joint.how->possible) + "\n";
   if (!joint.coupled.empty()) out += "      coupled:\n";
   for (const Coupling& coupling : joint.coupled) {
     out += "        - {joint: " + write_text(coupling.joint) + ", angle: " + write_text(coupling.angle) +
@@ -74,8 +76,10 @@ std::string joint_to_yaml(const Joint& joint) {
 
 }  // namespace
 
-std::string skeleton_to_yaml(const Skeleton& skeleton) {
-  std::string out = "ecorche_skeleton: 1\nname: " + write_text(skeleton.name) + "\nsegments:\n";
+std::string skeleton_to_yaml(const Skeleton& skeleton, const std::optional<BodySize>& size) {
+  std::string out = "ecorche_skeleton: 1\nname: " + write_text(skeleton.name) + "\n";
+  if (size) out += "size_mm: " + size_to_yaml(*size) + "\n";
+  out += "segments:\n";
   for (const Segment& segment : skeleton.segments) {
     out += "  " + write_text(segment.name) + ":\n";
     if (segment.parent >= 0) {

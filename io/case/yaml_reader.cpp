@@ -104,8 +104,8 @@ void Value::fail(std::string what, std::string mend) const {
   throw Error(ErrorKind::config, where(), std::move(what), std::move(mend));
 }
 
-void Value::fail_unknown(std::string_view what, std::string_view word,
-                         std::span<const std::string> known) const {
+void Value::fail_unknown(std::string_view what, std::string_view word, std::span<const std::string> known,
+                         std::string_view why) const {
   std::string mend;
   if (const std::string near = nearest(word, known); !near.empty()) {
     mend = "did you mean '" + near + "'?";
@@ -115,6 +115,7 @@ void Value::fail_unknown(std::string_view what, std::string_view word,
     mend = "use ";
     for (std::size_t i = 0; i < known.size() && i < 24; ++i) mend += (i ? ", " : "") + known[i];
     if (known.size() > 24) mend += ", ...";
+    if (!why.empty()) mend += "; " + std::string(why);
   }
   fail("unknown " + std::string(what) + " " + shown(word), mend);
 }

@@ -71,9 +71,10 @@ class Value {
   }
 
   [[noreturn]] void fail(std::string what, std::string mend) const;
-  /// Fails for an unknown word among `known`: suggests the nearest, or lists them.
+  /// Fails for an unknown word among `known`: suggests the nearest, or lists them, with why it may be
+  /// missing.
   [[noreturn]] void fail_unknown(std::string_view what, std::string_view word,
-                                 std::span<const std::string> known) const;
+                                 std::span<const std::string> known, std::string_view why = {}) const;
 
  private:
   struct Document;

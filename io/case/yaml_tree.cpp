@@ -85,7 +85,8 @@ class TreeBuilder final : public YAML::EventHandler {
   }
   Node& add(Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
     check(mark, anchor);
-    if (awaits_key()) fail(mark, "a key that is no plain word", "keys are words");
+    if (awaits_key())
+      fail(mark, "a key that is no plain word", "keys are words; is a { or [ before this line not closed?");
     Node* node = &root_;
     bool under_key = false;
     if (!open_.empty()) {

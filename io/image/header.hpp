@@ -13,7 +13,9 @@
 #include <string_view>
 #include <vector>
 
+#include "core/files/budget.hpp"
 #include "core/values/image.hpp"
+#include "io/image/nifti_form.hpp"
 
 namespace ecorche::io {
 
@@ -24,7 +26,9 @@ inline constexpr std::uint64_t largest_inflation = 1100;
 
 struct ImageHeader {
   std::array<std::int32_t, 3> size{0, 0, 0};
-  ScalarType type = ScalarType::u8;
+  ScalarType type = ScalarType::u8;  ///< as it is read
+  bool wide = false;                 ///< stored as i64, of which `type` is i32
+  bool wide_unsigned = false;        ///< as u64
   int components = 1;
   bool gzip = false;
   std::filesystem::path data_file;  ///< the file itself, or a plain name beside it
@@ -43,6 +47,8 @@ struct ImageHeader {
   bool scaled = false;          ///< stored integers become real values: slope * stored + intercept
   double slope = 1, intercept = 0;
 
+  /// Bytes of one scalar as stored.
+  std::size_t stored_bytes() const { return wide ? 8 : scalar_bytes(type); }
   /// Bytes of all voxels as stored; the parsers keep it at most `largest_image_bytes`.
   std::uint64_t voxel_bytes() const;
 };
@@ -63,14 +69,15 @@ std::string read_head(const std::filesystem::path& path);
 ImageHeader parse_meta_header(std::string_view head, const std::filesystem::path& path);
 
 /// The header of a `.nii`; of a `.nii.gz`, `head` is inflated already. Beyond what cannot be read anywhere
-/// here, it refuses an image that does not say where it lies (neither qform nor sform).
-ImageHeader parse_nifti_header(std::string_view head, const std::filesystem::path& path);
+/// here, it refuses an image that does not say where it lies (neither qform nor sform), or says it in two
+/// ways.
+ImageHeader parse_nifti_header(std::string_view head, const std::filesystem::path& path, NiftiForm form);
 
 /// Makes `data_offset` the byte where the voxels or their stream begin: behind skipped lines, before the end.
 void place_data(ImageHeader& header);
 
 /// Fills `image`, whose grid and type are set, from the file that `header` was read from and that
-/// `check_payload` has passed. Throws Error{io}.
+/// `check_payload` has passed. Throws Error{io}, and Error{data} for 64-bit integers beyond 32 bits.
 void read_voxels(const ImageHeader& header, const std::filesystem::path& path, Image& image);
 
 /// The voxels of a checked file as they are stored. Throws Error{io}.
@@ -81,8 +88,9 @@ std::vector<std::byte> stored_voxels(const ImageHeader& header, const std::files
 std::string inflate_head(std::string_view packed, std::size_t limit, const std::filesystem::path& path);
 
 /// Holds the declared bytes against the data file: its length where raw, its whole inflated stream where gzip
-/// (counted without storing it, so that a lying header costs nothing). Throws
-/// Error{data}.
-void check_payload(const ImageHeader& header, const std::filesystem::path& path);
+/// (counted without storing it, so that a lying header costs nothing); and all that they take in memory
+/// against the budget of a file of that size. Throws Error{data}.
+void check_payload(const ImageHeader& header, const std::filesystem::path& path,
+                   const files::ReadLimits& limits);
 
 }  // namespace ecorche::io

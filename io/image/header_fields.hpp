@@ -66,10 +66,17 @@ inline std::filesystem::path beside(const std::filesystem::path& path, std::stri
   return path.parent_path() / name;
 }
 
+/// Voxels are integers of 64 bits.
+inline void set_wide(ImageHeader& header, bool is_unsigned) {
+  header.type = ScalarType::i32;
+  header.wide = true;
+  header.wide_unsigned = is_unsigned;
+}
+
 /// Refuses what does not fit `largest_image_bytes`; sizes are at least 1 each.
 inline void check_size(const ImageHeader& header, const std::filesystem::path& path) {
   // Each factor is below 2^31 and the product is checked as it grows: it cannot overflow.
-  std::uint64_t bytes = scalar_bytes(header.type);
+  std::uint64_t bytes = header.stored_bytes();
   for (const std::int64_t factor : {std::int64_t{header.components}, std::int64_t{header.size[0]},
                                     std::int64_t{header.size[1]}, std::int64_t{header.size[2]}}) {
     bytes *= static_cast<std::uint64_t>(factor);

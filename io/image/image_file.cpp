@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image/image_file.hpp"
 
-#include <Eigen/Core>
-#include <Eigen/SVD>
 #include <cmath>
 #include <fstream>
 
 #include "core/files/atomic_file.hpp"
 #include "core/values/error.hpp"
+#include "io/image/dicom.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/itk_images.hpp"
+#include "io/image/non_finite.hpp"
+#include "io/image/right_angles.hpp"
+#include "io/image/whole_labels.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -18,21 +20,21 @@ namespace {
 using fields::refuse;
 using itk_images::Format;
 using Path = std::filesystem::path;
-using Direction = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 constexpr std::size_t kLargestHeader = std::size_t{1} << 20;
+constexpr double kItkDegrees = 1e-6;  // what float32 rounds
 
 bool ends_with(const Path& path, std::string_view ending) {
   return fields::lower(path.filename().string()).ends_with(ending);
 }
 
 // A `.nii`, or a `.nii.gz` whose stream holds one.
-ImageHeader parse_nifti(const std::string& head, const Path& path) {
+ImageHeader parse_nifti(const std::string& head, const Path& path, NiftiForm form) {
   if (!ends_with(path, ".gz")) {
     if (head.starts_with("\x1f\x8b")) refuse(path, "is packed by gzip", "name it .nii.gz");
-    return parse_nifti_header(head, path);
+    return parse_nifti_header(head, path, form);
   }
-  ImageHeader header = parse_nifti_header(inflate_head(head, 4096, path), path);
+  ImageHeader header = parse_nifti_header(inflate_head(head, 4096, path), path, form);
   header.gzip = true;
   header.stream_offset = header.data_offset;
   header.data_offset = 0;
@@ -57,7 +59,7 @@ void check_agreement(const ImageHeader& declared, const Image& seen, const Path&
   refuse(path, "its header can be read in two ways", "write the image again");
 }
 
-void check_grid(ImageGrid& grid, const Path& path) {
+void check_grid(ImageGrid& grid, const Path& path, const files::ReadOptions& options) {
   for (const double spacing : grid.spacing) {
     if (!(spacing > 0 && spacing < 1e6))
       refuse(path, "its spacing is " + std::to_string(spacing), "it must be positive, mm");
@@ -66,17 +68,51 @@ void check_grid(ImageGrid& grid, const Path& path) {
     if (!(std::abs(origin) < 1e9))
       refuse(path, "its origin is " + std::to_string(origin), "it must be finite, mm");
   }
-  Eigen::Map<Direction> direction(grid.direction.data());
-  const double skew = (direction.transpose() * direction - Direction::Identity()).cwiseAbs().maxCoeff();
-  if (!(skew <= 1e-3)) {
-    refuse(path, "its axes are not orthonormal: off by " + std::to_string(skew),
-           "resample it onto a right-angled grid");
+  make_right_angled(grid, path, options);
+}
+
+// ITK's second opinion; where the axes of the file are a little off, which it refuses, there is none.
+Image opinion(const ImageHeader& declared, const Path& path, Format format, bool skewed) {
+  if (declared.second_version) return as_declared(declared);
+  try {
+    return itk_images::read_header(path, format);
+  } catch (const Error&) {
+    if (!skewed) throw;
+    return as_declared(declared);
   }
-  // Headers round to a few digits; everybody inverts by transposing.
-  if (skew > 1e-12) {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    direction = svd.matrixU() * svd.matrixV().transpose();
+}
+
+// As the file has it.
+Image read_stored(const Path& path, const files::ReadOptions& options, NiftiForm form) {
+  refuse_dicom(path);
+  Format format = Format::nrrd;
+  if (ends_with(path, ".mha") || ends_with(path, ".mhd")) {
+    format = Format::meta;
+  } else if (ends_with(path, ".nii") || ends_with(path, ".nii.gz")) {
+    format = Format::nifti;
+  } else if (!ends_with(path, ".nrrd") && !ends_with(path, ".nhdr")) {
+    refuse(path, "'" + path.extension().string() + "' images cannot be read",
+           "convert it to .nrrd, .mha or .nii.gz");
   }
+  if (form != NiftiForm::either && format != Format::nifti)
+    refuse(path, "has neither qform nor sform: it is no NIfTI", "leave out form");
+  const std::string head = read_head(path);
+  ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
+                         : format == Format::meta ? parse_meta_header(head, path)
+                                                  : parse_nifti(head, path, form);
+  const bool skewed = declared.grid && degrees_off(*declared.grid) > kItkDegrees;
+  if (declared.grid) check_grid(*declared.grid, path, options);
+  place_data(declared);
+  check_payload(declared, path, options.limits);
+  Image image = opinion(declared, path, format, skewed);
+  check_agreement(declared, image, path);
+  if (declared.grid) {
+    image.grid = *declared.grid;
+  } else {
+    check_grid(image.grid, path, options);
+  }
+  read_voxels(declared, path, image);
+  return image;
 }
 
 }  // namespace
@@ -92,28 +128,14 @@ std::string read_head(const Path& path) {
   return head;
 }
 
-Image read_image(const Path& path) {
-  Format format = Format::nrrd;
-  if (ends_with(path, ".mha") || ends_with(path, ".mhd")) {
-    format = Format::meta;
-  } else if (ends_with(path, ".nii") || ends_with(path, ".nii.gz")) {
-    format = Format::nifti;
-  } else if (!ends_with(path, ".nrrd") && !ends_with(path, ".nhdr")) {
-    refuse(path, "'" + path.extension().string() + "' images cannot be read",
-           "convert it to .nrrd, .mha or .nii.gz");
-  }
-  const std::string head = read_head(path);
-  ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
-                         : format == Format::meta ? parse_meta_header(head, path)
-                                                  : parse_nifti(head, path);
-  place_data(declared);
-  check_payload(declared, path);
-  Image image = declared.second_version ? as_declared(declared) : itk_images::read_header(path, format);
-  check_agreement(declared, image, path);
-  if (declared.grid) image.grid = *declared.grid;
-  check_grid(image.grid, path);
-  read_voxels(declared, path, image);
+Image read_image(const Path& path, const files::ReadOptions& options, NiftiForm form) {
+  Image image = read_stored(path, options, form);
+  replace_non_finite(image, path, options);
   return image;
+}
+
+Image read_label_image(const Path& path, const files::ReadOptions& options, NiftiForm form) {
+  return whole_labels(read_stored(path, options, form), path);
 }
 
 void write_image(const Path& path, const Image& image, bool compress) {

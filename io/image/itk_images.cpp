@@ -20,7 +20,6 @@ using Component = itk::IOComponentEnum;
 
 // The image format objects themselves: no reader templates, no pixel conversion, no factories.
 itk::ImageIOBase::Pointer make(Format format, const std::filesystem::path& path) {
-  itk::Object::SetGlobalWarningDisplay(false);  // would go to stderr
   itk::ImageIOBase::Pointer io;
   switch (format) {
     case Format::nrrd:
@@ -37,15 +36,22 @@ itk::ImageIOBase::Pointer make(Format format, const std::filesystem::path& path)
   return io;
 }
 
-// MetaIO and teem write their complaints on std::cerr: kept here instead. Nothing of ours writes there.
+// MetaIO and teem write their complaints on std::cerr, and so does ITK: kept here instead, until the call is
+// over. Nothing of ours writes there.
 class Complaints {
  public:
-  Complaints() : before_(std::cerr.rdbuf(&text_)) {}
-  ~Complaints() { std::cerr.rdbuf(before_); }
+  Complaints() : shown_(itk::Object::GetGlobalWarningDisplay()), before_(std::cerr.rdbuf(&text_)) {
+    itk::Object::SetGlobalWarningDisplay(false);
+  }
+  ~Complaints() {
+    std::cerr.rdbuf(before_);
+    itk::Object::SetGlobalWarningDisplay(shown_);
+  }
   Complaints(const Complaints&) = delete;
   Complaints& operator=(const Complaints&) = delete;
 
  private:
+  bool shown_;
   std::stringbuf text_;
   std::streambuf* before_;
 };
@@ -89,6 +95,10 @@ ScalarType scalar_type(Component component, const std::filesystem::path& path) {
     case Component::UINT:
       return ScalarType::u32;
     case Component::INT:
+    case Component::LONG:  // of 64 bits, as LONGLONG: handed on as i32
+    case Component::LONGLONG:
+    case Component::ULONG:
+    case Component::ULONGLONG:
       return ScalarType::i32;
     case Component::FLOAT:
       return ScalarType::f32;

@@ -140,7 +140,9 @@ class TableReader {
   std::map<std::int64_t, std::string> names_;
 };
 
-std::string identifier(std::string_view name) {
+}  // namespace
+
+std::string identifier_from(std::string_view name) {
   std::string out;
   for (const char c : fields::lower(name)) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
@@ -155,13 +157,11 @@ std::string identifier(std::string_view name) {
   return out;
 }
 
-}  // namespace
-
 LabelNames make_identifiers(const std::map<std::int64_t, std::string>& names) {
   LabelNames out;
   std::set<std::string> taken;
   for (const auto& [id, name] : names) {
-    std::string made = identifier(name);
+    std::string made = identifier_from(name);
     const std::string number =
         (id < 0 ? "minus_" : "") + std::to_string(id < 0 ? -(id + 1) + 1ULL : static_cast<std::uint64_t>(id));
     if (made.empty()) made = "label_" + number;

@@ -9,20 +9,23 @@ namespace ecorche::io {
 namespace {
 
 using fields::refuse;
+using fields::set_wide;
 using Path = std::filesystem::path;
 using Fields = std::map<std::string, std::string, std::less<>>;
 
-ScalarType type_from(const std::string& name, const Path& path) {
+void set_type(ImageHeader& header, const std::string& name, const Path& path) {
   static const std::map<std::string, ScalarType, std::less<>> types{
       {"MET_CHAR", ScalarType::i8},    {"MET_UCHAR", ScalarType::u8},  {"MET_SHORT", ScalarType::i16},
       {"MET_USHORT", ScalarType::u16}, {"MET_INT", ScalarType::i32},   {"MET_UINT", ScalarType::u32},
       {"MET_FLOAT", ScalarType::f32},  {"MET_DOUBLE", ScalarType::f64}};
+  if (name == "MET_LONG_LONG") return set_wide(header, false);
+  if (name == "MET_ULONG_LONG") return set_wide(header, true);
   const auto found = types.find(name);
   if (found == types.end()) {
     refuse(path, "voxels of type '" + name + "' cannot be read",
-           "convert them to 8, 16 or 32-bit integers, float or double");
+           "convert them to 8, 16, 32 or 64-bit integers, float or double");
   }
-  return found->second;
+  header.type = found->second;
 }
 
 // Reads the lines up to ElementDataFile, which ends the header; `offset` becomes the byte after it.
@@ -91,7 +94,7 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   }
   header.components = static_cast<int>(fields::integer(value_of(fields, "ElementNumberOfChannels", "1"), 1,
                                                        1 << 16, "ElementNumberOfChannels", path));
-  header.type = type_from(needed(fields, "ElementType", path), path);
+  set_type(header, needed(fields, "ElementType", path), path);
   fields::check_size(header, path);
   if (!truth(fields, "BinaryData", false)) refuse(path, "its voxels are text", "save it as binary");
   header.gzip = truth(fields, "CompressedData", false);
@@ -100,8 +103,8 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
                                                                      std::numeric_limits<std::int64_t>::max(),
                                                                      "CompressedDataSize", path));
   }
-  header.swapped = scalar_bytes(header.type) > 1 && (truth(fields, "BinaryDataByteOrderMSB", false) ||
-                                                     truth(fields, "ElementByteOrderMSB", false));
+  header.swapped = header.stored_bytes() > 1 && (truth(fields, "BinaryDataByteOrderMSB", false) ||
+                                                 truth(fields, "ElementByteOrderMSB", false));
   const std::string data = needed(fields, "ElementDataFile", path);
   const std::int64_t skip = fields::integer(value_of(fields, "HeaderSize", "0"), -1,
                                             std::numeric_limits<std::int64_t>::max(), "HeaderSize", path);

@@ -2,6 +2,7 @@
 // https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h and nifti2.h
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 #include "io/image/header.hpp"
@@ -75,12 +76,11 @@ Fields second_version(const Bytes& bytes) {
   return f;
 }
 
-// Where both forms stand, the qform: it is right-angled, and ITK takes it too. NIfTI's x and y point right
-// and anterior.
-ImageGrid grid_of(const Fields& f, const std::array<std::int32_t, 3>& size) {
+// By the qform or the sform. NIfTI's x and y point right and anterior.
+ImageGrid grid_of(const Fields& f, const std::array<std::int32_t, 3>& size, bool by_qform) {
   std::array<std::array<double, 3>, 3> axis{};
   std::array<double, 3> origin{};
-  if (f.qform > 0) {
+  if (by_qform) {
     const auto [b, c, d, x, y, z] = f.quaternion;
     const double a = std::sqrt(std::max(0.0, 1 - b * b - c * c - d * d));
     const double side = f.pixdim[0] < 0 ? -1 : 1;
@@ -107,6 +107,35 @@ ImageGrid grid_of(const Fields& f, const std::array<std::int32_t, 3>& size) {
     grid.origin[k] = (k < 2 ? -1 : 1) * origin[k];
   }
   return grid;
+}
+
+// The farthest that a corner lies by one grid from where it lies by the other, mm.
+double apart(const ImageGrid& a, const ImageGrid& b) {
+  double most = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto at = [&](const ImageGrid& grid) {
+      return grid.point((corner & 1) != 0 ? grid.size[0] - 1 : 0, (corner & 2) != 0 ? grid.size[1] - 1 : 0,
+                        (corner & 4) != 0 ? grid.size[2] - 1 : 0);
+    };
+    const auto p = at(a), q = at(b);
+    const double mm = std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+    if (!std::isfinite(mm)) return mm;
+    most = std::max(most, mm);
+  }
+  return most;
+}
+
+// Where both forms stand and agree, the qform: it is right-angled, and ITK takes it too. A NaN does not
+// agree.
+ImageGrid placed(const Fields& f, const std::array<std::int32_t, 3>& size, NiftiForm form, const Path& path) {
+  const ImageGrid one = grid_of(f, size, f.qform > 0 && form != NiftiForm::sform);
+  if (form != NiftiForm::either || f.qform <= 0 || f.sform <= 0) return one;
+  const double mm = apart(one, grid_of(f, size, false));
+  if (mm <= 0.5 * *std::min_element(one.spacing.begin(), one.spacing.end())) return one;
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", mm);
+  refuse(path, std::string("its qform and its sform lie ") + text.data() + " mm apart",
+         "write the image with one of them, or say in the case which counts: form: qform, or form: sform");
 }
 
 void set_type(ImageHeader& header, int datatype, const Path& path) {
@@ -143,9 +172,13 @@ void set_type(ImageHeader& header, int datatype, const Path& path) {
     case 768:
       header.type = ScalarType::u32;
       return;
+    case 1024:
+      return fields::set_wide(header, false);
+    case 1280:
+      return fields::set_wide(header, true);
     default:
       refuse(path, "voxels of NIfTI type " + std::to_string(datatype) + " cannot be read",
-             "convert them to 8, 16 or 32-bit integers, float, double or RGB");
+             "convert them to 8, 16, 32 or 64-bit integers, float, double or RGB");
   }
 }
 
@@ -167,7 +200,7 @@ void set_size(ImageHeader& header, const Fields& f, const Path& path) {
 
 }  // namespace
 
-ImageHeader parse_nifti_header(std::string_view head, const Path& path) {
+ImageHeader parse_nifti_header(std::string_view head, const Path& path, NiftiForm form) {
   if (head.size() < 348)
     refuse(path, "is no NIfTI: it has " + std::to_string(head.size()) + " bytes of header");
   const Bytes plain(head, false), swapped(head, true);
@@ -196,12 +229,16 @@ ImageHeader parse_nifti_header(std::string_view head, const Path& path) {
   // Without either there is a convention for axes, but nobody keeps to it: left and right would be a guess.
   if (f.qform <= 0 && f.sform <= 0)
     refuse(path, "does not say where it lies: qform_code and sform_code are 0", "set its sform");
+  if ((form == NiftiForm::qform && f.qform <= 0) || (form == NiftiForm::sform && f.sform <= 0)) {
+    const std::string name = form == NiftiForm::qform ? "qform" : "sform";
+    refuse(path, "has no " + name + ": its code is 0", "leave out form: " + name);
+  }
   header.scaled = f.slope != 0 && std::isfinite(f.slope) && (f.slope != 1 || f.intercept != 0);
   header.slope = header.scaled ? f.slope : 1;
   header.intercept = header.scaled && std::isfinite(f.intercept) ? f.intercept : 0;
   header.swapped = swap;
   header.second_version = second;
-  header.grid = grid_of(f, header.size);
+  header.grid = placed(f, header.size, form, path);
   header.planar = f.dim[0] >= 5 && f.datatype != 128 && f.datatype != 2304;
   header.data_file = path;
   header.data_offset = static_cast<std::uint64_t>(f.offset);

@@ -12,12 +12,13 @@ namespace ecorche::io {
 namespace {
 
 using fields::refuse;
+using fields::set_wide;
 using Path = std::filesystem::path;
 
 // Field names without spaces, in lower case: teem takes `data file` and `datafile` for the same.
 using Fields = std::map<std::string, std::string>;
 
-ScalarType type_from(const std::string& name, const Path& path) {
+void set_type(ImageHeader& header, const std::string& name, const Path& path) {
   static const std::map<std::string, ScalarType, std::less<>> types{{"signed char", ScalarType::i8},
                                                                     {"int8", ScalarType::i8},
                                                                     {"int8_t", ScalarType::i8},
@@ -46,12 +47,19 @@ ScalarType type_from(const std::string& name, const Path& path) {
                                                                     {"uint32_t", ScalarType::u32},
                                                                     {"float", ScalarType::f32},
                                                                     {"double", ScalarType::f64}};
+  for (const std::string_view sign : {"", "signed ", "unsigned "}) {
+    for (const std::string_view word : {"long long", "long long int"}) {
+      if (name == std::string(sign) + std::string(word)) return set_wide(header, sign == "unsigned ");
+    }
+  }
+  if (name == "int64" || name == "int64_t" || name == "longlong") return set_wide(header, false);
+  if (name == "uint64" || name == "uint64_t" || name == "ulonglong") return set_wide(header, true);
   const auto found = types.find(name);
   if (found == types.end()) {
     refuse(path, "voxels of type '" + name + "' cannot be read",
-           "convert them to 8, 16 or 32-bit integers, float or double");
+           "convert them to 8, 16, 32 or 64-bit integers, float or double");
   }
-  return found->second;
+  header.type = found->second;
 }
 
 // Reads the lines up to the empty one; `offset` becomes the byte after it.
@@ -225,7 +233,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
       header.size[i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
     }
   }
-  header.type = type_from(fields::lower(needed(fields, "type", path)), path);
+  set_type(header, fields::lower(needed(fields, "type", path)), path);
   fields::check_size(header, path);
   const std::string encoding = fields::lower(needed(fields, "encoding", path));
   header.gzip = encoding == "gzip" || encoding == "gz";
@@ -240,7 +248,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   read_skips(fields, header, path);
   const auto endian = fields.find("endian");
   header.swapped =
-      scalar_bytes(header.type) > 1 && endian != fields.end() && fields::lower(endian->second) == "big";
+      header.stored_bytes() > 1 && endian != fields.end() && fields::lower(endian->second) == "big";
   header.grid = grid_of(fields, header, path);
   return header;
 }

@@ -117,11 +117,19 @@ void check_stream(const ImageHeader& header, const Path& path) {
                    (count && *count > expected ? "more" : std::to_string(count.value_or(expected))));
 }
 
+// As stored, in the order of this machine, and as what they mean.
+void spend(const ImageHeader& header, std::uint64_t file_bytes, const Path& path,
+           const files::ReadLimits& limits) {
+  files::Budget budget = files::Budget::of_image(file_bytes, limits, path.string());
+  budget.spend(header.voxel_bytes(), 1 + (header.planar ? 1 : 0));
+  if (header.scaled || header.wide) budget.spend(header.voxel_bytes() / header.stored_bytes(), 8);
+}
+
 }  // namespace
 
 std::uint64_t ImageHeader::voxel_bytes() const {
   return static_cast<std::uint64_t>(size[0]) * static_cast<std::uint64_t>(size[1]) *
-         static_cast<std::uint64_t>(size[2]) * static_cast<std::uint64_t>(components) * scalar_bytes(type);
+         static_cast<std::uint64_t>(size[2]) * static_cast<std::uint64_t>(components) * stored_bytes();
 }
 
 std::string inflate_head(std::string_view packed, std::size_t limit, const Path& path) {
@@ -157,7 +165,7 @@ void place_data(ImageHeader& header) {
   header.data_offset += header.skipped_bytes;
 }
 
-void check_payload(const ImageHeader& header, const Path& path) {
+void check_payload(const ImageHeader& header, const Path& path, const files::ReadLimits& limits) {
   if (!std::filesystem::is_regular_file(header.data_file)) {
     throw Error(ErrorKind::missing_input, header.data_file.string(), "cannot be opened",
                 "the header " + path.string() + " names it");
@@ -168,7 +176,7 @@ void check_payload(const ImageHeader& header, const Path& path) {
       refuse(path,
              "declares " + std::to_string(expected) + " bytes of voxels, but has " + std::to_string(there));
     }
-    return;
+    return spend(header, there, path, limits);
   }
   const std::uint64_t packed = header.packed_bytes.value_or(there);
   if (packed > there) {
@@ -179,6 +187,7 @@ void check_payload(const ImageHeader& header, const Path& path) {
     refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its " +
                      std::to_string(packed) + " compressed bytes cannot hold them");
   }
+  spend(header, packed, path, limits);
   check_stream(header, path);
 }
 

@@ -132,13 +132,8 @@ void write_segmentation(const Path& path, const Segmentation& segmentation) {
   files::write_text(path, bytes);
 }
 
-Segmentation read_segmentation(const Path& path) {
-  Image image = read_image(path);
-  if (image.type == ScalarType::f32 || image.type == ScalarType::f64) {
-    refuse(path,
-           "labels are " + std::string(scalar_name(image.type)) + " x " + std::to_string(image.components),
-           "labels are whole numbers, one a voxel");
-  }
+Segmentation read_segmentation(const Path& path, const files::ReadOptions& options, NiftiForm form) {
+  Image image = read_label_image(path, options, form);
   const std::vector<Segment> segments = read_segments(read_nrrd_keys(path), image.components, path);
   if (segments.empty() && image.components != 1) {
     refuse(path,

@@ -6,8 +6,10 @@
 #include <optional>
 #include <vector>
 
+#include "core/files/read_options.hpp"
 #include "core/values/image.hpp"
 #include "io/image/label_table.hpp"
+#include "io/image/nifti_form.hpp"
 
 namespace ecorche::io {
 
@@ -22,9 +24,10 @@ struct Segmentation {
 /// Reads any image that `read_image` reads as labels. Of a NRRD with `Segment0_Name`, ... the segments are
 /// named (by `make_identifiers`), and components are layers. Where two segments of different layers share a
 /// value, all are numbered anew from 1 in the file's order (u16), and values of no segment are dropped: an id
-/// means one thing. Throws Error{missing_input} or Error{data}: real voxels, several components that are no
-/// layers, a segment whose layer is not there.
-Segmentation read_segmentation(const std::filesystem::path& path);
+/// means one thing. Throws Error{missing_input} or Error{data}: voxels that are no whole numbers, several
+/// components that are no layers, a segment whose layer is not there.
+Segmentation read_segmentation(const std::filesystem::path& path, const files::ReadOptions& options = {},
+                               NiftiForm form = NiftiForm::either);
 
 /// Writes a `.seg.nrrd` that names its segments (those ids of `names` that a layer holds), one component a
 /// layer; atomically. Layers are of one grid and type. Throws Error{usage} for another ending,

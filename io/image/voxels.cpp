@@ -2,8 +2,13 @@
 // Voxels as they are stored become voxels of this machine: byte order, components together, scale.
 #include <algorithm>
 #include <cstring>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
 
 #include "io/image/header.hpp"
+#include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -26,33 +31,59 @@ std::vector<std::byte> interleave(const std::vector<std::byte>& planes, std::siz
   return out;
 }
 
-template <class To>
-void scale(const Image& stored, const ImageHeader& header, Image& image) {
-  with_scalar_type(stored.type, [&](auto zero) {
-    const auto from = stored.scalars<decltype(zero)>();
-    const auto to = image.scalars<To>();
-    for (std::size_t i = 0; i < from.size(); ++i)
-      to[i] = static_cast<To>(static_cast<double>(from[i]) * header.slope + header.intercept);
+// Calls `f` with the scalars as they are stored.
+template <class F>
+void with_stored(const ImageHeader& header, const std::vector<std::byte>& bytes, F&& f) {
+  const auto as = [&](auto zero) {
+    using T = decltype(zero);
+    f(std::span(reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)));
+  };
+  if (header.wide) {
+    header.wide_unsigned ? as(std::uint64_t{}) : as(std::int64_t{});
+  } else {
+    with_scalar_type(header.type, as);
+  }
+}
+
+template <class To, class From>
+void scale(std::span<const From> from, const ImageHeader& header, Image& image) {
+  std::transform(from.begin(), from.end(), image.scalars<To>().begin(), [&](From x) {
+    return static_cast<To>(static_cast<double>(x) * header.slope + header.intercept);
   });
+}
+
+template <class From>
+void narrow(std::span<const From> from, Image& image, const std::filesystem::path& path) {
+  const auto to = image.scalars<std::int32_t>();
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (!std::in_range<std::int32_t>(from[i]))
+      fields::refuse(path, "holds the value " + std::to_string(from[i]),
+                     "whole numbers fit 32 bits: save them so");
+    to[i] = static_cast<std::int32_t>(from[i]);
+  }
 }
 
 }  // namespace
 
 void read_voxels(const ImageHeader& header, const std::filesystem::path& path, Image& image) {
   std::vector<std::byte> bytes = stored_voxels(header, path);
-  const std::size_t size = scalar_bytes(header.type);
+  const std::size_t size = header.stored_bytes();
   if (header.swapped) swap_bytes(bytes, size);
   if (header.planar && header.components > 1)
     bytes = interleave(bytes, static_cast<std::size_t>(header.components), size);
-  if (!header.scaled) {
+  if (!header.scaled && !header.wide) {
     image.bytes = std::move(bytes);
     return;
   }
-  Image stored;
-  stored.type = header.type;
-  stored.bytes = std::move(bytes);
-  image.bytes.resize(stored.bytes.size() / size * scalar_bytes(image.type));
-  image.type == ScalarType::f64 ? scale<double>(stored, header, image) : scale<float>(stored, header, image);
+  image.bytes.resize(bytes.size() / size * scalar_bytes(image.type));
+  with_stored(header, bytes, [&](auto from) {
+    using From = typename decltype(from)::value_type;
+    if constexpr (std::is_integral_v<From>) {
+      if (!header.scaled) return narrow<From>(from, image, path);
+    }
+    image.type == ScalarType::f64 ? scale<double, From>(from, header, image)
+                                  : scale<float, From>(from, header, image);
+  });
 }
 
 }  // namespace ecorche::io

@@ -105,9 +105,17 @@ class Writer {
     out_ += "\n" + indent + "  CHANNELS " + (j == 0 ? "6 Xposition Yposition Zposition" : "3") +
             " Zrotation Xrotation Yrotation\n";
     for (const std::size_t child : children_[j]) joint(child, indent + "  ");
-    if (children_[j].empty())
-      out_ += indent + "  End Site\n" + indent + "  {\n" + indent + "    OFFSET 0 0 0\n" + indent + "  }\n";
+    if (children_[j].empty()) {
+      out_ += indent + "  End Site\n" + indent + "  {\n" + indent + "    OFFSET";
+      append(out_, to_lsa(tip(at)) / unit_mm_);
+      out_ += "\n" + indent + "  }\n";
+    }
     out_ += indent + "}\n";
+  }
+
+  // Where a limb's last bone is drawn to: programs refuse, or warn of, one without length.
+  static Vector3d tip(const ClipJoint& joint) {
+    return joint.parent >= 0 && joint.offset.norm() > 1 ? Vector3d(joint.offset / 2) : Vector3d(0, 0, 50);
   }
 
   const Clip& clip_;

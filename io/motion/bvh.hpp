@@ -20,7 +20,8 @@ std::unique_ptr<ClipFile> open_bvh(TextStream stream, const std::string& name, c
 /// All of it, in LSA; `unit_mm` is the length of one unit of the file.
 Clip read_bvh(const std::filesystem::path& path, double unit_mm = 10.0);
 
-/// Writes `clip` as `.bvh`, LSA, ZXY rotations (root also XYZ position), atomically.
+/// Writes `clip` as `.bvh`, LSA, ZXY rotations (root also XYZ position), atomically. A BVH does not say its
+/// unit. End sites continue their joint by half of its length.
 void write_bvh(const std::filesystem::path& path, const Clip& clip, double unit_mm = 10.0);
 
 }  // namespace ecorche::io

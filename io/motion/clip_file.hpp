@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "core/files/budget.hpp"
 #include "core/values/pose.hpp"
 
 namespace ecorche::io {
@@ -18,6 +19,7 @@ struct MotionSpace {
   Eigen::Matrix3d axes{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}};
   /// Of one unit of the file, mm. Default: what the file says (glTF, ASF, TRC, OpenSim), cm for BVH.
   std::optional<double> unit_mm;
+  files::ReadLimits limits = {};  ///< of what a clip may take that lies in memory whole (glTF)
 
   Eigen::Vector3d direction(const Eigen::Vector3d& v) const { return axes * v; }
   /// A mirrored frame turns the other way round.

@@ -50,11 +50,12 @@ struct Driven {
 
 class GltfClip final : public ClipFile {
  public:
-  GltfClip(const tinygltf::Model& model, std::string where, const std::string& name, const MotionSpace& space)
-      : space_(space), where_(std::move(where)) {
+  GltfClip(const tinygltf::Model& model, files::Budget& budget, const std::string& name,
+           const MotionSpace& space)
+      : space_(space), where_(budget.where()) {
     head_.name = name;
     if (model.animations.empty()) refuse(where_, "has no animation");
-    read_tracks(model, model.animations[0]);
+    read_tracks(model, model.animations[0], budget);
     choose_joints(model);
     choose_times();
   }
@@ -90,7 +91,8 @@ class GltfClip final : public ClipFile {
  private:
   Vector3d place(const Vector3d& p) const { return space_.unit_mm.value_or(kMetre) * space_.direction(p); }
 
-  void read_tracks(const tinygltf::Model& model, const tinygltf::Animation& animation) {
+  void read_tracks(const tinygltf::Model& model, const tinygltf::Animation& animation,
+                   files::Budget& budget) {
     for (const tinygltf::AnimationChannel& channel : animation.channels) {
       const bool turns = channel.target_path == "rotation";
       if (!turns && channel.target_path != "translation") continue;
@@ -100,7 +102,7 @@ class GltfClip final : public ClipFile {
         refuse(where_, "an animation's channel names a node or a sampler that is not there");
       auto& tracks = turns ? rotations_ : translations_;
       const auto& sampler = animation.samplers[static_cast<std::size_t>(channel.sampler)];
-      if (!tracks.emplace(channel.target_node, read_track(model, sampler, turns ? 4 : 3, where_)).second)
+      if (!tracks.emplace(channel.target_node, read_track(model, sampler, turns ? 4 : 3, budget)).second)
         refuse(where_, "a node is moved twice by one animation");
     }
     if (rotations_.empty()) refuse(where_, "its animation turns nothing");
@@ -205,7 +207,9 @@ class GltfClip final : public ClipFile {
 std::unique_ptr<ClipFile> parse_gltf_clip(std::string_view bytes, const std::filesystem::path& path,
                                           const MotionSpace& space) {
   if (space.unit_mm) check_unit(*space.unit_mm);
-  return std::make_unique<GltfClip>(gltf::parse(bytes, path), path.string(), path.stem().string(), space);
+  files::Budget budget(bytes.size(), space.limits, path.string());
+  const tinygltf::Model model = gltf::parse(bytes, path, budget);
+  return std::make_unique<GltfClip>(model, budget, path.stem().string(), space);
 }
 
 std::unique_ptr<ClipFile> open_gltf_clip(const std::filesystem::path& path, const MotionSpace& space) {

@@ -59,7 +59,8 @@ std::array<double, 4> GltfTrack::at(double seconds) const {
 }
 
 GltfTrack read_track(const tinygltf::Model& model, const tinygltf::AnimationSampler& sampler,
-                     std::size_t width, const std::string& where) {
+                     std::size_t width, files::Budget& budget) {
+  const std::string& where = budget.where();
   GltfTrack track;
   track.width = width;
   if (sampler.interpolation == "STEP") {
@@ -69,8 +70,8 @@ GltfTrack read_track(const tinygltf::Model& model, const tinygltf::AnimationSamp
   } else if (sampler.interpolation != "LINEAR" && !sampler.interpolation.empty()) {
     refuse(where, "an animation is interpolated by '" + sampler.interpolation.substr(0, 40) + "'");
   }
-  track.time = gltf::reals(model, sampler.input, 1, where);
-  track.values = gltf::reals(model, sampler.output, static_cast<int>(width), where);
+  track.time = gltf::reals(model, sampler.input, 1, budget);
+  track.values = gltf::reals(model, sampler.output, static_cast<int>(width), budget);
   const std::size_t parts = track.interpolation == Interpolation::cubic ? 3 : 1;
   if (track.time.empty() || track.values.size() != parts * width * track.time.size())
     refuse(where, "an animation has " + std::to_string(track.time.size()) + " times and " +

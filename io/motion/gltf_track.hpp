@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "core/files/budget.hpp"
+
 namespace ecorche::io {
 
 enum class Interpolation : std::uint8_t { step, linear, cubic };
@@ -26,6 +28,6 @@ struct GltfTrack {
 
 /// Reads a sampler. Throws Error{data} for keys that are damaged, not finite or out of order.
 GltfTrack read_track(const tinygltf::Model& model, const tinygltf::AnimationSampler& sampler,
-                     std::size_t width, const std::string& where);
+                     std::size_t width, files::Budget& budget);
 
 }  // namespace ecorche::io

@@ -20,8 +20,8 @@ using bytes::refuse;
 
 class SceneReader {
  public:
-  SceneReader(const tinygltf::Model& model, const std::string& where)
-      : model_(model), where_(where), mesh_(where) {}
+  SceneReader(const tinygltf::Model& model, files::Budget& budget)
+      : model_(model), where_(budget.where()), budget_(budget), mesh_(budget) {}
 
   SurfaceMesh read() {
     global_.resize(model_.nodes.size());
@@ -48,8 +48,9 @@ class SceneReader {
     const tinygltf::Skin& skin = model_.skins[static_cast<std::size_t>(number)];
     std::vector<Eigen::Affine3d> out;
     std::vector<double> binds;
+    budget_.spend(skin.joints.size(), 2 * sizeof(Eigen::Affine3d));
     if (skin.inverseBindMatrices >= 0) {
-      binds = reals(model_, skin.inverseBindMatrices, 16, where_);
+      binds = reals(model_, skin.inverseBindMatrices, 16, budget_);
       if (binds.size() < 16 * skin.joints.size()) refuse(where_, "a skin has fewer matrices than joints");
     }
     for (std::size_t j = 0; j < skin.joints.size(); ++j) {
@@ -70,7 +71,8 @@ class SceneReader {
       const auto found = primitive.attributes.find(name);
       return found == primitive.attributes.end() ? -1 : found->second;
     };
-    const std::vector<double> x = reals(model_, attribute("POSITION"), 3, where_);
+    const std::vector<double> x = reals(model_, attribute("POSITION"), 3, budget_);
+    budget_.spend(x.size() / 3, 2 * sizeof(Eigen::Vector3d) + sizeof(double));
     std::vector<Eigen::Vector3d> out(x.size() / 3);
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Vector3d(x.data() + 3 * i);
     if (node.skin < 0 || attribute("JOINTS_0") < 0 || attribute("WEIGHTS_0") < 0) {
@@ -81,9 +83,10 @@ class SceneReader {
     std::vector<Eigen::Vector3d> moved(out.size(), Eigen::Vector3d::Zero());
     std::vector<double> total(out.size(), 0);
     for (int set = 0; attribute("JOINTS_" + std::to_string(set)) >= 0; ++set) {
-      const std::vector<double> joints = reals(model_, attribute("JOINTS_" + std::to_string(set)), 4, where_);
+      const std::vector<double> joints =
+          reals(model_, attribute("JOINTS_" + std::to_string(set)), 4, budget_);
       const std::vector<double> weights =
-          reals(model_, attribute("WEIGHTS_" + std::to_string(set)), 4, where_);
+          reals(model_, attribute("WEIGHTS_" + std::to_string(set)), 4, budget_);
       if (joints.size() != 4 * out.size() || weights.size() != joints.size())
         refuse(where_, "its weights are not as many as its points");
       for (std::size_t i = 0; i < joints.size(); ++i) {
@@ -108,8 +111,9 @@ class SceneReader {
     for (const Eigen::Vector3d& p : points) mesh_.add_point({p.x(), p.y(), p.z()});
     std::vector<std::int64_t> corners;
     if (primitive.indices >= 0) {
-      corners = wholes(model_, primitive.indices, where_);
+      corners = wholes(model_, primitive.indices, budget_);
     } else {
+      budget_.spend(points.size(), 2 * sizeof corners[0]);  // with room to grow
       for (std::size_t i = 0; i < points.size(); ++i) corners.push_back(static_cast<std::int64_t>(i));
     }
     for (std::int64_t& c : corners) {
@@ -140,16 +144,18 @@ class SceneReader {
 
   const tinygltf::Model& model_;
   const std::string& where_;
+  files::Budget& budget_;
   MeshBuilder mesh_;
   std::vector<std::optional<Eigen::Affine3d>> global_;
 };
 
 }  // namespace
 
-SurfaceMesh decode(std::string_view file, const std::filesystem::path& path) {
-  const tinygltf::Model model = parse(file, path);
-  const std::string where = path.string();
-  return SceneReader(model, where).read();
+SurfaceMesh decode(std::string_view file, const std::filesystem::path& path,
+                   const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, path.string());
+  const tinygltf::Model model = parse(file, path, budget);
+  return SceneReader(model, budget).read();
 }
 
 }  // namespace ecorche::io::gltf

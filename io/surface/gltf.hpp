@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "core/files/budget.hpp"
 #include "core/values/mesh.hpp"
 
 namespace ecorche::io::gltf {
@@ -14,6 +15,7 @@ namespace ecorche::io::gltf {
 /// quantized accessors. Buffers are in the file or, named plainly, beside it. Nodes with a skin are taken in
 /// the rest pose of their joints. Compressed geometry and unknown required extensions are refused by name.
 /// Throws Error{data}.
-SurfaceMesh decode(std::string_view file, const std::filesystem::path& path);
+SurfaceMesh decode(std::string_view file, const std::filesystem::path& path,
+                   const files::ReadLimits& limits = {});
 
 }  // namespace ecorche::io::gltf

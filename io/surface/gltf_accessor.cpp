@@ -68,8 +68,9 @@ double real_of(const char* from, Scalar type, bool normalized) {
 
 // Reads all rows by `load(from, type)`, then writes the sparse ones over them.
 template <class T, class Load>
-std::vector<T> values(const tinygltf::Model& model, int number, int components, const std::string& where,
+std::vector<T> values(const tinygltf::Model& model, int number, int components, files::Budget& budget,
                       Load&& load) {
+  const std::string& where = budget.where();
   if (number < 0 || static_cast<std::size_t>(number) >= model.accessors.size())
     refuse(where, "a mesh names accessor " + std::to_string(number) + " of " +
                       std::to_string(model.accessors.size()));
@@ -89,12 +90,12 @@ std::vector<T> values(const tinygltf::Model& model, int number, int components, 
   };
   if (accessor.bufferView >= 0) {
     const Rows rows(model, accessor.bufferView, accessor.byteOffset, size * columns, accessor.count, where);
+    budget.spend(accessor.count, columns * sizeof(T));
     out.resize(accessor.count * columns);
     for (std::size_t i = 0; i < accessor.count; ++i) read(rows, i, i);
   } else {
-    // Zeros, of which the sparse rows are the least that the file can vouch for.
-    if (accessor.count > (std::size_t{1} << 26))
-      refuse(where, "a sparse accessor has " + std::to_string(accessor.count) + " rows");
+    // Zeros, for which no byte of the file stands.
+    budget.spend(accessor.count, columns * sizeof(T));
     out.resize(accessor.count * columns);
   }
   if (!sparse.isSparse) return out;
@@ -118,14 +119,13 @@ std::vector<T> values(const tinygltf::Model& model, int number, int components, 
 
 }  // namespace
 
-std::vector<double> reals(const tinygltf::Model& model, int number, int components,
-                          const std::string& where) {
-  return values<double>(model, number, components, where, real_of);
+std::vector<double> reals(const tinygltf::Model& model, int number, int components, files::Budget& budget) {
+  return values<double>(model, number, components, budget, real_of);
 }
 
-std::vector<std::int64_t> wholes(const tinygltf::Model& model, int number, const std::string& where) {
-  return values<std::int64_t>(model, number, 1, where, [&](const char* from, Scalar type, bool) {
-    if (bytes::is_real(type)) refuse(where, "its indices are no whole numbers");
+std::vector<std::int64_t> wholes(const tinygltf::Model& model, int number, files::Budget& budget) {
+  return values<std::int64_t>(model, number, 1, budget, [&](const char* from, Scalar type, bool) {
+    if (bytes::is_real(type)) refuse(budget.where(), "its indices are no whole numbers");
     return bytes::load_whole(from, type, false);
   });
 }

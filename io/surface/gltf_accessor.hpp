@@ -9,13 +9,16 @@
 #include <string>
 #include <vector>
 
+#include "core/files/budget.hpp"
+
 namespace ecorche::io::gltf {
 
 /// Row-major values of accessor `number`, `components` a row, as reals: normalized integers are mapped to
-/// [-1, 1] or [0, 1]. Throws Error{data} for what lies outside its buffer or has another shape.
-std::vector<double> reals(const tinygltf::Model& model, int number, int components, const std::string& where);
+/// [-1, 1] or [0, 1]. They are taken out of the file's budget: nodes may share an accessor. Throws
+/// Error{data} for what lies outside its buffer or has another shape.
+std::vector<double> reals(const tinygltf::Model& model, int number, int components, files::Budget& budget);
 
 /// The values of a scalar accessor of whole numbers.
-std::vector<std::int64_t> wholes(const tinygltf::Model& model, int number, const std::string& where);
+std::vector<std::int64_t> wholes(const tinygltf::Model& model, int number, files::Budget& budget);
 
 }  // namespace ecorche::io::gltf

@@ -16,8 +16,15 @@ using bytes::refuse;
 constexpr int kDeepestJson = 64, kDeepestNodes = 256;
 constexpr std::size_t kLargestBuffer = std::size_t{1} << 32;
 
-// tinygltf descends into nested values by recursion.
-void check_depth(std::string_view json, const std::string& where) {
+// What tinygltf makes of an object; and of what stands between two commas, as JSON and as a number of a
+// vector.
+constexpr std::uint64_t kObject = 2560, kValue = 100;
+static_assert(sizeof(tinygltf::Node) < kObject && sizeof(tinygltf::Material) < kObject &&
+              sizeof(tinygltf::Accessor) < kObject && sizeof(tinygltf::Primitive) < kObject);
+
+// tinygltf descends into nested values by recursion, and builds a value of its own for every object.
+void check_json(std::string_view json, files::Budget& budget) {
+  const std::string& where = budget.where();
   int depth = 0;
   bool text = false;
   for (std::size_t i = 0; i < json.size(); ++i) {
@@ -27,7 +34,10 @@ void check_depth(std::string_view json, const std::string& where) {
       if (c == '"') text = false;
     } else if (c == '"') {
       text = true;
+    } else if (c == ',') {
+      budget.spend(kValue);
     } else if (c == '{' || c == '[') {
+      budget.spend(c == '{' ? kObject : kValue);
       if (++depth > kDeepestJson) refuse(where, "its JSON is nested more than 64 deep");
     } else if (c == '}' || c == ']') {
       --depth;
@@ -106,30 +116,32 @@ class Placer {
 
 }  // namespace
 
-tinygltf::Model parse(std::string_view file, const std::filesystem::path& path) {
-  const std::string where = path.string();
+tinygltf::Model parse(std::string_view file, const std::filesystem::path& path, files::Budget& budget) {
+  const std::string& where = budget.where();
   const bool binary = bytes::lower(path.extension().string()) == ".glb";
   if (file.size() > std::numeric_limits<std::uint32_t>::max()) refuse(where, "is larger than glTF can be");
   const std::string_view json = binary ? json_of_glb(file, where) : file;
   if (!binary && !bytes::trim(json).starts_with('{')) refuse(where, "is no glTF: it is no JSON object");
-  check_depth(json, where);
+  check_json(json, budget);
   tinygltf::TinyGLTF reader;
   reader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
                         nullptr);
-  const std::filesystem::path folder = path.parent_path();
+  struct Beside {
+    std::filesystem::path folder;
+    files::Budget& budget;
+  } beside{path.parent_path(), budget};
   tinygltf::FsCallbacks files{};
   files.FileExists = [](const std::string& name, void* base) {
-    return is_plain(name) &&
-           std::filesystem::is_regular_file(*static_cast<std::filesystem::path*>(base) / name);
+    return is_plain(name) && std::filesystem::is_regular_file(static_cast<Beside*>(base)->folder / name);
   };
   files.ExpandFilePath = [](const std::string& name, void*) { return name; };
   files.ReadWholeFile = [](std::vector<unsigned char>* out, std::string* problem, const std::string& name,
                            void* base) {
     try {
       if (!is_plain(name)) return false;
-      const std::string read =
-          files::read_text(*static_cast<std::filesystem::path*>(base) / name, kLargestBuffer);
+      const std::string read = files::read_text(static_cast<Beside*>(base)->folder / name, kLargestBuffer);
+      static_cast<Beside*>(base)->budget.add_file(read.size());
       out->assign(read.begin(), read.end());
       return true;
     } catch (const Error& error) {
@@ -140,7 +152,7 @@ tinygltf::Model parse(std::string_view file, const std::filesystem::path& path) 
   files.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
     return false;
   };
-  files.user_data = const_cast<std::filesystem::path*>(&folder);
+  files.user_data = &beside;
   reader.SetFsCallbacks(files);
   tinygltf::Model model;
   std::string problem, warning;

@@ -10,11 +10,14 @@
 #include <string_view>
 #include <vector>
 
+#include "core/files/budget.hpp"
+
 namespace ecorche::io::gltf {
 
 /// The parsed file, buffers loaded: in it or, named plainly, beside it; no pictures. Throws Error{data}: no
-/// glTF 2.0, JSON nested more than 64 deep, a required extension that changes geometry.
-tinygltf::Model parse(std::string_view file, const std::filesystem::path& path);
+/// glTF 2.0, JSON nested more than 64 deep, a required extension that changes geometry, more values than
+/// `budget` pays for. Files beside it add to the budget.
+tinygltf::Model parse(std::string_view file, const std::filesystem::path& path, files::Budget& budget);
 
 /// A node's own transform. Throws Error{data} where it is damaged or not affine.
 Eigen::Affine3d local_transform(const tinygltf::Node& node, const std::string& where);

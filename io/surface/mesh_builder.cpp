@@ -27,18 +27,19 @@ double turn(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vec
 void MeshBuilder::add_point(const std::array<double, 3>& p) {
   for (const double x : p) {
     if (std::abs(x) <= largest_coordinate) continue;
-    bytes::refuse(where_,
+    bytes::refuse(where(),
                   "point " + std::to_string(points_.size()) + " has the coordinate " + bytes::number(x),
                   "every coordinate must be finite and below 1e9");
   }
-  bytes::check_points(points_.size() + 1, most_points_, where_);
+  bytes::check_points(points_.size() + 1, most_points_, where());
+  budget_.spend_points(1);
   points_.push_back(p);
 }
 
 std::int32_t MeshBuilder::corner(std::int64_t index) const {
   if (index < 0 || static_cast<std::uint64_t>(index) >= points_.size()) {
-    bytes::refuse(where_, "triangle " + std::to_string(triangles_.size()) + " uses point " +
-                              std::to_string(index) + " of " + std::to_string(points_.size()));
+    bytes::refuse(where(), "triangle " + std::to_string(triangles_.size()) + " uses point " +
+                               std::to_string(index) + " of " + std::to_string(points_.size()));
   }
   return static_cast<std::int32_t>(index);
 }
@@ -50,7 +51,8 @@ Eigen::Vector3d MeshBuilder::point(std::int64_t index) const {
 void MeshBuilder::add_triangle(std::int64_t a, std::int64_t b, std::int64_t c) {
   const Triangle triangle{corner(a), corner(b), corner(c)};
   if (triangles_.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()) / 3)
-    bytes::refuse(where_, "has more triangles than can be counted");
+    bytes::refuse(where(), "has more triangles than can be counted");
+  budget_.spend_triangles(1);
   triangles_.push_back(triangle);
 }
 
@@ -77,7 +79,7 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
     return;
   }
   if (corners.size() > kLargestHollowPolygon) {
-    bytes::refuse(where_,
+    bytes::refuse(where(),
                   "has a polygon of " + std::to_string(corners.size()) + " corners that is not convex",
                   "cut it into triangles");
   }
@@ -130,7 +132,7 @@ void MeshBuilder::add_fan(std::span<const std::int64_t> corners) {
 }
 
 SurfaceMesh MeshBuilder::finish() {
-  if (triangles_.empty()) bytes::refuse(where_, "has no triangle", "save it as a surface");
+  if (triangles_.empty()) bytes::refuse(where(), "has no triangle", "save it as a surface");
   std::vector<char> used(points_.size(), 0);
   for (const Triangle& t : triangles_) {
     for (const std::int32_t c : t) used[static_cast<std::size_t>(c)] = 1;

@@ -4,10 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/files/budget.hpp"
 #include "core/values/mesh.hpp"
 
 namespace ecorche::io {
@@ -16,12 +18,14 @@ namespace ecorche::io {
 inline constexpr double largest_coordinate = 1e9;
 
 /// Collects points and faces. Corners are numbered from 0 in the order of `add_point`. Memory grows with what
-/// was added, never with what a header promises. Every member throws Error{data} naming `where`.
+/// was added, never with what a header promises, and is taken out of the file's budget first. Every member
+/// throws Error{data} naming the file.
 class MeshBuilder {
  public:
-  /// `most_points`: what 32-bit corners can number; less in tests.
-  explicit MeshBuilder(std::string where, std::size_t most_points = std::numeric_limits<std::int32_t>::max())
-      : where_(std::move(where)), most_points_(most_points) {}
+  /// `budget` must outlive it. `most_points`: what 32-bit corners can number; less in tests.
+  explicit MeshBuilder(files::Budget& budget,
+                       std::size_t most_points = std::numeric_limits<std::int32_t>::max())
+      : budget_(budget), most_points_(most_points) {}
 
   /// Refuses a coordinate that is not finite or beyond `largest_coordinate`.
   void add_point(const std::array<double, 3>& p);
@@ -36,7 +40,7 @@ class MeshBuilder {
 
   std::size_t points() const { return points_.size(); }
   std::size_t triangles() const { return triangles_.size(); }
-  const std::string& where() const { return where_; }
+  const std::string& where() const { return budget_.where(); }
 
   /// The surface: bit-identical points merged (-0 counts as 0), points that no triangle uses left out, the
   /// file's order kept. Refuses a file without any triangle.
@@ -51,7 +55,7 @@ class MeshBuilder {
   void clip_ears(std::span<const std::int64_t> corners, const Eigen::Vector3d& normal);
   Eigen::Vector3d point(std::int64_t index) const;
 
-  std::string where_;
+  files::Budget& budget_;
   std::size_t most_points_;
   std::vector<std::array<double, 3>> points_;
   std::vector<Triangle> triangles_;

@@ -49,8 +49,9 @@ std::int64_t read_corner(std::string_view word, std::size_t points, const bytes:
 
 }  // namespace
 
-SurfaceMesh decode(std::string_view file, const std::string& where) {
-  MeshBuilder mesh(where);
+SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, where);
+  MeshBuilder mesh(budget);
   bytes::Lines lines(file, where);
   // Corners may name vertices that follow: faces wait until all of them are known.
   std::vector<std::int64_t> corners;
@@ -69,6 +70,7 @@ SurfaceMesh decode(std::string_view file, const std::string& where) {
       for (std::string_view c = bytes::cut_word(line); !c.empty(); c = bytes::cut_word(line))
         corners.push_back(read_corner(c, mesh.points(), lines));
       if (corners.size() < before + 3) lines.fail("a face has fewer than three corners");
+      budget.spend(corners.size() - before + 1, 2 * sizeof corners[0]);  // with room to grow
       ends.push_back(corners.size());
     } else if (!word.empty() &&
                std::find(kPassedOver.begin(), kPassedOver.end(), word) == kPassedOver.end()) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/files/budget.hpp"
 #include "core/values/mesh.hpp"
 
 namespace ecorche::io::obj {
@@ -13,7 +14,7 @@ namespace ecorche::io::obj {
 /// 1 or, negative, backwards from the last vertex so far. All its objects and groups make one surface;
 /// normals, textures, colours, points and lines are passed over, curves and free-form surfaces refused.
 /// Throws Error{data}.
-SurfaceMesh decode(std::string_view file, const std::string& where);
+SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits = {});
 
 /// `# SPACE=LPS`, then `v` and `f` lines; coordinates narrowed to float32.
 std::string encode(const SurfaceMesh& mesh);

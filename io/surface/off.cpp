@@ -11,56 +11,82 @@
 namespace ecorche::io::off {
 namespace {
 
-// The next line that says something, without its comment.
-std::string_view next_said(bytes::Lines& lines, const std::string& where) {
-  while (const auto line = lines.next()) {
-    const std::string_view said = bytes::trim(line->substr(0, line->find('#')));
-    if (!said.empty()) return said;
-  }
-  bytes::refuse(where, "ends before all that it declares");
-}
+// Words one after the other, wherever lines end; the rest of a line can be passed over.
+class Words {
+ public:
+  Words(std::string_view file, const std::string& where) : lines_(file, where), where_(where) {}
 
-std::size_t read_count(std::string_view& line, const bytes::Lines& lines) {
-  const std::int64_t count = lines.whole(bytes::cut_word(line));
-  // A vertex or a face takes more than two bytes.
-  if (count < 0 || static_cast<std::uint64_t>(count) > lines.left() / 2)
-    lines.fail(std::to_string(count) + " is more than the file can hold");
-  return static_cast<std::size_t>(count);
-}
+  // The next line that says something, without its comment.
+  std::string_view next_line() {
+    while (const auto line = lines_.next()) {
+      rest_ = bytes::trim(line->substr(0, line->find('#')));
+      if (!rest_.empty()) return rest_;
+    }
+    bytes::refuse(where_, "ends before all that it declares");
+  }
+  std::string_view next() {
+    if (bytes::trim(rest_).empty()) next_line();
+    return bytes::cut_word(rest_);
+  }
+  double real() { return lines_.real(next()); }
+  std::int64_t whole() { return lines_.whole(next()); }
+  // Colours, normals and what else stands behind a vertex or a face, to the end of its line.
+  void pass_line() { rest_ = {}; }
+  // At most a half of the bytes that are left: a vertex, a face or a corner takes two.
+  std::size_t count(const std::string& what = "") {
+    const std::int64_t count = whole();
+    if (count < 0 || static_cast<std::uint64_t>(count) > (rest_.size() + lines_.left() + 1) / 2)
+      lines_.fail(what + std::to_string(count) +
+                  (what.empty() ? " is more than the file can hold" : " corners"));
+    return static_cast<std::size_t>(count);
+  }
+  std::string_view rest() const { return rest_; }
+  [[noreturn]] void fail(std::string what, std::string mend = "save the surface again") const {
+    lines_.fail(std::move(what), std::move(mend));
+  }
+  void check_end() {
+    while (const auto rest = lines_.next()) {
+      if (!bytes::trim(rest->substr(0, rest->find('#'))).empty()) fail("has more lines than it declares");
+    }
+  }
+
+ private:
+  bytes::Lines lines_;
+  const std::string& where_;
+  std::string_view rest_;
+};
 
 }  // namespace
 
-SurfaceMesh decode(std::string_view file, const std::string& where) {
-  bytes::Lines lines(file, where);
-  MeshBuilder mesh(where);
-  std::string_view line = next_said(lines, where);
-  std::string_view keyword = bytes::cut_word(line);
-  if (!keyword.ends_with("OFF")) lines.fail("is no OFF: it does not begin with 'OFF'");
+SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, where);
+  Words words(file, where);
+  MeshBuilder mesh(budget);
+  words.next_line();
+  const std::string_view keyword = words.next();
+  if (!keyword.ends_with("OFF")) words.fail("is no OFF: it does not begin with 'OFF'");
   if (keyword.substr(0, keyword.size() - 3).find_first_not_of("STCN") != keyword.npos ||
-      line.find("BINARY") != line.npos)
-    lines.fail("'" + std::string(file.substr(0, 20)) + "' cannot be read",
+      words.rest().find("BINARY") != keyword.npos)
+    words.fail("'" + std::string(file.substr(0, 20)) + "' cannot be read",
                "save it as a text OFF in three dimensions");
-  if (bytes::trim(line).empty()) line = next_said(lines, where);
-  const std::size_t vertices = read_count(line, lines), faces = read_count(line, lines);
+  const std::size_t vertices = words.count(), faces = words.count();
+  words.pass_line();  // a number of edges, which nobody needs
   for (std::size_t i = 0; i < vertices; ++i) {
-    line = next_said(lines, where);
     std::array<double, 3> p{};
-    for (double& x : p) x = lines.real(bytes::cut_word(line));
+    for (double& x : p) x = words.real();
     mesh.add_point(p);
+    words.pass_line();
   }
   std::vector<std::int64_t> corners;
   for (std::size_t f = 0; f < faces; ++f) {
-    line = next_said(lines, where);
-    const std::int64_t count = lines.whole(bytes::cut_word(line));
-    if (count < 1 || static_cast<std::uint64_t>(count) > line.size())
-      lines.fail("a face has " + std::to_string(count) + " corners");
-    corners.resize(static_cast<std::size_t>(count));
-    for (std::int64_t& c : corners) c = lines.whole(bytes::cut_word(line));
+    const std::size_t count = words.count("a face has ");
+    if (count == 0) words.fail("a face has 0 corners");
+    corners.resize(count);
+    for (std::int64_t& c : corners) c = words.whole();
     mesh.add_polygon(corners);
+    words.pass_line();
   }
-  while (const auto rest = lines.next()) {
-    if (!bytes::trim(rest->substr(0, rest->find('#'))).empty()) lines.fail("has more lines than it declares");
-  }
+  words.check_end();
   return mesh.finish();
 }
 

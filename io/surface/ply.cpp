@@ -280,22 +280,23 @@ void add_faces(const Faces& faces, MeshBuilder& mesh) {
   }
 }
 
-void read_faces(const Element& element, Data& data, const std::string& where, Faces& faces) {
+void read_faces(const Element& element, Data& data, files::Budget& budget, Faces& faces) {
   const auto is_corners = [](const Property& p) {
     return p.count && !bytes::is_real(p.type) && (p.name == "vertex_indices" || p.name == "vertex_index");
   };
   bool found = false;
   for (const Property& p : element.properties) found = found || is_corners(p);
   if (!found && element.count > 0)
-    refuse(where, "its element '" + element.name + "' has no list 'vertex_indices'");
+    refuse(budget.where(), "its element '" + element.name + "' has no list 'vertex_indices'");
   for (std::uint64_t i = 0; i < element.count; ++i) {
     for (const Property& property : element.properties) {
       if (!is_corners(property)) {
         data.skip(property);
         continue;
       }
-      for (std::size_t left = data.length(property); left > 0; --left)
-        faces.corners.push_back(data.whole(property.type));
+      std::size_t left = data.length(property);
+      budget.spend(left + 2, 2 * sizeof faces.corners[0]);  // with room to grow
+      for (; left > 0; --left) faces.corners.push_back(data.whole(property.type));
       faces.ends.push_back(faces.corners.size());
       faces.strip.push_back(element.name != "face");
     }
@@ -304,17 +305,18 @@ void read_faces(const Element& element, Data& data, const std::string& where, Fa
 
 }  // namespace
 
-SurfaceMesh decode(std::string_view file, const std::string& where) {
+SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, where);
   const Header header = HeaderReader(file, where).read();
   Data data(header, file, where);
-  MeshBuilder mesh(where);
+  MeshBuilder mesh(budget);
   Faces faces;
   for (const Element& element : header.elements) {
     data.check_count(element);
     if (element.name == "vertex") {
       read_vertices(element, data, mesh);
     } else if (element.name == "face" || element.name == "tristrips") {
-      read_faces(element, data, where, faces);
+      read_faces(element, data, budget, faces);
     } else if (!element.properties.empty()) {
       for (std::uint64_t i = 0; i < element.count; ++i) {
         for (const Property& property : element.properties) data.skip(property);

@@ -4,6 +4,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/values/error.hpp"
 #include "io/surface/gltf_build.hpp"
+#include "io/surface/tissue_material.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -96,16 +97,25 @@ class Builder {
     primitive.attributes["WEIGHTS_0"] =
         gltf::add_array(model_, surface.influences.weight.data(), 16 * count, count,
                         TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC4, TINYGLTF_TARGET_ARRAY_BUFFER);
+    primitive.material = gltf::add_material(model_, surface.name, surface.group);
     tinygltf::Mesh mesh;
-    mesh.name = surface.name;
+    mesh.name = name_of(surface);
     mesh.primitives.push_back(primitive);
     model_.meshes.push_back(mesh);
     tinygltf::Node node;
-    node.name = surface.name;
+    node.name = model_.meshes.back().name;
     node.mesh = static_cast<int>(model_.meshes.size()) - 1;
     node.skin = 0;
     model_.nodes.push_back(node);
     return static_cast<int>(model_.nodes.size()) - 1;
+  }
+
+  // Names of nodes are unique: readers rename the second, and motions are matched by those of joints.
+  std::string name_of(const SkinnedSurface& surface) const {
+    for (const ClipJoint& joint : clip_.joints) {
+      if (joint.name == surface.name) return surface.name + "_" + std::string(group_name(surface.group));
+    }
+    return surface.name;
   }
 
   int add_floats(const std::vector<float>& values, int type, std::size_t width) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/values/case.hpp"
 #include "core/values/mesh.hpp"
 #include "core/values/pose.hpp"
 
@@ -22,13 +23,15 @@ struct Influences {
 
 struct SkinnedSurface {
   std::string name;
-  SurfaceMesh mesh;  ///< in the clip's zero pose, LPS mm
+  Group group = Group::other;  ///< chooses the material
+  SurfaceMesh mesh;            ///< in the clip's zero pose, LPS mm
   Influences influences;
 };
 
 /// Writes a `.glb` of skinned surfaces: a node a joint (its axes those of space, its place that of the clip's
 /// zero pose), inverse bind matrices, and the clip as one animation of rotations and the root's way; without
-/// frames, none. Metres, glTF's frame. Surfaces without triangles are left out. Whole or not at all. Throws
+/// frames, none. Metres, glTF's frame. A surface named as a joint gets its group behind its name
+/// (`pelvis_bone`). Surfaces without triangles are left out. Whole or not at all. Throws
 /// Error{internal} for influences that are not one a vertex or name no joint, Error{io},
 /// Error{cannot_create}.
 void write_rigged_glb(const std::filesystem::path& path, const Clip& clip,

@@ -24,6 +24,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "STL is little-endian");
 
 constexpr std::size_t kHeader = 80, kCounted = kHeader + 4, kFacet = 50;
+// Three points of their own, the table that merges them, and the corners.
+constexpr std::uint64_t kFacetMemory = 240;
 constexpr std::string_view kBadSave = "save the surface again";
 
 [[noreturn]] void refuse(const std::string& where, std::string what,
@@ -62,8 +64,10 @@ SurfaceMesh assemble(const VertexMerge& merge, const std::vector<std::array<std:
   return mesh;
 }
 
-SurfaceMesh decode_binary(std::string_view bytes, const std::string& where) {
+SurfaceMesh decode_binary(std::string_view bytes, files::Budget& budget) {
+  const std::string& where = budget.where();
   const std::size_t count = (bytes.size() - kCounted) / kFacet;
+  budget.spend(count, kFacetMemory);
   VertexMerge merge(3 * count);
   std::vector<std::array<std::int32_t, 3>> facets(count);
   for (std::size_t f = 0; f < count; ++f) {
@@ -136,7 +140,8 @@ class Words {
   std::size_t line_ = 1;
 };
 
-SurfaceMesh decode_text(std::string_view text, const std::string& where) {
+SurfaceMesh decode_text(std::string_view text, files::Budget& budget) {
+  const std::string& where = budget.where();
   Words words(text, where);
   // The shortest facet that anyone writes takes over 80 bytes.
   VertexMerge merge(3 * (text.size() / 80));
@@ -170,6 +175,7 @@ SurfaceMesh decode_text(std::string_view text, const std::string& where) {
     }
     words.expect("endloop");
     words.expect("endfacet");
+    budget.spend(kFacetMemory);
     facets.push_back(facet);
   }
   return assemble(merge, facets);
@@ -189,16 +195,17 @@ std::uint32_t counted_facets(std::string_view bytes) {
 
 }  // namespace
 
-SurfaceMesh decode(std::string_view bytes, const std::string& where) {
+SurfaceMesh decode(std::string_view bytes, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(bytes.size(), limits, where);
   const bool counted = bytes.size() >= kCounted;
   const std::uint64_t expected = counted ? kCounted + std::uint64_t{kFacet} * counted_facets(bytes) : 0;
   SurfaceMesh mesh;
   if (counted && bytes.size() == expected) {
     if (expected / kFacet > std::numeric_limits<std::int32_t>::max() / 3)
       refuse(where, "more triangles than can be counted");
-    mesh = decode_binary(bytes, where);
+    mesh = decode_binary(bytes, budget);
   } else if (begins_with_solid(bytes) && bytes.substr(0, 1024).find('\0') == std::string_view::npos) {
-    mesh = decode_text(bytes, where);
+    mesh = decode_text(bytes, budget);
   } else if (counted) {
     refuse(where, "says " + std::to_string(counted_facets(bytes)) + " triangles, which take " +
                       std::to_string(expected) + " bytes, but has " + std::to_string(bytes.size()));

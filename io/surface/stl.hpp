@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/files/budget.hpp"
 #include "core/values/mesh.hpp"
 
 namespace ecorche::io::stl {
@@ -14,7 +15,7 @@ namespace ecorche::io::stl {
 /// A binary or text STL, told by content: a binary one may begin with "solid", so the size decides first
 /// (84 + 50 n bytes). Corners with equal coordinates become one vertex, in order of first use (-0 counts as
 /// 0). `where` names the file in messages. Throws Error{data}.
-SurfaceMesh decode(std::string_view bytes, const std::string& where);
+SurfaceMesh decode(std::string_view bytes, const std::string& where, const files::ReadLimits& limits = {});
 
 /// A binary STL, `SPACE=LPS` in its header, coordinates narrowed to float32.
 /// Throws Error{internal} for a triangle without vertex, or a mesh that the format cannot count.

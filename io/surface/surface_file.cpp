@@ -40,7 +40,7 @@ void check_corners(const SurfaceMesh& mesh) {
 
 }  // namespace
 
-TaggedSurface read_tagged_surface(const std::filesystem::path& path) {
+TaggedSurface read_tagged_surface(const std::filesystem::path& path, const files::ReadLimits& limits) {
   const std::string extension = extension_of(path), where = path.string();
   constexpr std::array<std::string_view, 8> known{".stl", ".obj", ".ply",  ".off",
                                                   ".vtp", ".vtk", ".gltf", ".glb"};
@@ -51,47 +51,60 @@ TaggedSurface read_tagged_surface(const std::filesystem::path& path) {
   const std::string file = files::read_text(path, kLargestFile);
   std::string_view bytes = file;
   if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);  // what some editors put before a text
-  if (extension == ".stl") return {stl::decode(bytes, where), stl::space_tag(bytes), {}};
-  if (extension == ".obj") return {obj::decode(bytes, where), obj::space_tag(bytes), {}};
-  if (extension == ".ply") return {ply::decode(bytes, where), ply::space_tag(bytes), {}};
-  if (extension == ".off") return {off::decode(bytes, where), off::space_tag(bytes), {}};
-  if (extension == ".vtk") return {vtk_legacy::decode(bytes, where), vtk_legacy::space_tag(bytes), {}};
+  if (extension == ".stl") return {stl::decode(bytes, where, limits), stl::space_tag(bytes), {}};
+  if (extension == ".obj") return {obj::decode(bytes, where, limits), obj::space_tag(bytes), {}};
+  if (extension == ".ply") return {ply::decode(bytes, where, limits), ply::space_tag(bytes), {}};
+  if (extension == ".off") return {off::decode(bytes, where, limits), off::space_tag(bytes), {}};
+  if (extension == ".vtk")
+    return {vtk_legacy::decode(bytes, where, limits), vtk_legacy::space_tag(bytes), {}};
   if (extension == ".vtp") {
-    vtp::Decoded decoded = vtp::decode(bytes, where);
+    vtp::Decoded decoded = vtp::decode(bytes, where, limits);
     return {std::move(decoded.mesh), std::move(decoded.space), {}};
   }
-  return {gltf::decode(bytes, path), "LSA", 1000};
+  return {gltf::decode(bytes, path, limits), "LSA", 1000};
 }
 
-SurfaceMesh read_surface(const std::filesystem::path& path) {
-  return read_tagged_surface(path).mesh;
+SurfaceMesh read_surface(const std::filesystem::path& path, const files::ReadLimits& limits) {
+  return read_tagged_surface(path, limits).mesh;
 }
 
-void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh) {
+void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
+                   const std::vector<GridArray>& point_data) {
   const std::string extension = extension_of(path);
   if (extension == ".stl") return files::write_text(path, stl::encode(mesh));
   if (extension == ".obj" || extension == ".off") {
     check_corners(mesh);
     return files::write_text(path, extension == ".obj" ? obj::encode(mesh) : off::encode(mesh));
   }
-  const auto write = extension == ".ply"   ? vtk_files::write_ply
-                     : extension == ".vtp" ? vtk_files::write_vtp
-                     : extension == ".glb" ? write_glb
-                                           : nullptr;
-  if (write == nullptr) {
+  if (extension == ".glb") {
+    const NamedSurface named{path.stem().string(), Group::other, mesh};
+    return write_surfaces(path, {&named, 1});
+  }
+  if (extension != ".ply" && extension != ".vtp") {
     throw Error(ErrorKind::usage, path.string(), "cannot write '" + extension + "' surfaces",
                 "use .stl, .obj, .ply, .off, .vtp or .glb");
   }
   files::AtomicFile file(path);
-  write(file.temporary(), mesh);
+  if (extension == ".ply") vtk_files::write_ply(file.temporary(), mesh);
+  if (extension == ".vtp") vtk_files::write_vtp(file.temporary(), mesh, point_data);
   file.commit();
 }
 
-TetFile read_tets(const std::filesystem::path& path) {
+void write_surfaces(const std::filesystem::path& path, std::span<const NamedSurface> surfaces) {
+  if (extension_of(path) != ".glb") {
+    throw Error(ErrorKind::usage, path.string(),
+                "'" + extension_of(path) + "' does not hold several surfaces", "use .glb");
+  }
+  files::AtomicFile file(path);
+  write_glb(file.temporary(), surfaces);
+  file.commit();
+}
+
+TetFile read_tets(const std::filesystem::path& path, const files::ReadLimits& limits) {
   if (extension_of(path) != ".vtu")
     throw Error(ErrorKind::data, path.string(), "'" + extension_of(path) + "' tets cannot be read",
                 "give a .vtu");
-  return vtu::decode(files::read_text(path, kLargestFile), path.string());
+  return vtu::decode(files::read_text(path, kLargestFile), path.string(), limits);
 }
 
 void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T,
@@ -105,14 +118,18 @@ void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets&
   }
   if (extension != ".msh" && extension != ".ele" && extension != ".inp") {
     throw Error(ErrorKind::usage, path.string(), "cannot write tets as '" + extension + "'",
-                "use .vtu, .msh, .ele, .inp or .mcnp.inp");
+                "use .vtu, .msh, .ele, .inp or .mcnp.inp; a rig goes into .glb or .bvh");
   }
   tet_formats::check_tets(V, T, regions);
   if (extension == ".msh") return files::write_text(path, tet_formats::encode_msh(V, T, regions));
   if (extension == ".ele") {
-    std::filesystem::path nodes = path;
-    files::write_text(nodes.replace_extension(".node"), tet_formats::encode_node(V));
-    return files::write_text(path, tet_formats::encode_ele(T, regions));
+    // Neither means anything without the other.
+    std::filesystem::path beside = path;
+    files::AtomicFile nodes(beside.replace_extension(".node")), tets(path);
+    files::write_text(nodes, tet_formats::encode_node(V));
+    files::write_text(tets, tet_formats::encode_ele(T, regions));
+    const std::array both{&nodes, &tets};
+    return files::commit_together(both);
   }
   const bool mcnp = extension_of(path.stem()) == ".mcnp";
   if (mcnp) tet_formats::refuse_degenerate(V, T, path.string());

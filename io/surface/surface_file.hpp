@@ -5,9 +5,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/files/budget.hpp"
+#include "core/values/case.hpp"
 #include "core/values/context.hpp"
 #include "core/values/mesh.hpp"
 
@@ -18,8 +21,9 @@ namespace ecorche::io {
 /// content that contradicts it is refused. Bit-identical vertices are merged and unused ones left out, the
 /// order kept (of first use in STL, of the file elsewhere); triangles with two equal corners are kept.
 /// Nothing is moved or scaled. Throws Error{missing_input} or Error{data}: not the format its name says,
-/// shorter than its counts, no triangle, a coordinate that is not finite.
-SurfaceMesh read_surface(const std::filesystem::path& path);
+/// shorter than its counts, no triangle, a coordinate that is not finite, more memory than `limits` allow a
+/// file of its size.
+SurfaceMesh read_surface(const std::filesystem::path& path, const files::ReadLimits& limits = {});
 
 /// A surface, and what its file says of its own frame.
 struct TaggedSurface {
@@ -28,21 +32,32 @@ struct TaggedSurface {
   /// The millimetres of a unit where the format fixes unit and axes (glTF: 1000, with LSA as `space`).
   std::optional<double> unit_mm;
 };
-TaggedSurface read_tagged_surface(const std::filesystem::path& path);
+TaggedSurface read_tagged_surface(const std::filesystem::path& path, const files::ReadLimits& limits = {});
 
-/// Writes `.stl` (binary), `.obj`, `.ply` (binary), `.off`, `.vtp`, `.glb`; atomically, coordinates as
-/// float32. `.stl`,
-/// `.obj`, `.ply` and `.off` carry `SPACE=LPS` in their header; `.glb` is in metres, turned to glTF's frame
-/// (x left, y superior, z anterior). Throws Error{usage} for another extension, Error{cannot_create},
-/// Error{io}.
-void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh);
+/// A surface with what files that hold several say of each.
+struct NamedSurface {
+  std::string name;
+  Group group = Group::other;  ///< chooses the material
+  SurfaceMesh mesh;            ///< LPS mm
+};
 
-/// One array over the points or tets of a `.vtu`.
+/// Writes a `.glb` of all of them, each a named mesh with its tissue's material, as `write_surface` does of
+/// one. Throws Error{usage} for another extension, Error{cannot_create}, Error{io}.
+void write_surfaces(const std::filesystem::path& path, std::span<const NamedSurface> surfaces);
+
+/// One array over the points or tets of a VTK file.
 struct GridArray {
   std::string name;
   int components = 1;
   std::vector<float> values;
 };
+
+/// Writes `.stl` (binary), `.obj`, `.ply` (binary), `.off`, `.vtp`, `.glb`; atomically, coordinates as
+/// float32. `.stl`, `.obj`, `.ply` and `.off` carry `SPACE=LPS` in their header; `.glb` is in metres, turned
+/// to glTF's frame (x left, y superior, z anterior). `point_data`: a row a vertex, kept by `.vtp` alone.
+/// Throws Error{usage} for another extension, Error{cannot_create}, Error{io}.
+void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
+                   const std::vector<GridArray>& point_data = {});
 
 /// Tets out of a file, with what it holds of each node. Nothing is said of the tets' volumes: posed ones may
 /// be inverted.
@@ -55,7 +70,7 @@ struct TetFile {
 /// Reads tets as `write_tets` writes `.vtu` (or VTK: text, base64 or appended, plain or zlib). Throws
 /// Error{missing_input} or Error{data}: another format, a cell that is no tet, values that are not there or
 /// not finite.
-TetFile read_tets(const std::filesystem::path& path);
+TetFile read_tets(const std::filesystem::path& path, const files::ReadLimits& limits = {});
 
 /// What each tet is in.
 struct TetRegions {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/files/budget.hpp"
 #include "core/values/volumetric_skeleton.hpp"
 
 namespace ecorche::io {
@@ -26,9 +27,11 @@ void write_volumetric_skeleton(const std::filesystem::path& path, const Volumetr
 /// Reads what the above wrote, also as ParaView saves it again, trusting nothing: `first_defect` finds none,
 /// points lie where `ijk` says, every line is an edge, names are as many as segments ask for. Throws
 /// Error{missing_input}, Error{data}.
-VolumetricSkeletonFile read_volumetric_skeleton(const std::filesystem::path& path);
+VolumetricSkeletonFile read_volumetric_skeleton(const std::filesystem::path& path,
+                                                const files::ReadLimits& limits = {});
 
 /// The same from the bytes of a file; `where` names it in errors.
-VolumetricSkeletonFile decode_volumetric_skeleton(std::string_view bytes, const std::string& where);
+VolumetricSkeletonFile decode_volumetric_skeleton(std::string_view bytes, const std::string& where,
+                                                  const files::ReadLimits& limits = {});
 
 }  // namespace ecorche::io

@@ -16,10 +16,11 @@ constexpr double kOffVoxel = 0.01;  // of a voxel: points are float32
 
 class Reader {
  public:
-  Reader(std::string_view bytes, const std::string& where)
+  Reader(std::string_view bytes, const std::string& where, const files::ReadLimits& limits)
       : where_(where),
+        budget_(bytes.size(), limits, where),
         document_(vtk_xml::parse(bytes, "PolyData", {"Points", "PointData", "Lines"},
-                                 "save it as XML PolyData (.vtp)", where)) {}
+                                 "save it as XML PolyData (.vtp)", budget_)) {}
 
   VolumetricSkeletonFile read() {
     if (const auto version = field("ecorche_volumetric_skeleton", 1); version[0] != 1)
@@ -122,6 +123,7 @@ class Reader {
   void read_voxels() {
     VolumetricSkeleton& s = out_.skeleton;
     rows_ = vtk_xml::count_of(piece(), "NumberOfPoints", document_, where_);
+    budget_.spend_points(rows_);
     const auto ijk = point_array<std::uint16_t>("ijk", 3, 0, 65535);
     s.voxel.resize(rows_);
     for (std::size_t r = 0; r < rows_; ++r) s.voxel[r] = {ijk[3 * r], ijk[3 * r + 1], ijk[3 * r + 2]};
@@ -188,6 +190,7 @@ class Reader {
   }
 
   const std::string& where_;
+  files::Budget budget_;
   vtk_xml::Document document_;
   std::uint64_t rows_ = 0;
   VolumetricSkeletonFile out_;
@@ -195,12 +198,14 @@ class Reader {
 
 }  // namespace
 
-VolumetricSkeletonFile decode_volumetric_skeleton(std::string_view bytes, const std::string& where) {
-  return Reader(bytes, where).read();
+VolumetricSkeletonFile decode_volumetric_skeleton(std::string_view bytes, const std::string& where,
+                                                  const files::ReadLimits& limits) {
+  return Reader(bytes, where, limits).read();
 }
 
-VolumetricSkeletonFile read_volumetric_skeleton(const std::filesystem::path& path) {
-  return decode_volumetric_skeleton(files::read_text(path, kLargestFile), path.string());
+VolumetricSkeletonFile read_volumetric_skeleton(const std::filesystem::path& path,
+                                                const files::ReadLimits& limits) {
+  return decode_volumetric_skeleton(files::read_text(path, kLargestFile), path.string(), limits);
 }
 
 }  // namespace ecorche::io

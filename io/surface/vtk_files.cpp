@@ -6,6 +6,7 @@
 #include <vtkCommand.h>
 #include <vtkFloatArray.h>
 #include <vtkIdTypeArray.h>
+#include <vtkIntArray.h>
 #include <vtkNew.h>
 #include <vtkPLYWriter.h>
 #include <vtkPointData.h>
@@ -15,6 +16,7 @@
 #include <vtkXMLPolyDataWriter.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/values/error.hpp"
@@ -82,7 +84,8 @@ vtkNew<vtkCellArray> cells(const M& rows, Eigen::Index points) {
   return out;
 }
 
-vtkNew<vtkPolyData> poly_data(const SurfaceMesh& mesh) {
+template <class M>
+vtkNew<vtkPolyData> poly_data(const M& mesh) {
   vtkNew<vtkPolyData> out;
   set_points(mesh.V, *out);
   out->SetPolys(cells(mesh.F, mesh.V.rows()));
@@ -125,10 +128,29 @@ void write_ply(const std::filesystem::path& path, const SurfaceMesh& mesh) {
   run(*writer, path);
 }
 
-void write_vtp(const std::filesystem::path& path, const SurfaceMesh& mesh) {
+void write_vtp(const std::filesystem::path& path, const SurfaceMesh& mesh,
+               const std::vector<GridArray>& point_data) {
   const vtkNew<vtkXMLPolyDataWriter> writer;
   set_raw(*writer);
   const auto data = poly_data(mesh);
+  for (const GridArray& array : point_data)
+    add_array(array, static_cast<std::size_t>(mesh.V.rows()), *data->GetPointData());
+  writer->SetInputData(data);
+  run(*writer, path);
+}
+
+void write_tied(const std::filesystem::path& path, const TiedSurfaces& surfaces) {
+  const vtkNew<vtkXMLPolyDataWriter> writer;
+  set_raw(*writer);
+  const auto data = poly_data(surfaces);
+  const vtkNew<vtkIntArray> tets;
+  tets->SetName("tet");
+  tets->SetNumberOfTuples(static_cast<vtkIdType>(surfaces.tet.size()));
+  std::copy(surfaces.tet.begin(), surfaces.tet.end(), tets->GetPointer(0));
+  data->GetPointData()->AddArray(tets);
+  const float* shares = surfaces.share.data();
+  add_array({"share", 4, {shares, shares + surfaces.share.size()}}, surfaces.tet.size(),
+            *data->GetPointData());
   writer->SetInputData(data);
   run(*writer, path);
 }

@@ -43,7 +43,8 @@ std::optional<Scalar> scalar_from(std::string_view name) {
 
 class Reader {
  public:
-  Reader(std::string_view file, const std::string& where) : rest_(file), where_(where), mesh_(where) {}
+  Reader(std::string_view file, files::Budget& budget)
+      : rest_(file), where_(budget.where()), budget_(budget), mesh_(budget) {}
 
   SurfaceMesh read() {
     if (!next_line().starts_with("# vtk DataFile Version ")) refuse(where_, "is no legacy VTK file");
@@ -136,6 +137,7 @@ class Reader {
   std::vector<std::int64_t> wholes(std::size_t count, Scalar type) {
     if (!text_ && count > rest_.size() / bytes::size_of(type))
       refuse(where_, "ends before all that it declares");
+    budget_.spend(count, sizeof(std::int64_t));
     std::vector<std::int64_t> out(count);
     for (std::int64_t& x : out) {
       if (!text_) {
@@ -202,7 +204,9 @@ class Reader {
 
   // Cells may stand before POINTS: they wait.
   void keep_cell(std::span<const std::int64_t> corners, bool keep, bool strip) {
-    if (keep) faces_.emplace_back(std::vector<std::int64_t>(corners.begin(), corners.end()), strip);
+    if (!keep) return;
+    budget_.spend(corners.size() + 16, sizeof corners[0]);  // each is a vector of its own
+    faces_.emplace_back(std::vector<std::int64_t>(corners.begin(), corners.end()), strip);
   }
 
   // FIELD name arrays, each `name components tuples type` and its values.
@@ -251,14 +255,16 @@ class Reader {
   std::string_view rest_;
   const std::string& where_;
   bool text_ = true;
+  files::Budget& budget_;
   MeshBuilder mesh_;
   std::vector<std::pair<std::vector<std::int64_t>, bool>> faces_;
 };
 
 }  // namespace
 
-SurfaceMesh decode(std::string_view file, const std::string& where) {
-  return Reader(file, where).read();
+SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, where);
+  return Reader(file, budget).read();
 }
 
 std::optional<std::string> space_tag(std::string_view file) {

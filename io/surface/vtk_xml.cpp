@@ -13,6 +13,8 @@ namespace {
 
 using bytes::refuse;
 
+constexpr std::size_t kDeepest = 64;  // a DataArray lies five deep
+
 std::string_view value_of(const Attributes& attributes, std::string_view key) {
   const auto found = attributes.find(key);
   return found == attributes.end() ? std::string_view() : std::string_view(found->second);
@@ -29,6 +31,7 @@ struct Reader {
   std::map<std::string, DataArray> fields;
   std::vector<std::string> open;  // elements around the present place
   DataArray* filling = nullptr;
+  bool too_deep = false;
 
   static void begin(void* self, const XML_Char* name, const XML_Char** attributes) {
     static_cast<Reader*>(self)->begin_element(name, attributes);
@@ -49,6 +52,7 @@ struct Reader {
     for (; *list != nullptr; list += 2) attributes.emplace(list[0], list[1]);
     const std::string parent = open.empty() ? "" : open.back();
     open.emplace_back(name);
+    if (open.size() > kDeepest) too_deep = true;
     filling = nullptr;
     if (name == "VTKFile" && parent.empty()) file = std::move(attributes);
     if (name == type && parent == "VTKFile") of_type = true;
@@ -87,13 +91,14 @@ void read(std::string_view file, std::string_view& appended, Reader& reader, con
   // Entities are what makes small XML large; VTK's files have none.
   if (xml.find("<!DOCTYPE") != xml.npos) refuse(where, "has a DOCTYPE, as no VTK file has");
   for (std::size_t at = 0; at <= xml.size();) {
-    constexpr std::size_t block = std::size_t{1} << 24;
+    constexpr std::size_t block = std::size_t{1} << 16;
     const std::size_t some = std::min(block, xml.size() - at);
     const bool last = at + some == xml.size();
     if (XML_Parse(parser.get(), xml.data() + at, static_cast<int>(some), last ? 1 : 0) != XML_STATUS_OK) {
       refuse(where + ":" + std::to_string(XML_GetCurrentLineNumber(parser.get())),
              std::string("is no XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
     }
+    if (reader.too_deep) refuse(where, "its elements are nested more than 64 deep");
     if (last) break;
     at += some;
   }
@@ -124,7 +129,8 @@ const DataArray* Piece::find(const std::string& section, const std::string& name
 }
 
 Document parse(std::string_view file, std::string_view type, std::initializer_list<std::string_view> sections,
-               const std::string& mend, const std::string& where) {
+               const std::string& mend, files::Budget& budget) {
+  const std::string& where = budget.where();
   std::string_view appended;
   Reader reader;
   reader.type = type;
@@ -133,6 +139,7 @@ Document parse(std::string_view file, std::string_view type, std::initializer_li
   if (value_of(reader.file, "type") != type || !reader.of_type)
     refuse(where, "is no VTK " + std::string(type), mend);
   Document document{std::move(reader.pieces), std::move(reader.fields), storage_of(reader, appended, where)};
+  document.storage.budget = &budget;
   // A value takes a byte; packed, coordinates never shrink to a 64th.
   document.largest = document.storage.zlib ? file.size() * 64 + (std::uint64_t{1} << 20) : file.size();
   return document;

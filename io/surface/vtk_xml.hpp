@@ -34,10 +34,10 @@ struct Document {
 };
 
 /// The data set of `type` (`PolyData`, `UnstructuredGrid`) that `file` holds: its field data, and the arrays
-/// of `sections` of its pieces. `file` must outlive the document. Throws Error{data} for anything else,
-/// `mend` says what would be read.
+/// of `sections` of its pieces. `file` and `budget`, which names it and pays for its arrays, must outlive the
+/// document. Throws Error{data} for anything else, `mend` says what would be read.
 Document parse(std::string_view file, std::string_view type, std::initializer_list<std::string_view> sections,
-               const std::string& mend, const std::string& where);
+               const std::string& mend, files::Budget& budget);
 
 /// A count that the piece declares, 0 where it does not; one that the file cannot hold is Error{data}.
 std::uint64_t count_of(const Piece& piece, std::string_view key, const Document& document,

@@ -60,10 +60,11 @@ class PieceReader {
 
 }  // namespace
 
-Decoded decode(std::string_view file, const std::string& where) {
+Decoded decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, where);
   const vtk_xml::Document document = vtk_xml::parse(file, "PolyData", {"Points", "Polys", "Strips"},
-                                                    "save it as XML PolyData (.vtp)", where);
-  MeshBuilder mesh(where);
+                                                    "save it as XML PolyData (.vtp)", budget);
+  MeshBuilder mesh(budget);
   for (const vtk_xml::Piece& piece : document.pieces) PieceReader(piece, document, mesh).read();
   Decoded out;
   if (const auto space = document.fields.find("SPACE"); space != document.fields.end())

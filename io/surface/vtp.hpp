@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/files/budget.hpp"
 #include "core/values/mesh.hpp"
 
 namespace ecorche::io::vtp {
@@ -17,6 +18,6 @@ struct Decoded {
 /// VTK XML PolyData of one or several pieces: polygons and strips, arrays as text, base64 or appended (raw or
 /// base64), plain or packed by zlib, either byte order, headers of 32 or 64 bits. Throws Error{data}; lz4 and
 /// lzma are refused by name.
-Decoded decode(std::string_view file, const std::string& where);
+Decoded decode(std::string_view file, const std::string& where, const files::ReadLimits& limits = {});
 
 }  // namespace ecorche::io::vtp

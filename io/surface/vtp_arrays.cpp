@@ -115,13 +115,17 @@ std::string packed_bytes(Source& source, const Storage& storage, std::uint64_t l
   if (blocks == 0) return {};
   // An array shorter than a block still names the size of a whole one.
   const bool any_whole = blocks > 1 || last == 0;
-  if (blocks > limit || last > limit || (any_whole && (size > limit || (blocks - 1) * size > limit)))
+  if (blocks > limit || last > limit ||
+      (any_whole && size > (limit - last) / std::max<std::uint64_t>(last > 0 ? blocks - 1 : blocks, 1)))
     refuse(where, "an array is larger than its counts say");
+  storage.budget->spend(any_whole ? (last > 0 ? blocks - 1 : blocks) * size + last : last);
   const std::string sizes = source.take(word * (3 + blocks)).substr(word * 3);
   std::uint64_t total = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     const std::uint64_t some = header_word(sizes, b, storage);
-    total = some > std::numeric_limits<std::uint64_t>::max() - total ? some : total + some;
+    if (some > std::numeric_limits<std::uint64_t>::max() - total)
+      refuse(where, "the packed sizes of an array are more than can be counted");
+    total += some;
   }
   const std::string packed = source.take(total);
   std::string out;
@@ -153,6 +157,7 @@ std::string binary_bytes(const DataArray& array, const Storage& storage, std::ui
   const std::uint64_t word = storage.wide_header ? 8 : 4;
   const std::uint64_t size = header_word(source.peek(word), 0, storage);
   if (size > limit) refuse(where, "an array is larger than its counts say");
+  storage.budget->spend(size);
   return source.take(word + size).substr(word);  // header and data are one text
 }
 
@@ -170,6 +175,7 @@ std::vector<T> values(const DataArray& array, const Storage& storage, std::uint6
       const auto value = from_word(word);
       if (!value) refuse(where, "expected a number, found '" + std::string(word.substr(0, 40)) + "'");
       if (out.size() >= limit) refuse(where, "an array is larger than its counts say");
+      storage.budget->spend(2 * sizeof(T));  // with room to grow
       out.push_back(*value);
     }
     return out;
@@ -178,6 +184,7 @@ std::vector<T> values(const DataArray& array, const Storage& storage, std::uint6
     refuse(where, "an array is stored as '" + std::string(format.substr(0, 40)) + "'");
   const std::size_t size = bytes::size_of(*type);
   const std::string raw = binary_bytes(array, storage, limit * size, where);
+  storage.budget->spend(raw.size() / size, sizeof(T));
   out.resize(raw.size() / size);
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = load(raw.data() + i * size, *type);
   return out;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/files/budget.hpp"
 #include "io/surface/byte_reader.hpp"
 
 namespace ecorche::io::vtp {
@@ -16,7 +17,8 @@ using Attributes = std::map<std::string, std::string, std::less<>>;
 /// How all arrays of a file are stored.
 struct Storage {
   bool big_endian = false, wide_header = false, zlib = false, base64_appended = false;
-  std::string_view appended;  ///< what follows the underscore of AppendedData
+  std::string_view appended;        ///< what follows the underscore of AppendedData
+  files::Budget* budget = nullptr;  ///< of the file: arrays may share its bytes
 };
 
 /// One DataArray: its attributes and the text between its tags.
@@ -30,7 +32,8 @@ struct DataArray {
   }
 };
 
-/// The values as doubles or whole numbers, at most `limit` of them. Throws Error{data}.
+/// The values as doubles or whole numbers, at most `limit` of them, taken out of the budget. Throws
+/// Error{data}.
 std::vector<double> reals(const DataArray& array, const Storage& storage, std::uint64_t limit,
                           const std::string& where);
 std::vector<std::int64_t> wholes(const DataArray& array, const Storage& storage, std::uint64_t limit,

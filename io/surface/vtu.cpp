@@ -22,7 +22,6 @@ struct Grid {
 };
 
 void append_floats(const std::vector<double>& from, std::vector<float>& to, const std::string& where) {
-  to.reserve(to.size() + from.size());
   for (const double value : from) {
     if (!std::isfinite(static_cast<float>(value))) refuse(where, "holds a number that is not finite");
     to.push_back(static_cast<float>(value));
@@ -37,6 +36,7 @@ class PieceReader {
   void read(Grid& grid) const {
     const std::uint64_t before = grid.points.size() / 3;
     const std::vector<double> x = vtk_xml::points_of(piece_, document_, where_);
+    document_.storage.budget->spend_points(x.size() / 3);
     append_floats(x, grid.points, where_);
     read_cells(x.size() / 3, before, grid);
     read_arrays(x.size() / 3, before == 0, grid);
@@ -82,7 +82,8 @@ class PieceReader {
         const auto found = std::find_if(grid.arrays.begin(), grid.arrays.end(),
                                         [&](const GridArray& other) { return other.name == name; });
         if (!first && (found == grid.arrays.end() || found->components != *components)) continue;
-        GridArray out{name, static_cast<int>(*components), first ? std::vector<float>() : found->values};
+        GridArray out{name, static_cast<int>(*components),
+                      first ? std::vector<float>() : std::move(found->values)};
         const std::uint64_t values = points * static_cast<std::uint64_t>(*components);
         const std::vector<double> read = vtp::reals(array, document_.storage, values, where_);
         if (read.size() != values)
@@ -101,10 +102,11 @@ class PieceReader {
 
 }  // namespace
 
-TetFile decode(std::string_view file, const std::string& where) {
+TetFile decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
+  files::Budget budget(file.size(), limits, where);
   const vtk_xml::Document document =
       vtk_xml::parse(file, "UnstructuredGrid", {"Points", "Cells", "PointData"},
-                     "save it as XML UnstructuredGrid (.vtu)", where);
+                     "save it as XML UnstructuredGrid (.vtu)", budget);
   Grid grid;
   for (const vtk_xml::Piece& piece : document.pieces) PieceReader(piece, document, where).read(grid);
   if (grid.corners.empty()) refuse(where, "has no tet");

@@ -10,6 +10,7 @@
 #include "core/values/joint_rule.hpp"
 #include "core/values/model.hpp"
 #include "preprocess/weights/harmonic.hpp"
+#include "preprocess/weights/rigid_bones.hpp"
 
 namespace ecorche {
 
@@ -111,7 +112,7 @@ void fields(A& archive, const Region& region) {
 
 template <class A>
 void fields(A& archive, const RegionUse& use) {
-  archive(use.region, use.bone, use.facing, use.segment, use.facing_segment, use.looks);
+  archive(use.region, use.bone, use.facing, use.segment, use.facing_segment, use.looks, use.along);
 }
 
 template <class A>
@@ -125,8 +126,14 @@ void fields(A& archive, const DirectionSource& source) {
 }
 
 template <class A>
+void fields(A& archive, const JointBounds::Range& range) {
+  archive(range.least, range.most);
+}
+
+template <class A>
 void fields(A& archive, const JointRule& rule) {
   archive(rule.center, rule.axes, rule.measured_rest);
+  archive(rule.possible.radius_mm, rule.possible.axis_to_shaft, rule.possible.rest);
 }
 
 /// All that the rig reads of a case beside its surfaces.
@@ -154,6 +161,11 @@ namespace ecorche::weights {
 template <class A, Some<WeightsResult> T>
 void fields(A& archive, T& result) {
   archive(result.weights, result.certificate, result.solver);
+}
+
+template <class A, Some<RigidBones> T>
+void fields(A& archive, T& bones) {
+  archive(bones.mesh, bones.contested);
 }
 
 }  // namespace ecorche::weights

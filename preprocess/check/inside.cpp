@@ -108,7 +108,9 @@ int Inside::crossings(const Vector3d& p, int axis) const {
 bool Inside::operator()(const Vector3d& p) const {
   int votes = 0;
   for (int axis = 0; axis < 3; ++axis) votes += crossings(p, axis) != 0;
-  return votes >= 2;
+  if (votes == 0 || votes == 3) return votes == 3;
+  std::call_once(asked_, [&] { winding_.emplace(surface_); });
+  return std::abs((*winding_)(p)) >= 0.5;
 }
 
 }  // namespace ecorche::check

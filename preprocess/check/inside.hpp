@@ -5,16 +5,19 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <mutex>
+#include <optional>
 #include <vector>
 
 #include "core/values/mesh.hpp"
+#include "preprocess/geometry/winding_tree.hpp"
 
 namespace ecorche::check {
 
-/// Counts signed crossings along one ray in each of +x, +y and +z, and lets the majority decide: a ray that
-/// leaves through a hole is outvoted. A ray that meets an edge or a corner counts each sheet once (half-open
-/// rule, the same intersection for both triangles of an edge). Memory and time to build O(#F); a query visits
-/// one column a ray.
+/// Counts signed crossings along one ray in each of +x, +y and +z. Where they differ, as where rays leave
+/// through holes, a generalized winding number decides (geometry/winding_tree.hpp): inside from 1/2. A ray
+/// that meets an edge or a corner counts each sheet once (half-open rule, the same intersection for both
+/// triangles of an edge). Memory and time to build O(#F); a query visits one column a ray.
 class Inside {
  public:
   explicit Inside(const SurfaceMesh& surface);  ///< `surface` must outlive it
@@ -35,6 +38,8 @@ class Inside {
 
   const SurfaceMesh& surface_;
   std::array<Columns, 3> columns_;
+  mutable std::once_flag asked_;  // closed surfaces never need it
+  mutable std::optional<geometry::WindingTree> winding_;
 };
 
 }  // namespace ecorche::check

@@ -11,6 +11,7 @@
 #include <mutex>
 
 #include "preprocess/check/frames.hpp"
+#include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inside.hpp"
 #include "preprocess/check/label_ids.hpp"
 #include "preprocess/check/self_intersections.hpp"
@@ -48,34 +49,32 @@ std::string rounded(double x) {
   return text.data();
 }
 
+// What closes them all; nothing closes chains that form no loop.
+std::string closing_of(const std::vector<Hole>& holes) {
+  double edge = 0;
+  for (const Hole& hole : holes) edge = std::max(edge, hole.filling_edge);
+  return edge > 0 ? "ecorche repair --holes " + rounded(std::ceil(1.05 * edge)) + " closes them"
+                  : "their edges form no loop: mend them where the surface was made";
+}
+
 AlignedBox3d bounds(const SurfaceFigures& figures) {
   return {figures.low, figures.high};
 }
 
-AlignedBox3d bounds(const ImageGrid& grid) {
-  AlignedBox3d box;
-  for (int corner = 0; corner < 8; ++corner) {
-    std::array<double, 3> index{};
-    for (std::size_t k = 0; k < 3; ++k) index[k] = (corner >> k & 1) != 0 ? grid.size[k] - 0.5 : -0.5;
-    const auto p = grid.point(index[0], index[1], index[2]);
-    box.extend(Vector3d(p[0], p[1], p[2]));
-  }
-  return box;
-}
-
 class Inspector {
  public:
-  Inspector(const Case& patient, const Context& context) : patient_(patient), context_(context) {}
+  Inspector(const Case& patient, const Context& context, const Options& options)
+      : patient_(patient), context_(context), options_(options) {}
 
   Report run() {
-    report_.surfaces.push_back({patient_.skin_name, Group::skin, {}, 0, 0, {}, {}});
+    report_.surfaces.push_back({patient_.skin_name, Group::skin, {}, 0, 0, {}, false, {}});
     meshes_.push_back(&patient_.skin);
     for (const CaseBone& bone : patient_.bones) {
-      report_.surfaces.push_back({bone.name, Group::bone, {}, 0, 0, {}, {}});
+      report_.surfaces.push_back({bone.name, Group::bone, {}, 0, 0, {}, false, {}});
       meshes_.push_back(&bone.surface);
     }
     for (const CaseTissue& tissue : patient_.tissues) {
-      report_.surfaces.push_back({tissue.name, tissue.group, {}, 0, 0, {}, {}});
+      report_.surfaces.push_back({tissue.name, tissue.group, {}, 0, 0, {}, false, {}});
       meshes_.push_back(&tissue.surface);
     }
     look_at_surfaces();
@@ -105,6 +104,8 @@ class Inspector {
   // All that is measured, the surfaces side by side.
   void look_at_surfaces() {
     parts_.resize(meshes_.size());
+    if (patient_.skin.V.rows() > 0)
+      skin_mm_ = (patient_.skin.V.colwise().maxCoeff() - patient_.skin.V.colwise().minCoeff()).maxCoeff();
     const Inside inside(patient_.skin);
     const geometry::FaceTree skin(patient_.skin);
     std::size_t all = 1, done = 0;
@@ -120,7 +121,8 @@ class Inspector {
         line.specks += parts_[i].speck(p, speck_mm);
         line.inner += parts_[i].parts[static_cast<std::size_t>(p)].inside >= 0;
       }
-      line.intersections = self_intersections(mesh, context_);
+      line.drawn = options_.drawn.contains(line.name);
+      if (!line.drawn) line.intersections = self_intersections(mesh, context_);
       if (i > 0 && patient_.skin.F.rows() > 0) line.outside = measure_outside(mesh, inside, skin);
       const std::lock_guard lock(mutex);
       context_.report(static_cast<double>(done += static_cast<std::size_t>(mesh.F.rows())) /
@@ -139,7 +141,7 @@ class Inspector {
       const geometry::FaceTree::Hit hit = skin.nearest(p, hint);
       hint = hit.face;
       const double distance = std::sqrt(hit.squared);
-      if (distance <= touching_mm) continue;
+      if (distance <= touching_share * skin_mm_) continue;
       ++out.count;
       if (distance > out.largest_mm) {
         out.largest_mm = distance;
@@ -170,7 +172,7 @@ class Inspector {
            plural(figures.open.count, "open edge") + " in " + plural(count_of(figures.holes), "hole") +
                ", the longest of " + plural(longest.edges, "edge") + " and " + rounded(longest.length_mm) +
                " mm",
-           longest.middle, "ecorche repair closes small ones");
+           longest.middle, closing_of(figures.holes));
     }
     tell_of(figures.nonmanifold, harm, "non-manifold edge", "let at most two triangles share an edge");
     tell_of(figures.turned, harm, "flipped triangle", "orient all triangles outward");
@@ -295,13 +297,15 @@ class Inspector {
       if (!line.outside || line.outside->count == 0) continue;
       const Outside& out = *line.outside;
       const bool bone = line.group == Group::bone;
-      if (!bone && out.largest_mm <= tissue_outside_mm) continue;
-      tell(bone ? Severity::warning : Severity::note, line.name,
+      if (!bone && out.largest_mm <= tissue_outside_share * skin_mm_) continue;
+      const bool lost = !bone && out.largest_mm > tissue_lost_share * skin_mm_;
+      tell(bone || lost ? Severity::warning : Severity::note, line.name,
            std::to_string(out.count) + (out.count == 1 ? " vertex (" : " vertices (") +
                rounded(100 * out.share) + " %) outside the skin, by up to " + rounded(out.largest_mm) + " mm",
            out.farthest,
-           bone ? "the body will be skin and bones together; mend one of them if that is not meant"
-                : "it will follow the nearest part of the body; mend it if that is not meant");
+           lost   ? "mend its frame or unit: farther out than 10 % of the body's length no model is made"
+           : bone ? "the body will be skin and bones together; mend one of them if that is not meant"
+                  : "it will follow the nearest part of the body; mend it if that is not meant");
     }
   }
 
@@ -323,28 +327,26 @@ class Inspector {
   }
 
   void check_volumes() {
-    if (patient_.skin.F.rows() == 0) return;
-    const AlignedBox3d skin = bounds(report_.surfaces.front().figures);
-    const auto check = [&](const std::string& name, const ImageGrid& grid) {
-      const AlignedBox3d box = bounds(grid);
-      if (!skin.intersects(box))
-        tell(Severity::warning, name, "this volume and the skin do not meet", box.center(),
-             "mend the skin's frame or unit, or the image's header");
-    };
-    for (const CaseVolume& volume : patient_.volumes) check(volume.name, volume.image.grid);
-    if (patient_.labels) {
-      check("labels", patient_.labels->image.grid);
-      check_labels(*patient_.labels);
-    }
+    for (Misplaced& image : misplaced_images(patient_))
+      tell(Severity::warning, image.name, image.what, image.at, image.mend);
+    if (patient_.skin.F.rows() > 0 && patient_.labels) check_labels(*patient_.labels);
   }
 
   void check_labels(const CaseLabels& labels) {
     const auto used = label_ids(labels.image);
+    std::int64_t absent = 0;
+    std::string names;
     for (const auto& [id, name] : labels.table) {
-      if (!used.contains(id))
-        tell(Severity::warning, "labels", "no voxel has the id " + std::to_string(id) + " of '" + name + "'",
-             {}, "mend the table, or the image");
+      if (used.contains(id)) continue;
+      if (absent++ < 5) names += (names.empty() ? "" : ", ") + std::to_string(id) + " '" + name + "'";
     }
+    if (absent == 1)
+      tell(Severity::warning, "labels", "no voxel has the id " + names, {}, "mend the table, or the image");
+    if (absent > 1)
+      tell(Severity::warning, "labels",
+           "no voxel has " + std::to_string(absent) + " of the table's " +
+               std::to_string(labels.table.size()) + " ids: " + names + (absent > 5 ? ", ..." : ""),
+           {}, "mend the table, or the image, unless they are not in this scan");
     std::int64_t unnamed = 0;
     std::string ids;
     std::optional<Vector3d> first;
@@ -362,6 +364,8 @@ class Inspector {
 
   const Case& patient_;
   const Context& context_;
+  const Options& options_;
+  double skin_mm_ = 0;  // its largest extent
   Report report_;
   std::vector<const SurfaceMesh*> meshes_;  // of report_.surfaces
   std::vector<SurfaceParts> parts_;
@@ -386,8 +390,8 @@ bool Report::possible() const {
                       [](const Finding& f) { return f.severity == Severity::error; });
 }
 
-Report inspect(const Case& patient, const Context& context) {
-  return Inspector(patient, context).run();
+Report inspect(const Case& patient, const Context& context, const Options& options) {
+  return Inspector(patient, context, options).run();
 }
 
 }  // namespace ecorche::check

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,7 @@ struct SurfaceLine {
   SurfaceFigures figures;
   std::int64_t specks = 0, inner = 0;      ///< parts: tiny ones, and closed ones inside another
   std::optional<Offenders> intersections;  ///< of the surface with itself; empty where nobody looked
+  bool drawn = false;                      ///< round voxels, by ourselves
   std::optional<Outside> outside;          ///< of bones and tissues
 };
 
@@ -51,14 +53,22 @@ struct Report {
   bool possible() const;              ///< no error among them
 };
 
-/// Vertices less than this outside of the skin are taken to touch it.
-inline constexpr double touching_mm = 0.01;
-/// Tissues that leave the skin by more than this are told, mm.
-inline constexpr double tissue_outside_mm = 10;
+/// Vertices less than this outside of the skin are taken to touch it: 0.01 mm of a man.
+inline constexpr double touching_share = 6e-6;  ///< of the skin's largest extent
+/// Tissues that leave the skin by more than this are told, 10 mm of a man, ...
+inline constexpr double tissue_outside_share = 6e-3;
+/// ... and by more than this no model is made of them, whatever the size (bounds.hpp: max_outside_mm).
+inline constexpr double tissue_lost_share = 0.1;
+
+struct Options {
+  /// Surfaces that were drawn round voxels here (label_surfaces): closed and manifold as they are, so that
+  /// nobody looks for pairs of their triangles that meet.
+  std::set<std::string> drawn;
+};
 
 /// Looks at every surface alone, at bones and tissues against the skin, at frames and units that would agree
 /// better, at segments without a bone, at the ids of the labels, and at bounds that cannot belong to one
 /// body. Throws Error{interrupted} only.
-Report inspect(const Case& patient, const Context& context);
+Report inspect(const Case& patient, const Context& context, const Options& options = {});
 
 }  // namespace ecorche::check

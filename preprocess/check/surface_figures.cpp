@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
@@ -58,6 +59,7 @@ std::vector<Hole> find_holes(const SurfaceMesh& mesh, std::span<const HalfEdge> 
       if (i + 1 < v.size() || loop.closed)
         hole.length_mm += (mesh.V.row(v[i]) - mesh.V.row(v[(i + 1) % v.size()])).norm();
     }
+    hole.filling_edge = geometry::filling_edge(mesh.V, loop);
     holes.push_back(hole);
   }
   std::stable_sort(holes.begin(), holes.end(),

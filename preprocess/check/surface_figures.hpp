@@ -21,6 +21,7 @@ struct Offenders {
 struct Hole {
   std::int64_t edges = 0;
   double length_mm = 0;
+  double filling_edge = 0;  ///< mm: of a square as large as its filling; 0 where its edges form no loop
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< mean of its vertices
 };
 

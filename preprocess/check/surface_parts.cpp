@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "preprocess/check/inside.hpp"
 
@@ -11,14 +12,42 @@ namespace {
 
 using Eigen::Vector3d;
 
-SurfaceMesh triangles_of(const SurfaceMesh& mesh, const SurfaceParts& parts, std::int32_t part) {
-  SurfaceMesh out{mesh.V, Triangles(parts.parts[static_cast<std::size_t>(part)].triangles, 3)};
-  Eigen::Index n = 0;
-  for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
-    if (parts.classes.of[static_cast<std::size_t>(f)] == part) out.F.row(n++) = mesh.F.row(f);
+// The triangles of every part, in their order.
+class ByPart {
+ public:
+  ByPart(const SurfaceMesh& mesh, const SurfaceParts& parts) : mesh_(mesh) {
+    offsets_.assign(parts.parts.size() + 1, 0);
+    for (std::size_t p = 0; p < parts.parts.size(); ++p)
+      offsets_[p + 1] = offsets_[p] + static_cast<std::size_t>(parts.parts[p].triangles);
+    triangles_.resize(offsets_.back());
+    std::vector<std::size_t> next(offsets_.begin(), offsets_.end() - 1);
+    for (std::int32_t f = 0; f < mesh.F.rows(); ++f)
+      triangles_[next[static_cast<std::size_t>(parts.classes.of[static_cast<std::size_t>(f)])]++] = f;
   }
-  return out;
-}
+
+  // The part alone, with its own vertices. O(its triangles).
+  SurfaceMesh mesh(std::int32_t part) const {
+    const std::size_t first = offsets_[static_cast<std::size_t>(part)],
+                      last = offsets_[static_cast<std::size_t>(part) + 1];
+    SurfaceMesh out;
+    out.F.resize(static_cast<Eigen::Index>(last - first), 3);
+    std::unordered_map<std::int32_t, std::int32_t> number;
+    for (std::size_t i = first; i < last; ++i) {
+      for (Eigen::Index c = 0; c < 3; ++c)
+        out.F(static_cast<Eigen::Index>(i - first), c) =
+            number.try_emplace(mesh_.F(triangles_[i], c), static_cast<std::int32_t>(number.size()))
+                .first->second;
+    }
+    out.V.resize(static_cast<Eigen::Index>(number.size()), 3);
+    for (const auto& [vertex, row] : number) out.V.row(row) = mesh_.V.row(vertex);
+    return out;
+  }
+
+ private:
+  const SurfaceMesh& mesh_;
+  std::vector<std::size_t> offsets_;
+  std::vector<std::int32_t> triangles_;
+};
 
 // From the smallest container to the largest: the first that holds a part is the innermost.
 void find_inner(const SurfaceMesh& mesh, SurfaceParts& parts) {
@@ -31,6 +60,7 @@ void find_inner(const SurfaceMesh& mesh, SurfaceParts& parts) {
   std::stable_sort(containers.begin(), containers.end(), [&](std::int32_t a, std::int32_t b) {
     return at(a).box.diagonal().norm() < at(b).box.diagonal().norm();
   });
+  const ByPart by_part(mesh, parts);
   for (const std::int32_t outer : containers) {
     std::vector<std::int32_t> candidates;
     for (const std::int32_t inner : containers) {
@@ -38,7 +68,7 @@ void find_inner(const SurfaceMesh& mesh, SurfaceParts& parts) {
         candidates.push_back(inner);
     }
     if (candidates.empty()) continue;
-    const SurfaceMesh around = triangles_of(mesh, parts, outer);
+    const SurfaceMesh around = by_part.mesh(outer);
     const Inside inside(around);
     for (const std::int32_t inner : candidates) {
       if (inside(mesh.V.row(mesh.F(at(inner).triangle, 0)).transpose())) at(inner).inside = outer;

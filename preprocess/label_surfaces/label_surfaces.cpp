@@ -11,6 +11,7 @@
 
 #include "preprocess/label_surfaces/hold_apart.hpp"
 #include "preprocess/label_surfaces/mask.hpp"
+#include "preprocess/label_surfaces/strays.hpp"
 #include "preprocess/label_surfaces/surface_net.hpp"
 
 namespace ecorche::label_surfaces {
@@ -58,7 +59,7 @@ void resolve(Case& patient, const Context& context) {
     throw Error(ErrorKind::config, jobs.front().source->where, "the case has no labels",
                 "name them under labels");
   }
-  if (patient.labels->apart) hold_apart(patient, context);
+  if (patient.labels->apart && !patient.labels->apart->limbs.empty()) hold_apart(patient, context);
   LabelBlocks blocks(*patient.labels, context);
   std::optional<Mask> body;
   if (patient.skin_source && patient.skin_source->ids.empty()) {
@@ -84,12 +85,8 @@ void resolve(Case& patient, const Context& context) {
     }
   });
   context.check_stop();
-  for (const Job& job : jobs) {
-    if (job.surface->F.rows() > 0) continue;
-    throw Error(ErrorKind::config, job.source->where, "its labels have no voxel there",
-                "check its ids, side and within");
-  }
-  patient.labels->apart.reset();
+  drop_strays(patient, context);
+  if (patient.labels->apart) patient.labels->apart->limbs.clear();
   patient.skin_source.reset();
   for (CaseBone& bone : patient.bones) bone.source.reset();
   for (CaseTissue& tissue : patient.tissues) tissue.source.reset();

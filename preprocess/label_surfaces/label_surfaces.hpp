@@ -18,10 +18,10 @@ namespace ecorche::label_surfaces {
 SurfaceMesh extract(const CaseLabels& labels, const LabelSource& source, const Context& context);
 
 /// Gives every entry of `patient` that has a source its surface, and forgets the source. Limbs are held apart
-/// first where the labels say so (hold_apart.hpp). Where the skin is
-/// the outside of everything, specks off the body belong to no entry. The same bytes for any number of
-/// threads. O(voxels + surface). Throws Error{config}, naming the entry, for a source without voxels;
-/// Error{interrupted}.
+/// first where the labels say so (hold_apart.hpp); `apart` then keeps its gap and has no limbs. Where the
+/// skin is the outside of everything, specks off the body belong to no entry, and a tissue that has nothing
+/// else goes (strays.hpp). The same bytes for any number of threads. O(voxels + surface). Throws
+/// Error{config}, naming the entry, for a source without voxels; Error{interrupted}.
 void resolve(Case& patient, const Context& context);
 
 }  // namespace ecorche::label_surfaces

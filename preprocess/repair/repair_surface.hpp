@@ -53,7 +53,7 @@ struct Mended {
 /// Coordinates come back as float32 holds them, since surface files do. Copies of vertices are moved into
 /// their sheet by 0.001 mm, since an STL knows vertices by their place only. A surface without faults comes
 /// back as it was, but for that. Throws Error{interrupted} only. O(#F log #F), and O(n^3) for a hole of n
-/// edges, at most 800.
+/// edges up to 800; of a longer one corners are cut off first.
 Mended repair_surface(const SurfaceMesh& surface, const Options& options, const Context& context);
 
 }  // namespace ecorche::repair

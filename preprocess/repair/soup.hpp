@@ -32,8 +32,9 @@ struct Filled {
   std::int64_t holes = 0, triangles = 0, left = 0;
 };
 
-/// Fills each hole with the triangles of least area (Barequet and Sharir 1995), where that is at most `area`
-/// mm^2. The surface must be split into sheets.
+/// Fills each hole with the triangles of least area (Barequet and Sharir 1995; of more than 800 edges,
+/// corners with the shortest chords go first until that many are left), where that is at most `area` mm^2.
+/// The surface must be split into sheets.
 Filled fill_holes(Soup& soup, double area, const Context& context);
 
 }  // namespace ecorche::repair

@@ -50,6 +50,12 @@ const SurfaceMesh& BonePoints::segment(const std::string& name) {
   return all;
 }
 
+std::string BonePoints::segment_of(const std::string& region) const {
+  const auto found = std::find_if(patient_.regions.begin(), patient_.regions.end(),
+                                  [&](const Region& r) { return r.name == region; });
+  return found == patient_.regions.end() ? "" : found->segment;
+}
+
 SurfacePoints BonePoints::region(const std::string& name) {
   const auto region = std::find_if(patient_.regions.begin(), patient_.regions.end(),
                                    [&](const Region& r) { return r.name == name; });
@@ -84,7 +90,7 @@ SurfacePoints BonePoints::region(const std::string& name) {
 
 const SurfacePoints& BonePoints::of(const RegionUse& use) {
   const Key key{{use.region, use.bone, use.facing, use.segment, use.facing_segment},
-                {use.looks.x(), use.looks.y(), use.looks.z()}};
+                {use.looks.x(), use.looks.y(), use.looks.z(), use.along.x(), use.along.y(), use.along.z()}};
   const auto [entry, fresh] = found_.try_emplace(key);
   if (fresh) entry->second = find(use);
   return entry->second;
@@ -99,8 +105,12 @@ SurfacePoints BonePoints::find(const RegionUse& use) {
   if (!use.region.empty()) return region(use.region);
   if (!use.segment.empty()) {
     const SurfaceMesh& own = segment(use.segment);
-    return use.facing_segment.empty() ? whole(own)
-                                      : facing_points(own, segment(use.facing_segment), use.looks);
+    if (use.facing_segment.empty()) return whole(own);
+    const SurfaceMesh& other = segment(use.facing_segment);
+    SurfacePoints points = facing_points(own, other, use.looks);
+    if (const auto end = use.along.isZero() ? std::nullopt : bone_end(own, other))
+      points.along = end->axes * use.along;
+    return points;
   }
   const SurfaceMesh* own = bone(use.bone);
   if (own == nullptr) return {};

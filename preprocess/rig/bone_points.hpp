@@ -25,6 +25,9 @@ class BonePoints {
   /// All bones of a segment as one surface; empty where it has none.
   const SurfaceMesh& segment(const std::string& name);
 
+  /// Whose bones a region is on; empty where it is on a single bone, or unknown.
+  std::string segment_of(const std::string& region) const;
+
  private:
   const SurfaceMesh* bone(const std::string& name) const;
   SurfacePoints region(const std::string& name);
@@ -32,7 +35,7 @@ class BonePoints {
 
   const Case& patient_;
   std::map<std::string, SurfaceMesh> segments_;
-  using Key = std::tuple<std::array<std::string, 5>, std::array<double, 3>>;
+  using Key = std::tuple<std::array<std::string, 5>, std::array<double, 6>>;
   std::map<Key, SurfacePoints> found_;  // facing is slow, and centre and axes ask alike
 };
 

@@ -10,6 +10,7 @@
 #include "core/kinematics/angles.hpp"
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
+#include "preprocess/rig/mirrored_joints.hpp"
 #include "preprocess/rig/present_part.hpp"
 
 namespace ecorche::rig {
@@ -19,6 +20,7 @@ constexpr double kBadResidual = 0.10;  // of the radius
 constexpr double kFewInliers = 0.5;
 constexpr double kRounding = 1e-9;  // radians
 constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kHalfSure = 10;  // degrees beyond a limit
 
 std::string percent(double share) {
   return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
@@ -88,30 +90,30 @@ void need_sphere(const Case& patient, const Joint& joint, const FoundPoint& foun
       "give the joint's center as [x, y, z]");
 }
 
-void warn_widened(const Joint& joint, const AngleAxis& angle, double from, double to,
-                  const Context& context) {
-  if (from == to) return;
+void warn_beyond(const Joint& joint, const AngleAxis& angle, double limit, const Context& context) {
   std::ostringstream line;
-  line << "joint " << joint.name << ": " << angle.name << " rests at " << std::lround(to * kDegrees)
-       << " degrees, outside its limits: widened from " << std::lround(from * kDegrees)
+  line << "joint " << joint.name << ": " << angle.name << " rests at " << std::lround(angle.rest * kDegrees)
+       << " degrees, outside its limits: widened from " << std::lround(limit * kDegrees)
        << ", for the scanned pose is allowed";
   context.warn(line.str());
 }
 
-// The rest angles that lead from the parent's axes to the joint's. Limits that leave them out are widened to
-// them. Turns that the joint does not make (those of a hinge about its second axis) have none.
-void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, const Context& context) {
+// The rest angles that lead from the parent's axes to the joint's. Limits that leave them out reach to them,
+// and the joint is as much less sure: by half where that is 10 degrees. Turns that the joint does not make
+// (those of a hinge about its second axis) have none.
+void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, JointFit& fit, const Context& context) {
   for (AngleAxis& angle : joint.sequence) angle.rest = 0;
   const std::array<double, 3> rest = kinematics::angles_from_rotation(
       joint, Eigen::Quaterniond(Eigen::Matrix3d(parent.transpose() * joint.axes)));
   for (std::size_t a = 0; a < 3; ++a) {
     AngleAxis& angle = joint.sequence[a];
     angle.rest = std::abs(rest[a]) < kRounding ? 0 : rest[a];
-    const double least = std::min(angle.min, angle.rest), most = std::max(angle.max, angle.rest);
-    if (std::isfinite(angle.min)) warn_widened(joint, angle, angle.min, least, context);
-    if (std::isfinite(angle.max)) warn_widened(joint, angle, angle.max, most, context);
-    angle.min = least;
-    angle.max = most;
+    if (angle.rest >= angle.min && angle.rest <= angle.max) continue;
+    double& limit = angle.rest < angle.min ? angle.min : angle.max;
+    warn_beyond(joint, angle, limit, context);
+    const double beyond = (angle.rest - limit) * kDegrees / kHalfSure;
+    fit.confidence /= 1 + beyond * beyond;
+    limit = angle.rest;
   }
 }
 
@@ -136,6 +138,7 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
   const bool two_bones = joint.rule == CenterRule::sphere_fit && !joint.facing_bone.empty();
   if (two_bones) need_sphere(patient, joint, found);
   rig.fits.push_back(found.fit);
+  for (const std::string& note : sources.notes(row)) context.warn("joint " + joint.name + ": " + note);
   if (two_bones) {
     warn_sphere(found.fit, context);
   } else {
@@ -151,6 +154,8 @@ Rig fit(const Case& patient, const Context& context, std::vector<JointEvidence>*
   const Skeleton asked = patient.generic ? generic_tree(patient, context) : present_part(patient, context);
   rig.skeleton = asked;
   JointSources sources(patient, asked);
+  take_other_sides(asked, sources, context);
+  keep_rest_possible(asked, sources, context);
   for (std::size_t row = 0; row < asked.segments.size(); ++row) {
     context.check_stop();
     fit_joint(patient, sources, row, rig, context);
@@ -165,7 +170,10 @@ Rig fit(const Case& patient, const Context& context, std::vector<JointEvidence>*
     joint.how.reset();
     const bool measured = from.joint.how && from.joint.how->measured_rest && from.parent >= 0;
     if (evidence != nullptr) evidence->push_back(evidence_of(sources.center(row)));
-    if (measured) measure_rest(sources.axes(static_cast<std::size_t>(from.parent)).first, joint, context);
+    if (measured) {
+      const Eigen::Matrix3d parent = sources.axes(static_cast<std::size_t>(from.parent)).first;
+      measure_rest(parent, joint, rig.fits[row], context);
+    }
   }
   return rig;
 }

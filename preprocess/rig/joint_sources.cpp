@@ -113,6 +113,21 @@ class Open {
   std::size_t row_;
 };
 
+// Says whose bounds hold for what is found, until the end of the scope.
+class Bounded {
+ public:
+  Bounded(int& bounded, std::size_t row) : bounded_(bounded), before_(bounded) {
+    bounded_ = static_cast<int>(row);
+  }
+  ~Bounded() { bounded_ = before_; }
+  Bounded(const Bounded&) = delete;
+  Bounded& operator=(const Bounded&) = delete;
+
+ private:
+  int& bounded_;
+  int before_;
+};
+
 // The first source that is good, else the best.
 template <class Found, class Sources, class Find, class Confidence>
 std::optional<Found> first_good(const Sources& sources, Find&& find, Confidence&& confidence) {
@@ -143,8 +158,38 @@ JointSources::JointSources(const Case& patient, const Skeleton& skeleton)
       bones_(patient),
       centers_(skeleton.segments.size()),
       axes_(skeleton.segments.size()),
+      settled_(skeleton.segments.size()),
+      settled_axes_(skeleton.segments.size()),
+      notes_(skeleton.segments.size()),
       open_center_(skeleton.segments.size()),
       open_axes_(skeleton.segments.size()) {}
+
+const JointRule* JointSources::rule_of(int row) const {
+  return row < 0 ? nullptr : skeleton_.segments[static_cast<std::size_t>(row)].joint.how.get();
+}
+
+namespace {
+
+const DirectionSource* first_fit(const DirectionSource& source) {
+  if (source.kind == DirectionSource::Kind::fit) return &source;
+  for (const DirectionSource& choice : source.choices) {
+    if (const DirectionSource* fit = first_fit(choice)) return fit;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::optional<FoundDirection> JointSources::shown_axis(std::size_t row, int axis) {
+  const JointRule* how = rule_of(static_cast<int>(row));
+  if (how == nullptr) return std::nullopt;
+  const Bounded bounded(bounded_, row);
+  for (const auto& [letter, source] : how->axes) {
+    if (letter == axis && first_fit(source) != nullptr)
+      return direction(source, axis, Eigen::Vector3d::Zero());
+  }
+  return std::nullopt;
+}
 
 const std::optional<CylinderFit>& JointSources::cylinder(const SurfacePoints& points) {
   const auto [entry, fresh] = cylinders_.try_emplace(&points);
@@ -161,11 +206,12 @@ std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse&
     case CenterRule::sphere_fit:
       if (auto fit = fit_sphere(points)) {
         if (surface.found) *fit = grown_sphere(bones_.of(whole(on)), *fit);
+        if (!possible_radius(fit->radius)) return std::nullopt;
         found = of_fit(rule, *fit, fit->radius, surface);
       }
       return found;
     case CenterRule::cylinder_fit:
-      if (const auto& fit = cylinder(surface)) {
+      if (const auto& fit = cylinder(surface); fit && crosses_shaft(fit->axis)) {
         found = of_fit(rule, *fit, fit->radius, surface);
         found->axis = fit->axis;
       }
@@ -202,6 +248,26 @@ std::optional<FoundPoint> JointSources::between(const PointSource& source) {
   return out;
 }
 
+// One end of a `between` that can be followed does not stand for it, however badly the other end is known: a
+// root amid two hips would lie at the better one.
+std::vector<PointSource> JointSources::without_ends(const std::vector<PointSource>& parts) const {
+  std::vector<std::string> ends;
+  for (const PointSource& part : parts) {
+    const bool both = part.rule == CenterRule::between &&
+                      std::all_of(part.parts.begin(), part.parts.end(), [&](const PointSource& end) {
+                        return end.rule == CenterRule::joint && skeleton_.find_joint(end.joint) >= 0;
+                      });
+    for (std::size_t end = 0; both && end < part.parts.size(); ++end) ends.push_back(part.parts[end].joint);
+  }
+  std::vector<PointSource> out;
+  for (const PointSource& part : parts) {
+    const bool is_end =
+        part.rule == CenterRule::joint && std::find(ends.begin(), ends.end(), part.joint) != ends.end();
+    if (!is_end) out.push_back(part);
+  }
+  return out;
+}
+
 std::optional<FoundPoint> JointSources::point(const PointSource& source) {
   switch (source.rule) {
     case CenterRule::given:
@@ -217,7 +283,7 @@ std::optional<FoundPoint> JointSources::point(const PointSource& source) {
     }
     case CenterRule::first_good:
       return first_good<FoundPoint>(
-          source.parts, [&](const PointSource& part) { return point(part); },
+          without_ends(source.parts), [&](const PointSource& part) { return point(part); },
           [](const FoundPoint& found) { return found.fit.confidence; });
     default:
       return fitted(source.rule, source.on);
@@ -253,6 +319,7 @@ const FoundPoint& JointSources::center(std::size_t row) {
   if (centers_[row]) return found(row);
   const Segment& segment = skeleton_.segments[row];
   const Open open(open_center_, row, segment.joint.name);
+  const Bounded bounded(bounded_, row);
   const std::optional<FoundPoint> by = by_rule(segment.joint);
   centers_[row] = by ? *by : by_proximity(segment);
   centers_[row]->fit.joint = segment.joint.name;
@@ -266,7 +333,7 @@ std::optional<FoundDirection> JointSources::fitted_axis(const DirectionSource& s
   FoundDirection out;
   if (source.from.rule == CenterRule::cylinder_fit) {
     const auto& fit = cylinder(surface);
-    if (!fit) return std::nullopt;
+    if (!fit || !crosses_shaft(fit->axis)) return std::nullopt;
     out = {fit->axis, fit->confidence};
   } else if (source.from.rule == CenterRule::plane_fit) {
     const auto fit = fit_plane(points);
@@ -304,7 +371,10 @@ std::optional<FoundDirection> JointSources::direction(const DirectionSource& sou
           [&](const DirectionSource& choice) {
             auto found = direction(choice, axis, beside);
             if (found && collinear(found->along, beside)) found.reset();
-            if (found && choice.kind == Kind::given) found->confidence = default_axis;
+            if (found && choice.kind == Kind::given) {
+              found->confidence = default_axis;
+              found->along = across_shaft(found->along);
+            }
             return found;
           },
           [](const FoundDirection& found) { return found.confidence; });
@@ -328,10 +398,13 @@ std::pair<Eigen::Matrix3d, double> JointSources::find_axes(std::size_t row) {
   const Joint& joint = skeleton_.segments[row].joint;
   if (!joint.how || joint.how->axes.empty()) return {joint.axes, 1};
   const Open open(open_axes_, row, joint.name);
+  const Bounded bounded(bounded_, row);
   double confidence = 1;
   const auto found = [&](const std::pair<int, DirectionSource>& said,
                          const Eigen::Vector3d& beside) -> Eigen::Vector3d {
-    const auto along = direction(said.second, said.first, beside);
+    auto along = direction(said.second, said.first, beside);
+    const auto settled = settled_axis_.find({row, said.first});
+    if (settled != settled_axis_.end() && !collinear(settled->second.along, beside)) along = settled->second;
     confidence = std::min(confidence, along ? along->confidence : 0);
     return along ? along->along : Eigen::Vector3d::Unit(said.first);
   };

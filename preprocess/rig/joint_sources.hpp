@@ -53,7 +53,34 @@ class JointSources {
   /// as above, and Error{data} when the two come out within 6 degrees of a line.
   std::pair<Eigen::Matrix3d, double> axes(std::size_t row);
 
+  /// Whose bones the joint's centre is first looked for on: a segment; empty where on none.
+  std::string shown_on(std::size_t row) const;
+  /// The axis (0 x, 1 y, 2 z) of a joint where a shape shows it, before anything is settled.
+  std::optional<FoundDirection> shown_axis(std::size_t row, int axis);
+  /// All bones of a segment.
+  const SurfaceMesh& bones(const std::string& segment) { return bones_.segment(segment); }
+  /// What was found for the joint and not used, since `JointRule::possible` leaves it out: lines without its
+  /// name.
+  const std::vector<std::string>& notes(std::size_t row) const { return notes_[row]; }
+
+  /// In place of what the rules find, from now on: a joint's centre, one axis (the rule's other one stays
+  /// perpendicular to it), or all axes. What was made of others is found again.
+  void settle(std::size_t row, const FoundPoint& center);
+  void settle_axis(std::size_t row, int axis, const FoundDirection& along);
+  void settle_axes(std::size_t row, const Eigen::Matrix3d& axes, double confidence);
+
  private:
+  const JointRule* rule_of(int row) const;
+  bool possible_radius(double radius);
+  // Whether the joint that is being found may turn about it.
+  bool crosses_shaft(const Eigen::Vector3d& axis);
+  // A direction that is only said, perpendicular to the shaft that it should cross.
+  Eigen::Vector3d across_shaft(const Eigen::Vector3d& said);
+  std::optional<Eigen::Vector3d> shaft(int row);
+  void note(std::string line);
+  void forget();
+  std::vector<PointSource> without_ends(const std::vector<PointSource>& parts) const;
+
   const FoundPoint& found(std::size_t row) const { return *centers_[row]; }
   const std::optional<CylinderFit>& cylinder(const SurfacePoints& points);
   std::optional<FoundPoint> point(const PointSource& source);
@@ -72,6 +99,11 @@ class JointSources {
   BonePoints bones_;
   std::vector<std::optional<FoundPoint>> centers_;
   std::vector<std::optional<std::pair<Eigen::Matrix3d, double>>> axes_;
+  std::vector<std::optional<FoundPoint>> settled_;
+  std::vector<std::optional<std::pair<Eigen::Matrix3d, double>>> settled_axes_;
+  std::map<std::pair<std::size_t, int>, FoundDirection> settled_axis_;
+  std::vector<std::vector<std::string>> notes_;
+  int bounded_ = -1;  // the joint that is being found: its bounds hold
   /// By the points' own place: centre and axis of a joint ask alike.
   std::map<const SurfacePoints*, std::optional<CylinderFit>> cylinders_;
   std::vector<bool> open_center_, open_axes_;  // being worked out: rules that meet one again go in a circle

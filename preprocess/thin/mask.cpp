@@ -68,7 +68,14 @@ Mask segment(const Image& image, const Segmentation& how, const Context& context
       mark<T>(image, how.component, context, mask.inside,
               [=](T v) { return static_cast<double>(v) >= low && static_cast<double>(v) <= high; });
     } else if (labels.empty()) {
-      mark<T>(image, how.component, context, mask.inside, [](T v) { return v != T{0}; });
+      bool negative = false;
+      mark<T>(image, how.component, context, mask.inside, [&](T v) {
+        negative = negative || v < T{0};
+        return v != T{0};
+      });
+      if (negative)
+        refuse("--threshold", "is needed for values below 0, as of a CT: 0 is not their background",
+               "say which values are the object, as LOW:HIGH, or --labels");
     } else {
       mark<T>(image, how.component, context, mask.inside, [&](T v) {
         return std::binary_search(labels.begin(), labels.end(), static_cast<std::int64_t>(v));

@@ -24,7 +24,7 @@ enum class Boundary : std::uint8_t { faces_6, all_26 };
 
 struct Segmentation {
   /// Values that are the object; both ends count. Without them every value but 0 is, which only whole numbers
-  /// can say (NaN never is).
+  /// without any below 0 can say (NaN never is).
   std::optional<double> low, high;
   std::vector<std::int64_t> labels;  ///< or exactly these values, of an image of whole numbers
   int component = 0;                 ///< which of a voxel's scalars is looked at
@@ -33,7 +33,8 @@ struct Segmentation {
 };
 
 /// Throws Error{usage} (named after the options of `ecorche thin`) for a range and labels together, an empty
-/// range, a component that the image has not, labels or nothing for voxels that are no whole numbers;
+/// range, a component that the image has not, labels or nothing for voxels that are no whole
+/// numbers, nothing for values below 0;
 /// Error{data} where no voxel is left. O(voxels).
 Mask segment(const Image& image, const Segmentation& how, const Context& context);
 

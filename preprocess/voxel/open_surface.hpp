@@ -7,15 +7,19 @@
 
 namespace ecorche::voxel {
 
-/// Marks what is inside an open surface: what a flood from outside cannot reach through untouched voxels
-/// falls into parts, and each part asks one generalized winding number (JacobsonKavan13), the mean of three
-/// of its voxels: inside from 1/2. A part under 8 voxels is taken as inside unasked. So slits and holes up to
-/// a voxel are closed; through wider ones the inside floods away, and only the touched voxels remain. `mask`
-/// must have an untouched margin. Returns the number of voxels found inside.
-std::size_t mark_inside_open(const SurfaceMesh& surface, const ImageGrid& grid, VoxelMask& mask,
-                             const Context& context);
+/// What was found inside, and what a look at some 20 000 voxels all over says of the rest.
+struct OpenInside {
+  std::size_t voxels = 0;  ///< marked as inside
+  double expected_ml = 0;  ///< of the untouched space that winding numbers call inside
+  double lost = 0;         ///< the share of it that flooded away
+};
 
-/// The solid angle of the whole surface seen from `p`, over 4 pi: about 1 inside, 0 outside.
-double generalized_winding(const SurfaceMesh& surface, const Eigen::Vector3d& p);
+/// Marks what is inside an open surface: what a flood from outside cannot reach through untouched voxels
+/// falls into parts, and each part asks one generalized winding number (geometry/winding_tree.hpp), the mean
+/// of three of its voxels: inside from 1/2. A part under 8 voxels is taken as inside unasked. So slits and
+/// holes up to a voxel are closed; through wider ones the inside floods away, and only the touched voxels
+/// remain. `mask` must have an untouched margin.
+OpenInside mark_inside_open(const SurfaceMesh& surface, const ImageGrid& grid, VoxelMask& mask,
+                            const Context& context);
 
 }  // namespace ecorche::voxel

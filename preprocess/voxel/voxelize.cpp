@@ -8,7 +8,9 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <map>
@@ -17,6 +19,7 @@
 #include <string>
 
 #include "preprocess/geometry/face_tree.hpp"
+#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/voxel/open_surface.hpp"
 #include "preprocess/voxel/rasterize.hpp"
 #include "preprocess/voxel/snapped_surface.hpp"
@@ -137,17 +140,61 @@ struct Solid {
   std::string warning;
 };
 
-Solid solid(const SurfaceMesh& surface, const std::string& name, const ImageGrid& grid,
+/// Holes that take more of the inside leave a shell, not a body.
+constexpr double kMostLost = 0.05;
+
+std::string rounded(double x) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.4g", x);
+  return text.data();
+}
+
+/// Whether a closed surface holds nothing: both sides of a sheet.
+bool flat(const SurfaceMesh& surface) {
+  const Eigen::Vector3d middle = surface.V.colwise().mean().transpose();
+  const double extent = (surface.V.colwise().maxCoeff() - surface.V.colwise().minCoeff()).maxCoeff();
+  double volume = 0;
+  for (Eigen::Index f = 0; f < surface.F.rows(); ++f) {
+    const auto corner = [&](Eigen::Index c) -> Eigen::Vector3d {
+      return surface.V.row(surface.F(f, c)).transpose() - middle;
+    };
+    volume += corner(0).dot(corner(1).cross(corner(2))) / 6;
+  }
+  return !(std::abs(volume) > 1e-6 * extent * extent * extent);
+}
+
+Solid solid(const SurfaceMesh& surface, const std::string& name, bool is_skin, const ImageGrid& grid,
             const Context& context) {
   if (surface.F.rows() == 0) return {{}, name + ": the bone has no triangle"};
   const SnappedSurface snapped = snap(surface, grid);
   Solid out{rasterize(snapped, snapped.closed, snapped.closed ? 0 : 1, context), {}};
   if (!snapped.closed) {
-    const std::size_t inside = mark_inside_open(surface, grid, out.mask, context);
-    out.warning =
-        name + ": the surface has open edges; " +
-        (inside > 0 ? "what it encloses was found by flooding"
-                    : "it encloses nothing at this voxel size, so that only the voxels it touches count");
+    const OpenInside inside = mark_inside_open(surface, grid, out.mask, context);
+    if (inside.lost > kMostLost) {
+      const geometry::LargestHole hole = geometry::largest_hole(surface);
+      const std::string what = "the surface is open: " + rounded(inside.lost * inside.expected_ml) +
+                               " of some " + rounded(inside.expected_ml) + " ml inside run out through its " +
+                               std::to_string(hole.holes) +
+                               (hole.holes == 1 ? " hole" : " holes, the largest") + " of " +
+                               std::to_string(hole.edges) + " edges at [" + rounded(hole.middle.x()) + ", " +
+                               rounded(hole.middle.y()) + ", " + rounded(hole.middle.z()) + "]";
+      const std::string mend =
+          hole.filling_edge > 0
+              ? "close it: ecorche repair --holes " + rounded(std::ceil(1.05 * hole.filling_edge)) + " does"
+              : std::string("give a closed surface of the body");
+      if (is_skin) throw Error(ErrorKind::data, name, what, mend);
+      out.warning = name + ": " + what + "; only the voxels that it touches count (" + mend + ")";
+    } else {
+      out.warning =
+          name + ": the surface has open edges; " +
+          (inside.voxels > 0
+               ? "what it encloses was found by flooding"
+               : "it encloses nothing at this voxel size, so that only the voxels it touches count");
+    }
+    if (is_skin && inside.voxels == 0)
+      throw Error(ErrorKind::data, name, "encloses no volume", "give a closed surface of the body");
+  } else if (is_skin && flat(surface)) {
+    throw Error(ErrorKind::data, name, "encloses no volume", "give a closed surface of the body");
   }
   return out;
 }
@@ -239,7 +286,7 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
   std::size_t done = 0;
   const auto make = [&](std::size_t at, const SurfaceMesh& surface, const std::string& name) {
     context.check_stop();
-    solids[at] = solid(surface, name, grid, context);
+    solids[at] = solid(surface, name, at == 0, grid, context);
     const std::lock_guard lock(mutex);
     done += static_cast<std::size_t>(surface.F.rows());
     context.report(0.9 * static_cast<double>(done) / static_cast<double>(triangles));

@@ -26,10 +26,10 @@ struct Options {
 /// a cavity), then bones; a voxel claimed by several bones goes to the one whose surface is nearest to its
 /// centre, ties to the lower index. The body is skin together with bones. A surface with open edges is
 /// flooded from outside instead and each part that the flood does not reach asks a generalized winding
-/// number, with a warning: slits up to a voxel are closed, wider holes leave only the touched voxels.
-/// Parallel over slabs; the same bytes for any number of threads. Throws Error{config} when voxel_mm gives
-/// more than 2^31 voxels or more than 2048 along an axis, Error{data} for an empty skin or a vertex that is
-/// not finite.
+/// number, with a warning: slits up to a voxel are closed, wider holes leave only the touched voxels of a
+/// bone. Parallel over slabs; the same bytes for any number of threads. Throws Error{config} when voxel_mm
+/// gives more than 2^31 voxels or more than 2048 along an axis, Error{data} for a vertex that is not finite
+/// and for a skin that is empty, holds nothing, or loses more than a twentieth of its inside through holes.
 Image voxelize(const Case& patient, const Options& options, const Context& context);
 
 }  // namespace ecorche::voxel

@@ -82,8 +82,9 @@ struct Options {
 /// leaves [-1e-3, 1 + 1e-3] beside bad tets is solved again with those tets' ties mended, with a warning
 /// (monotone.hpp); Error{data} when more than 2 % of the nodes would need that. What still leaves [0, 1] is
 /// clamped and renormalised, and counted (repair.hpp); Error{data} when that would change a weight by more
-/// than 1e-2, naming the worst node and its tets. The certificate's solved_* members stand for the solver's
-/// last solution, before it is clamped.
+/// than 1e-2, naming the worst node and its tets. The certificate's first_violation stands for the solution
+/// on the whole mesh, mended_* for what solving again did to it, and solved_* for the solver's last solution,
+/// before it is clamped.
 WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
                             const std::vector<std::int32_t>& bone_segment, std::size_t segments,
                             const Options& options, const Context& context);

@@ -47,6 +47,8 @@ MonotoneResult solve_monotone(solve::SparseMatrix& L, const std::vector<std::uin
   result.harmonic = solve_harmonic(L, fixed, std::move(boundary), solver, context);
   std::vector<double> left = violations(fixed, result);
   result.first_violation = result.violation;
+  solve::Block first;
+  if (result.violation > kSmallViolation) first = result.harmonic.values;
   const auto most = static_cast<std::int64_t>(kMostMended * static_cast<double>(fixed.size()));
   std::vector<std::uint8_t> marked(fixed.size(), 0);
   Context quiet;  // progress has come to its end with the first solution
@@ -62,6 +64,12 @@ MonotoneResult solve_monotone(solve::SparseMatrix& L, const std::vector<std::uin
     drop_positive_ties(L, marked);
     result.harmonic = solve_harmonic(L, fixed, std::move(result.harmonic.values), solver, quiet);
     left = violations(fixed, result);
+  }
+  if (result.mended_nodes > 0) {
+    result.largest_change = worst_row(fixed, [&](std::size_t n) {
+                              const auto row = static_cast<Eigen::Index>(n);
+                              return (result.harmonic.values.row(row) - first.row(row)).cwiseAbs().maxCoeff();
+                            }).value;
   }
   return result;
 }

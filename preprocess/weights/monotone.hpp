@@ -17,6 +17,7 @@ struct MonotoneResult {
   HarmonicResult harmonic;
   std::int64_t mended_nodes = 0;  ///< nodes whose positive off-diagonals were dropped
   double first_violation = 0;     ///< how far the solution on the whole mesh had left [0, 1]
+  double largest_change = 0;      ///< of a value, from that solution to the last
   double violation = 0;  ///< how far the last one does; beyond kSmallViolation the mesh is to be refused
   std::int32_t worst_node = -1;  ///< where the last one does
 };

@@ -55,11 +55,19 @@ void warn_of_untouched_bones(const TetMesh& mesh, const Case& patient, const Con
 void warn_of_mended_nodes(const MonotoneResult& solved, const Context& context) {
   if (solved.mended_nodes == 0) return;
   std::array<char, 200> line{};
-  std::snprintf(
-      line.data(), line.size(),
-      "weights left [0, 1] by up to %.2g beside bad tets: solved again with the ties of %lld nodes mended",
-      solved.first_violation, static_cast<long long>(solved.mended_nodes));
+  std::snprintf(line.data(), line.size(),
+                "weights left [0, 1] by up to %.2g beside bad tets: solved again with the ties of %lld nodes "
+                "mended, by which a weight moved by up to %.2g",
+                solved.first_violation, static_cast<long long>(solved.mended_nodes), solved.largest_change);
   context.warn(line.data());
+}
+
+/// Of both equations where there are two: the worse.
+void certify_mending(const MonotoneResult& solved, Certificate& certificate) {
+  certificate.first_violation = std::max(certificate.first_violation, solved.first_violation);
+  certificate.mended_nodes =
+      std::max(certificate.mended_nodes, static_cast<std::uint64_t>(solved.mended_nodes));
+  certificate.mended_largest_change = std::max(certificate.mended_largest_change, solved.largest_change);
 }
 
 /// Names a node whose weights cannot be had, and the tets around it.
@@ -235,12 +243,14 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   Context scaled = stop_only(context);
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
   MonotoneResult monotone = solve_monotone(L, fixed, std::move(boundary), *solver, scaled);
+  certify_mending(monotone, certificate);
   if (options.kind == Kind::quasi_harmonic && monotone.violation <= kSmallViolation) {
     context.check_stop();
     solve::SparseMatrix().swap(L);
     solve::SparseMatrix bent =
         stiffness(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
     monotone = solve_monotone(bent, fixed, std::move(monotone.harmonic.values), *solver, stop_only(context));
+    certify_mending(monotone, certificate);
   }
   if (monotone.violation > kSmallViolation) {
     refuse(mesh, monotone.worst_node, monotone.violation, monotone.mended_nodes);

@@ -29,6 +29,12 @@ struct alignas(64) RunWords {
   std::uint32_t of[32];
 };
 
+HWY_INLINE const float* node_at(std::span<const float> nodes, std::span<const float> copied,
+                                std::size_t node) {
+  return node < TetRuns::first_copied ? nodes.data() + 3 * node
+                                      : copied.data() + 3 * (node - TetRuns::first_copied);
+}
+
 // A node, or as many as a vector holds: x, y, z and what follows in memory, which nobody looks at.
 #if HWY_TARGET == HWY_SCALAR
 struct Box {
@@ -44,11 +50,13 @@ HWY_INLINE Box bound_run(const float* nodes, std::span<const std::uint32_t> rows
   }
   return box;
 }
-HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, float* padded, std::size_t b) {
+HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, std::span<const float> copied,
+                           float* padded, std::size_t b) {
   Box box{{kFar, kFar, kFar, 0}, {-kFar, -kFar, -kFar, 0}};
   const auto take = [&](std::uint32_t node, float* to) {
+    const float* from = node_at(nodes, copied, node);
     for (std::size_t a = 0; a < 3; ++a) {
-      const float x = nodes[3 * std::size_t{node} + a];
+      const float x = from[a];
       if (to != nullptr) to[a] = x;
       box.low[a] = std::min(box.low[a], x);
       box.high[a] = std::max(box.high[a], x);
@@ -108,26 +116,28 @@ HWY_INLINE Box bound_run(const float* nodes, std::span<const std::uint32_t> rows
   return between(low, high);
 }
 
-// A node of the mesh, of which nothing follows the last, and a zero.
-HWY_INLINE hn::Vec<F4> mesh_node(std::span<const float> nodes, std::size_t node) {
-  const float* from = nodes.data() + 3 * node;
+// A node of the mesh, of which nothing follows the last, or a copied one, and a zero.
+HWY_INLINE hn::Vec<F4> mesh_node(std::span<const float> nodes, std::span<const float> copied,
+                                 std::size_t node) {
   if (HWY_UNLIKELY(3 * node + 4 > nodes.size())) {
+    const float* from = node_at(nodes, copied, node);
     HWY_ALIGN const float last[4] = {from[0], from[1], from[2], 0};
     return hn::Load(F4(), last);
   }
-  return hn::IfThenElseZero(hn::FirstN(F4(), 3), hn::LoadU(F4(), from));
+  return hn::IfThenElseZero(hn::FirstN(F4(), 3), hn::LoadU(F4(), nodes.data() + 3 * node));
 }
-HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, float* padded, std::size_t b) {
+HWY_INLINE Box bound_nodes(const TetRuns& runs, std::span<const float> nodes, std::span<const float> copied,
+                           float* padded, std::size_t b) {
   const std::span<const std::uint32_t> order = runs.order();
   auto low = hn::Set(F4(), kFar), high = hn::Set(F4(), -kFar);
   for (std::size_t n = runs.own(b); n < runs.own(b + 1); ++n) {
-    const auto x = mesh_node(nodes, order[n]);
+    const auto x = mesh_node(nodes, copied, order[n]);
     hn::Store(x, F4(), padded + TetRuns::stride * n);
     low = hn::Min(low, x);
     high = hn::Max(high, x);
   }
   for (const std::uint32_t node : runs.shared(b)) {
-    const auto x = mesh_node(nodes, node);
+    const auto x = mesh_node(nodes, copied, node);
     low = hn::Min(low, x);
     high = hn::Max(high, x);
   }
@@ -263,9 +273,9 @@ void fit_block(const FindTets& where, std::size_t b) {
   hwy::FlushStream();  // what went past the caches, before another thread looks
 }
 
-void bound_block(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
-                 std::size_t b) {
-  const Box box = bound_nodes(runs, nodes, padded.data(), b);
+void bound_block(const TetRuns& runs, std::span<const float> nodes, std::span<const float> copied,
+                 PaddedNodes& padded, BoxTree& tree, std::size_t b) {
+  const Box box = bound_nodes(runs, nodes, copied, padded.data(), b);
   if (runs.levels() == 2) return;
   BoxNode& above = tree.above[runs.first(2) + b / kWidth];
   for (std::size_t a = 0; a < 3; ++a) {
@@ -287,9 +297,9 @@ void fit_block(const FindTets& where, std::size_t b) {
   HWY_DYNAMIC_DISPATCH(fit_block)(where, b);
 }
 
-void bound_block(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
-                 std::size_t b) {
-  HWY_DYNAMIC_DISPATCH(bound_block)(runs, nodes, padded, tree, b);
+void bound_block(const TetRuns& runs, std::span<const float> nodes, std::span<const float> copied,
+                 PaddedNodes& padded, BoxTree& tree, std::size_t b) {
+  HWY_DYNAMIC_DISPATCH(bound_block)(runs, nodes, copied, padded, tree, b);
 }
 
 }  // namespace ecorche::runtime::kernels

@@ -57,7 +57,7 @@ void halve(std::span<Middle> tets, std::size_t width) {
 
 }  // namespace
 
-std::vector<std::uint32_t> halving_order(const Tets& tets, const PointsF& nodes, std::size_t width) {
+std::vector<std::uint32_t> halving_order(const DrawnTets& tets, const PointsF& nodes, std::size_t width) {
   std::vector<Middle> middles(static_cast<std::size_t>(tets.rows()));
   std::vector<std::uint32_t> order(middles.size());
   const tbb::blocked_range<std::size_t> all(0, middles.size(), kTask);

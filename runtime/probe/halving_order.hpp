@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/values/mesh.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 
 namespace ecorche::runtime {
 
@@ -15,6 +16,6 @@ namespace ecorche::runtime {
 /// box: a point lies in fewer of their boxes than along a space-filling curve, whose stretches wind.
 /// (Bentley, "Multidimensional binary search trees used for associative searching", CACM 18 (1975).) `width`:
 /// a power of two. Parallel.
-std::vector<std::uint32_t> halving_order(const Tets& tets, const PointsF& nodes, std::size_t width);
+std::vector<std::uint32_t> halving_order(const DrawnTets& tets, const PointsF& nodes, std::size_t width);
 
 }  // namespace ecorche::runtime

@@ -94,6 +94,22 @@ void near_order(std::span<const float> points, const BoxNode& top, ProbeOrder& o
   SpaceOrder::sort(out.places, out.rows, out.other);
 }
 
+// Copied nodes come behind all others, and are given by rows of their own.
+TetRuns runs_of(const Model& model, const RigidCopies& copies, std::span<const std::uint32_t> given) {
+  const auto own = model.nodes.rows(), copied = static_cast<Eigen::Index>(copies.nodes());
+  if (copied == 0) return {model.tets, model.nodes, given};
+  PointsF nodes(own + copied, 3);
+  nodes << model.nodes, Eigen::Map<const PointsF>(copies.rest().data(), copied, 3);
+  std::vector<std::uint32_t> rows(given.begin(), given.end());
+  if (given.empty()) {
+    rows.resize(static_cast<std::size_t>(own));
+    std::iota(rows.begin(), rows.end(), 0U);
+  }
+  for (std::size_t n = 0; n < copies.nodes(); ++n)
+    rows.push_back(TetRuns::first_copied + static_cast<std::uint32_t>(n));
+  return {DrawnTets(model.tets, copies, static_cast<std::int32_t>(own)), nodes, rows};
+}
+
 }  // namespace
 
 // From the nodes where points lie to those of the other side.
@@ -103,26 +119,32 @@ struct Probe::Way {
   bool from_rest;
 
   // What is said of a point lies in places of its own: all of them are asked for before the first is said.
-  void ask_for(const Model& model, const TetPlace& place) const {
+  void ask_for(const Model& model, const RigidCopies& copies, const TetPlace& place) const {
     if (place.tet == TetPlace::none) return;
-    hwy::Prefetch(&model.tet_label[static_cast<std::size_t>(place.tet)]);
+    hwy::Prefetch(&model.tet_label[copies.own(static_cast<std::size_t>(place.tet))]);
     for (const std::uint32_t node : place.nodes) hwy::Prefetch(&there[std::size_t{TetRuns::stride} * node]);
   }
 };
 
 Probe::Probe(std::shared_ptr<const Model> model, std::span<const std::uint32_t> given)
-    : model_(std::move(model)), runs_(model_->tets, model_->nodes, given), columns_(*model_) {
+    : model_(std::move(model)),
+      copies_(*model_, given),
+      runs_(runs_of(*model_, copies_, given)),
+      columns_(*model_) {
   const std::span nodes(model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size()));
   std::vector<float> rows(
       given.empty() ? 0 : 3 * (std::size_t{1} + *std::max_element(given.begin(), given.end())));
   for (std::size_t n = 0; n < given.size(); ++n)
     std::copy_n(&nodes[3 * n], 3, &rows[3 * std::size_t{given[n]}]);
-  runtime::follow(runs_, given.empty() ? nodes : std::span<const float>(rows), rest_nodes_, rest_);
+  runtime::follow(runs_, given.empty() ? nodes : std::span<const float>(rows), rest_nodes_, rest_,
+                  copies_.rest());
   fit_blocks({runs_, rest_nodes_, rest_});
 }
 
 void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
-  runtime::follow(runs_, nodes, tree.nodes, tree.boxes);
+  tree.copied.resize(3 * copies_.nodes());
+  copies_.place(nodes, tree.copied);
+  runtime::follow(runs_, nodes, tree.nodes, tree.boxes, tree.copied);
 }
 
 void Probe::fit(const PosedTree& tree) const {
@@ -170,14 +192,15 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
     std::array<TetPlace, kPointsPerTask> places;
     std::array<Eigen::Vector3d, kPointsPerTask> rest, voxel;
     kernels::find_tets(way.here, points, which, places);
-    for (std::size_t turn = 0; turn < which.size(); ++turn) way.ask_for(*model_, places[turn]);
+    for (std::size_t turn = 0; turn < which.size(); ++turn) way.ask_for(*model_, copies_, places[turn]);
     for (std::size_t turn = 0; turn < which.size(); ++turn) {
       const std::size_t i = which[turn];
       const std::array<float, 3> point{points[3 * i], points[3 * i + 1], points[3 * i + 2]};
       const TetPlace& place = places[turn];
       const bool held = place.tet != TetPlace::none;
-      out.tet[i] = place.tet;
-      out.label[i] = held ? model_->tet_label[static_cast<std::size_t>(place.tet)] : TetMesh::soft;
+      const auto drawn = static_cast<std::size_t>(place.tet);
+      out.tet[i] = held ? static_cast<std::int32_t>(copies_.own(drawn)) : TetPlace::none;
+      out.label[i] = held ? copies_.label(drawn, model_->tet_label) : TetMesh::soft;
       Eigen::Vector3d other = Eigen::Vector3d::Constant(kNowhere);
       if (held) {
         other.setZero();

@@ -14,6 +14,7 @@
 #include "runtime/probe/tissue_cells.hpp"
 #include "runtime/probe/tissue_columns.hpp"
 #include "runtime/volume/resample.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 
 namespace ecorche::runtime {
 
@@ -36,10 +37,12 @@ struct ProbeOrder {
 
 /// One row per point, #P.
 struct Probed {
-  std::vector<std::int32_t> tet;     ///< TetPlace::none where the point lies outside the body
-  std::vector<float> barycentric;    ///< 4 * #P, of the tet's corners; the same at rest and posed
-  std::vector<float> points;         ///< 3 * #P, LPS mm, on the other side; NaN outside
-  std::vector<std::uint16_t> label;  ///< of the tet: TetMesh::soft, or 1 + the row of its bone; 0 outside
+  std::vector<std::int32_t> tet;   ///< TetPlace::none where the point lies outside the body
+  std::vector<float> barycentric;  ///< 4 * #P, of the tet's corners; the same at rest and posed
+  std::vector<float> points;       ///< 3 * #P, LPS mm, on the other side; NaN outside
+  /// Of the tet: TetMesh::soft, or 1 + the row of its bone, which a contested tet has where it is drawn
+  /// rigidly (rigid_copies.hpp); 0 outside.
+  std::vector<std::uint16_t> label;
   std::vector<float> gradient;       ///< 9 * #P, row by row: F = d posed / d rest of the tet; NaN outside
   std::vector<std::int32_t> tissue;  ///< as TissueColumns::at says of the rest point; none outside
   std::vector<std::vector<double>> values;  ///< per wanted volume, #P * components; its background outside
@@ -48,8 +51,8 @@ struct Probed {
 
 /// Made once per model; shared and immutable, as BodyPoser is. The body is its tets: what lies in the skin's
 /// surface but in no tet (the skin may stand a little off the mesh) is outside. Where the posed body folds
-/// over itself the tet is the one that posed volumes take (resample.hpp): a positive one before an inverted
-/// one, then the lowest index. Results are the same for any number of threads.
+/// over itself the tet is the one that posed volumes take (volume_poser.hpp): a positive one before an
+/// inverted one, then the lowest drawn index. Results are the same for any number of threads.
 class Probe {
  public:
   /// `given`: #nodes, the row of a node in what follow() is given (as BodyPoser::lanes tells of its lanes);
@@ -60,6 +63,7 @@ class Probe {
   /// again. Blocks of it are fitted by who first asks for a point in them.
   struct PosedTree {
     PaddedNodes nodes;
+    std::vector<float> copied;
     mutable BoxTree boxes;
   };
   /// Must follow every new pose; nobody may ask meanwhile. `nodes`: 3 a row, LPS mm, those of nodes finite.
@@ -82,6 +86,7 @@ class Probe {
   void run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const;
 
   std::shared_ptr<const Model> model_;
+  RigidCopies copies_;
   TetRuns runs_;
   PaddedNodes rest_nodes_;
   mutable BoxTree rest_;  // all of it fitted

@@ -25,7 +25,7 @@ BoxNode empty_node() {
 
 }  // namespace
 
-TetRuns::TetRuns(const Tets& tets, const PointsF& nodes, std::span<const std::uint32_t> given)
+TetRuns::TetRuns(const DrawnTets& tets, const PointsF& nodes, std::span<const std::uint32_t> given)
     : tet_(halving_order(tets, nodes, width)) {
   const TetPalettes palettes(tets, tet_, stride);
   const std::size_t runs = palettes.runs();
@@ -97,7 +97,8 @@ std::uint64_t tree_bytes(std::uint64_t tets, std::uint64_t nodes) {
          sizeof(BoxNode) * (lowest / (kWidth - 1) + 1);
 }
 
-void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree) {
+void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
+            std::span<const float> copied) {
   const std::size_t levels = runs.levels(), above = runs.first(levels);
   if (tree.above.size() != above || tree.runs.size() != runs.runs() + 1) {
     tree.above.assign(above, empty_node());
@@ -109,7 +110,7 @@ void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padd
   for (auto& block : tree.blocks) block.store(BoxTree::State::stale, std::memory_order_relaxed);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, runs.blocks(), 8), [&](const auto& range) {
     for (std::size_t b = range.begin(); b < range.end(); ++b)
-      kernels::bound_block(runs, nodes, padded, tree, b);
+      kernels::bound_block(runs, nodes, copied, padded, tree, b);
   });
   // Points are sorted by the box of the top.
   if (runs.blocks() == 1) return fit_block({runs, padded, tree}, 0);

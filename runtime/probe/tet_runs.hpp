@@ -10,6 +10,7 @@
 
 #include "core/values/mesh.hpp"
 #include "runtime/skin/aligned.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 
 namespace ecorche::runtime {
 
@@ -30,8 +31,11 @@ class TetRuns {
   static constexpr std::size_t most_levels = 8;  ///< 16^8 tets: beyond 32 bits
   static constexpr std::uint32_t stride = 4;     ///< of PaddedNodes
 
+  /// Rows from here on are of copied nodes (rigid_copies.hpp), which follow() is given apart.
+  static constexpr std::uint32_t first_copied = std::uint32_t{1} << 31U;
+
   /// `given`: #nodes, the row at which follow() is given a node; empty: its own.
-  TetRuns(const Tets& tets, const PointsF& nodes, std::span<const std::uint32_t> given = {});
+  TetRuns(const DrawnTets& tets, const PointsF& nodes, std::span<const std::uint32_t> given = {});
 
   std::size_t runs() const { return corners_.size(); }
   /// At least two; the last is one node.
@@ -121,11 +125,12 @@ struct FindTets {
 /// What `padded` and `tree` of follow() take, about.
 std::uint64_t tree_bytes(std::uint64_t tets, std::uint64_t nodes);
 
-/// Brings the tree to `nodes` (3 for each row that may be given, finite), of which `padded` gets those of
-/// tets: boxes of all blocks and of what lies above them; the blocks themselves become stale, but for an only
-/// one. Nobody may look meanwhile. Allocates only where `padded` and `tree` were not made for these runs yet.
-/// Parallel.
-void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree);
+/// Brings the tree to `nodes` (3 for each row that may be given, finite) and `copied` (3 for each copied
+/// node), of which `padded` gets those of tets: boxes of all blocks and of what lies above them; the blocks
+/// themselves become stale, but for an only one. Nobody may look meanwhile. Allocates only where `padded` and
+/// `tree` were not made for these runs yet. Parallel.
+void follow(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
+            std::span<const float> copied = {});
 
 /// The block `b`, unless it is fitted already; returns once it is. Any number of threads.
 void fit_block(const FindTets& where, std::size_t b);
@@ -147,8 +152,8 @@ void fit_block(const FindTets& where, std::size_t b);
 
 /// Pads the block's own nodes and puts the box of all of its nodes into the tree above it, where there is
 /// one.
-void bound_block(const TetRuns& runs, std::span<const float> nodes, PaddedNodes& padded, BoxTree& tree,
-                 std::size_t b);
+void bound_block(const TetRuns& runs, std::span<const float> nodes, std::span<const float> copied,
+                 PaddedNodes& padded, BoxTree& tree, std::size_t b);
 
 /// `out`: #which; the tet that holds each of the points `which` (rows of `points`, 3 each). Where several do:
 /// those of positive volume before inverted ones, then the lowest index, as volumes are posed (resample.hpp).

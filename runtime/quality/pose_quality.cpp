@@ -9,6 +9,8 @@
 #include <numeric>
 #include <vector>
 
+#include "runtime/quality/verdict.hpp"
+
 namespace ecorche::runtime {
 namespace {
 
@@ -35,7 +37,7 @@ double det_of(const Tets& tets, std::span<const float> nodes, std::size_t t) {
 
 // Sums over a block of tets; blocks are added in order, so that threads change nothing.
 struct TetSums {
-  double rest = 0, posed = 0;  // determinants
+  double rest = 0, posed = 0, changed = 0;  // determinants; of changes without their signs
   double inverted_rest = 0;
   std::uint64_t inverted = 0;
   double min_det_f = 1;
@@ -47,6 +49,7 @@ TetSums sum_block(const Model& model, std::span<const float> posed, std::size_t 
     const double before = det_of(model.tets, floats(model.nodes), t), after = det_of(model.tets, posed, t);
     sums.rest += before;
     sums.posed += after;
+    sums.changed += std::abs(after - before);
     if (after <= 0) {
       ++sums.inverted;
       sums.inverted_rest += before;
@@ -66,6 +69,7 @@ TetSums sum_tets(const Model& model, std::span<const float> posed) {
   for (const TetSums& block : blocks) {
     all.rest += block.rest;
     all.posed += block.posed;
+    all.changed += block.changed;
     all.inverted += block.inverted;
     all.inverted_rest += block.inverted_rest;
     all.min_det_f = std::min(all.min_det_f, block.min_det_f);
@@ -169,13 +173,6 @@ double rigid_residual(std::span<const float> rest, std::span<const float> posed)
   return worst;
 }
 
-void judge(const QualityThresholds& thresholds, PoseQuality& quality) {
-  quality.thresholds = thresholds;
-  quality.pass = quality.inverted_share <= thresholds.max_inverted_share &&
-                 std::abs(quality.volume_change) <= thresholds.max_volume_change &&
-                 quality.bone_rigidity_mm <= thresholds.max_bone_rigidity_mm;
-}
-
 std::vector<std::uint8_t> closed_surfaces(const Model& model) {
   std::vector<std::uint8_t> out(model.tissues.size());
   tbb::parallel_for(std::size_t{0}, out.size(),
@@ -194,7 +191,9 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
   if (sums.rest > 0) {
     out.inverted_share = sums.inverted_rest / sums.rest;
     out.volume_change = sums.posed / sums.rest - 1;
+    out.unsigned_volume_change = sums.changed / sums.rest;
   }
+  out.places = worst_places(model, body.nodes);
 
   out.tissues.resize(tissues.size());
   std::vector<double> residuals(tissues.size(), 0);
@@ -203,6 +202,7 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
     const std::vector<float>& posed = body.tissues[tissues[i]];
     TissueChange& change = out.tissues[i];
     change.name = tissue.name;
+    change.group = tissue.group;
     change.closed = closed.empty() ? is_closed(tissue.F) : closed[tissues[i]] != 0;
     if (change.closed) {
       change.rest_mm3 = enclosed_volume(floats(tissue.V), tissue.F);
@@ -214,6 +214,7 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
   for (const double residual : residuals) out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, residual);
 
   out.clamped = body.clamped;
+  out.doubtful = doubtful_joints(model.rig, body.pose, thresholds);
   judge(thresholds, out);
   return out;
 }

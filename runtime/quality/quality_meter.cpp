@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/quality/verdict.hpp"
+
 namespace ecorche::runtime {
 namespace {
 
@@ -40,7 +42,7 @@ std::size_t drawn(std::size_t number, std::size_t run) {
 }  // namespace
 
 struct QualityMeter::Sums {
-  double rest = 0, posed = 0, inverted_rest = 0;
+  double rest = 0, posed = 0, changed = 0, inverted_rest = 0;
   double rest_rest = 0, rest_posed = 0, posed_posed = 0, inverted_squared = 0;
   std::uint64_t inverted = 0;
   double min_det_f = 1;
@@ -48,6 +50,7 @@ struct QualityMeter::Sums {
   void add(const Sums& other) {
     rest += other.rest;
     posed += other.posed;
+    changed += other.changed;
     inverted_rest += other.inverted_rest;
     rest_rest += other.rest_rest;
     rest_posed += other.rest_posed;
@@ -120,6 +123,7 @@ QualityMeter::Sums QualityMeter::sum(std::span<const float> nodes, std::size_t b
     const double after = static_cast<double>(det_of(nodes, corners_[i]));
     sums.rest += before;
     sums.posed += after;
+    sums.changed += std::abs(after - before);
     sums.rest_rest += before * before;
     sums.rest_posed += before * after;
     sums.posed_posed += after * after;
@@ -159,6 +163,7 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
     const double share = all.inverted_rest / all.rest, change = all.posed / all.rest;
     out.inverted_share = share;
     out.volume_change = change - 1;
+    out.unsigned_volume_change = all.changed / all.rest;
     if (scale > 1 && measured > 1) {
       const auto error = [&](double aa, double ab, double r) {
         const double squares = std::max(0.0, aa - 2 * r * ab + r * r * all.rest_rest);
@@ -172,11 +177,18 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
   out.tissues.resize(tissues.size());
   for (std::size_t i = 0; i < tissues.size(); ++i) {
     const Part& part = parts_[tissues[i]];
-    out.tissues[i] = {model_->tissues[tissues[i]].name,       part.closed,      part.rest_mm3,
-                      part.rest_mm3 * (1 + changes[i].share), changes[i].share, changes[i].error};
+    const Tissue& tissue = model_->tissues[tissues[i]];
+    out.tissues[i] = {.name = tissue.name,
+                      .group = tissue.group,
+                      .closed = part.closed,
+                      .rest_mm3 = part.rest_mm3,
+                      .posed_mm3 = part.rest_mm3 * (1 + changes[i].share),
+                      .share = changes[i].share,
+                      .share_error = changes[i].error};
     out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, changes[i].residual);
   }
   out.clamped = body.clamped;
+  out.doubtful = doubtful_joints(model_->rig, body.pose, thresholds);
   judge(thresholds, out);
   return out;
 }

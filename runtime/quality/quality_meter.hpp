@@ -29,8 +29,8 @@ class QualityMeter {
   /// `inverted_share_error` and `volume_change_error`; the smallest det F is that of the subset, so no less
   /// than the true one. Tissues that follow the tets: a coarse surface on some of their vertices, whose
   /// difference from a coarser one is `share_error`; small surfaces whole, exact to 1e-5 of their volume.
-  /// Bones: their rigidity is that of up to 64 vertices each, and their volume is the rest's. Same figures
-  /// for any thread count.
+  /// Which place is worst is not looked for. Bones: their rigidity is that of up to 64 vertices each, and
+  /// their volume is the rest's. Same figures for any thread count.
   PoseQuality measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                       const QualityThresholds& thresholds = {}) const;
 

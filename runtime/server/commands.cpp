@@ -17,6 +17,10 @@ constexpr std::uint32_t kProtocol = 1;
 // Clips that the server plays count on from a client's poses: never to the end of all numbers, where 0 comes
 // again, which is the rest pose to every session.
 constexpr std::uint64_t kMostSequence = std::uint64_t{1} << 63U;
+// A session's poses count on by this at most: two days of 90 a second. No one pose, then, leaves no numbers
+// for the next ones, and 2000 a second that each skip as many take eight years.
+constexpr std::uint64_t kMostAhead = std::uint64_t{1} << 24U;
+constexpr std::size_t kMostPing = 64;  // bytes
 constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY,    v1::FEATURE_CONTROL,
                                v1::FEATURE_RESUME,  v1::FEATURE_CLIPS,      v1::FEATURE_INVERSE_KINEMATICS,
                                v1::FEATURE_RELOAD,  v1::FEATURE_THRESHOLDS, v1::FEATURE_SPHERES,
@@ -41,6 +45,9 @@ void describe(const Limits& limits, v1::Limits& out) {
   out.set_requests_per_second(limits.requests_per_second);
   out.set_kept_bytes(limits.kept_bytes);
   out.set_record_bytes(limits.record_bytes);
+  out.set_frame_bytes(limits.frame_bytes);
+  out.set_peer_share(limits.peer_share);
+  out.set_connection_share(limits.connection_share);
 }
 
 // Why this hello cannot be answered; ok when it can.
@@ -59,10 +66,22 @@ Status check_hello(const v1::ClientHello& hello) {
   return {};
 }
 
-runtime::Skinning skinning_of(v1::Skinning skinning) {
-  if (skinning == v1::SKINNING_DQS) return runtime::Skinning::dqs;
-  if (skinning == v1::SKINNING_LBS) return runtime::Skinning::lbs;
-  return runtime::Skinning::cor;
+Status read_skinning(v1::Skinning skinning, runtime::Skinning& out) {
+  switch (static_cast<int>(skinning)) {
+    case v1::SKINNING_UNSPECIFIED:
+    case v1::SKINNING_COR:
+      out = runtime::Skinning::cor;
+      return {};
+    case v1::SKINNING_DQS:
+      out = runtime::Skinning::dqs;
+      return {};
+    case v1::SKINNING_LBS:
+      out = runtime::Skinning::lbs;
+      return {};
+    default:
+      return {StatusCode::invalid_argument, "pose: skinning " + std::to_string(static_cast<int>(skinning)) +
+                                                " (send 0 to 3, see Skinning)"};
+  }
 }
 
 }  // namespace
@@ -89,12 +108,16 @@ void Connection::handle(const wire::Frame& frame) {
     case v1::Envelope::kFrameAck:
       outbox_.acknowledge(request.frame_ack().subscription(), request.frame_ack().frame(), Clock::now());
       if (session_) session_->arrived();
+      if (session_) session_->has_read();
       wake_.cancel();
       return;
     case v1::Envelope::kPing: {
+      if (request.ping().data().size() > kMostPing)
+        return answer_status(
+            id, {StatusCode::invalid_argument, "ping: " + std::to_string(request.ping().data().size()) +
+                                                   " bytes of data (send at most 64)"});
       v1::Envelope pong;
-      // Cut, not refused: a ping is a question about the connection, not about its bytes.
-      pong.mutable_pong()->set_data(request.ping().data().substr(0, 64));
+      pong.mutable_pong()->set_data(request.ping().data());
       return answer(id, std::move(pong));
     }
     case v1::Envelope::kClaimControl:
@@ -148,9 +171,10 @@ void Connection::handle_hello(const v1::Envelope& request) {
   for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
     hello.add_encodings(encoding);
   describe(house_.limits(), *hello.mutable_limits());
+  hello.set_connection(number_);
   resume_token_ = random_token();
   hello.set_resume_token(resume_token_);
-  house_.arrived(resume_token_, [this] { close("its place was taken up again"); });
+  house_.arrived(resume_token_, [this] { give_up(); });
   const std::string& place = request.client_hello().resume_token();
   if (place.empty()) return answer(request.request_id(), std::move(envelope));
   come_back(request.request_id(), place, std::move(envelope));
@@ -171,16 +195,17 @@ void Connection::handle_open(const v1::Envelope& request) {
         {StatusCode::failed_precondition, "open: this connection has a model (open another connection)"});
   }
   std::shared_ptr<Session> session;
-  if (const Status status = house_.open(open, session); !status.ok())
+  if (const Status status = house_.open(open, address_, session); !status.ok())
     return answer_status(request.request_id(), status);
   if (session_) {  // of the model that was
+    if (session_->controls(*this)) heir_ = session_->name();
     session_->leave(*this, false);
     for (const std::uint32_t subscription : subscriptions_) outbox_.forget(subscription);
     subscriptions_.clear();
     last_sequence_ = 0;
   }
   session_ = std::move(session);
-  role_ = session_->join(*this);
+  role_ = session_->join(*this, std::exchange(heir_, {}) == session_->name());
   const ServedModel& model = *session_->model();
   v1::Envelope envelope;
   v1::ModelOpened& opened = *envelope.mutable_model_opened();
@@ -209,6 +234,13 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
         id, {StatusCode::resource_exhausted, "subscribe: " + std::to_string(subscriptions_.size()) +
                                                  " subscriptions already (Unsubscribe one first)"});
   }
+  if (const std::uint64_t bytes = session_->frame_bytes(want); bytes > house_.limits().frame_bytes) {
+    house_.metrics().hit("frame_bytes");
+    return answer_status(id, {StatusCode::resource_exhausted,
+                              "subscribe: a frame of it has " + std::to_string(bytes) + " bytes (at most " +
+                                  std::to_string(house_.limits().frame_bytes) +
+                                  "; ask for a region, fewer slices or fewer tissues)"});
+  }
   const auto* mesh = std::get_if<MeshWant>(&want);
   if (!mesh || !takes_long(*mesh))
     return subscribe(id, {.id = 0, .want = want, .request = request.subscribe()}, {}, nullptr);
@@ -226,6 +258,11 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
       [made, model = session_->model()] {
         try {
           made->asked.streams = open_streams(*model, std::get<MeshWant>(made->asked.want));
+          if (empty(made->asked.streams)) {
+            made->status = {StatusCode::invalid_argument,
+                            "subscribe: no vertex of the tissues lies in the region (make it larger)"};
+            return;
+          }
           made->payload = describe(*model, made->asked.streams, made->told);
         } catch (const std::bad_alloc&) {
           made->status = {StatusCode::resource_exhausted,
@@ -244,7 +281,8 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
           if (!made->status.ok()) return self->answer_status(id, made->status);
           self->subscribe(id, made->asked, std::move(made->told), std::move(made->payload));
         });
-      });
+      },
+      account_);
 }
 
 void Connection::subscribe(std::uint64_t id, const Asked& asked, v1::Subscribed told,
@@ -301,19 +339,24 @@ Status Connection::check_pose(const v1::PoseUpdate& update, PoseRequest& out) co
   }
   if (Status status = check_sequence(update.sequence()); !status.ok()) return status;
   out.sequence = update.sequence();
-  out.skinning = skinning_of(update.skinning());
+  if (Status status = read_skinning(update.skinning(), out.skinning); !status.ok()) return status;
   return wire::from_proto(update, model.model().segment_count(), out.pose);
 }
 
 Status Connection::check_sequence(std::uint64_t sequence) const {
   if (sequence >= kMostSequence)
     return {StatusCode::out_of_range, "pose: sequence " + std::to_string(sequence) + " (stay below 2^63)"};
-  if (sequence > last_sequence_) return {};
-  return {StatusCode::out_of_range, "pose: sequence " + std::to_string(sequence) + " after " +
-                                        std::to_string(last_sequence_) + " (let it grow)"};
+  const std::string after = std::to_string(sequence) + " after " + std::to_string(last_sequence_);
+  if (sequence <= last_sequence_)
+    return {StatusCode::out_of_range, "pose: sequence " + after + " (let it grow)"};
+  if (sequence - last_sequence_ > kMostAhead)
+    return {StatusCode::out_of_range, "pose: sequence " + after + " (skip less than 2^24)"};
+  return {};
 }
 
 void Connection::handle_reload(const v1::Envelope& request) {
+  if (const Status status = may("reload", true); !status.ok())
+    return answer_status(request.request_id(), status);
   house_.reload(request.reload_model().model(),
                 [weak = weak_from_this(), id = request.request_id()](const Status& status) {
                   if (const auto self = weak.lock())
@@ -323,14 +366,20 @@ void Connection::handle_reload(const v1::Envelope& request) {
 
 void Connection::model_changed(std::uint64_t identity) {
   if (closed_ || ending_) return;
-  v1::Envelope envelope;
-  envelope.mutable_model_changed()->set_identity(identity);
-  answer(0, std::move(envelope));
+  told([&] {
+    v1::Envelope envelope;
+    envelope.mutable_model_changed()->set_identity(identity);
+    answer(0, std::move(envelope));
+  });
 }
 
 void Connection::pose_done(const PoseOutcome& outcome, const Skipped& skipped) {
   if (closed_ || ending_) return;
   last_sequence_ = std::max(last_sequence_, outcome.sequence);  // of a clip that the server plays
+  told([&] { acknowledge(outcome, skipped); });
+}
+
+void Connection::acknowledge(const PoseOutcome& outcome, const Skipped& skipped) {
   v1::Envelope envelope;
   v1::PoseAck& ack = *envelope.mutable_pose_ack();
   ack.set_sequence(outcome.sequence);

@@ -2,8 +2,6 @@
 // Bytes in and out, deadlines and the end of a connection; what its messages do stands in commands.cpp.
 #include "runtime/server/connection.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <array>
 #include <new>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "proto/convert.hpp"
+#include "runtime/server/shares.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -27,6 +26,8 @@ constexpr std::size_t kLittle = 64;
 constexpr double kLessPatience = 0.25;
 // How long an ending connection may take to read its last words.
 constexpr double kLastWordsSeconds = 1;
+// After a server that stops: until a supervisor has started it again.
+constexpr double kRetrySeconds = 1;
 
 }  // namespace
 
@@ -38,7 +39,13 @@ Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, b
       outbox_(house.limits().frames_in_flight),
       wake_(transport_->executor()),
       pause_(transport_->executor()),
-      peer_(std::move(peer)),
+      number_(house.next_connection()),
+      peer_("#" + std::to_string(number_) + " " + peer),
+      address_(address_of(peer)),
+      portion_(
+          std::make_shared<const Pool>(portion(house.limits().kept_bytes, house.limits().connection_share),
+                                       house.portion_of(address_)->kept)),
+      account_(std::make_shared<Account>(house.portion_of(address_)->account)),
       proven_(proven),
       allowance_(house.limits().messages_per_second),
       allowance_at_(Clock::now()),
@@ -46,8 +53,16 @@ Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, b
 
 Connection::~Connection() = default;
 
+// Says nothing where there is no memory for it.
+void Connection::log(spdlog::level::level_enum level, const char* what, const std::string& why) const {
+  try {
+    house_.journal().line(level, address_, peer_, what + why);
+  } catch (const std::bad_alloc&) {
+  }
+}
+
 void Connection::start() {
-  spdlog::debug("{}: connected", peer_);
+  log(spdlog::level::debug, "connected", {});
   spawn(read_frames());
 }
 
@@ -67,7 +82,8 @@ void Connection::start_refused(const Status& status) {
 void Connection::say_goodbye(const Status& status) {
   v1::Envelope last;
   wire::to_proto(status, *last.mutable_goodbye()->mutable_status());
-  end(std::move(last));
+  last.mutable_goodbye()->set_retry_seconds(kRetrySeconds);
+  end(std::move(last), farewell_of(status.code));
 }
 
 void Connection::make_way(bool told) {
@@ -80,30 +96,42 @@ void Connection::make_way(bool told) {
 }
 
 void Connection::end(const Status& status) {
-  spdlog::info("{}: ended: {}", peer_, status.message);
-  v1::Envelope last;
-  wire::to_proto(status, *last.mutable_status());
-  end(std::move(last));
+  end(status, farewell_of(status.code));
 }
 
-void Connection::end(v1::Envelope last) {
+void Connection::end(const Status& status, Farewell why) {
+  log(spdlog::level::info, "ended: ", status.message);
+  v1::Envelope last;
+  wire::to_proto(status, *last.mutable_status());
+  end(std::move(last), why);
+}
+
+void Connection::end(v1::Envelope last, Farewell why) {
   if (ending_) return;
   answer(0, std::move(last));
+  transport_->ends_by(why);
   ending_ = true;
   ending_since_ = Clock::now();
 }
 
 void Connection::close(const char* why) {
   if (std::exchange(closed_, true)) return;
-  spdlog::debug("{}: closed: {}", peer_, why);
+  log(spdlog::level::debug, "closed: ", why);
   transport_->close();
   wake_.cancel();
   pause_.cancel();
-  // A place that can be taken up again; not by one who said goodbye.
+  leave_place();
+  try {
+    house_.let_go(outbox_.clear());
+  } catch (const std::bad_alloc&) {  // then it goes with the connection
+  }
+}
+
+// One who said goodbye does not come back.
+void Connection::leave_place() {
   const auto session = std::exchange(session_, nullptr);
-  const bool may_return = session && !departed_ && !session->retired();
   std::optional<Lost> place;
-  if (may_return) {
+  if (session && !departed_ && !session->retired()) {
     try {
       place =
           Lost{.session = session, .asked = session->asked_by(*this), .controlled = session->controls(*this)};
@@ -111,11 +139,26 @@ void Connection::close(const char* why) {
     }
   }
   if (session) session->leave(*this, place.has_value());
+  house_.left(resume_token_, std::move(place));
+}
+
+void Connection::give_up() {
   try {
     house_.let_go(outbox_.clear());
-  } catch (const std::bad_alloc&) {  // then it goes with the connection
+    end({StatusCode::aborted,
+         "resume: another connection showed this one's token, and has its place (go on there)"});
+  } catch (const std::bad_alloc&) {
+    return close("its place was taken up again");
   }
-  house_.left(resume_token_, std::move(place));
+  leave_place();
+}
+
+void Connection::told(const std::function<void()>& tell) noexcept {
+  try {
+    tell();
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
 }
 
 Clock::duration Connection::check(Clock::time_point now) {
@@ -131,7 +174,9 @@ Clock::duration Connection::check(Clock::time_point now) {
     return since && reached(*since + duration(seconds));
   };
   if (closed_) return left;
-  if (ending_) {
+  if (failed_) {
+    close("no memory for what it was to be told");
+  } else if (ending_) {
     if (longer(ending_since_, kLastWordsSeconds)) close("last words not read");
   } else if (!open_ && longer(came_, limits.hello_seconds)) {
     house_.metrics().hit("hello");
@@ -140,9 +185,7 @@ Clock::duration Connection::check(Clock::time_point now) {
     hit("hello", {StatusCode::deadline_exceeded,
                   "hello: none within " + std::to_string(limits.hello_seconds) + " s (send it first)"});
   } else if (reached(stalls_at(now))) {
-    spdlog::info("{}: dropped: stopped reading", peer_);
-    house_.metrics().hit("stall");
-    close("stalled");
+    stalled();
   } else if (longer(reading_since_, limits.stall_seconds)) {
     hit("stall",
         {StatusCode::deadline_exceeded, "frame: half a message, then nothing (send whole messages)"});
@@ -164,6 +207,48 @@ std::optional<Clock::time_point> Connection::stalls_at(Clock::time_point now) co
   return at;
 }
 
+// Who takes nothing of a write can be told nothing. What else waits for it would only keep it from its last
+// words.
+void Connection::stalled() {
+  if (writing_) {
+    log(spdlog::level::info, "dropped: stopped reading", {});
+    house_.metrics().hit("stall");
+    return close("stalled");
+  }
+  house_.let_go(outbox_.clear());
+  hit("stall", {StatusCode::deadline_exceeded,
+                "frame: none was acknowledged in time (send FrameAck for each as soon as it is read)"});
+}
+
+std::uint64_t Connection::clogged(Clock::time_point now, Clock::duration patience) const {
+  if (closed_ || (!writing_ && !outbox_.oldest_written())) return 0;
+  const Clock::time_point since =
+      writing_ ? std::max(writing_->since, transport_->moved().value_or(writing_->since))
+               : *outbox_.oldest_written();
+  return now - since < patience ? 0 : held();
+}
+
+std::uint64_t Connection::held() const {
+  return outbox_.bytes() + (writing_ ? writing_->bytes : 0);
+}
+
+void Connection::make_room() {
+  log(spdlog::level::info, "dropped: read nothing while others waited for room", {});
+  house_.metrics().hit("room");
+  close("made room");
+}
+
+// Within its share; who reads may have another frame made while the last one is written, however large they
+// are. Where all memory is taken, only of what has been read.
+bool Connection::may_take(std::uint32_t subscription, std::uint64_t bytes) {
+  const std::uint64_t waits = held();
+  if (waits == 0) return true;
+  const ServerMemory& memory = house_.memory();
+  if (!memory.small(bytes) && memory.full(bytes)) return false;
+  if (waits + bytes <= portion(memory.limit(), house_.limits().connection_share)) return true;
+  return waits <= bytes && outbox_.arrives(subscription);
+}
+
 void Connection::hit(const char* limit, const Status& status) {
   house_.metrics().hit(limit);
   end(status);
@@ -172,7 +257,7 @@ void Connection::hit(const char* limit, const Status& status) {
 net::awaitable<bool> Connection::open_transport() {
   boost::system::error_code ec;
   co_await transport_->open(ec);
-  if (ec && !closed_) spdlog::debug("{}: {}", peer_, ec.message());
+  if (ec && !closed_) log(spdlog::level::debug, "", ec.message());
   open_ = !ec;
   co_return open_ && !closed_;
 }
@@ -197,6 +282,11 @@ net::awaitable<void> Connection::read_frames() {
     }
     heard_ = Clock::now();
     house_.metrics().read(n);
+    if (transport_->wrong_kind()) {
+      end({StatusCode::invalid_argument, "message: it is text (send binary ones, a frame each)"},
+          Farewell::wrong_kind);
+      break;
+    }
     const bool trickles = n < kLittle;
     if (!direct && n > 0) {
       co_await take_apart(std::span<const std::byte>(inbox_).first(n));
@@ -225,7 +315,11 @@ void Connection::take_in(std::size_t n, bool last) {
   if (reader_.between_frames()) reading_since_ = heard_;
   const Handling handling(house_.seams());
   try {
-    if (const Status status = reader_.advance(n); !status.ok()) return hit("frame", status);
+    if (const Status status = reader_.advance(n); !status.ok()) {
+      house_.metrics().hit("frame");
+      const bool large = status.code == StatusCode::resource_exhausted;
+      return end(status, large ? Farewell::too_big : farewell_of(status.code));
+    }
     if (const auto ended = transport_->message_ended(); ended && (last && *ended) != reader_.complete()) {
       return end({StatusCode::invalid_argument,
                   "message: it holds more or less than one frame (send one frame a message)"});
@@ -234,7 +328,7 @@ void Connection::take_in(std::size_t n, bool last) {
     reading_since_.reset();
     handle(reader_.take());
   } catch (const std::exception& error) {
-    spdlog::error("{}: {}", peer_, error.what());
+    log(spdlog::level::err, "failed: ", error.what());
     end({StatusCode::internal, "message: the server failed at it (report it)"});
   }
 }
@@ -244,7 +338,7 @@ void Connection::take_back(const std::function<void()>& answer) {
   try {
     answer();
   } catch (const std::exception& error) {
-    spdlog::error("{}: {}", peer_, error.what());
+    log(spdlog::level::err, "failed: ", error.what());
     close("failed");
   }
 }
@@ -324,14 +418,18 @@ net::awaitable<void> Connection::write_frames() {
     for (const SharedFrame& frame : frames)
       house_.metrics().wrote(frame->bytes(), posed && frame == frames.back());
     if (posed) house_.metrics().took(Metrics::Stage::written, seconds(written - start));
+    frames.clear();
+    if (session_) session_->has_read();
   }
 }
 
 bool Connection::deliver(const PosedFrame& frame) {
   if (closed_ || ending_) return true;
-  const bool taken =
-      outbox_.offer(frame.subscription, frame.level, frame.number, frame.keyframe, frame.bytes);
-  wake_.cancel();
+  bool taken = true;
+  told([&] {
+    taken = outbox_.offer(frame.subscription, frame.level, frame.number, frame.keyframe, frame.bytes);
+    wake_.cancel();
+  });
   return taken;
 }
 

@@ -37,6 +37,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   /// for a hello is left in any case.
   Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited,
              House& house);
+  /// address_of() its peer.
+  const std::string& address() const { return address_; }
   ~Connection() override;
 
   void start();
@@ -52,6 +54,11 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   Clock::time_point born() const { return born_; }
   /// A silent one's place goes to another client; it is told so where `told` and possible.
   void make_way(bool told);
+
+  /// Bytes that wait for the client to read, which has taken none for `patience`; 0 where it has.
+  std::uint64_t clogged(Clock::time_point now, Clock::duration patience) const;
+  /// What it does not read makes room for others.
+  void make_room();
 
   /// Drops the connection when it broke a deadline; how long until the next one could be.
   Clock::duration check(Clock::time_point now);
@@ -76,9 +83,12 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
                           bool still) override;
   void pose_done(const PoseOutcome& outcome, const Skipped& skipped) override;
+  void acknowledge(const PoseOutcome& outcome, const Skipped& skipped);
 
-  void control_changed(v1::Role role, bool vacant) override;
+  void control_changed(v1::Role role, bool vacant, double reserved_seconds) override;
   void model_changed(std::uint64_t identity) override;
+  bool may_take(std::uint32_t subscription, std::uint64_t bytes) override;
+  std::shared_ptr<const Pool> kept_share() const override { return portion_; }
 
   void handle(const wire::Frame& frame);
   void handle_hello(const v1::Envelope& request);
@@ -118,15 +128,26 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
               std::shared_ptr<const wire::Payload> payload = nullptr);
   void answer_status(std::uint64_t request_id, const Status& status);
   /// The last message, then the end.
-  void end(v1::Envelope last);
+  void end(v1::Envelope last, Farewell why);
   void end(const Status& status);
+  void end(const Status& status, Farewell why);
+  /// Its session goes on without it, and may keep its place for it. Throws nothing.
+  void leave_place();
+  /// Its place is another connection's, which showed its token.
+  void give_up();
+  /// What a session tells it, from among its other members: where there is no memory for it, this connection
+  /// ends soon after, and the others hear what they should.
+  void told(const std::function<void()>& tell) noexcept;
 
   void spawn(net::awaitable<void> work);
+  std::uint64_t held() const;
+  void log(spdlog::level::level_enum level, const char* what, const std::string& why) const;
   /// What was found for this connection elsewhere. Whatever goes wrong ends this connection alone.
   void take_back(const std::function<void()>& answer);
   net::awaitable<bool> open_transport();
   std::optional<Clock::time_point> stalls_at(Clock::time_point now) const;
   void hit(const char* limit, const Status& status);
+  void stalled();
 
   std::unique_ptr<Transport> transport_;
   House& house_;
@@ -135,7 +156,11 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   Outbox outbox_;
   net::steady_timer wake_;   ///< the writer sleeps on it
   net::steady_timer pause_;  ///< the reader sleeps on it
-  std::string peer_;
+  const std::uint64_t number_;
+  std::string peer_;                     ///< and the number before it, for the log
+  std::string address_;                  ///< address_of() the peer
+  std::shared_ptr<const Pool> portion_;  ///< its part of what is kept
+  std::shared_ptr<Account> account_;     ///< for what is made aside
 
   bool proven_;           ///< of the token, where one is asked for
   bool open_ = false;     ///< the transport's handshake is over
@@ -143,11 +168,13 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   bool ending_ = false;   ///< the last message is queued
   bool closed_ = false;
   bool departed_ = false;  ///< the client said goodbye
+  bool failed_ = false;    ///< it could not be told something: it closes as soon as it can
   double allowance_;       ///< messages that may be read at once
   Clock::time_point allowance_at_;
 
   std::shared_ptr<Session> session_;
   v1::Role role_ = v1::ROLE_UNSPECIFIED;
+  std::string heir_;  ///< name of the session, of a model that was, whose control it held
   std::string resume_token_;
   std::set<std::uint32_t> subscriptions_;
   bool returning_ = false;     ///< the hello is answered once the place's streams are made

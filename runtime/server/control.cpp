@@ -46,6 +46,7 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
   const Lost* const place = house_.place_of(back->token);
   const std::shared_ptr<Session> session = place ? place->session.lock() : nullptr;
   // A retired one's members were told so; who comes back now opens the new one.
+  if (session && session->retired() && place->controlled) heir_ = session->name();
   if (!session || session->retired()) return answer(back->id, std::move(back->answer));
   if (back->asked.empty()) back->asked = place->asked;
   std::vector<Asked*> lacking;
@@ -74,7 +75,8 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
             self->end({StatusCode::resource_exhausted,
                        "hello: the server is out of memory for your place (come back once more)"});
           });
-        });
+        },
+        account_);
     returning_ = true;
     return;
   }
@@ -132,13 +134,17 @@ void Connection::handle_release(const v1::Envelope& request) {
   session_->release(*this);
 }
 
-void Connection::control_changed(v1::Role role, bool vacant) {
+void Connection::control_changed(v1::Role role, bool vacant, double reserved_seconds) {
   role_ = role;
   if (closed_ || ending_) return;
-  v1::Envelope envelope;
-  envelope.mutable_control_changed()->set_role(role);
-  envelope.mutable_control_changed()->set_vacant(vacant);
-  answer(0, std::move(envelope));
+  told([&] {
+    v1::Envelope envelope;
+    v1::ControlChanged& changed = *envelope.mutable_control_changed();
+    changed.set_role(role);
+    changed.set_vacant(vacant);
+    changed.set_reserved_seconds(reserved_seconds);
+    answer(0, std::move(envelope));
+  });
 }
 
 void Connection::handle_thresholds(const v1::Envelope& request) {
@@ -149,8 +155,9 @@ void Connection::handle_thresholds(const v1::Envelope& request) {
   if (wanted.has_max_inverted_share()) thresholds.max_inverted_share = wanted.max_inverted_share();
   if (wanted.has_max_volume_change()) thresholds.max_volume_change = wanted.max_volume_change();
   if (wanted.has_max_bone_rigidity()) thresholds.max_bone_rigidity_mm = wanted.max_bone_rigidity();
-  for (const double value :
-       {thresholds.max_inverted_share, thresholds.max_volume_change, thresholds.max_bone_rigidity_mm}) {
+  if (wanted.has_tissue_factor()) thresholds.tissue_factor = wanted.tissue_factor();
+  for (const double value : {thresholds.max_inverted_share, thresholds.max_volume_change,
+                             thresholds.max_bone_rigidity_mm, thresholds.tissue_factor}) {
     if (!(std::isfinite(value) && value >= 0))
       return answer_status(
           id, {StatusCode::invalid_argument, "thresholds: one is no number from 0 up (mend it)"});

@@ -34,6 +34,8 @@ class Flow {
   /// 180 ms while there is a coarser level: the shortest delay of large frames says little about the way.
   std::uint32_t level(std::uint32_t finest, std::uint32_t coarsest, Clock::time_point now);
 
+  /// Some frame arrived.
+  bool arrives() const { return shortest_.has_value(); }
   /// When the oldest one left that is on its way.
   std::optional<Clock::time_point> oldest() const;
   /// When it was written; nothing while it is being written.

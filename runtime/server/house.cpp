@@ -8,20 +8,13 @@
 #include <tuple>
 #include <utility>
 
+#include "runtime/server/post_back.hpp"
+#include "runtime/server/shares.hpp"
+#include "runtime/server/tls.hpp"
+#include "runtime/server/unnamed_files.hpp"
+
 namespace ecorche::server {
 namespace {
-
-// Recordings of a rig that can be played; the oldest goes.
-constexpr std::size_t kMostRecorded = 16;
-// Recordings under way, which grow in memory, and those that the folder may hold.
-constexpr std::ptrdiff_t kMostRecording = 4, kMostFiles = 256;
-
-// [a-z0-9_]{1,64}
-bool identifier(const std::string& name) {
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-  });
-}
 
 // Throws nothing: what could not be made is tried again by who wants it.
 void warm_up(const ServedModel& model) {
@@ -40,8 +33,12 @@ House::House(net::io_context& io, Workers& workers, Options options, std::vector
       options_(std::move(options)),
       memory_(options_.limits.queued_bytes, options_.limits.kept_bytes),
       judging_(io),
+      recordings_(io, options_),
       seams_(std::move(seams)),
+      journal_(options_.limits.log_lines_per_second),
       aside_(1, giving_way),
+      bin_(1, giving_way),
+      coarsener_(1, giving_way),
       volumes_(static_cast<int>(workers.threads())),
       planes_(static_cast<int>(workers.threads())) {
   if (models.empty() || models.size() > options_.limits.models) {
@@ -80,7 +77,7 @@ void House::stop() {
 // model that nobody has any more.
 void House::coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
   if (leaving_ || tissue >= model->model().tissues.size() || model.use_count() == 1) return;
-  aside_.submit([this, model = std::move(model), tissue]() mutable {
+  coarsener_.submit([this, model = std::move(model), tissue]() mutable {
     if (seams_.may_coarsen && !seams_.may_coarsen()) return;
     try {
       model->make_levels({tissue});
@@ -99,7 +96,7 @@ net::awaitable<void> House::wait(net::steady_timer& timer, boost::system::error_
   co_await timer.async_wait(quietly(ec));
 }
 
-Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) {
+Status House::open(const v1::OpenModel& request, const std::string& address, std::shared_ptr<Session>& out) {
   const auto model = std::find_if(models_.begin(), models_.end(), [&](const auto& m) {
     return request.model().empty() || m->summary.name() == request.model();
   });
@@ -110,8 +107,8 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {StatusCode::invalid_argument,
             "open: a session's name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   }
-  // An unnamed session gets a name that no client can ask for.
-  const std::string name = named ? request.session() : "-" + std::to_string(++unnamed_);
+  // An unnamed session gets a name that nobody can guess, and that who is told it can ask for.
+  const std::string name = named ? request.session() : "s_" + random_token();
   if (const auto found = sessions_.find(name); found != sessions_.end()) {
     if (found->second->model() != *model) {
       return {StatusCode::failed_precondition, "open: session '" + name + "' shows model '" +
@@ -127,6 +124,17 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
     return {StatusCode::resource_exhausted,
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
   }
+  const auto own = [&](const Session& session) { return session.owner() == address; };
+  const auto count =
+      std::count_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return own(*s.second); }) +
+      std::count_if(retired_.begin(), retired_.end(), [&](const auto& s) { return own(*s); });
+  const std::uint64_t most = portion(options_.limits.sessions, options_.limits.peer_share);
+  if (!address.empty() && static_cast<std::uint64_t>(count) >= most && !make_room(address)) {
+    metrics_.hit("sessions");
+    return {StatusCode::resource_exhausted, "open: " + std::to_string(count) +
+                                                " sessions of your address are open (leave one, or ask for "
+                                                "a larger --peer-share)"};
+  }
   const Services services{io_,
                           workers_,
                           volumes_.workers(),
@@ -135,49 +143,80 @@ Status House::open(const v1::OpenModel& request, std::shared_ptr<Session>& out) 
                           judging_,
                           openings_,
                           metrics_,
-                          [this](std::shared_ptr<const void> what) { let_go(std::move(what)); }};
+                          [this](std::shared_ptr<const void> what) { let_go(std::move(what)); },
+                          &journal_};
   out = std::make_shared<Session>(services, *model, name, named, options_.limits);
+  const auto before = [&](const auto& session) { return session->name() == name && session->controlled(); };
+  if (std::any_of(retired_.begin(), retired_.end(), before)) out->await_heir();
+  const std::shared_ptr<const Portion> of = portion_of(address);
+  out->belong(address, of->kept, of->account);
   sessions_.emplace(name, out);
   return {};
 }
 
+std::shared_ptr<const House::Portion> House::portion_of(const std::string& address) {
+  // Whoever has none of it left is forgotten.
+  std::erase_if(portions_, [&](const auto& entry) {
+    return entry.first != address && entry.second->kept.use_count() == 1 &&
+           entry.second->account.use_count() == 1;
+  });
+  std::shared_ptr<const Portion>& of = portions_[address];
+  if (!of) {
+    const std::uint64_t most = portion(options_.limits.kept_bytes, options_.limits.peer_share);
+    of = std::make_shared<const Portion>(
+        Portion{std::make_shared<const Pool>(most, memory_.kept_pool()), std::make_shared<Account>()});
+  }
+  return of;
+}
+
 // The one that waits for longest, of those that only wait for a client to come back, goes; those without a
-// name first. Otherwise one client that makes sessions and leaves them would keep all others out.
-bool House::make_room() {
-  const auto rank = [](const Session& session) {
-    const auto since = session.waiting();
+// name first; with an address, of those of its clients. Otherwise one client that makes sessions and leaves
+// them would keep all others out.
+bool House::make_room(const std::string& address) {
+  const auto rank = [&](const Session& session) {
+    const bool other = !address.empty() && session.owner() != address;
+    const auto since = other ? std::nullopt : session.waiting();
     return std::tuple(!since, session.named(), since.value_or(Clock::time_point{}));
   };
   const auto oldest = std::min_element(sessions_.begin(), sessions_.end(), [&](const auto& a, const auto& b) {
     return rank(*a.second) < rank(*b.second);
   });
-  if (oldest == sessions_.end() || !oldest->second->waiting()) return false;
-  keep_recording(*oldest->second);
+  if (oldest == sessions_.end() || std::get<0>(rank(*oldest->second))) return false;
+  recordings_.keep(*oldest->second);
   sessions_.erase(oldest);
   return true;
 }
 
 void House::sweep(Clock::time_point now) {
+  // Models that nobody may have any more: they end elsewhere, after their sessions.
+  std::vector<std::shared_ptr<const ServedModel>> old;
+  old.reserve(retired_.size());
   const auto ends = [&](const std::shared_ptr<Session>& session) {
     session->forget_probes(now);
-    if (!session->over(now)) return false;
-    keep_recording(*session);
-    return true;
+    session->free_control(now);
+    const bool over = session->over(now);
+    const auto since = session->abandoned();
+    if (over || (since && now - *since >= Recordings::abandoned_after)) recordings_.keep(*session);
+    if (over && session->retired()) old.push_back(session->model());
+    return over;
   };
   std::erase_if(sessions_, [&](const auto& entry) { return ends(entry.second); });
   std::erase_if(retired_, ends);
+  for (auto& model : old) let_go(std::move(model));
   const auto linger = duration(options_.limits.linger_seconds);
   std::erase_if(lost_, [&](const auto& entry) {
     return now - entry.second.since >= linger || entry.second.session.expired();
   });
   for (const auto& [name, session] : sessions_) session->catch_up();
+  recordings_.tick(now);
+  journal_.tick(now);
 }
 
 void House::arrived(const std::string& token, std::function<void()> give_up) {
   live_.emplace(token, std::move(give_up));
 }
 
-void House::left(const std::string& token, std::optional<Lost> place) {
+void House::left(const std::string& token, std::optional<Lost> place) noexcept {
   live_.erase(token);
   if (!place || token.empty()) return;
   // Who comes and goes all the time leaves places faster than they are forgotten.
@@ -186,7 +225,10 @@ void House::left(const std::string& token, std::optional<Lost> place) {
       return a.second.since < b.second.since;
     }));
   }
-  lost_.insert_or_assign(token, std::move(*place));
+  try {
+    lost_.insert_or_assign(token, std::move(*place));
+  } catch (const std::bad_alloc&) {
+  }
 }
 
 const Lost* House::place_of(const std::string& token) {
@@ -201,94 +243,14 @@ const Lost* House::place_of(const std::string& token) {
 
 std::vector<std::shared_ptr<const Clip>> House::clips_for(const ServedModel& model) const {
   std::vector<std::shared_ptr<const Clip>> clips = model.clips;
-  const auto own = recorded_.find(model.opened.rig_digest());
-  if (own != recorded_.end()) clips.insert(clips.end(), own->second.begin(), own->second.end());
+  const auto own = recordings_.clips(model.opened.rig_digest());
+  clips.insert(clips.end(), own.begin(), own.end());
   return clips;
 }
 
-void House::add_clip(std::uint64_t rig_digest, Clip clip) {
-  auto& clips = recorded_[rig_digest];
-  if (clip.poses.empty()) return;
-  if (clips.size() >= kMostRecorded) clips.erase(clips.begin());
-  clips.push_back(std::make_shared<const Clip>(std::move(clip)));
-}
-
-Status House::recording_path(const std::string& name, std::filesystem::path& out) const {
-  if (options_.record_folder.empty()) {
-    return {StatusCode::failed_precondition,
-            "record: this server keeps no recordings (serve with --record-dir)"};
-  }
-  if (!identifier(name))
-    return {StatusCode::invalid_argument, "record: a name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
-  out = options_.record_folder / (name + ".ecrec");
-  std::error_code ec;
-  if (std::filesystem::exists(out, ec))
-    return {StatusCode::already_exists, "record: there is a recording '" + name + "' (choose another name)"};
-  return {};
-}
-
-void House::finish_recording(Session& session, std::function<void(const Status&)> done) {
-  const std::shared_ptr<Recording> recording = session.recording();
-  std::filesystem::path path;
-  if (const Status status = recording_path(recording->name(), path); !status.ok()) return done(status);
-  std::erase_if(ending_, [](const auto& one) { return one.expired(); });
-  ending_.push_back(recording);
-  session.end_recording([this, recording, path, rig = session.model()->opened.rig_digest(),
-                         done = std::move(done)] { write(recording, path, rig, done); });
-}
-
-void House::write(const std::shared_ptr<Recording>& recording, const std::filesystem::path& path,
-                  std::uint64_t rig_digest, const std::function<void(const Status&)>& done) {
-  const auto clip = std::make_shared<Clip>(recording->finish());
-  const auto written = std::make_shared<Status>();
-  offload([recording, path, written] { *written = recording->write(path); },
-          [this, recording, clip, written, rig_digest, done] {
-            if (written->ok()) add_clip(rig_digest, std::move(*clip));
-            if (written->ok() && recording->full()) {
-              *written = {StatusCode::resource_exhausted,
-                          "record: it grew to the server's limit, and is whole up to there (record less)"};
-            }
-            done(*written);
-          });
-}
-
-// Nobody ended it: it ends with its session.
-void House::keep_recording(Session& session) {
-  if (!session.recording()) return;
-  finish_recording(session, [name = session.recording()->name()](const Status& status) {
-    if (!status.ok()) spdlog::warn("recording {}: {}", name, status.message);
-  });
-}
-
 void House::end_recordings() {
-  for (const auto& [name, session] : sessions_) keep_recording(*session);
-  for (const auto& session : retired_) keep_recording(*session);
-}
-
-Status House::room_for_recording(const std::string& name) const {
-  std::ptrdiff_t running = 0;
-  bool same = false;
-  const auto look_at = [&](const std::shared_ptr<const Recording>& recording) {
-    if (!recording) return;
-    ++running;
-    same = same || recording->name() == name;
-  };
-  for (const auto& entry : sessions_) look_at(entry.second->recording());
-  for (const auto& session : retired_) look_at(session->recording());
-  for (const auto& recording : ending_) look_at(recording.lock());
-  if (same) {
-    return {StatusCode::already_exists,
-            "record: another session's recording '" + name + "' runs (choose another name)"};
-  }
-  if (running >= kMostRecording) {
-    return {StatusCode::resource_exhausted,
-            "record: " + std::to_string(running) + " recordings run already (try again later)"};
-  }
-  std::error_code ec;
-  const std::filesystem::directory_iterator files(options_.record_folder, ec);
-  if (!ec && std::distance(begin(files), end(files)) >= kMostFiles)
-    return {StatusCode::resource_exhausted, "record: the server's folder is full (ask who runs it)"};
-  return {};
+  for (const auto& [name, session] : sessions_) recordings_.keep(*session);
+  for (const auto& session : retired_) recordings_.keep(*session);
 }
 
 void House::reload(const std::string& name, std::function<void(const Status&)> done) {
@@ -310,19 +272,37 @@ void House::reload(const std::string& name, std::function<void(const Status&)> d
       ModelParts parts = read();
       reading->model = std::make_shared<const ServedModel>(name, parts.model, std::move(parts.clips));
       warm_up(*reading->model);
-    } catch (const Error& error) {
-      reading->status = to_status(error);
     } catch (const std::bad_alloc&) {
-      reading->status = {StatusCode::resource_exhausted, "reload: the server is out of memory (restart it)"};
+      until_memory([&] {
+        reading->status = {StatusCode::resource_exhausted,
+                           "reload: the server is out of memory (restart it)"};
+      });
     } catch (const std::exception& error) {
-      reading->status = {StatusCode::internal, error.what()};
+      reading->status = without_paths("reload: cannot read model", name, error);
     }
   };
   // Beside all else: nobody waits for it but who asked.
   set_aside(work, [this, reading, done = std::move(done)] {
     reloading_ = false;
     if (reading->status.ok()) replace(reading->model);
+    let_go(std::exchange(reading->model, nullptr));
     done(reading->status);
+  });
+}
+
+void House::reload_all() {
+  reload_from(0);
+}
+
+void House::reload_from(std::size_t row) {
+  if (row >= models_.size()) return;
+  const std::string name = models_[row]->summary.name();
+  reload(name, [this, row, name](const Status& status) {
+    if (status.ok())
+      spdlog::info("model {}: read again", name);
+    else
+      spdlog::warn("model {}: {}", name, status.message);
+    reload_from(row + 1);
   });
 }
 
@@ -330,9 +310,13 @@ void House::replace(std::shared_ptr<const ServedModel> model) {
   const auto old = std::find_if(models_.begin(), models_.end(),
                                 [&](const auto& m) { return m->summary.name() == model->summary.name(); });
   const std::uint64_t identity = model->opened.identity();
+  // The same body may have other motion.
   if ((*old)->opened.identity() == identity &&
-      (*old)->opened.topology_digest() == model->opened.topology_digest())
+      (*old)->opened.topology_digest() == model->opened.topology_digest()) {
+    (*old)->clips = model->clips;
     return;
+  }
+  retired_.reserve(retired_.size() + sessions_.size());
   for (auto it = sessions_.begin(); it != sessions_.end();) {
     if (it->second->model() != *old) {
       ++it;
@@ -342,12 +326,16 @@ void House::replace(std::shared_ptr<const ServedModel> model) {
     retired_.push_back(it->second);
     it = sessions_.erase(it);
   }
-  *old = std::move(model);
-  coarsen(*old);
+  std::swap(*old, model);
+  let_go(std::move(model));
+  try {
+    coarsen(*old);
+  } catch (const std::bad_alloc&) {  // who asks for levels has them made
+  }
 }
 
-void House::offload(std::function<void()> work, std::function<void()> then) {
-  offers_.emplace_back(std::move(work), std::move(then));
+void House::offload(std::function<void()> work, std::function<void()> then, std::shared_ptr<Account> by) {
+  offers_.push_back({std::move(work), std::move(then), std::move(by)});
   offer();
 }
 
@@ -355,8 +343,16 @@ void House::offload(std::function<void()> work, std::function<void()> then) {
 void House::offer() {
   const std::size_t most = std::max<std::size_t>(workers_.threads(), 2) - 1;
   while (offloaded_ < most && !offers_.empty()) {
-    const auto& [work, then] = offers_.front();
-    hand_over(workers_, work, [this, then = then] {
+    const auto first = std::min_element(offers_.begin(), offers_.end(), [](const Offer& a, const Offer& b) {
+      if (!a.by || !b.by) return !a.by && b.by;
+      return a.by->used() < b.by->used();
+    });
+    const auto charged = [work = first->work, by = first->by] {
+      const auto begun = Clock::now();
+      work();
+      if (by) by->use(seconds(Clock::now() - begun));
+    };
+    hand_over(workers_, charged, [this, then = first->then] {
       --offloaded_;
       try {
         offer();
@@ -365,28 +361,30 @@ void House::offer() {
       then();
     });
     ++offloaded_;
-    offers_.pop_front();
+    offers_.erase(first);
   }
 }
 
-void House::set_aside(std::function<void()> work, std::function<void()> then) {
-  hand_over(aside_, std::move(work), std::move(then));
+void House::set_aside(std::function<void()> work, std::function<void()> then, std::shared_ptr<Account> by) {
+  hand_over(aside_, std::move(work), std::move(then), std::move(by));
 }
 
 void House::let_go(std::shared_ptr<const void> what) noexcept {
   try {
-    aside_.submit([what = std::move(what)]() mutable { what = nullptr; });
+    bin_.submit([what = std::move(what)]() mutable { what = nullptr; });
   } catch (const std::exception&) {  // no memory to say so: it goes here
   }
 }
 
-void House::hand_over(Workers& to, std::function<void()> work, std::function<void()> then) {
-  to.submit([&io = io_, work = std::move(work), then = std::move(then),
+void House::hand_over(Workers& to, std::function<void()> work, std::function<void()> then,
+                      std::shared_ptr<Account> by) {
+  Job job = [&io = io_, work = std::move(work), then = std::move(then),
              guard = net::make_work_guard(io_)]() mutable {
     work();
     // What both hold ends on the I/O thread.
-    net::post(io, [work = std::move(work), then = std::move(then), guard = std::move(guard)] { then(); });
-  });
+    post_back(io, [work = std::move(work), then = std::move(then), guard = std::move(guard)] { then(); });
+  };
+  to.submit(std::move(job), std::move(by));
 }
 
 }  // namespace ecorche::server

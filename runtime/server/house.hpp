@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <deque>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -13,12 +12,14 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/server/frame_memory.hpp"
+#include "runtime/server/journal.hpp"
 #include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"
 #include "runtime/server/named_model.hpp"
 #include "runtime/server/openings.hpp"
+#include "runtime/server/recordings.hpp"
 #include "runtime/server/seams.hpp"
+#include "runtime/server/server_memory.hpp"
 #include "runtime/server/session.hpp"
 #include "runtime/server/volume_workers.hpp"
 #include "runtime/server/workers.hpp"
@@ -44,16 +45,25 @@ class House {
   const Limits& limits() const { return options_.limits; }
   const std::vector<std::shared_ptr<const ServedModel>>& models() const { return models_; }
 
-  /// The session that the request names, made where it is new. not_found for an unknown model,
-  /// invalid_argument for an odd name, failed_precondition for a session of another model, resource_exhausted
-  /// for one session too many.
-  Status open(const v1::OpenModel& request, std::shared_ptr<Session>& out);
+  /// The session that the request names, made where it is new, for a client of this address. not_found for an
+  /// unknown model, invalid_argument for an odd name, failed_precondition for a session of another model,
+  /// resource_exhausted for one session too many, of all or of the address.
+  Status open(const v1::OpenModel& request, const std::string& address, std::shared_ptr<Session>& out);
+  /// What clients of one address have together.
+  struct Portion {
+    std::shared_ptr<const Pool> kept;  ///< a part of what all keep
+    std::shared_ptr<Account> account;
+  };
+  std::shared_ptr<const Portion> portion_of(const std::string& address);
 
+  /// Of a new connection, counted from 1.
+  std::uint64_t next_connection() { return ++connections_seen_; }
   /// A connection with this resume token is there; `give_up` ends it for another that shows the token.
   void arrived(const std::string& token, std::function<void()> give_up);
   /// It ended; a place that can be taken up again is kept for `linger_seconds`, as many as there may be
   /// connections: then the oldest is lost.
-  void left(const std::string& token, std::optional<Lost> place);
+  /// Throws nothing: where there is no memory for a place, it is lost.
+  void left(const std::string& token, std::optional<Lost> place) noexcept;
   /// The place of the token, which its connection leaves where it is still there; good until the next call.
   /// Null where there is none (any more).
   const Lost* place_of(const std::string& token);
@@ -62,35 +72,33 @@ class House {
 
   /// What can be played on the model.
   std::vector<std::shared_ptr<const Clip>> clips_for(const ServedModel& model) const;
-  /// What was recorded with models of this rig is a clip, too.
-  void add_clip(std::uint64_t rig_digest, Clip clip);
-  /// Where a recording of this name goes: invalid_argument, failed_precondition, already_exists.
-  Status recording_path(const std::string& name, std::filesystem::path& out) const;
-  /// Ends the session's recording, which it has, with its last pose, and writes it; then `done`.
-  void finish_recording(Session& session, std::function<void(const Status&)> done);
-  /// As finish_recording, for all sessions, whose end is the server's.
+  Recordings& recordings() { return recordings_; }
+  /// Ends those of all sessions, whose end is the server's.
   void end_recordings();
-  /// resource_exhausted where four run, or the folder holds 256 files; already_exists where one of this name
-  /// runs, or ends.
-  Status room_for_recording(const std::string& name) const;
-
   /// Reads a model again, aside, and calls `done` on the I/O thread.
   void reload(const std::string& name, std::function<void(const Status&)> done);
+  /// All of them, one after the other; the log tells how each went.
+  void reload_all();
 
   /// `work` on a worker, then `then` on the I/O thread. Neither may throw. One worker is left for poses
-  /// (where there are two): what else is asked, however much, waits for the others.
-  void offload(std::function<void()> work, std::function<void()> then);
+  /// (where there are two): what else is asked, however much, waits for the others. `by`: for whom; who had
+  /// least comes first.
+  void offload(std::function<void()> work, std::function<void()> then, std::shared_ptr<Account> by = nullptr);
   /// As offload, but on one thread that gives way to all others.
-  void set_aside(std::function<void()> work, std::function<void()> then);
+  void set_aside(std::function<void()> work, std::function<void()> then,
+                 std::shared_ptr<Account> by = nullptr);
 
   /// Lets go of what a client had to be sent, on that thread: giving back a GiB takes longer than a frame.
   void let_go(std::shared_ptr<const void> what) noexcept;
 
   Metrics& metrics() { return metrics_; }
-  const FrameMemory& memory() const { return memory_; }
+  Journal& journal() { return journal_; }
+  const ServerMemory& memory() const { return memory_; }
   /// Frames fill half of the memory for them, or did within the time that a stalled client has: else the
   /// first to be dropped would save the others, and they would keep theirs.
   bool crowded(Clock::time_point now);
+  /// See Openings.
+  std::optional<Clock::duration> patience(Clock::time_point now) const { return openings_.patience(now); }
   const Seams& seams() const { return seams_; }
   /// Waits for the timer.
   net::awaitable<void> wait(net::steady_timer& timer, boost::system::error_code& ec);
@@ -105,17 +113,16 @@ class House {
  private:
   net::io_context& io_;
   Workers& workers_;
-  void hand_over(Workers& to, std::function<void()> work, std::function<void()> then);
+  void hand_over(Workers& to, std::function<void()> work, std::function<void()> then,
+                 std::shared_ptr<Account> by = nullptr);
   void offer();
   void coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
   void replace(std::shared_ptr<const ServedModel> model);
-  bool make_room();
-  void keep_recording(Session& session);
-  void write(const std::shared_ptr<Recording>& recording, const std::filesystem::path& path,
-             std::uint64_t rig_digest, const std::function<void(const Status&)>& done);
+  void reload_from(std::size_t row);
+  bool make_room(const std::string& address = {});
 
   Options options_;
-  FrameMemory memory_;
+  ServerMemory memory_;
   Judging judging_;
   Openings openings_;
   std::vector<std::shared_ptr<const ServedModel>> models_;
@@ -124,17 +131,23 @@ class House {
   std::map<std::string, std::function<void()>> live_;
   std::map<std::string, Lost> lost_;
   std::vector<std::shared_ptr<Session>> retired_;
-  std::map<std::uint64_t, std::vector<std::shared_ptr<const Clip>>> recorded_;  // by rig digest
-  std::vector<std::weak_ptr<const Recording>> ending_;  ///< wait for their last frames, or are being written
+  Recordings recordings_;
   Seams seams_;
   Metrics metrics_;
+  Journal journal_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
-  std::uint64_t unnamed_ = 0;
-  std::optional<Clock::time_point> crowded_;                                    ///< when it was last
-  std::deque<std::pair<std::function<void()>, std::function<void()>>> offers_;  ///< wait for a worker
-  std::size_t offloaded_ = 0;                                                   ///< have one
+  std::uint64_t connections_seen_ = 0;
+  std::map<std::string, std::shared_ptr<const Portion>> portions_;  ///< by address
+  std::optional<Clock::time_point> crowded_;                        ///< when it was last
+  struct Offer {
+    std::function<void()> work, then;
+    std::shared_ptr<Account> by;
+  };
+  std::deque<Offer> offers_;           ///< wait for a worker
+  std::size_t offloaded_ = 0;          ///< have one
   std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
-  Workers aside_;
+  Workers aside_;                      ///< for what clients ask for, and models that are read again
+  Workers bin_, coarsener_;  ///< lets go of what is large; makes levels of detail that nobody waits for yet
   VolumeWorkers volumes_, planes_;
 };
 

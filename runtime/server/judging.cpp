@@ -7,6 +7,7 @@
 #include <new>
 #include <utility>
 
+#include "runtime/quality/verdict.hpp"
 #include "runtime/server/serially.hpp"
 #include "runtime/server/session.hpp"
 
@@ -58,7 +59,17 @@ void Judging::done(Clock::duration cost) {
 bool judged_by(const v1::PoseQuality& quality, const runtime::QualityThresholds& thresholds) {
   return quality.max_inverted_share() == thresholds.max_inverted_share &&
          quality.max_volume_change() == thresholds.max_volume_change &&
-         quality.max_bone_rigidity() == thresholds.max_bone_rigidity_mm;
+         quality.max_bone_rigidity() == thresholds.max_bone_rigidity_mm &&
+         quality.tissue_factor() == thresholds.tissue_factor;
+}
+
+runtime::QualityThresholds thresholds_of(const v1::PoseQuality& quality) {
+  runtime::QualityThresholds out;
+  out.max_inverted_share = quality.max_inverted_share();
+  out.max_volume_change = quality.max_volume_change();
+  out.max_bone_rigidity_mm = quality.max_bone_rigidity();
+  out.tissue_factor = quality.tissue_factor();
+  return out;
 }
 
 v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,
@@ -75,32 +86,50 @@ v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<
     if (!quality.tissues[i].closed) continue;
     change.set_share(quality.tissues[i].share);
     change.set_share_error(quality.tissues[i].share_error);
+    change.set_max_share(quality.tissues[i].max_share);
   }
   out.set_bone_rigidity(quality.bone_rigidity_mm);
   out.set_max_inverted_share(quality.thresholds.max_inverted_share);
   out.set_max_volume_change(quality.thresholds.max_volume_change);
   out.set_max_bone_rigidity(quality.thresholds.max_bone_rigidity_mm);
+  out.set_tissue_factor(quality.thresholds.tissue_factor);
+  out.set_unsigned_volume_change(quality.unsigned_volume_change);
+  const std::size_t worst = worst_tissue(quality);
+  if (worst < tissues.size()) out.set_worst_tissue(tissues[worst]);
+  for (const runtime::DoubtfulJoint& joint : quality.doubtful) {
+    v1::DoubtfulJoint& doubtful = *out.add_doubtful();
+    doubtful.set_joint(static_cast<std::uint32_t>(joint.joint));
+    doubtful.set_turned(joint.turned);
+    doubtful.set_confidence(joint.confidence);
+  }
   out.set_pose_sequence(pose);
   return out;
+}
+
+BodyPool::Lease pose_still(const ServedModel& model, const PoseRequest& request,
+                           const std::vector<std::uint32_t>& tissues) {
+  BodyPool::Lease body = model.bodies_aside.take();
+  for (std::uint32_t t = 0; t < body->tissues.size(); ++t) {
+    const bool shown = std::binary_search(tissues.begin(), tissues.end(), t);
+    body->tissues[t].resize(shown ? static_cast<std::size_t>(model.model().tissues[t].V.size()) : 0);
+    body->quantised[t].clear();
+    body->normals[t].clear();
+  }
+  const Status status = model.poser().run(request.pose, request.skinning, tissues, *body,
+                                          runtime::NodesOf::body, runtime::Root::still);
+  return status.ok() ? std::move(body) : BodyPool::Lease();
 }
 
 void run(JudgeJob& job) {
   const Clock::duration start = processor_time();
   const auto judge = [&job] {
-    const runtime::BodyPoser& poser = job.model->poser();
-    const BodyPool::Lease body = job.model->bodies_aside.take();
     std::vector<std::uint32_t> tissues;
-    for (std::size_t t = 0; t < body->tissues.size(); ++t) {
-      const bool shown = std::any_of(job.rows.begin(), job.rows.end(), [&](const JudgeJob::Row& row) {
-        return std::binary_search(row.tissues.begin(), row.tissues.end(), static_cast<std::uint32_t>(t));
-      });
-      if (shown) tissues.push_back(static_cast<std::uint32_t>(t));
-      body->tissues[t].resize(shown ? static_cast<std::size_t>(job.model->model().tissues[t].V.size()) : 0);
-      body->quantised[t].clear();
-      body->normals[t].clear();
-    }
-    if (!poser.run(job.request.pose, job.request.skinning, tissues, *body, runtime::NodesOf::body).ok())
-      return;
+    for (const JudgeJob::Row& row : job.rows)
+      tissues.insert(tissues.end(), row.tissues.begin(), row.tissues.end());
+    std::sort(tissues.begin(), tissues.end());
+    tissues.erase(std::unique(tissues.begin(), tissues.end()), tissues.end());
+    const BodyPool::Lease body = pose_still(*job.model, job.request, tissues);
+    if (!body) return;
     for (JudgeJob::Row& row : job.rows) {
       row.quality = std::make_shared<const v1::PoseQuality>(describe(
           job.model->meter().measure(*body, row.tissues, job.thresholds), row.tissues, job.request.sequence));

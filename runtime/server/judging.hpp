@@ -9,6 +9,7 @@
 
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/asio.hpp"
+#include "runtime/server/body_pool.hpp"
 #include "runtime/server/pose_job.hpp"
 #include "runtime/server/workers.hpp"
 
@@ -59,10 +60,18 @@ struct JudgeJob {
   Clock::duration cost{};  ///< the result's, of a processor
 };
 
+/// The pose with the body's root as it was scanned, all nodes and the positions of `tissues` (ascending);
+/// null for a pose that is none. Throws bad_alloc.
+BodyPool::Lease pose_still(const ServedModel& model, const PoseRequest& request,
+                           const std::vector<std::uint32_t>& tissues);
+
 /// Poses and measures, on the calling thread alone: the other cores are for frames. Throws nothing.
 void run(JudgeJob& job);
 
 bool judged_by(const v1::PoseQuality& quality, const runtime::QualityThresholds& thresholds);
+
+/// As far as the wire tells them.
+runtime::QualityThresholds thresholds_of(const v1::PoseQuality& quality);
 
 /// `pose`: the sequence number that was judged.
 v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<std::uint32_t>& tissues,

@@ -79,6 +79,13 @@ std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, 
   return streams;
 }
 
+bool empty(const std::vector<std::shared_ptr<MeshStream>>& streams) {
+  return std::all_of(streams.begin(), streams.end(), [](const auto& stream) {
+    return stream->parts() && std::all_of(stream->parts()->begin(), stream->parts()->end(),
+                                          [](const MeshRows& part) { return part.vertices.empty(); });
+  });
+}
+
 std::shared_ptr<const wire::Payload> describe(const ServedModel& model,
                                               const std::vector<std::shared_ptr<MeshStream>>& streams,
                                               v1::Subscribed& out) {

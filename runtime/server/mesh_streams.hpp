@@ -17,6 +17,9 @@ bool takes_long(const MeshWant& want);
 /// A stream for every level that may come, finest first. Throws bad_alloc.
 std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, const MeshWant& want);
 
+/// They are of a region that no vertex of theirs lies in.
+bool empty(const std::vector<std::shared_ptr<MeshStream>>& streams);
+
 /// Fills all but the subscription's number: what the levels hold, how vertices hang on control nodes. Null
 /// where the answer needs no arrays.
 std::shared_ptr<const wire::Payload> describe(const ServedModel& model,

@@ -31,7 +31,7 @@ class Metrics {
 
   void set_clients(std::size_t count);
   void set_sessions(std::size_t count);
-  /// Of FrameMemory, bytes.
+  /// Of ServerMemory, bytes.
   void set_memory(std::uint64_t waiting, std::uint64_t kept);
 
   /// The whole page.

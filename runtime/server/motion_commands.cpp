@@ -86,9 +86,12 @@ void Connection::handle_solve(const v1::Envelope& request) {
       outcome->status = {StatusCode::internal, error.what()};
     }
   };
-  house_.offload(work, [weak = weak_from_this(), outcome, id, solve] {
-    if (const auto self = weak.lock()) self->take_back([&] { self->solved(id, solve, *outcome); });
-  });
+  house_.offload(
+      work,
+      [weak = weak_from_this(), outcome, id, solve] {
+        if (const auto self = weak.lock()) self->take_back([&] { self->solved(id, solve, *outcome); });
+      },
+      account_);
 }
 
 void Connection::solved(std::uint64_t id, const v1::SolveIk& request, const IkOutcome& outcome) {
@@ -158,19 +161,11 @@ void Connection::handle_record(const v1::Envelope& request) {
   const std::uint64_t id = request.request_id();
   if (const Status status = may("record", true); !status.ok()) return answer_status(id, status);
   if (!request.record().on()) return finish_recording(id);
-  std::filesystem::path path;
-  if (const Status status = house_.recording_path(request.record().name(), path); !status.ok())
-    return answer_status(id, status);
   if (session_->recording()) {
     return answer_status(
         id, {StatusCode::failed_precondition, "record: a recording runs in this session (end it first)"});
   }
-  if (const Status status = house_.room_for_recording(request.record().name()); !status.ok())
-    return answer_status(id, status);
-  session_->record(std::make_shared<Recording>(request.record().name(), *session_->model(),
-                                               "ecorche " + house_.options().version,
-                                               house_.limits().record_bytes));
-  answer_status(id, {});
+  answer_status(id, house_.recordings().begin(*session_, request.record().name(), address_));
 }
 
 void Connection::finish_recording(std::uint64_t id) {
@@ -178,7 +173,7 @@ void Connection::finish_recording(std::uint64_t id) {
     return answer_status(
         id, {StatusCode::failed_precondition, "record: no recording runs in this session (begin one)"});
   }
-  house_.finish_recording(*session_, [weak = weak_from_this(), id](const Status& status) {
+  house_.recordings().finish(*session_, [weak = weak_from_this(), id](const Status& status) {
     if (const auto self = weak.lock()) self->take_back([&] { self->answer_status(id, status); });
   });
 }

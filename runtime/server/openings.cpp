@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/openings.hpp"
 
+#include <algorithm>
+
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
@@ -13,8 +15,14 @@ void Openings::ask(const std::shared_ptr<Session>& session) {
 
 void Openings::next() {
   while (!busy_ && !stopped_ && !waiting_.empty()) {
-    const std::shared_ptr<Session> session = waiting_.front().lock();
-    waiting_.pop_front();
+    std::erase_if(waiting_, [](const auto& one) { return one.expired(); });
+    const auto least = std::min_element(waiting_.begin(), waiting_.end(), [](const auto& a, const auto& b) {
+      const std::shared_ptr<Session> one = a.lock(), other = b.lock();
+      return one && other && one->account()->used() < other->account()->used();
+    });
+    if (least == waiting_.end()) return;
+    const std::shared_ptr<Session> session = least->lock();
+    waiting_.erase(least);
     busy_ = session && session->open_up();
   }
 }

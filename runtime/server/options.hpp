@@ -25,12 +25,20 @@ struct Limits {
   std::uint32_t frames_in_flight = 2;
   std::uint64_t queued_bytes = std::uint64_t{512} << 20;  ///< of frames that wait for clients, all together
   std::uint64_t kept_bytes = std::uint64_t{4} << 30;      ///< by streams and probes, all together
-  double requests_per_second = 100;                       ///< over HTTP, all clients together
+  std::uint64_t frame_bytes = std::uint64_t{256} << 20;   ///< of one frame
+  double requests_per_second = 100;                       ///< over HTTP, of one address and kind (WebKind)
   double stall_seconds = 10;
   double idle_seconds = 300;
   double linger_seconds = 60;
   std::uint64_t volume_voxels = std::uint64_t{256} << 20;
   std::uint64_t record_bytes = std::uint64_t{64} << 20;  ///< of one recording
+  std::uint32_t recordings = 4;                          ///< at once
+  std::uint32_t recording_files = 256;                   ///< in their folder
+  double recordings_per_minute = 6;                      ///< begun by clients of one address
+  double recording_days = 30;                            ///< until one makes way in a full folder
+  double log_lines_per_second = 2;  ///< for clients of one address; of all ten times as many
+  double peer_share = 0.75;  ///< of connections, sessions, recordings and bytes: to one address (Shares)
+  double connection_share = 0.25;  ///< of queued_bytes and kept_bytes: to one connection
 };
 
 struct Endpoint {

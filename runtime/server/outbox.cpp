@@ -16,6 +16,20 @@ std::uint64_t Outbox::answer_bytes() const {
   return bytes;
 }
 
+std::uint64_t Outbox::bytes() const {
+  std::uint64_t bytes = answer_bytes();
+  for (const auto& [id, lane] : lanes_) {
+    for (const Waiting* waiting : {&lane.keyframe, &lane.newest})
+      bytes += waiting->frame ? waiting->frame->bytes() : 0;
+  }
+  return bytes;
+}
+
+bool Outbox::arrives(std::uint32_t subscription) const {
+  const auto found = lanes_.find(subscription);
+  return found != lanes_.end() && found->second.flow.arrives();
+}
+
 std::uint32_t Outbox::ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
                                 bool still, Clock::time_point now) {
   Lane& asked = lane(subscription);

@@ -52,6 +52,10 @@ class Outbox {
 
   std::size_t answers() const { return answers_.size(); }
   std::uint64_t answer_bytes() const;
+  /// Of all that waits to be written.
+  std::uint64_t bytes() const;
+  /// A frame of the subscription was acknowledged.
+  bool arrives(std::uint32_t subscription) const;
   /// When the frame left that has been on its way for longest.
   std::optional<Clock::time_point> oldest_in_flight() const;
   /// When the frame was written whose acknowledgement has been awaited for longest; one that is being written

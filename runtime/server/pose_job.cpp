@@ -106,8 +106,12 @@ Judged judge(const PoseJob& job, const Subscription& subscription, const runtime
   if (!measured(job, subscription)) return {subscription.quality};
   const auto start = Clock::now();
   const std::vector<std::uint32_t>& tissues = std::get<MeshWant>(subscription.want).tissues;
-  auto quality = std::make_shared<const v1::PoseQuality>(server::describe(
-      job.model->meter().measure(body, tissues, job.thresholds), tissues, job.request.sequence));
+  // Where the body went far, its float32 positions are too coarse to be measured.
+  const BodyPool::Lease still =
+      runtime::stands_still(body) ? BodyPool::Lease() : pose_still(*job.model, job.request, tissues);
+  auto quality = std::make_shared<const v1::PoseQuality>(
+      server::describe(job.model->meter().measure(still ? *still : body, tissues, job.thresholds), tissues,
+                       job.request.sequence));
   return {std::move(quality), true, microseconds(Clock::now() - start)};
 }
 
@@ -230,8 +234,8 @@ Status show_volume(const PoseJob& job, const Subscription& subscription, const r
   Context context;
   context.stop = job.stop;
   Status status = guarded([&] {
-    return subscription.volume->write(*job.model, body, job.volume_voxels, *job.memory,
-                                      (subscription.keyframes & 1) != 0, frame, *payload, context);
+    return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
+                                      frame, *payload, context);
   });
   if (status.code == StatusCode::cancelled) return status;
   if (!status.ok()) {

@@ -13,8 +13,8 @@
 #include "runtime/probe/probe.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/asio.hpp"
-#include "runtime/server/frame_memory.hpp"
 #include "runtime/server/served_model.hpp"
+#include "runtime/server/server_memory.hpp"
 #include "runtime/server/subscription.hpp"
 
 namespace ecorche::server {
@@ -51,7 +51,7 @@ struct PosedFrame {
 struct ProbeFrame {
   std::uint64_t sequence = 0;
   runtime::Probe::PosedTree tree;
-  FrameMemory::Room kept;  ///< its memory, counted
+  ServerMemory::Room kept;  ///< its memory, counted
 };
 
 struct PoseJob {
@@ -67,10 +67,10 @@ struct PoseJob {
   bool alone = false;    ///< keeps to the calling thread, however large: the others are for streams
   bool volumes = false;  ///< the session's volumes are shown by this job, too
   std::stop_token stop;  ///< nobody wants its volumes any more
-  const FrameMemory* memory = nullptr;  ///< counts the frames
-  FrameMemory::Room room;               ///< about what they will take
-  std::shared_ptr<ProbeFrame> probe;    ///< to be filled; null where nobody probes
-  bool probe_many = false;              ///< points: the first must not wait until all is fitted that they see
+  const ServerMemory* memory = nullptr;  ///< counts the frames
+  ServerMemory::Room room;               ///< about what they will take
+  std::shared_ptr<ProbeFrame> probe;     ///< to be filled; null where nobody probes
+  bool probe_many = false;  ///< points: the first must not wait until all is fitted that they see
   /// Called on the worker, in this order: the outcome once, `probe` once it is filled, then every frame,
   /// meshes before volumes (which take longer).
   std::function<void(PoseOutcome)> on_outcome;

@@ -125,7 +125,8 @@ void Connection::handle_probe(const wire::Frame& frame) {
                            [weak, id, asked, body] {
                              const auto still = weak.lock();
                              if (still) still->take_back([&] { still->answer_probe(id, asked, body); });
-                           });
+                           },
+                           self->account_);
     });
   };
   session_->probe(ready, !few);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/files/atomic_file.hpp"
 #include "proto/convert.hpp"
 #include "proto/recording.hpp"
 
@@ -29,7 +28,6 @@ bool stands_alone(const v1::Subscribe& request) {
 
 Recording::Recording(std::string name, const ServedModel& model, const std::string& server, std::size_t limit)
     : name_(std::move(name)), limit_(limit), rig_digest_(model.opened.rig_digest()) {
-  clip_.name = name_;
   v1::Envelope envelope;
   v1::RecordingHead& head = *envelope.mutable_recording_head();
   head.set_version(kVersion);
@@ -44,7 +42,7 @@ Recording::Recording(std::string name, const ServedModel& model, const std::stri
 bool Recording::append(const v1::Envelope& envelope) {
   if (full_) return false;
   const std::string frame = wire::encode(envelope).head;
-  full_ = bytes_.size() + frame.size() + kEndBytes > limit_;
+  full_ = taken_ + bytes_.size() + frame.size() + kEndBytes > limit_;
   if (!full_) bytes_ += frame;
   return !full_;
 }
@@ -63,9 +61,6 @@ void Recording::add(const PoseRequest& pose) {
   if (!append(envelope)) return mark_.reset();
   ++poses_;
   last_sequence_ = sequence;
-  if (clip_.at.empty()) first_seconds_ = recorded.seconds();
-  clip_.at.push_back(recorded.seconds() - first_seconds_);
-  clip_.poses.push_back(pose.pose);
 }
 
 void Recording::add(const PosedFrame& frame, const v1::Subscribe& request) {
@@ -96,34 +91,42 @@ void Recording::take_back() {
   for (const std::uint32_t subscription : mark_->subscriptions) subscriptions_.erase(subscription);
   mark_.reset();
   --poses_;
-  clip_.at.pop_back();
-  clip_.poses.pop_back();
 }
 
-Clip Recording::finish() {
+std::string Recording::take() {
+  if (poses_ == (mark_ ? 1U : 0U)) return {};
+  const std::size_t size = mark_ ? mark_->bytes : bytes_.size();
+  std::string out = bytes_.substr(0, size);
+  bytes_.erase(0, size);
+  taken_ += size;
+  if (mark_) mark_->bytes = 0;
+  return out;
+}
+
+void Recording::finish() {
+  settle();
   v1::Envelope envelope;
   v1::RecordingEnd& end = *envelope.mutable_recording_end();
   end.set_poses(poses_);
   end.set_frames(frames_);
   end.set_full(full_);
   bytes_ += wire::encode(envelope).head;
-  const double steps = static_cast<double>(clip_.at.size()) - 1;
-  clip_.last_seconds = steps > 0 && clip_.at.back() > 0 ? clip_.at.back() / steps : 1.0 / 30;
-  return std::move(clip_);
 }
 
-Status Recording::write(const std::filesystem::path& path) const {
-  try {
-    if (std::filesystem::exists(path)) {
-      return {StatusCode::already_exists, "record: there is a recording of this name (choose another)"};
-    }
-    files::write_text(path, bytes_);
-    return {};
-  } catch (const Error& error) {
-    return to_status(error);
-  } catch (const std::exception& error) {
-    return {StatusCode::internal, error.what()};
+Clip clip_of(std::span<const std::byte> file, const std::string& name, std::size_t segments) {
+  Clip clip;
+  clip.name = name;
+  wire::RecordedSession session;
+  if (!wire::read_recording(file, session).ok()) return clip;
+  for (const wire::RecordedStep& step : session.steps) {
+    Pose pose;
+    if (!wire::from_proto(step.pose, segments, pose).ok()) break;
+    clip.at.push_back(step.seconds - session.steps.front().seconds);
+    clip.poses.push_back(std::move(pose));
   }
+  const double steps = static_cast<double>(clip.at.size()) - 1;
+  if (steps > 0 && clip.at.back() > 0) clip.last_seconds = clip.at.back() / steps;
+  return clip;
 }
 
 std::uint64_t digest_of(const wire::EncodedFrame& frame) {

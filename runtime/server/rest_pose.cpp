@@ -26,10 +26,7 @@ RestPose::Quality RestPose::quality(const std::vector<std::uint32_t>& tissues,
 }
 
 void RestPose::know(const std::vector<std::uint32_t>& tissues, Quality told) {
-  const runtime::QualityThresholds thresholds{.max_inverted_share = told->max_inverted_share(),
-                                              .max_volume_change = told->max_volume_change(),
-                                              .max_bone_rigidity_mm = told->max_bone_rigidity()};
-  if (quality(tissues, thresholds)) return;
+  if (quality(tissues, thresholds_of(*told))) return;
   const std::lock_guard lock(mutex_);
   remember(qualities_, tissues, std::move(told));
 }

@@ -53,11 +53,11 @@ struct ServedModel {
   const runtime::VolumeBalls& balls(std::size_t volume) const;
 
   v1::ModelSummary summary;
-  v1::ModelOpened opened;                         ///< without session, role and triangles
-  std::vector<v1::Array> triangles;               ///< one per tissue, within `topology`
-  std::shared_ptr<const wire::Payload> topology;  ///< the triangles of every tissue
-  float step = 0;                                 ///< mm, of the u16 encodings
-  std::vector<std::shared_ptr<const Clip>> clips;
+  v1::ModelOpened opened;                                  ///< without session, role and triangles
+  std::vector<v1::Array> triangles;                        ///< one per tissue, within `topology`
+  std::shared_ptr<const wire::Payload> topology;           ///< the triangles of every tissue
+  float step = 0;                                          ///< mm, of the u16 encodings
+  mutable std::vector<std::shared_ptr<const Clip>> clips;  ///< for the I/O thread: the file may be read again
 
  private:
   struct Made;

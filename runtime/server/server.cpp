@@ -4,9 +4,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "runtime/server/connection.hpp"
+#include "runtime/server/rates.hpp"
+#include "runtime/server/shares.hpp"
 #include "runtime/server/tls.hpp"
 #include "runtime/server/web.hpp"
 
@@ -16,6 +19,8 @@ namespace {
 // How often deadlines are looked at, at least and, where one is due, at most.
 constexpr Clock::duration kTick = std::chrono::milliseconds(100);
 constexpr Clock::duration kShortTick = std::chrono::milliseconds(5);
+// And while somebody waits for memory that others do not let go of.
+constexpr Clock::duration kRoomTick = std::chrono::milliseconds(20);
 // Connections beyond the limit that may be told so at one time; the next ones are closed without a word.
 constexpr std::size_t kMostRefusals = 32;
 // After so long without a hello a connection makes way for the next one, where there is no room for both. A
@@ -95,7 +100,7 @@ struct Server::Impl {
             .ready = [this] { return !stopping; },
             .metrics = [this] { return metrics(); },
             .denied = [this] { house->metrics().denied(); },
-            .admit = [this] { return admit(Clock::now()); },
+            .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
             .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
                               bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
     house = std::make_unique<House>(io, workers, std::move(options), std::move(models), std::move(seams));
@@ -104,12 +109,13 @@ struct Server::Impl {
   net::awaitable<void> accept(tcp::acceptor& at, bool web);
   net::awaitable<void> watch();
   net::awaitable<void> pause(net::steady_timer& timer, Clock::duration time = kTick);
-  bool admit(Clock::time_point now);
+  bool admit(WebKind kind, const std::string& peer);
   Clock::duration look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool web);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
-  bool make_way(Clock::time_point now);
+  bool make_way(Clock::time_point now, const std::string& address);
   bool room_for_request(Clock::time_point now);
+  void make_room(Clock::time_point now, Clock::duration patience);
   void begin_shutdown();
   std::string metrics();
 
@@ -126,8 +132,7 @@ struct Server::Impl {
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
   bool stopping = false;
-  double allowance = 0;  ///< requests that may be answered at once
-  Clock::time_point allowance_at{};
+  std::map<WebKind, Rates> admitted;  ///< requests
 };
 
 Server::Server(Options options, std::vector<NamedModel> models, Workers& workers, Seams seams)
@@ -165,6 +170,13 @@ void Server::stop() {
   net::post(impl_->io, [this] { impl_->begin_shutdown(); });
 }
 
+void Server::reload() {
+  net::post(impl_->io, [this] {
+    spdlog::info("asked to read the models again");
+    impl_->house->reload_all();
+  });
+}
+
 net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
   boost::system::error_code ec;
   net::steady_timer next(io);
@@ -176,9 +188,9 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
       if (!ec) receive(std::move(socket), web);
       failed = static_cast<bool>(ec);
       // Out of file descriptors, or the client is gone already: neither ends the server.
-      if (ec) spdlog::warn("accept: {}", ec.message());
+      if (ec) house->journal().line(spdlog::level::warn, "accept: " + ec.message());
     } catch (const std::exception& error) {
-      spdlog::warn("accept: {}", error.what());
+      house->journal().line(spdlog::level::warn, std::string("accept: ") + error.what());
       failed = true;
     }
     co_await pause(next, failed ? kTick : kBetween);
@@ -207,41 +219,60 @@ bool Server::Impl::room_for_request(Clock::time_point now) {
   return true;
 }
 
-// At most a second's worth in one go.
-bool Server::Impl::admit(Clock::time_point now) {
+// At most a second's worth in one go. All together are as many as the port lets in (kBetween).
+bool Server::Impl::admit(WebKind kind, const std::string& peer) {
   const double rate = house->limits().requests_per_second;
-  allowance = std::min(rate, allowance + rate * seconds(now - allowance_at));
-  allowance_at = now;
-  if (allowance < 1) {
-    house->metrics().hit("requests");
-    return false;
-  }
-  allowance -= 1;
-  return true;
+  Rates& of_kind = admitted.try_emplace(kind, rate, rate).first->second;
+  if (of_kind.take(address_of(peer), Clock::now())) return true;
+  house->metrics().hit("requests");
+  return false;
 }
 
 void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven,
                            Clock::duration waited) {
   if (stopping) return;
   const auto limit = house->limits().connections;
-  auto alive = static_cast<std::size_t>(std::count_if(
-      connections.begin(), connections.end(), [](const auto& c) { return !c->closed() && !c->ending(); }));
-  if (alive >= limit && make_way(Clock::now())) --alive;
+  const auto share = portion(limit, house->limits().peer_share);
+  const std::string address = address_of(peer);
+  std::size_t alive = 0, own = 0;
+  for (const auto& c : connections) {
+    if (c->closed() || c->ending()) continue;
+    ++alive;
+    own += c->address() == address ? 1 : 0;
+  }
+  const bool beyond = own >= share;
+  bool let_in = alive < limit && !beyond;
+  if (!let_in) let_in = make_way(Clock::now(), beyond ? address : std::string());
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
-  if (alive >= limit) house->metrics().hit("connections");
+  if (!let_in) house->metrics().hit("connections");
   if (connections.size() >= limit + kMostRefusals) return;
   connections.push_back(
       std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *house));
-  if (alive < limit) return connections.back()->start();
+  if (let_in) return connections.back()->start();
   connections.back()->start_refused(
-      {StatusCode::resource_exhausted,
-       "connection: " + std::to_string(limit) + " clients are connected (try again later)"});
+      {StatusCode::resource_exhausted, "connection: " + std::to_string(beyond ? own : alive) + " clients " +
+                                           (beyond ? "of your address " : "") +
+                                           "are connected (try again later)"});
 }
 
-// The oldest connection that had time for a hello, and sent none.
-bool Server::Impl::make_way(Clock::time_point now) {
+// Of those who read nothing, whoever holds most: the longest queue is pushed out (Wei, Coyle, Hsiao 1991), if
+// it is longer than half of what each would have of the memory. One at a time: its bytes are given back soon.
+void Server::Impl::make_room(Clock::time_point now, Clock::duration patience) {
+  std::uint64_t most = house->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
+  Connection* longest = nullptr;
+  for (const auto& connection : connections) {
+    const std::uint64_t bytes = connection->clogged(now, patience);
+    if (bytes <= most) continue;
+    most = bytes;
+    longest = connection.get();
+  }
+  if (longest) longest->make_room();
+}
+
+// The oldest connection that had time for a hello, and sent none; with an address, the oldest of its.
+bool Server::Impl::make_way(Clock::time_point now, const std::string& address) {
   const auto silent = std::find_if(connections.begin(), connections.end(), [&](const auto& c) {
-    return c->silent() && now - c->born() >= kTimeToGreet;
+    return c->silent() && now - c->born() >= kTimeToGreet && (address.empty() || c->address() == address);
   });
   if (silent == connections.end()) return false;
   // Whoever is told why stays for a moment.
@@ -282,6 +313,10 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
     request->close();
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });
+  if (const auto patience = house->patience(now)) {
+    make_room(now, *patience);
+    next = std::min(next, kRoomTick);
+  }
   house->sweep(now);
   return std::max(next, kShortTick);
 }

@@ -44,6 +44,8 @@ class Server {
 
   /// From any thread, any number of times, also before run().
   void stop();
+  /// Reads all models again, aside, as ReloadModel does; the log tells how each went. As stop().
+  void reload();
 
  private:
   struct Impl;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/server/journal.hpp"
 #include "runtime/server/kept.hpp"
 #include "runtime/server/mesh_streams.hpp"
 #include "runtime/server/volume_stream.hpp"
@@ -30,10 +31,12 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
       judging_(services.judging),
       openings_(services.openings),
       let_go_(services.let_go),
+      journal_(services.journal),
       model_(std::move(model)),
       name_(std::move(name)),
       named_(named),
       limits_(limits),
+      kept_(memory_.kept_pool()),
       poses_(io_, services.workers),
       whole_(io_, services.volume_workers),
       planes_(io_, services.plane_workers),
@@ -48,73 +51,18 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
   });
 }
 
+bool identifier(const std::string& name) {
+  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+  });
+}
+
+void Session::complain(const std::string& what) const {
+  if (journal_) journal_->line(spdlog::level::err, "session " + name_ + ": " + what);
+}
+
 Session::~Session() {
   player_->release();
-}
-
-v1::Role Session::join(Member& member) {
-  members_.insert(&member);
-  const bool vacant =
-      !controller_ && (!control_left_ || Clock::now() - *control_left_ >= duration(limits_.linger_seconds));
-  if (vacant) controller_ = &member;
-  return controller_ == &member ? v1::ROLE_CONTROLLER : v1::ROLE_OBSERVER;
-}
-
-v1::Role Session::rejoin(Member& member, bool control) {
-  if (!control || controller_) return join(member);
-  members_.insert(&member);
-  controller_ = &member;
-  control_left_.reset();
-  return v1::ROLE_CONTROLLER;
-}
-
-void Session::leave(Member& member, bool may_return) {
-  members_.erase(&member);
-  for (Row& row : rows_) {
-    row.members.erase(&member);
-    if (row.members.empty()) drop(row);
-  }
-  std::erase_if(rows_, [](const Row& row) { return row.members.empty(); });
-  stop_unwatched();
-  const auto now = Clock::now();
-  const bool controlled = controller_ == &member;
-  if (controlled) {
-    controller_ = nullptr;
-    control_left_ = now;
-  }
-  if (members_.empty()) {
-    last_seen_ = now;
-    awaited_ = may_return;
-    player_->stop();
-    keep_time();  // a server that stops would wait for who watches at the slowest rate
-    forget_probes(now);
-  } else if (controlled) {
-    tell_control();
-  }
-}
-
-bool Session::claim(Member& member) {
-  if (controller_ == &member) return true;
-  const auto now = Clock::now();
-  if (controller_ || (control_left_ && now - *control_left_ < duration(limits_.linger_seconds))) return false;
-  controller_ = &member;
-  tell_control();
-  return true;
-}
-
-bool Session::release(Member& member) {
-  if (controller_ != &member) return false;
-  controller_ = nullptr;
-  control_left_.reset();
-  tell_control();
-  return true;
-}
-
-void Session::tell_control() {
-  for (Member* member : members_) {
-    member->control_changed(controller_ == member ? v1::ROLE_CONTROLLER : v1::ROLE_OBSERVER,
-                            controller_ == nullptr);
-  }
 }
 
 void Session::retire(std::uint64_t identity) {
@@ -128,6 +76,8 @@ const Subscription* Session::subscribe(Member& member, const Asked& asked) {
       std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return r.subscription.want == want; });
   if (row == rows_.end()) {
     const auto* mesh = std::get_if<MeshWant>(&want);
+    const std::shared_ptr<const Pool> share = member.kept_share();
+    const std::shared_ptr<const Pool>& pool = share ? share : memory_.kept_pool();
     Row made;
     made.subscription.id = asked.id != 0 ? asked.id : ++last_subscription_;
     made.subscription.want = want;
@@ -142,10 +92,10 @@ const Subscription* Session::subscribe(Member& member, const Asked& asked) {
       const std::uint64_t voxels = rest_voxels(model_->model(), *volume);
       // Of what is too large altogether nothing is ever made.
       if (voxels <= limits_.volume_voxels) kept = kept_by(model_->model(), *volume, voxels);
-      made.subscription.volume = std::make_shared<VolumeStream>(*volume, voxels);
+      made.subscription.volume = std::make_shared<VolumeStream>(*volume, voxels, pool);
     }
-    if (memory_.kept_full(kept)) return nullptr;
-    made.kept = memory_.keep(kept);
+    if (kept > 0 && pool->full(kept)) return nullptr;
+    made.kept = ServerMemory::Room(pool, kept);
     row = rows_.insert(row, std::move(made));
   }
   row->members.insert(&member);
@@ -259,9 +209,9 @@ std::shared_ptr<ProbeFrame> Session::spare_probe() {
     if (frame.use_count() == 1) return frame;
   }
   const std::uint64_t kept = kept_by_probe(model_->model());
-  if (memory_.kept_full(kept)) return nullptr;
+  if (kept_->full(kept)) return nullptr;
   auto frame = std::make_shared<ProbeFrame>();
-  frame->kept = memory_.keep(kept);
+  frame->kept = ServerMemory::Room(kept_, kept);
   return probe_frames_.emplace_back(std::move(frame));
 }
 

@@ -16,16 +16,18 @@
 
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/server/clip.hpp"
-#include "runtime/server/frame_memory.hpp"
 #include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"
 #include "runtime/server/openings.hpp"
 #include "runtime/server/options.hpp"
 #include "runtime/server/pose_job.hpp"
 #include "runtime/server/recording.hpp"
+#include "runtime/server/server_memory.hpp"
 #include "runtime/server/workers.hpp"
 
 namespace ecorche::server {
+
+class Journal;
 
 /// Poses overtaken by newer ones since the last that was taken up.
 struct Skipped {
@@ -36,7 +38,8 @@ struct Skipped {
   void add(std::uint64_t sequence);
 };
 
-/// A connection, as its session sees it. Called on the I/O thread.
+/// A connection, as its session sees it. Called on the I/O thread. Nothing here throws, nor joins or leaves a
+/// session before it has returned.
 class Member {
  public:
   virtual ~Member() = default;
@@ -47,10 +50,18 @@ class Member {
                                   bool still) = 0;
   /// Only to the member that holds control.
   virtual void pose_done(const PoseOutcome& outcome, const Skipped& skipped) = 0;
-  /// `vacant`: nobody holds control.
-  virtual void control_changed(v1::Role role, bool vacant) = 0;
+  /// `vacant`: control is free; else, for so many seconds above 0, only its last holder may have it.
+  virtual void control_changed(v1::Role role, bool vacant, double reserved_seconds) = 0;
   /// The model of this name is another one now; the session goes on with the old one.
   virtual void model_changed(std::uint64_t identity) = 0;
+  /// Whether a frame of so many bytes of the subscription is worth making: false while what it was sent
+  /// before waits for the member to read, and fills its share.
+  virtual bool may_take(std::uint32_t subscription, std::uint64_t bytes) {
+    static_cast<void>(subscription), static_cast<void>(bytes);
+    return true;
+  }
+  /// Its part of what all keep; null: it has no share of its own.
+  virtual std::shared_ptr<const Pool> kept_share() const { return nullptr; }
 };
 
 /// A subscription as a member asked for it.
@@ -67,14 +78,18 @@ struct Services {
   Workers& workers;
   Workers& volume_workers;  ///< give way to those
   Workers& plane_workers;   ///< as well; planes do not wait behind other sessions' volumes
-  const FrameMemory& memory;
+  const ServerMemory& memory;
   Judging& judging;
   Openings& openings;
   Metrics& metrics;
   /// Has something large destroyed elsewhere than on the I/O thread, which giving back hundreds of MiB would
   /// keep for longer than a frame. Throws nothing.
   std::function<void(std::shared_ptr<const void>)> let_go;
+  Journal* journal = nullptr;  ///< for what goes wrong; may be null
 };
+
+/// [a-z0-9_]{1,64}
+bool identifier(const std::string& name);
 
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the
 /// workers until its end is posted back. Volumes, which take longer than all else of a pose, have a job of
@@ -88,14 +103,30 @@ class Session : public std::enable_shared_from_this<Session> {
 
   const std::string& name() const { return name_; }
   bool named() const { return named_; }
+  /// Whose it is: the address of the client that made it, the part of what all keep that is for it, and on
+  /// whose account jobs are done.
+  void belong(const std::string& address, std::shared_ptr<const Pool> kept, std::shared_ptr<Account> of) {
+    owner_ = address;
+    kept_ = std::move(kept);
+    account_ = std::make_shared<Account>(std::move(of));
+  }
+  const std::string& owner() const { return owner_; }
+  const std::shared_ptr<Account>& account() const { return account_; }
   const std::shared_ptr<const ServedModel>& model() const { return model_; }
 
-  /// Gives control to the member when nobody holds it (and nobody did during the last `linger_seconds`).
-  v1::Role join(Member& member);
+  /// Gives control to the member where it is free; to an `heir` also where it is kept for one. The others are
+  /// told.
+  v1::Role join(Member& member, bool heir = false);
   /// As join; with `control`, the control that it left with is its again, unless somebody has it.
   v1::Role rejoin(Member& member, bool control);
-  /// `may_return`: keeps an unnamed session for `linger_seconds`, too.
+  /// `may_return`: keeps an unnamed session, and the member's control, for `linger_seconds`. Throws nothing.
   void leave(Member& member, bool may_return);
+  /// Control is kept for `linger_seconds` for who held it in the session of this name before (join's heir).
+  void await_heir();
+  /// Somebody holds control, or it is kept for somebody.
+  bool controlled() const { return controller_ != nullptr || reserved(Clock::now()); }
+  /// Tells all once control is free that was kept.
+  void free_control(Clock::time_point now);
 
   /// False while another holds control or may come back to it.
   bool claim(Member& member);
@@ -107,6 +138,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// new; good until the next call. Frames follow, the present pose first. Null where what its streams keep
   /// has no room.
   const Subscription* subscribe(Member& member, const Asked& asked);
+  /// About the bytes of a frame of it.
+  std::uint64_t frame_bytes(const Want& want) const;
   std::vector<Asked> asked_by(Member& member) const;
   /// Somebody has such a subscription.
   bool shows(const Want& want) const;
@@ -137,9 +170,15 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Takes it away; `ended` is called once the pose that is being shown has all its frames in it.
   void end_recording(std::function<void()> ended);
   const std::shared_ptr<Recording>& recording() const { return recording_; }
+  /// Since when a recording runs that no client may end, since none controls the session.
+  std::optional<Clock::time_point> abandoned() const;
 
   /// Makes what had to wait for memory.
   void catch_up();
+  /// A member has read something: what had to wait for that is made.
+  void has_read() {
+    if (std::exchange(unread_, false)) start_jobs();
+  }
   /// Lets go of what probes need, where none has come for ten seconds, or nobody is here.
   void forget_probes(Clock::time_point now);
   /// The server stops: volumes under way end early, and no more are begun, but those of a recording.
@@ -177,7 +216,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<Clock::time_point> refresh_at;     ///< when the present pose is to be shown (again)
     std::optional<Clock::time_point> fresh;          ///< since when somebody waits for the present pose
     bool shown = false;                              ///< somebody had a frame of it
-    FrameMemory::Room kept;                          ///< what its streams keep
+    ServerMemory::Room kept;                         ///< what its streams keep
     bool is_volume() const { return subscription.volume != nullptr; }
   };
 
@@ -209,7 +248,10 @@ class Session : public std::enable_shared_from_this<Session> {
   };
 
   class Teller;
-  void tell_control();
+  void complain(const std::string& what) const;
+  bool reserved(Clock::time_point now) const;
+  void take_control(Member& member);
+  void tell_control(const Member* but = nullptr);
   void judged(const JudgeJob& job);
   std::shared_ptr<const v1::PoseQuality> known_quality(const MeshWant& want, bool refresh) const;
   void drop(Row& row) const;
@@ -219,7 +261,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void start_jobs();
   bool too_early(Lane& lane, Clock::time_point now);
   bool by_pose(const Row& row) const;
-  bool anybody_waits() const;
+  bool anybody_waits();
+  bool anybody_reads(const Row& row, std::uint64_t before);
+  bool has_room(const Row& row, std::uint64_t before);
   void start_pose();
   void start(Clock::time_point now, bool aside);
   bool soon_posed(Clock::time_point now);
@@ -243,7 +287,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void want_again(const Lane& lane);
   void stop_unwatched();
   void start_volumes(Lane& lane);
-  void submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job);
+  void submit_volumes(Lane& lane, Workers& workers, std::shared_ptr<PoseJob> job);
+  void volumes_done(Lane& lane, bool posed, const Status& status);
   bool held_back(Row& row, Clock::time_point now) const;
   void ask_levels(Row& row, bool still, Clock::time_point now) const;
   void put_off_keyframes(Clock::time_point now);
@@ -254,18 +299,23 @@ class Session : public std::enable_shared_from_this<Session> {
 
   net::io_context& io_;
   Metrics& metrics_;
-  const FrameMemory& memory_;
+  const ServerMemory& memory_;
   Judging& judging_;
   Openings& openings_;
   std::function<void(std::shared_ptr<const void>)> let_go_;
+  Journal* journal_;
   std::shared_ptr<const ServedModel> model_;
-  std::string name_;
+  std::string name_, owner_;
   bool named_;
   Limits limits_;
+  std::shared_ptr<const Pool> kept_;  ///< for what is no subscription's
+  std::shared_ptr<Account> account_ = std::make_shared<Account>();
 
   std::set<Member*> members_;
   Member* controller_ = nullptr;
-  std::optional<Clock::time_point> control_left_;  ///< when the last controller went
+  std::optional<Clock::time_point> control_left_;  ///< when the last controller went, who may return
+  bool awaits_heir_ = false;                       ///< it went from the session that was before
+  Clock::time_point uncontrolled_{};               ///< since when nobody controls it
   Clock::time_point last_seen_ = Clock::now();     ///< when the last member went
 
   bool awaited_ = false;  ///< the last one may come back
@@ -288,6 +338,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Clock::time_point posed_{};    ///< when the last pose was taken up
   Clock::time_point stirred_{};  ///< when the last pose came, or the last job ended
   bool rested_ = false;          ///< the waiting pose came after a rest
+  bool unread_ = false;          ///< something waits until a member has read
   Clock::time_point moved_{};    ///< when the pose last became another one
 
   std::uint64_t last_sequence_ = 0;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a session has posed, one job after another, and judged.
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <utility>
 
 #include "runtime/server/judging.hpp"
+#include "runtime/server/kept.hpp"
 #include "runtime/server/mesh_stream.hpp"
+#include "runtime/server/post_back.hpp"
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
@@ -19,6 +19,10 @@ constexpr std::chrono::milliseconds kKeyframePause{100};
 constexpr std::chrono::milliseconds kStill{150};
 // Within a stream the next pose comes so soon.
 constexpr std::chrono::milliseconds kNextPose{50};
+
+// What is shown first takes turns of so many bytes, so that who asks for little never waits for long behind
+// who asks for much: of the paper phantom a whole body in float32.
+constexpr std::uint64_t kTurn = std::uint64_t{16} << 20;
 
 // Seconds between frames of the slowest rate.
 constexpr double kLongest = 24 * 3600;
@@ -33,11 +37,15 @@ bool same(const Pose& a, const Pose& b) {
          std::equal(a.rotation.begin(), a.rotation.end(), b.rotation.begin(), b.rotation.end(), equal);
 }
 
-// About the bytes of a frame that holds everything.
-std::uint64_t bytes_of(const Model& model, const Want& want) {
+// About the bytes of a frame that holds everything; of what has more than `most_voxels` nothing is made.
+std::uint64_t bytes_of(const Model& model, const Want& want, std::uint64_t most_voxels) {
   if (const auto* volume = std::get_if<VolumeWant>(&want)) {
     const Image& scan = model.volumes[volume->volume].image;
-    if (volume->slices.empty()) return scan.bytes.size();
+    if (volume->slices.empty()) {
+      const std::uint64_t voxels = volume->region ? rest_voxels(model, *volume) : scan.grid.voxels();
+      if (voxels > most_voxels) return 0;
+      return voxels * scalar_bytes(scan.type) * static_cast<std::uint64_t>(scan.components);
+    }
     std::uint64_t pixels = 0;
     for (const ImageGrid& plane : volume->slices) pixels += plane.voxels();
     return pixels * scalar_bytes(scan.type) * static_cast<std::uint64_t>(scan.components);
@@ -50,6 +58,10 @@ std::uint64_t bytes_of(const Model& model, const Want& want) {
 }
 
 }  // namespace
+
+std::uint64_t Session::frame_bytes(const Want& want) const {
+  return bytes_of(model_->model(), want, limits_.volume_voxels);
+}
 
 // What a job has to tell, posted from the worker. The outcome waits for the first mesh: the I/O thread wakes
 // once for both, and they leave in one write.
@@ -66,15 +78,15 @@ class Session::Teller {
   }
 
   void outcome(PoseOutcome outcome) {
-    outcome_ = std::make_shared<const PoseOutcome>(std::move(outcome));
+    until_memory([&] { outcome_ = std::make_shared<const PoseOutcome>(std::move(outcome)); });
     if (!waits_ || !outcome_->status.ok()) tell_outcome();
   }
   void probe(const std::shared_ptr<ProbeFrame>& frame) {
     tell_outcome();
-    net::post(session_->io_, [self = session_, frame] { self->probe_ready(frame); });
+    post_back(session_->io_, [self = session_, frame] { self->probe_ready(frame); });
   }
   void frame(PosedFrame frame) {
-    net::post(session_->io_, [self = session_, told = std::exchange(outcome_, nullptr), skipped = skipped_,
+    post_back(session_->io_, [self = session_, told = std::exchange(outcome_, nullptr), skipped = skipped_,
                               shown = shown_, refresh = refresh_, frame = std::move(frame)] {
       if (told) self->finish_pose(*told, *skipped, *shown, refresh);
       self->publish(frame);
@@ -82,7 +94,7 @@ class Session::Teller {
   }
   void tell_outcome() {
     if (!outcome_) return;
-    net::post(session_->io_,
+    post_back(session_->io_,
               [self = session_, told = std::exchange(outcome_, nullptr), skipped = skipped_, shown = shown_,
                refresh = refresh_] { self->finish_pose(*told, *skipped, *shown, refresh); });
   }
@@ -122,17 +134,38 @@ bool Session::by_pose(const Row& row) const {
 }
 
 // For the present pose, which such a job would show.
-bool Session::anybody_waits() const {
+bool Session::anybody_waits() {
   return std::any_of(rows_.begin(), rows_.end(),
-                     [this](const Row& row) { return row.fresh && by_pose(row); });
+                     [this](const Row& row) { return row.fresh && by_pose(row) && has_room(row, 0); });
+}
+
+// Somebody would read the frame, beside `before` bytes of the same job; else it is made once somebody has
+// read.
+bool Session::anybody_reads(const Row& row, std::uint64_t before) {
+  const std::uint64_t bytes = before + frame_bytes(row.subscription.want);
+  for (Member* member : row.members) {
+    if (member->may_take(row.subscription.id, bytes)) return true;
+  }
+  unread_ = true;
+  return false;
+}
+
+// For the present pose's frame of the row, beside `before` bytes of the same job, as far as it is to be shown
+// now: with no room for more frames, who has none yet waits (catch_up).
+bool Session::has_room(const Row& row, std::uint64_t before) {
+  const std::uint64_t bytes = frame_bytes(row.subscription.want);
+  if (before > 0 && before + bytes > kTurn) return false;
+  if (!anybody_reads(row, before)) return false;
+  if (!memory_.must_wait(bytes, before)) return true;
+  openings_.wait_for_room(Clock::now(), memory_.large(bytes));
+  return false;
 }
 
 void Session::start_pose() {
   const auto now = Clock::now();
   if (!slot_) put_off_keyframes(now);
-  // With no room for more frames, who has none yet waits (catch_up).
-  const bool refresh = anybody_waits() && !memory_.full();
-  if (poses_.busy || (together() && volumes_busy()) || (!slot_ && !refresh && probes_.empty())) return;
+  if (poses_.busy || (together() && volumes_busy()) || (!slot_ && probes_.empty() && !anybody_waits()))
+    return;
   if (!slot_ && probes_.empty() && openings_.beside_streams(now)) {
     if (!soon_posed(now)) openings_.ask(shared_from_this());
     return;
@@ -177,8 +210,7 @@ bool Session::soon_posed(Clock::time_point now) {
 bool Session::open_up() {
   awaits_opening_ = false;
   const auto now = Clock::now();
-  if (poses_.busy || (together() && volumes_busy()) || slot_ || !anybody_waits() || memory_.full() ||
-      soon_posed(now))
+  if (poses_.busy || (together() && volumes_busy()) || slot_ || !anybody_waits() || soon_posed(now))
     return false;
   start(now, true);
   return true;
@@ -199,23 +231,26 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
   // The guard keeps the I/O thread waiting for the job's end. All that the job holds goes back with it, so
   // that no worker ever destroys a session.
   const bool aside = job->aside;
+  // Of a recorded session with volumes; it takes no worker from those who pose.
+  const bool volumes = job->volumes && std::any_of(job->subscriptions.begin(), job->subscriptions.end(),
+                                                   [](const Subscription& s) { return s.volume != nullptr; });
   Job work = [self = std::move(self), job = std::move(job), teller,
               guard = net::make_work_guard(io_)]() mutable {
-    const Status status = run(*job);
+    Status status = run(*job);
     teller->tell_outcome();  // where no frame could be made
     net::io_context& io = self->io_;
-    net::post(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
-                   guard = std::move(guard), status] { self->posed(*job, status); });
+    post_back(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
+                   guard = std::move(guard), status = std::move(status)] { self->posed(*job, status); });
   };
   if (aside)
-    openings_.submit(std::move(work));
+    openings_.submit(std::move(work), account_);
   else
-    poses_.workers.submit(std::move(work));
+    (volumes ? whole_ : poses_).workers.submit(std::move(work), account_);
 }
 
 // The job is over.
 void Session::posed(const PoseJob& job, const Status& status) {
-  if (!status.ok()) spdlog::error("session {}: {}", name_, status.message);
+  if (!status.ok()) complain(status.message);
   poses_.busy = false;
   if (job.volumes) set_volumes_busy(false);
   stirred_ = Clock::now();
@@ -270,10 +305,14 @@ void Session::take_up(PoseJob& job) {
   for (Row& row : rows_) {
     if (!by_pose(row)) continue;
     if (!row.fresh && (refresh || held_back(row, now))) continue;
-    if (row.fresh && (refresh || !row.shown) && memory_.full(taking.bytes)) continue;
+    if (row.fresh && (refresh || !row.shown) && !has_room(row, taking.bytes)) continue;
+    if (!refresh && row.shown && !anybody_reads(row, taking.bytes)) {
+      row.fresh = row.fresh.value_or(now);
+      continue;
+    }
     take_up(row, taking, job);
   }
-  job.room = FrameMemory::Room(memory_, taking.bytes);
+  job.room = ServerMemory::Room(memory_, taking.bytes);
   keep_time();
   if (refresh) {
     job.request = present_;
@@ -284,7 +323,7 @@ void Session::take_up(PoseJob& job) {
 }
 
 void Session::take_up(Row& row, Taking& taking, PoseJob& job) {
-  taking.bytes += bytes_of(model_->model(), row.subscription.want);
+  taking.bytes += frame_bytes(row.subscription.want);
   row.fresh.reset();
   row.shown = true;
   ask_levels(row, taking.still, taking.now);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "runtime/server/judging.hpp"
+#include "runtime/server/post_back.hpp"
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
@@ -40,7 +41,7 @@ bool Session::judge() {
   judging_.submit([self = shared_from_this(), job, guard = net::make_work_guard(io_)]() mutable {
     run(*job);
     net::io_context& io = self->io_;
-    net::post(io, [self = std::move(self), job = std::move(job), guard = std::move(guard)] {
+    post_back(io, [self = std::move(self), job = std::move(job), guard = std::move(guard)] {
       self->judging_.done(job->cost);
       self->judged(*job);
     });

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What of a session goes into its recording: poses with all of their frames.
-#include <spdlog/spdlog.h>
-
 #include <utility>
 
 #include "runtime/server/session.hpp"
@@ -36,13 +34,19 @@ void Session::record_frame(const PosedFrame& frame) {
 // The job is over. `whole`: every frame was made.
 void Session::end_recorded(bool whole) {
   const Recorded done = std::exchange(recorded_, {});
-  if (!whole && done.job != 0) done.recording->take_back();
+  if (done.job != 0 && whole) done.recording->settle();
+  if (done.job != 0 && !whole) done.recording->take_back();
   if (!done.ended) return;
   try {
     done.ended();
   } catch (const std::exception& error) {
-    spdlog::error("session {}: its recording is lost: {}", name_, error.what());
+    complain("its recording is lost: " + std::string(error.what()));
   }
+}
+
+std::optional<Clock::time_point> Session::abandoned() const {
+  if (!recording_ || controller_) return std::nullopt;
+  return uncontrolled_;
 }
 
 }  // namespace ecorche::server

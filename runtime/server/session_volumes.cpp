@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a session's volumes show: the newest pose, as fast as they are made, beside the meshes of newer ones.
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <utility>
 
+#include "runtime/server/post_back.hpp"
 #include "runtime/server/session.hpp"
 
 namespace ecorche::server {
@@ -53,10 +52,10 @@ void Session::stop_unwatched() {
 void Session::start_volumes(Lane& lane) {
   if (lane.busy || together() || stopping_) return;
   const auto now = Clock::now();
-  // With no room for more frames, who has none yet waits (catch_up).
   const auto ready = [&](const Row& row, std::uint64_t bytes) {
     const auto* want = std::get_if<VolumeWant>(&row.subscription.want);
-    return want && &lane_of(*want) == &lane && row.fresh && (row.shown || !memory_.full(bytes));
+    if (!want || &lane_of(*want) != &lane || !row.fresh) return false;
+    return row.shown ? anybody_reads(row, bytes) : has_room(row, bytes);
   };
   if (std::none_of(rows_.begin(), rows_.end(), [&](const Row& row) { return ready(row, 0); }) ||
       too_early(lane, now))
@@ -77,9 +76,10 @@ void Session::start_volumes(Lane& lane) {
       job->request.arrived = std::min(job->request.arrived, *row.fresh);
       take_up(row, taking, *job);
     }
-    job->room = FrameMemory::Room(memory_, taking.bytes);
+    job->room = ServerMemory::Room(memory_, taking.bytes);
     keep_time();
-    submit_volumes(lane, std::move(job));
+    // Large planes are made where volumes are, so that small ones do not wait for them.
+    submit_volumes(lane, memory_.large(taking.bytes) ? whole_.workers : lane.workers, std::move(job));
   } catch (...) {  // out of memory: catch_up() tries again
     lane.busy = false;
     want_again(lane);
@@ -87,30 +87,33 @@ void Session::start_volumes(Lane& lane) {
   }
 }
 
-void Session::submit_volumes(Lane& lane, std::shared_ptr<PoseJob> job) {
+void Session::submit_volumes(Lane& lane, Workers& workers, std::shared_ptr<PoseJob> job) {
   std::shared_ptr<Session> self = shared_from_this();
   const auto posed = std::make_shared<bool>(false);
   job->on_outcome = [posed](const PoseOutcome& outcome) { *posed = outcome.status.ok(); };
   job->on_frame = [self](PosedFrame frame) {
-    net::post(self->io_, [self, frame = std::move(frame)] { self->publish(frame); });
+    post_back(self->io_, [self, frame = std::move(frame)] { self->publish(frame); });
   };
   // As of submit(): nothing that the job holds goes on the worker.
-  lane.workers.submit([self = std::move(self), job = std::move(job), posed, &lane,
-                       guard = net::make_work_guard(io_)]() mutable {
-    const Status status = run(*job);
+  Job work = [self = std::move(self), job = std::move(job), posed, &lane,
+              guard = net::make_work_guard(io_)]() mutable {
+    Status status = run(*job);
     net::io_context& io = self->io_;
-    net::post(io,
-              [self = std::move(self), job = std::move(job), guard = std::move(guard), posed, &lane, status] {
-                const bool stopped = status.code == StatusCode::cancelled;
-                if (!status.ok() && !stopped) spdlog::error("session {}: {}", self->name_, status.message);
-                lane.busy = false;
-                if (!stopped && (!*posed || !status.ok())) {  // no memory: once more, soon
-                  lane.next = Clock::now() + kSoon;
-                  self->want_again(lane);
-                }
-                self->start_jobs();
-              });
-  });
+    post_back(io, [self = std::move(self), job = std::move(job), guard = std::move(guard), posed, &lane,
+                   status = std::move(status)] { self->volumes_done(lane, *posed, status); });
+  };
+  workers.submit(std::move(work), account_);
+}
+
+void Session::volumes_done(Lane& lane, bool posed, const Status& status) {
+  const bool stopped = status.code == StatusCode::cancelled;
+  if (!status.ok() && !stopped) complain(status.message);
+  lane.busy = false;
+  if (!stopped && (!posed || !status.ok())) {  // no memory: once more, soon
+    lane.next = Clock::now() + kSoon;
+    want_again(lane);
+  }
+  start_jobs();
 }
 
 }  // namespace ecorche::server

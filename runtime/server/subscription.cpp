@@ -78,7 +78,7 @@ Status read_mesh(const v1::MeshSelection& mesh, const Model& model, MeshWant& ou
 }
 
 Status read_deformer(const v1::VolumeSelection& volume, const Model& model, VolumeWant& out) {
-  if (volume.deformer() > v1::DEFORMER_SPHERES)
+  if (volume.deformer() < v1::DEFORMER_UNSPECIFIED || volume.deformer() > v1::DEFORMER_SPHERES)
     return unimplemented("deformer " + std::to_string(volume.deformer()));
   out.by_spheres = volume.deformer() == v1::DEFORMER_SPHERES;
   if (out.by_spheres && model.spheres.empty()) {

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "runtime/server/asio.hpp"
+#include "runtime/server/farewell.hpp"
 
 namespace ecorche::server {
 
@@ -39,6 +40,10 @@ class Transport {
 
   /// Where the carrier has messages, and one must be one frame: whether the last byte read ended one.
   virtual std::optional<bool> message_ended() const { return std::nullopt; }
+  /// What was read last is of a kind that holds no frames, such as a WebSocket's text.
+  virtual bool wrong_kind() const { return false; }
+  /// What finish() is to say, where the carrier has words for it.
+  virtual void ends_by(Farewell) {}
   /// Without messages, frames may leave in one write.
   bool joins_frames() const { return !message_ended().has_value(); }
 };

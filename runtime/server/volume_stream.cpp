@@ -34,8 +34,8 @@ void append_brick(const Image& image, const runtime::VoxelRange& range, std::vec
 }  // namespace
 
 Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& body,
-                           std::uint64_t most_voxels, const FrameMemory& memory, bool keyframe,
-                           v1::VolumeFrame& frame, wire::Payload& payload, const Context& context) {
+                           std::uint64_t most_voxels, bool keyframe, v1::VolumeFrame& frame,
+                           wire::Payload& payload, const Context& context) {
   payload.clear();
   // Until it is whole: what moved meanwhile would be forgotten.
   const std::uint64_t last_keyframe = std::exchange(keyframe_, 0);
@@ -43,7 +43,7 @@ Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& 
     write_slices(served, body, frame, payload, context);
     return {};
   }
-  const Room room{most_voxels, memory, context};
+  const Room room{most_voxels, context};
   if (Status status = want_.by_spheres ? by_spheres(served, body, room) : by_tets(served, body, room);
       !status.ok())
     return status;
@@ -67,11 +67,11 @@ Status VolumeStream::find_room(const Model& model, const ImageGrid& grid, const 
   }
   const std::uint64_t beyond =
       kept_by(model, want_, std::max(voxels, at_rest_)) - kept_by(model, want_, at_rest_);
-  if (beyond > beyond_ && room.memory.kept_full(beyond - beyond_)) {
+  if (pool_ && beyond > beyond_ && pool_->full(beyond - beyond_)) {
     return {StatusCode::resource_exhausted,
             "volume: posed grids fill the server's memory for streams (keep the body nearer to the scan)"};
   }
-  if (beyond != beyond_) held_ = room.memory.keep(beyond);
+  if (pool_ && beyond != beyond_) held_ = ServerMemory::Room(pool_, beyond);
   beyond_ = beyond;
   return {};
 }
@@ -106,7 +106,20 @@ void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedB
   if (want_.by_spheres) set = served.balls(want_.volume).at(body.segments);
   const std::shared_ptr<VolumeScratch> scratch = served.volume_scratch->take();
   Image& slice = scratch->slice;
-  std::vector<std::byte> pixels;
+  const std::size_t pixel =
+      scalar_bytes(volume.image.type) * static_cast<std::size_t>(volume.image.components);
+  std::size_t pixels = 0;
+  for (const ImageGrid& plane : want_.slices) pixels += plane.voxels();
+  // Where they stay: grown, or copied once more, hundreds of MiB would be there twice.
+  std::vector<std::byte> packed;
+  if (want_.compressed) packed.reserve(pixels * pixel);
+  const auto components = static_cast<std::uint32_t>(volume.image.components);
+  v1::Array& array = *frame.mutable_voxels();
+  if (!want_.compressed) {
+    payload.reserve((pixels * pixel + 15) / 16 * 16);
+    array = wire::append(payload, std::span<const std::byte>(), volume.image.type, components);
+    array.set_count(pixels);
+  }
   for (const ImageGrid& plane : want_.slices) {
     if (set) {
       slice = Image(plane, volume.image.type, volume.image.components);
@@ -114,9 +127,14 @@ void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedB
     } else {
       served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice, scratch->tets, context);
     }
-    pixels.insert(pixels.end(), slice.bytes.begin(), slice.bytes.end());
+    if (want_.compressed) {
+      packed.insert(packed.end(), slice.bytes.begin(), slice.bytes.end());
+    } else {
+      payload.insert(payload.end(), slice.bytes.begin(), slice.bytes.end());
+    }
   }
-  put(pixels, slice, frame, payload);
+  if (want_.compressed) return put(packed, slice, frame, payload);
+  payload.resize((payload.size() + 15) / 16 * 16);
 }
 
 void VolumeStream::write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,

@@ -9,9 +9,9 @@
 
 #include "core/values/context.hpp"
 #include "proto/framing.hpp"
-#include "runtime/server/frame_memory.hpp"
 #include "runtime/server/payload_pool.hpp"
 #include "runtime/server/served_model.hpp"
+#include "runtime/server/server_memory.hpp"
 #include "runtime/server/subscription.hpp"
 #include "runtime/spheres/refilled_volume.hpp"
 
@@ -24,10 +24,12 @@ class VolumeStream {
   /// Frames from one keyframe to the next.
   static constexpr std::uint64_t keyframe_interval = 128;
 
-  /// `voxels`: as rest_voxels() has them, which whoever makes it counts as kept.
-  VolumeStream(VolumeWant want, std::uint64_t voxels)
+  /// `voxels`: as rest_voxels() has them, which whoever makes it counts as kept. `pool`: what it grows beyond
+  /// them is counted there; null: it is not.
+  VolumeStream(VolumeWant want, std::uint64_t voxels, std::shared_ptr<const Pool> pool = nullptr)
       : want_(std::move(want)),
         at_rest_(voxels),
+        pool_(std::move(pool)),
         payloads_(want_.slices.empty() ? std::make_shared<PayloadPool>() : std::make_shared<PayloadPool>(0)) {
   }
 
@@ -37,16 +39,14 @@ class VolumeStream {
 
   /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
   /// needs one. resource_exhausted beyond `most_voxels`, and where the lattice has grown since the rest pose
-  /// and `memory` lets no more be kept. Error{interrupted} on a stop. Whatever it throws, the next frame
+  /// and its pool lets no more be kept. Error{interrupted} on a stop. Whatever it throws, the next frame
   /// holds everything.
   Status write(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
-               const FrameMemory& memory, bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload,
-               const Context& context = {});
+               bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload, const Context& context = {});
 
  private:
   struct Room {
     std::uint64_t most_voxels;
-    const FrameMemory& memory;
     const Context& context;
   };
   // The whole posed volume, or its region, into posed_.
@@ -62,6 +62,7 @@ class VolumeStream {
 
   VolumeWant want_;
   std::uint64_t at_rest_;  // voxels
+  std::shared_ptr<const Pool> pool_;
   // Planes, which may hold far more than a volume, leave nothing behind that is not counted.
   std::shared_ptr<PayloadPool> payloads_;
   // Where the last frame lies, of one deformer or the other.
@@ -76,7 +77,7 @@ class VolumeStream {
   ImageGrid keyframe_grid_;
   std::uint64_t keyframe_ = 0;  // number of its frame; 0: none yet
   std::uint64_t beyond_ = 0;    // bytes of the kept volume beyond those at rest
-  FrameMemory::Room held_;      // for those
+  ServerMemory::Room held_;     // for those
 };
 
 }  // namespace ecorche::server

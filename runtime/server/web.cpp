@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "runtime/server/tls.hpp"
+#include "runtime/server/web_host.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -143,7 +144,7 @@ class WebSocketTransport final : public Transport {
   net::awaitable<std::size_t> read_some(std::span<std::byte> out, error_code& ec) override {
     const std::size_t n = co_await socket_->async_read_some(net::buffer(out.data(), out.size()), quietly(ec));
     socket_->next_layer().claim(n + kMostHead);
-    if (!ec && !socket_->got_binary()) ec = websocket::error::bad_opcode;
+    wrong_kind_ = !ec && !socket_->got_binary();
     co_return n;
   }
 
@@ -152,8 +153,10 @@ class WebSocketTransport final : public Transport {
   }
 
   net::awaitable<void> finish(error_code& ec) override {
-    co_await socket_->async_close(websocket::close_code::normal, quietly(ec));
+    co_await socket_->async_close(static_cast<websocket::close_code>(farewell_), quietly(ec));
   }
+  bool wrong_kind() const override { return wrong_kind_; }
+  void ends_by(Farewell why) override { farewell_ = why; }
 
   void close() override { socket_->next_layer().transport().close(); }
 
@@ -166,6 +169,8 @@ class WebSocketTransport final : public Transport {
 
  private:
   std::unique_ptr<Socket> socket_;
+  bool wrong_kind_ = false;
+  Farewell farewell_ = Farewell::normal;
 };
 
 // `Bearer TOKEN`: the scheme's name in any case (RFC 7235).
@@ -215,10 +220,12 @@ class Request final : public WebRequest {
     if (ec) co_return;
     const auto& request = parser_.get();
     const std::string_view target(request.target().data(), request.target().size());
-    if (!room_.admit()) co_return co_await answer(http::status::too_many_requests, "try again in a second\n");
+    const bool reads = request.method() == http::verb::get || request.method() == http::verb::head;
+    const bool health = reads && (target == "/healthz" || target == "/readyz");
+    if (!health && !room_.admit(kind(target), peer_))
+      co_return co_await answer(http::status::too_many_requests, "try again in a second\n");
     if (target == "/v1") co_return co_await upgrade();
-    if (request.method() != http::verb::get && request.method() != http::verb::head)
-      co_return co_await answer(http::status::method_not_allowed, "GET and HEAD only\n");
+    if (!reads) co_return co_await answer(http::status::method_not_allowed, "GET and HEAD only\n");
     if (target == "/healthz") co_return co_await answer(http::status::ok, "alive\n");
     if (target == "/readyz") {
       const bool ready = room_.ready();
@@ -227,9 +234,18 @@ class Request final : public WebRequest {
     }
     if (target == "/metrics") {
       if (!proven()) co_return co_await deny();
+      const auto host = request[http::field::host];
+      if (room_.token.empty() && !names_this_machine({host.data(), host.size()}))
+        co_return co_await answer(http::status::forbidden, "without a token, ask by address or localhost\n");
       co_return co_await answer(http::status::ok, room_.metrics());
     }
     co_return co_await answer(http::status::not_found, "see /healthz, /readyz, /metrics and /v1\n");
+  }
+
+  // Who has shown the token is not kept out by those who have none, nor a viewer by who asks for pages.
+  WebKind kind(std::string_view target) const {
+    if (!room_.token.empty() && proven()) return WebKind::proven;
+    return target == "/v1" && websocket::is_upgrade(parser_.get()) ? WebKind::handshake : WebKind::page;
   }
 
   // Whoever needs no token has it.
@@ -274,6 +290,8 @@ class Request final : public WebRequest {
     }));
     socket_->binary(true);
     socket_->auto_fragment(false);
+    // A message is a frame, and its reader has the limits, the same as over TCP; Beast's own is 16 MiB.
+    socket_->read_message_max(0);
     error_code ec;
     co_await socket_->async_accept(request, quietly(ec));
     // What the request brought beyond its header would be lost: no client may speak before the answer.

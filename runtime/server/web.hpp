@@ -2,6 +2,7 @@
 // The HTTP port: /healthz, /readyz, /metrics, and /v1, where a WebSocket begins.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -10,6 +11,10 @@
 #include "runtime/server/transport.hpp"
 
 namespace ecorche::server {
+
+/// What a request is for, each with a rate of its own: a page, a WebSocket, one that has shown the token.
+/// What asks for /healthz or /readyz is none of them: it is always answered.
+enum class WebKind : std::uint8_t { page, handshake, proven };
 
 /// What the HTTP port asks the server.
 struct WebRoom {
@@ -20,8 +25,8 @@ struct WebRoom {
   std::function<bool()> ready;
   std::function<std::string()> metrics;
   std::function<void()> denied;
-  /// Whether one more request may be answered now.
-  std::function<bool()> admit;
+  /// Whether one more request of this kind and peer may be answered now.
+  std::function<bool(WebKind kind, const std::string& peer)> admit;
   /// A client that speaks WebSocket from here on; `proven`: its request had the token.
   std::function<void(std::unique_ptr<Transport> transport, std::string peer, bool proven)> welcome;
 };

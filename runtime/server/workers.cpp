@@ -7,6 +7,8 @@
 #include <unistd.h>
 #endif
 
+#include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace ecorche::server {
@@ -24,10 +26,11 @@ Workers::~Workers() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void Workers::submit(Job job) {
+void Workers::submit(Job job, std::shared_ptr<Account> by) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    if (by) by->at_least(least_);
+    jobs_.push_back({std::move(job), std::move(by)});
   }
   wake_.notify_one();
 }
@@ -37,19 +40,33 @@ void Workers::drain() {
   idle_.wait(lock, [this] { return jobs_.empty() && running_ == 0; });
 }
 
+// There is one.
+Workers::Waiting Workers::next() {
+  const auto first = std::min_element(jobs_.begin(), jobs_.end(), [](const Waiting& a, const Waiting& b) {
+    if (!a.by || !b.by) return !a.by && b.by;
+    return a.by->used() < b.by->used();
+  });
+  Waiting taken = std::move(*first);
+  jobs_.erase(first);
+  if (taken.by) least_ = std::max(least_, taken.by->used());
+  return taken;
+}
+
 void Workers::work() {
   while (true) {
-    Job job;
+    Waiting taken;
     {
       std::unique_lock lock(mutex_);
       wake_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
       if (jobs_.empty()) return;
-      job = std::move(jobs_.front());
-      jobs_.pop_front();
+      taken = next();
       ++running_;
     }
-    within_(job);
-    job = nullptr;  // what it holds goes before anyone hears that it ended
+    const auto begun = std::chrono::steady_clock::now();
+    within_(taken.job);
+    if (taken.by)
+      taken.by->use(std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
+    taken = {};  // what it holds goes before anyone hears that it ended
     {
       const std::lock_guard lock(mutex_);
       --running_;

@@ -2,19 +2,62 @@
 // The threads that pose, so that the I/O thread never does.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace ecorche::server {
 
 using Job = std::function<void()>;
 
-/// Runs jobs in the order they come, `threads` at a time. The hand-over is one mutex: what was written before
-/// submit() is seen by the job. The destructor finishes every job submitted.
+/// For whom jobs are done: whoever had less time of a thread comes first. A part, such as a client, of a
+/// whole, such as all clients of its address: wholes have equal shares, and so have the parts of each.
+class Account {
+ public:
+  explicit Account(std::shared_ptr<Account> of = nullptr) : of_(std::move(of)) {}
+
+  /// Seconds, of itself and of what it is a part of.
+  std::pair<double, double> used() const {
+    const double own = used_.load(std::memory_order_relaxed);
+    return {of_ ? of_->used_.load(std::memory_order_relaxed) : own, own};
+  }
+  void use(double seconds) {
+    add(used_, seconds);
+    if (of_) add(of_->used_, seconds);
+  }
+  /// Who comes, or comes again, has no more to get than those who stayed.
+  void at_least(const std::pair<double, double>& used) {
+    raise(used_, used.second);
+    if (of_) raise(of_->used_, used.first);
+  }
+
+ private:
+  static void add(std::atomic<double>& to, double seconds) {
+    double was = to.load(std::memory_order_relaxed);
+    while (!to.compare_exchange_weak(was, was + seconds, std::memory_order_relaxed)) {
+    }
+  }
+  static void raise(std::atomic<double>& to, double least) {
+    double was = to.load(std::memory_order_relaxed);
+    while (was < least && !to.compare_exchange_weak(was, least, std::memory_order_relaxed)) {
+    }
+  }
+
+  std::shared_ptr<Account> of_;
+  std::atomic<double> used_ = 0;
+};
+
+/// Runs jobs `threads` at a time: first those without an account in the order they come, then those of the
+/// account that had the least (start-time fair queueing, with the time that jobs took: Goyal et al. 1996). So
+/// the first job of a newcomer waits for none of those who keep the threads busy, but for what has begun. The
+/// hand-over is one mutex: what was written before submit() is seen by the job. The destructor finishes every
+/// job submitted.
 class Workers {
  public:
   /// `within` calls its argument, e.g. inside the app's TBB arena.
@@ -25,18 +68,24 @@ class Workers {
 
   std::size_t threads() const { return threads_.size(); }
   /// Jobs must not throw.
-  void submit(Job job);
+  void submit(Job job, std::shared_ptr<Account> by = nullptr);
   /// Waits until no job is queued or running.
   void drain();
 
  private:
+  struct Waiting {
+    Job job;
+    std::shared_ptr<Account> by;
+  };
   void work();
+  Waiting next();
 
   std::function<void(const Job&)> within_;
   std::mutex mutex_;
   std::condition_variable wake_;
   std::condition_variable idle_;
-  std::deque<Job> jobs_;
+  std::deque<Waiting> jobs_;
+  std::pair<double, double> least_{};  ///< of the account whose job began last
   int running_ = 0;
   bool stopping_ = false;
   std::vector<std::thread> threads_;

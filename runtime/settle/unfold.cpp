@@ -10,6 +10,7 @@
 #include "runtime/quality/pose_quality.hpp"
 #include "runtime/settle/fold_energy.hpp"
 #include "runtime/settle/lbfgs.hpp"
+#include "runtime/settle/patch_volumes.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -21,7 +22,10 @@ constexpr int kRounds = 12;          ///< of a pass: eps is lowered between them
 constexpr int kSteps = 40;           ///< of a round
 constexpr double kEnough = 0.02;     ///< det F that a patch is left with
 constexpr double kLeastEps = 1e-3;
-constexpr double kTie = 0.1;  ///< of a node to where skinning put it, against the shapes of mean tets
+constexpr double kTie = 0.1;         ///< of a node to where skinning put it, against the shapes of mean tets
+constexpr double kTolerance = 1e-3;  ///< of a tissue's rest volume, by which it may come out farther from it
+constexpr double kAimed = 0.3;       ///< of the tolerance: what patches are held to
+constexpr int kMoreRounds = 8;       ///< for volumes alone
 
 Vector3d rest_of(const Model& model, std::int32_t node) {
   return model.nodes.row(node).cast<double>().transpose();
@@ -74,6 +78,20 @@ class Patches {
 
   std::size_t count() const { return patches_.size(); }
   const FoldPatch& operator[](std::size_t g) const { return patches_[g]; }
+
+  /// Per node of the body its place among the free ones of patch `g`, -1 elsewhere.
+  std::vector<std::int32_t> free_of(std::size_t g) const {
+    std::vector<std::int32_t> out(model_.node_count(), -1);
+    for (std::size_t i = 0; i < patches_[g].free; ++i) out[nodes_[g][i]] = static_cast<std::int32_t>(i);
+    return out;
+  }
+  /// Tets a mm^3 of rest.
+  double density(std::size_t g) const { return density_[g]; }
+  /// What `write` wrote, taken back.
+  void restore(std::size_t g, std::span<const float> before, std::span<float> nodes) const {
+    for (std::size_t i = 0; i < patches_[g].free; ++i)
+      std::copy_n(&before[3 * nodes_[g][i]], 3, &nodes[3 * nodes_[g][i]]);
+  }
 
   void write(std::size_t g, const Eigen::VectorXd& x, std::span<float> nodes) const {
     for (std::size_t i = 0; i < patches_[g].free; ++i)
@@ -163,6 +181,7 @@ class Patches {
       volume += patch.tets.back().weight;
     }
     for (FoldPatch::Tet& tet : patch.tets) tet.weight *= static_cast<double>(tets.size()) / volume;
+    density_.push_back(6 * static_cast<double>(tets.size()) / volume);
     for (const std::size_t n : nodes_[g]) row_[n] = -1;  // held nodes may lie in several groups
   }
 
@@ -189,11 +208,12 @@ class Patches {
   std::vector<std::int32_t> row_;    // of every node, in the patch that is being filled
   std::vector<FoldPatch> patches_;
   std::vector<std::vector<std::size_t>> nodes_;  // of every row, free ones first
+  std::vector<double> density_;                  // of every patch
 };
 
 /// Returns the free nodes, relaxed until no tet is flat or nothing gets better; each is tied to where
-/// skinning had put it.
-Eigen::VectorXd relax(const FoldPatch& patch, double length, const Context& context) {
+/// skinning had put it, and tissues are held to the bounds of their volumes.
+Eigen::VectorXd relax(const FoldPatch& patch, PatchVolumes& volumes, double length, const Context& context) {
   const FoldEnergy energy(patch);
   std::vector<double> all = patch.x;
   const auto free = static_cast<Eigen::Index>(3 * patch.free);
@@ -204,25 +224,30 @@ Eigen::VectorXd relax(const FoldPatch& patch, double length, const Context& cont
     std::copy(y.begin(), y.end(), all.begin());
     return all;
   };
+  double beyond = 0;  // the volumes' bounds, of a rest volume
   const auto round = [&](double eps) {
     lbfgs(
         [&](const Eigen::VectorXd& y, Eigen::VectorXd& gradient) {
           context.check_stop();
           const double sum = energy(placed(y), eps, {gradient.data(), static_cast<std::size_t>(free)});
           gradient += tie * (y - start);
-          return sum + tie / 2 * (y - start).squaredNorm();
+          return sum + tie / 2 * (y - start).squaredNorm() + volumes(y, gradient);
         },
         x, kSteps, 0.1 * length);
+    beyond = volumes.tighten(x);
     return energy.folds(placed(x));
   };
   FoldEnergy::Folds best = energy.folds(placed(x));
+  const auto eps_of = [](double least) {
+    return std::sqrt(kLeastEps * kLeastEps + 0.04 * std::pow(std::min(0.0, least), 2));
+  };
   for (int n = 0, idle = 0; n < kRounds && best.least < kEnough && idle < 2; ++n) {
-    const FoldEnergy::Folds now =
-        round(std::sqrt(kLeastEps * kLeastEps + 0.04 * std::pow(std::min(0.0, best.least), 2)));
+    const FoldEnergy::Folds now = round(eps_of(best.least));
     idle = now.count < best.count || now.least > best.least + 0.01 ? 0 : idle + 1;
     best = now;
   }
-  if (best.count == 0) round(kLeastEps);  // eps shrank before the shapes had settled
+  if (best.count == 0) best = round(kLeastEps);  // eps shrank before the shapes had settled
+  for (int n = 0; n < kMoreRounds && beyond > kAimed * kTolerance; ++n) best = round(eps_of(best.least));
   return x;
 }
 
@@ -249,8 +274,12 @@ void carry_tissues(const Model& model, const std::vector<std::uint8_t>& moved, P
 
 class Unfolder {
  public:
-  Unfolder(const Model& model, const Context& context)
-      : model_(model), context_(context), held_(held_nodes(model)), given_up_(model.tet_count(), 0) {}
+  Unfolder(const Model& model, std::span<const float> skinned, const Context& context)
+      : model_(model),
+        context_(context),
+        held_(held_nodes(model)),
+        given_up_(model.tet_count(), 0),
+        volumes_(model, skinned, kAimed * kTolerance) {}
 
   bool on_bones(std::size_t t) const {
     const auto tet = model_.tets.row(static_cast<Eigen::Index>(t));
@@ -266,11 +295,14 @@ class Unfolder {
       if (seeds.empty()) break;
       const Patches patches(model_, held_, given_up_, seeds, rings, nodes);
       const double length = std::cbrt(6 * now.rest_mm3 / static_cast<double>(now.tets.size()));
+      std::vector<PatchVolumes> parts = parts_of(patches, nodes);
       std::vector<float> next = nodes;
-      tbb::parallel_for(std::size_t{0}, patches.count(),
-                        [&](std::size_t g) { patches.write(g, relax(patches[g], length, context_), next); });
+      tbb::parallel_for(std::size_t{0}, patches.count(), [&](std::size_t g) {
+        patches.write(g, relax(patches[g], parts[g], length, context_), next);
+      });
+      step_back(patches, parts, nodes, next);
       Inverted after = inverted(model_, next);
-      if (after.rest_mm3 >= now.rest_mm3) continue;
+      if (after.rest_mm3 >= now.rest_mm3 || after.tets.size() > now.tets.size()) continue;
       nodes.swap(next);
       now = std::move(after);
     }
@@ -292,10 +324,44 @@ class Unfolder {
     return out;
   }
 
+  std::vector<PatchVolumes> parts_of(const Patches& patches, std::span<const float> nodes) const {
+    const std::vector<double> now = volumes_.at(nodes);
+    std::vector<PatchVolumes> parts(patches.count());
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t g) {
+      parts[g] = PatchVolumes(volumes_, patches.free_of(g), nodes, now, patches.density(g));
+    });
+    std::vector<std::size_t> of_how_many(now.size(), 0);
+    for (const PatchVolumes& part : parts)
+      for (const std::size_t row : part.rows()) ++of_how_many[row];
+    for (PatchVolumes& part : parts) part.share_out(of_how_many);
+    return parts;
+  }
+
+  /// Takes back the patches of tissues that came out of their bounds all the same.
+  void step_back(const Patches& patches, const std::vector<PatchVolumes>& parts,
+                 std::span<const float> before, std::span<float> nodes) const {
+    std::vector<std::uint8_t> back(patches.count(), 0);
+    for (bool again = true; again;) {
+      again = false;
+      const std::vector<double> volume = volumes_.at(nodes);
+      for (std::size_t g = 0; g < patches.count(); ++g) {
+        const std::vector<std::size_t> rows = parts[g].rows();
+        const bool beyond = std::any_of(rows.begin(), rows.end(), [&](std::size_t row) {
+          return volumes_.beyond(row, volume[row]) > (1 - kAimed) * kTolerance;
+        });
+        if (!beyond || back[g] != 0) continue;
+        back[g] = 1;
+        again = true;
+        patches.restore(g, before, nodes);
+      }
+    }
+  }
+
   const Model& model_;
   const Context& context_;
   const std::vector<std::uint8_t> held_;
   std::vector<std::uint8_t> given_up_;
+  const TissueVolumes volumes_;
 };
 
 }  // namespace
@@ -306,14 +372,14 @@ Unfolding unfold(const Model& model, PosedBody& body, const Context& context) {
   out.inverted_before = now.tets.size();
   out.rest_mm3_before = now.rest_mm3;
   if (now.tets.empty()) return out;
-  Unfolder unfolder(model, context);
   const std::vector<float> skinned = body.nodes;
+  Unfolder unfolder(model, skinned, context);
   now = unfolder.run(body.nodes);
   // What cannot be unfolded pushes all about it away in vain: again without it.
   if (unfolder.give_up(now)) {
     std::vector<float> nodes = skinned;
     Inverted again = unfolder.run(nodes);
-    if (again.rest_mm3 <= 1.1 * now.rest_mm3) {
+    if (again.rest_mm3 <= 1.1 * now.rest_mm3 && again.tets.size() <= out.inverted_before) {
       body.nodes.swap(nodes);
       now = std::move(again);
     }

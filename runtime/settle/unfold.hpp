@@ -21,7 +21,9 @@ struct Unfolding {
 /// Moves nodes of `body` near inverted tets, and the vertices that hang on them; segments and bones stay.
 /// Nodes that touch a bone are held, so what two bones squeeze between them stays inverted. A patch of so
 /// many rings of nodes about the folds relaxes by FoldEnergy (its outer nodes are held too), first a narrow
-/// one, then wider ones about what is left; the rest of the body keeps its nodes. A frame alone decides:
+/// one, then wider ones about what is left; the rest of the body keeps its nodes. What closed tissues enclose
+/// is held (PatchVolumes): none comes out farther from its rest volume than skinning had put it, by more than
+/// 1e-3 of it; a patch that would is taken back. A frame alone decides:
 /// nothing joins it to the frame before, and it takes seconds, so it is for posing offline. Skinning that
 /// folds nothing is left as it is, to the last bit.
 Unfolding unfold(const Model& model, PosedBody& body, const Context& context);

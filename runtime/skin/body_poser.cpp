@@ -80,6 +80,13 @@ Status check_pose(const Skeleton& skeleton, const Pose& pose) {
   return {};
 }
 
+// Quaternions that are all turned alike still lie on the side of their parents.
+void stand_still(std::vector<RigidTransform>& segments) {
+  const RigidTransform back = segments[0].inverse();
+  for (RigidTransform& segment : segments) segment = back * segment;
+  segments[0] = {};
+}
+
 }  // namespace
 
 std::string_view skinning_name(Skinning skinning) {
@@ -92,6 +99,11 @@ Skinning skinning_from_name(std::string_view name) {
   }
   throw Error(ErrorKind::usage, "skinning", "unknown method '" + std::string(name) + "'",
               "use cor, dqs or lbs");
+}
+
+bool stands_still(const PosedBody& body) {
+  const RigidTransform& root = body.segments.at(0);
+  return root.q.vec().norm() < 1e-9 && root.t.norm() < 1e-6;
 }
 
 struct BodyPoser::Impl {
@@ -166,7 +178,7 @@ PosedBody BodyPoser::make_frame(const FrameParts& parts) const {
 }
 
 Status BodyPoser::run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues,
-                      PosedBody& out, NodesOf nodes) const {
+                      PosedBody& out, NodesOf nodes, Root root) const {
   const Rig& rig = impl_->model->rig;
   if (Status status = check_pose(rig.skeleton, pose); !status.ok()) return status;
   if (!impl_->fits(out)) return bad("the frame was made for another model");
@@ -176,6 +188,7 @@ Status BodyPoser::run(const Pose& pose, Skinning skinning, std::span<const std::
   out.clamped.clear();
   kinematics::constrain(rig.skeleton, out.pose, out.clamped);
   kinematics::forward(rig, out.pose, out.segments);
+  if (root == Root::still) stand_still(out.segments);
   impl_->parts.pose(*impl_->model, skinning, tissues, nodes, out);
   return {};
 }

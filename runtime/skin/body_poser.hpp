@@ -42,6 +42,13 @@ enum class NodesOf : std::uint8_t {
   tissues,  ///< those that the asked tissues hang on: about half of the work. PosedBody::nodes is not written
 };
 
+/// Where the body stands.
+enum class Root : std::uint8_t {
+  moved,  ///< where the pose takes it
+  still,  ///< as scanned, whatever turned and moved it as a whole: no digits go into where it stands. For
+          ///< measuring: a body that was only moved is the rest body, to the last bit but one
+};
+
 /// One posed body. Allocated once by BodyPoser::make_frame, then only written.
 struct PosedBody {
   Pose pose;                             ///< what was posed: as asked, within limits, coupled
@@ -67,6 +74,9 @@ struct PosedBody {
   } scratch;
 };
 
+/// Whether it stands as Root::still would have it, within float32's grain.
+bool stands_still(const PosedBody& body);
+
 /// Shared and immutable: any number of threads may pose different frames at once. Work inside runs in the
 /// caller's TBB arena; results are the same bytes for any number of threads.
 class BodyPoser {
@@ -89,7 +99,7 @@ class BodyPoser {
   /// frame of it. Positions keep 1e-3 mm at rest and under any rigid motion of the whole body within metres:
   /// see segment_motion.hpp.
   Status run(const Pose& pose, Skinning skinning, std::span<const std::uint32_t> tissues, PosedBody& out,
-             NodesOf nodes = NodesOf::body) const;
+             NodesOf nodes = NodesOf::body, Root root = Root::moved) const;
 
   /// All tissues of the model.
   std::span<const std::uint32_t> all_tissues() const;

@@ -46,7 +46,7 @@ struct Inverted {
 /// A job on tets of one posed body; owns nothing, allocates nothing. Corners and axes as whole numbers of
 /// 2^-bits voxels (fixed_points.hpp).
 struct DrawTets {
-  const Tets& tets;
+  const DrawnTets& tets;
   const TetPalettes& palettes;          ///< of `tets` in their own order, 3 numbers a node
   std::span<const std::int32_t> posed;  ///< 3 * #nodes and one more, indices of the posed grid
   std::span<const std::int32_t> rest;   ///< 3 * #nodes and one more, indices of the volume

@@ -78,7 +78,8 @@ void to_fixed(const ImageGrid& grid, int bits, std::span<const float> points,
   const FixedIndex index(grid, bits);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, groups.size(), 128), [&](const auto& range) {
     for (std::size_t g = range.begin(); g < range.end(); ++g) {
-      if (groups[g] != 0) index.of(points, 64 * g, std::min(points.size() / 3, 64 * (g + 1)), out);
+      if (groups[g] != 0 && 64 * g < points.size() / 3)
+        index.of(points, 64 * g, std::min(points.size() / 3, 64 * (g + 1)), out);
     }
   });
 }

@@ -6,41 +6,14 @@
 #include <algorithm>
 
 #include "runtime/volume/grid_affine.hpp"
+#include "runtime/volume/rest_map.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 #include "runtime/volume/sampler.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
 using Eigen::Vector3d;
-
-// From a continuous index of the posed grid to `target` of the rest point, by the inverse of tet t's
-// deformation.
-class RestMap {
- public:
-  RestMap(const Deformation& body, const ImageGrid& grid, const Affine& target)
-      : body_(body), posed_index_(to_index(grid)), target_(target) {}
-
-  const Affine& of(std::int32_t tet) {
-    if (tet == current_) return map_;
-    current_ = tet;
-    Eigen::Matrix3d posed_edges, rest_edges;
-    const Vector3d posed0 = posed_index_ * corner_of(body_.tets, body_.posed, tet, 0);
-    const Vector3d rest0 = target_ * corner_of(body_.tets, body_.rest, tet, 0);
-    for (int c = 1; c < 4; ++c) {
-      posed_edges.col(c - 1) = posed_index_ * corner_of(body_.tets, body_.posed, tet, c) - posed0;
-      rest_edges.col(c - 1) = target_ * corner_of(body_.tets, body_.rest, tet, c) - rest0;
-    }
-    map_.linear = rest_edges * posed_edges.inverse();
-    map_.at = rest0 - map_.linear * posed0;
-    return map_;
-  }
-
- private:
-  const Deformation& body_;
-  Affine posed_index_, target_;
-  std::int32_t current_ = InverseMap::none;
-  Affine map_;
-};
 
 // Calls f(offset, index, rest) for every voxel that a tet holds; a task is a slice.
 template <class F>
@@ -80,20 +53,45 @@ Image resample(const Deformation& body, const InverseMap& map, const ModelVolume
   return out;
 }
 
+namespace {
+
+// `f(deformation)` of the drawn tets.
+template <class F>
+auto as_drawn(const Model& model, std::span<const float> nodes, const F& f) {
+  if (model.contested.empty()) return f(deformation(model, nodes));
+  const DrawnBody body = drawn_body(model.tets, deformation(model, nodes).rest, nodes, RigidCopies(model));
+  return f(Deformation{body.tets, body.rest, body.posed});
+}
+
+}  // namespace
+
+void locate(const Model& model, std::span<const float> nodes, const ImageGrid& grid, InverseMap& out,
+            const Context& context) {
+  as_drawn(model, nodes, [&](const Deformation& body) { locate(body, grid, out, context); });
+}
+
+Image resample(const Model& model, std::span<const float> nodes, const InverseMap& map,
+               const ModelVolume& volume, Sampling sampling) {
+  return as_drawn(model, nodes,
+                  [&](const Deformation& body) { return resample(body, map, volume, sampling); });
+}
+
 DisplacementField inverse_displacement(const Model& model, std::span<const float> nodes,
                                        const InverseMap& map) {
   DisplacementField out{Image(map.grid, ScalarType::f32, 3), Image(map.grid, ScalarType::u8)};
   const std::span<float> vectors = out.vectors.scalars<float>();
   const std::span<std::uint8_t> mask = out.mask.scalars<std::uint8_t>();
   const Affine space = to_space(map.grid);
-  for_held_voxels(deformation(model, nodes), map, Affine{},
-                  [&](std::size_t offset, const Vector3d& index, const Vector3d& rest) {
-                    const Vector3d moved = rest - space * index;
-                    for (std::size_t c = 0; c < 3; ++c) {
-                      vectors[3 * offset + c] = static_cast<float>(moved[static_cast<Eigen::Index>(c)]);
-                    }
-                    mask[offset] = 1;
-                  });
+  as_drawn(model, nodes, [&](const Deformation& body) {
+    for_held_voxels(body, map, Affine{},
+                    [&](std::size_t offset, const Vector3d& index, const Vector3d& rest) {
+                      const Vector3d moved = rest - space * index;
+                      for (std::size_t c = 0; c < 3; ++c) {
+                        vectors[3 * offset + c] = static_cast<float>(moved[static_cast<Eigen::Index>(c)]);
+                      }
+                      mask[offset] = 1;
+                    });
+  });
   return out;
 }
 

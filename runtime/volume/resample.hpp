@@ -49,23 +49,23 @@ inline Deformation deformation(const Model& model, std::span<const float> nodes)
 /// do). The result is the same for any number of threads, each of which fills slabs of the last axis.
 /// Error{interrupted} on a stop.
 void locate(const Deformation& body, const ImageGrid& grid, InverseMap& out, const Context& context = {});
-inline void locate(const Model& model, std::span<const float> nodes, const ImageGrid& grid, InverseMap& out,
-                   const Context& context = {}) {
-  locate(deformation(model, nodes), grid, out, context);
-}
+/// Of a model, as volumes are posed: `out.tet` are drawn tets (rigid_copies.hpp), the model's own where none
+/// is contested.
+void locate(const Model& model, std::span<const float> nodes, const ImageGrid& grid, InverseMap& out,
+            const Context& context = {});
 
 /// `volume` carried along: each voxel of map.grid takes the sample at its rest point, or `background` where
 /// no tet holds it or the rest point's sample lies beyond the image. Scalar type and components are kept;
 /// integers are rounded and saturated. Labels are always sampled nearest. The volume's own grid may differ
 /// from map.grid.
 Image resample(const Deformation& body, const InverseMap& map, const ModelVolume& volume, Sampling sampling);
-inline Image resample(const Model& model, std::span<const float> nodes, const InverseMap& map,
-                      const ModelVolume& volume, Sampling sampling) {
-  return resample(deformation(model, nodes), map, volume, sampling);
-}
+/// Of a model, with a map that locate() made of it.
+Image resample(const Model& model, std::span<const float> nodes, const InverseMap& map,
+               const ModelVolume& volume, Sampling sampling);
 
 /// Posed to rest: per voxel of map.grid the vector (rest point - posed point), f32, 3 components, LPS mm,
-/// zero outside; and the u8 mask of the voxels where it holds.
+/// zero outside; and the u8 mask of the voxels where it holds. `map`: of locate() of the same model and
+/// nodes.
 struct DisplacementField {
   Image vectors;
   Image mask;

@@ -8,15 +8,16 @@
 
 namespace ecorche::runtime {
 
-TetBlocks::TetBlocks(const Model& model) : nodes_(model.node_count()) {
-  const std::size_t tets = model.tet_count();
+TetBlocks::TetBlocks(const DrawnTets& drawn, std::size_t nodes, std::size_t copied)
+    : nodes_(nodes), base_(nodes - copied) {
+  const auto tets = static_cast<std::size_t>(drawn.rows());
   std::vector<std::vector<std::uint32_t>> of_block((tets + size - 1) / size);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, of_block.size(), 64), [&](const auto& range) {
     for (std::size_t b = range.begin(); b < range.end(); ++b) {
       std::vector<std::uint32_t>& groups = of_block[b];
       for (std::size_t t = size * b; t < std::min(tets, size * (b + 1)); ++t) {
         for (int c = 0; c < 4; ++c) {
-          const auto node = static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(t), c));
+          const auto node = static_cast<std::size_t>(drawn(static_cast<Eigen::Index>(t), c));
           const auto group = static_cast<std::uint32_t>(node / size);
           // A handful: a search beats a sort of 256.
           if (std::find(groups.begin(), groups.end(), group) == groups.end()) groups.push_back(group);
@@ -32,15 +33,19 @@ TetBlocks::TetBlocks(const Model& model) : nodes_(model.node_count()) {
   }
 }
 
-void TetBlocks::bound_groups(std::span<const float> nodes, std::span<float> low_high) const {
+void TetBlocks::bound_groups(std::span<const float> nodes, std::span<const float> copied,
+                             std::span<float> low_high) const {
   constexpr float far = std::numeric_limits<float>::infinity();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, groups(), 256), [&](const auto& range) {
     for (std::size_t g = range.begin(); g < range.end(); ++g) {
       std::array<float, 3> low{far, far, far}, high{-far, -far, -far};
-      for (std::size_t n = size * g; n < std::min(nodes_, size * (g + 1)); ++n) {
+      const bool own = copied.empty() || size * g < base_;
+      const std::span<const float> from = own ? nodes : copied;
+      const std::size_t first = size * g - (own ? 0 : base_);
+      for (std::size_t n = first; n < std::min(from.size() / 3, first + size); ++n) {
         for (std::size_t c = 0; c < 3; ++c) {
           // Written so that what is no number changes nothing.
-          const float x = nodes[3 * n + c];
+          const float x = from[3 * n + c];
           low[c] = x < low[c] ? x : low[c];
           high[c] = x > high[c] ? x : high[c];
         }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tets in blocks of 64 of the model's (Morton) order, and where each block lies in a pose: what a region of
-// interest needs to leave most of the body alone.
+// Tets in blocks of 64 of the order in which they are drawn (Morton within each class), and where each block
+// lies in a pose: what a region of interest needs to leave most of the body alone.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/values/image.hpp"
-#include "core/values/model.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 
 namespace ecorche::runtime {
 
@@ -18,14 +18,16 @@ class TetBlocks {
  public:
   static constexpr std::size_t size = 64;  ///< of a block of tets, and of a group of nodes
 
-  explicit TetBlocks(const Model& model);
+  /// `nodes`: how many; the last `copied` of them are given apart.
+  TetBlocks(const DrawnTets& tets, std::size_t nodes, std::size_t copied);
 
   std::size_t blocks() const { return begin_.size() - 1; }
   std::size_t groups() const { return (nodes_ + size - 1) / size; }
 
   /// Lowest and highest x, y, z of every group of nodes; 6 * #groups floats. What is no number is left out.
-  /// Parallel.
-  void bound_groups(std::span<const float> nodes, std::span<float> low_high) const;
+  /// Copied ones lie in groups of their own, the last ones. Parallel.
+  void bound_groups(std::span<const float> nodes, std::span<const float> copied,
+                    std::span<float> low_high) const;
 
   /// The node groups that the tets of block `b` hang on.
   std::span<const std::uint32_t> groups_of(std::size_t b) const {
@@ -33,7 +35,7 @@ class TetBlocks {
   }
 
  private:
-  std::size_t nodes_ = 0;
+  std::size_t nodes_ = 0, base_ = 0;  // all; the first copied one
   std::vector<std::uint32_t> begin_;  // #blocks + 1
   std::vector<std::uint32_t> group_;
 };

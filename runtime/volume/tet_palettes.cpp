@@ -14,7 +14,7 @@ constexpr std::size_t kRunsPerTask = 4096;
 
 }  // namespace
 
-TetPalettes::TetPalettes(const Tets& tets, std::span<const std::uint32_t> order, std::uint32_t stride) {
+TetPalettes::TetPalettes(const DrawnTets& tets, std::span<const std::uint32_t> order, std::uint32_t stride) {
   const auto all = static_cast<std::size_t>(tets.rows());
   const std::size_t runs = (all + width - 1) / width, tasks = (runs + kRunsPerTask - 1) / kRunsPerTask;
   begin_.resize(runs + 1);

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "core/values/mesh.hpp"
 #include "runtime/skin/aligned.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 
 namespace ecorche::runtime {
 
@@ -21,7 +21,7 @@ class TetPalettes {
 
   /// `order`: #T, which tets follow each other; empty: as they are. `stride`: how many numbers a kernel keeps
   /// of a node.
-  TetPalettes(const Tets& tets, std::span<const std::uint32_t> order, std::uint32_t stride);
+  TetPalettes(const DrawnTets& tets, std::span<const std::uint32_t> order, std::uint32_t stride);
 
   std::size_t runs() const { return count_.size(); }
   /// Of run `r`, each once, ascending; without what the palette is filled up with.

@@ -131,7 +131,16 @@ struct VolumePoser::Job {
   const Context& context;
 };
 
-VolumePoser::VolumePoser(std::shared_ptr<const Model> model) : model_(std::move(model)), blocks_(*model_) {
+std::size_t VolumePoser::base() const {
+  return (model_->node_count() + TetBlocks::size - 1) / TetBlocks::size * TetBlocks::size;
+}
+
+VolumePoser::VolumePoser(std::shared_ptr<const Model> model)
+    : model_(std::move(model)),
+      copies_(*model_),
+      drawn_(model_->tets, copies_, static_cast<std::int32_t>(base())),
+      blocks_(drawn_, copies_.nodes() == 0 ? model_->node_count() : base() + copies_.nodes(),
+              copies_.nodes()) {
   if (model_->node_count() == 0) return;
   for (int c = 0; c < 3; ++c) {
     rest_box_[static_cast<std::size_t>(c)] = model_->nodes.col(c).minCoeff();
@@ -143,7 +152,7 @@ const TetPalettes& VolumePoser::palettes() const {
   std::call_once(palettes_made_, [&] {
     // A thread that waits here must not begin another volume of this poser: it would wait for itself.
     tbb::this_task_arena::isolate([&] {
-      palettes_ = std::make_unique<const TetPalettes>(model_->tets, std::span<const std::uint32_t>(), 3);
+      palettes_ = std::make_unique<const TetPalettes>(drawn_, std::span<const std::uint32_t>(), 3);
     });
   });
   return *palettes_;
@@ -153,7 +162,9 @@ const TetPalettes& VolumePoser::palettes() const {
 DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
   const ImageGrid& rest_grid = job.volume.image.grid;
   scratch.bounds.resize(6 * blocks_.groups());
-  blocks_.bound_groups(job.nodes, scratch.bounds);
+  scratch.copied.resize(3 * copies_.nodes());
+  copies_.place(job.nodes, scratch.copied);
+  blocks_.bound_groups(job.nodes, scratch.copied, scratch.bounds);
   const int bits = fraction_bits(
       std::max(index_reach(job.grid, box_of(scratch.bounds)), index_reach(rest_grid, rest_box_)));
 
@@ -179,17 +190,22 @@ DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
       }
     }
   });
-  scratch.posed.resize(job.nodes.size() + 1);
+  // Copied nodes come last, from a group of their own on.
+  const std::size_t numbers = copies_.nodes() == 0 ? job.nodes.size() : 3 * (base() + copies_.nodes());
+  scratch.posed.resize(numbers + 1);
   to_fixed(job.grid, bits, job.nodes, scratch.groups, scratch.posed);
+  to_fixed(job.grid, bits, scratch.copied, std::span(scratch.posed).subspan(numbers - scratch.copied.size()));
   if (scratch.of_rest.model != model_.get() || scratch.of_rest.bits != bits ||
       !(scratch.of_rest.grid == rest_grid)) {
-    scratch.rest.resize(job.nodes.size() + 1);
+    scratch.rest.resize(numbers + 1);
     to_fixed(rest_grid, bits, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())},
              scratch.rest);
+    to_fixed(rest_grid, bits, copies_.rest(),
+             std::span(scratch.rest).subspan(numbers - copies_.rest().size()));
     scratch.of_rest = {model_.get(), rest_grid, bits};
   }
   job.context.check_stop();
-  return {model_->tets,
+  return {drawn_,
           palettes(),
           scratch.posed,
           scratch.rest,
@@ -213,7 +229,7 @@ void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume
                          const Context& context) const {
   check_grid(grid);
   const bool same = kept.drawn.volume == &volume && kept.drawn.sampling == sampling &&
-                    kept.image.grid == grid && kept.drawn.posed.size() == nodes.size() + 1;
+                    kept.image.grid == grid && kept.drawn.nodes == nodes.size();
   kept.drawn.volume = nullptr;
   fit_image(grid, volume, kept.image);
   const Job job{nodes, volume, sampling, grid, true, context};
@@ -230,8 +246,9 @@ void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume
     if (kept.moved[b] != 0) kept.rewritten.push_back(static_cast<std::uint32_t>(b));
   }
   if (!kept.rewritten.empty()) draw(job, tets, kept.image, scratch);
-  kept.drawn.posed.resize(nodes.size() + 1);
+  kept.drawn.posed.resize(scratch.posed.size());
   std::swap(kept.drawn.posed, scratch.posed);
+  kept.drawn.nodes = nodes.size();
   kept.drawn.bits = tets.bits;
   kept.drawn.sampling = sampling;
   kept.drawn.volume = &volume;
@@ -258,7 +275,8 @@ void VolumePoser::find_moved(const Job& job, const DrawTets& tets, PosedVolume& 
       if (std::none_of(groups.begin(), groups.end(), [&](std::uint32_t g) { return scratch.groups[g] != 0; }))
         continue;
       kernels::mark_moved(tets, before, range, kept.bricks, b * TetBlocks::size,
-                          std::min(model_->tet_count(), (b + 1) * TetBlocks::size), kept.moved.data());
+                          std::min(static_cast<std::size_t>(drawn_.rows()), (b + 1) * TetBlocks::size),
+                          kept.moved.data());
     }
   });
   job.context.check_stop();

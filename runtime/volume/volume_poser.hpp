@@ -15,6 +15,7 @@
 #include "runtime/volume/bricks.hpp"
 #include "runtime/volume/draw_tets.hpp"
 #include "runtime/volume/resample.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 #include "runtime/volume/tet_blocks.hpp"
 #include "runtime/volume/tet_palettes.hpp"
 
@@ -33,6 +34,7 @@ struct PosedVolume {
     const ModelVolume* volume = nullptr;  // null: nothing yet, or only half of it
     Sampling sampling = Sampling::trilinear;
     int bits = 0;
+    std::size_t nodes = 0;  // numbers given
     std::vector<std::int32_t> posed;
   } drawn;
 };
@@ -42,7 +44,7 @@ class VolumePoser {
  public:
   /// Kept by the caller from pose to pose, so that nothing of the body's size is allocated again.
   struct Scratch {
-    std::vector<float> bounds;
+    std::vector<float> bounds, copied;
     std::vector<std::int32_t> posed, rest;
     std::vector<VoxelRange> runs, stretches;  // boxes of runs of tets, and of some that follow each other
     std::vector<std::uint8_t> sides, block_meets, groups;
@@ -57,12 +59,12 @@ class VolumePoser {
 
   /// `volume` carried along onto `grid`, which may be any: the grown lattice (grow_to), a region of interest,
   /// a slice. As locate() and resample(), its slow twins: a voxel belongs to the tets that hold its centre,
-  /// those of positive posed volume before inverted ones, then to the lowest index; where none does, it is
-  /// `background`. Rest points agree with them to 1e-3 voxel; where a centre lies within 1e-5 of a tet's size
-  /// of its face, a tet may win that does not hold it. At rest, on the volume's own lattice, every voxel
-  /// inside is given back exactly. `out` is made anew unless it has that grid, type and components already.
-  /// Same bytes for any number of threads. Error{data} for a grid of more than 2^31 voxels,
-  /// Error{interrupted} on a stop.
+  /// those of positive posed volume before inverted ones, then to the lowest drawn index (rigid_copies.hpp:
+  /// bones first, then what is contested as rigid as they are); where none does, it is `background`. Rest
+  /// points agree with them to 1e-3 voxel; where a centre lies within 1e-5 of a tet's size of its face, a tet
+  /// may win that does not hold it. At rest, on the volume's own lattice, every voxel inside is given back
+  /// exactly. `out` is made anew unless it has that grid, type and components already. Same bytes for any
+  /// number of threads. Error{data} for a grid of more than 2^31 voxels, Error{interrupted} on a stop.
   void pose(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling, const ImageGrid& grid,
             Image& out, Scratch& scratch, const Context& context = {}) const;
 
@@ -83,7 +85,11 @@ class VolumePoser {
 
   const TetPalettes& palettes() const;
 
+  std::size_t base() const;  // of the copied nodes, a multiple of TetBlocks::size
+
   std::shared_ptr<const Model> model_;
+  RigidCopies copies_;
+  DrawnTets drawn_;
   TetBlocks blocks_;
   mutable std::once_flag palettes_made_;  // with the first volume: many a poser never poses one
   mutable std::unique_ptr<const TetPalettes> palettes_;

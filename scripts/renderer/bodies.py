@@ -34,6 +34,7 @@ class Volume:
     voxels: np.ndarray  # indexed [k, j, i]
     spacing: np.ndarray  # mm along i, j, k
     labels: bool
+    names: dict = dataclasses.field(default_factory=dict)  # of labels, by value
 
 
 @dataclasses.dataclass
@@ -44,6 +45,7 @@ class Body:
     tets: vtkUnstructuredGrid = None
     weights: dict = None  # segment name -> per-node weight
     segments: list = None
+    bones: list = None  # of tet labels 1, 2, ...
 
 
 def fail(where, what, mend):
@@ -136,12 +138,13 @@ def read_case(folder):
     tissues += [Tissue(b["name"], "bone", read_surface(source(b))) for b in case["bones"]]
     tissues += [Tissue(t["name"], t.get("group", "other"), read_surface(source(t))) for t in case.get("tissues", [])]
     volumes = []
-    entries = [(v["name"], v["file"], False) for v in case.get("volumes", [])]
+    entries = [(v["name"], v["file"], {}) for v in case.get("volumes", [])]
     if case.get("labels"):
-        entries.append(("labels", case["labels"]["file"], True))
-    for name, file, labels in entries:
+        table = case["labels"].get("table")
+        entries.append(("labels", case["labels"]["file"], table if isinstance(table, dict) else {0: "background"}))
+    for name, file, names in entries:
         if file.endswith(".nrrd"):
-            volumes.append(Volume(name, *read_image(folder / file), labels))
+            volumes.append(Volume(name, *read_image(folder / file), bool(names), names))
     return Body(case["name"], tissues, volumes)
 
 
@@ -186,10 +189,11 @@ def read_model(path):
         owner = table.argmax(axis=0)
         corner = connectivity.reshape(-1, 4)
         tets = tets_of(points, connectivity, {"label": label.astype(np.int32), "owner": owner[corner[:, 0]].astype(np.int32)})
+        bones = [text(name) for name in own["labels/bone"][:]]
         tissues = []
         for name, group in own["tissues"].items():
             tissues.append(Tissue(name, text(group["group"][0]), surface_of(group["points"][:], group["triangles"][:])))
-    return Body(path.stem, tissues, [], tets, weights, segments)
+    return Body(path.stem, tissues, [], tets, weights, segments, bones)
 
 
 def is_posed_folder(path):

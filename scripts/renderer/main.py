@@ -3,7 +3,7 @@
 """Turns a case, a model or a posed folder into PNG pictures.
 
   scripts/render CASE_FOLDER -o DIR     the patient from the front and the side: skin translucent over all tissues; volume slices
-  scripts/render MODEL.hdf -o DIR       the same, and the tets cut by a plane: by label, by owning segment, by one weight
+  scripts/render MODEL.hdf -o DIR       the same, and the tets cut through the bones: by label, by owning segment, by one weight
                                         (Sujar18 figures 3, 4, 5, 11)
   scripts/render POSED_FOLDER -o DIR    what `ecorche pose` wrote: tissues, volume slices, the posed tets by det F
   scripts/render A.vtp B.vtp ... -o DIR surfaces side by side, one picture (Sujar18 figure 7)
@@ -36,7 +36,9 @@ def parse():
     parser.add_argument("--name", help="how the pictures' names begin (default: the input's name)")
     parser.add_argument("--height", type=int, default=1200, help="pixels (default %(default)s)")
     parser.add_argument("--segment", help="whose weight is drawn on a model (default: the third of the skeleton)")
-    parser.add_argument("--cut", type=float, help="y of the cutting plane through a model, mm (default: the middle)")
+    parser.add_argument("--plane", choices=sorted(scene.PLANES), default="coronal", help="that cuts tets (default %(default)s)")
+    parser.add_argument("--cut", type=float, help="where in the scan it does, mm (default: coronal through all bones, else in the middle)")
+    parser.add_argument("--only", choices=("tissues", "volumes", "tets"), help="of a case, a model or a posed folder: these pictures alone")
     parser.add_argument("--beside", action="store_true", help="volumes side by side")
     parser.add_argument("--grey", action="store_true", help="volumes of bytes are grey values, not labels")
     parser.add_argument("--view", choices=sorted(scene.VIEWS), default="front",
@@ -75,15 +77,15 @@ def main():
         raise SystemExit("error: render: several inputs must all be surfaces or all volumes (name one case, model or posed folder)")
     else:
         body = bodies.read(first)
-        if body.tissues:
+        if body.tissues and args.only in (None, "tissues"):
             for view in ("front", "side"):
                 save(scene.translucent(body, view, args.height), view)
-        for volume in body.volumes:
-            save(slices.three_planes(volume, args.height), f"slice_{volume.name}")
-        if body.tets is not None:
-            for key, picture in scene.tet_cuts(body, args.cut, args.segment, args.height):
+        for volume in body.volumes if args.only in (None, "volumes") else ():
+            save(slices.three_planes(volume, args.height, f"{body.name}: {volume.name}"), f"slice_{volume.name}")
+        if body.tets is not None and args.only in (None, "tets"):
+            for key, picture in scene.tet_cuts(body, args.plane, args.cut, args.segment, args.height):
                 save(picture, key)
-        if first.suffix == ".hdf":
+        if first.suffix == ".hdf" and args.only is None:
             skins = [tissue.surface for tissue in body.tissues if tissue.group == "skin"]
             for spheres, data in skeletons.of_model(first):
                 for view in ("front", "side"):

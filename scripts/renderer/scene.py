@@ -6,13 +6,15 @@ import hashlib
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (chooses the drawing back end)
-from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkCommonCore import vtkIdList
 from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
-from vtkmodules.vtkFiltersExtraction import vtkExtractGeometry
+from vtkmodules.vtkFiltersExtraction import vtkExtractCells
 from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
 from vtkmodules.vtkIOImage import vtkPNGWriter
 from vtkmodules.vtkRenderingCore import (vtkActor, vtkColorTransferFunction, vtkLight, vtkPolyDataMapper, vtkRenderer,
                                          vtkRenderWindow, vtkTextActor, vtkWindowToImageFilter)
+
+import annotate
 
 BACKGROUND = (0.97, 0.97, 0.96)
 GROUP_COLOURS = {"skin": (0.93, 0.76, 0.65), "bone": (0.93, 0.89, 0.78), "muscle": (0.70, 0.25, 0.22), "organ": (0.62, 0.42, 0.55),
@@ -24,7 +26,11 @@ NAME_COLOURS = [("lung", (0.88, 0.60, 0.60)), ("heart", (0.72, 0.14, 0.18)), ("l
                 ("brain", (0.88, 0.72, 0.70)), ("bladder", (0.88, 0.80, 0.45)), ("intestin", (0.85, 0.60, 0.50)),
                 ("bowel", (0.85, 0.60, 0.50)), ("vein", (0.20, 0.25, 0.60)), ("cava", (0.20, 0.25, 0.60)),
                 ("pancreas", (0.88, 0.72, 0.42)), ("aorta", (0.80, 0.12, 0.12))]
-VIEWS = {"front": ((0, -1, 0), (0, 0, 1)), "side": ((1, 0, 0), (0, 0, 1)), "oblique": ((0.6, -0.75, 0.25), (0, 0, 1))}
+VIEWS = {"front": ((0, -1, 0), (0, 0, 1)), "side": ((1, 0, 0), (0, 0, 1)), "oblique": ((0.6, -0.75, 0.25), (0, 0, 1)),
+         "feet": ((0, 0, -1), (0, -1, 0))}
+SEEN = {"front": "from the front", "side": "from the left", "oblique": "from the front and left", "feet": "from the feet"}
+# Of a cut: its axis, the view that it is seen from, the side that stays (+1: the larger coordinates).
+PLANES = {"coronal": (1, "front", 1), "sagittal": (0, "side", -1), "axial": (2, "feet", 1)}
 
 
 class Picture:
@@ -152,7 +158,9 @@ def caption(text, x, y, size=22):
 def translucent(body, view, height):
     """Skin translucent over everything else."""
     actors = [surface_actor(t.surface, colour_of(t), 0.28 if t.group == "skin" else 1.0) for t in body.tissues]
-    return shoot(actors, view, height)
+    groups = [group for group in GROUP_COLOURS if any(t.group == group for t in body.tissues)]
+    return Picture(annotate.image_of(annotate.annotated(annotate.pixels(shoot(actors, view, height).image), f"{body.name}, {SEEN[view]}", view,
+                                                        legend=[(group, GROUP_COLOURS[group]) for group in groups])))
 
 
 def row_of_surfaces(surfaces, view, height):
@@ -177,17 +185,42 @@ def distinct(index):
     return colorsys.hsv_to_rgb((index * 0.618034) % 1.0, 0.55 + 0.25 * (index % 2), 0.65 + 0.3 * ((index // 2) % 2))
 
 
-def cut_actor(grid, values, y, colours):
-    """The half of the tets behind the plane, whole tets (so that their shape shows), coloured per tet."""
+def bone_sheet(centres, bone, cell_mm=20.0):
+    """How far back (y, mm) the bones lie at each place of the front view: a sheet through all of them, smooth between. `centres`: of
+    the tets in the scan, #T by 3; `bone`: which of them are of bone. Returns the sheet's y for every tet."""
+    low = centres[:, [0, 2]].min(axis=0)
+    at = ((centres[:, [0, 2]] - low) / cell_mm).astype(int)
+    shape = at.max(axis=0) + 1
+    total, count = np.zeros(shape), np.zeros(shape)
+    np.add.at(total, tuple(at[bone].T), centres[bone, 1])
+    np.add.at(count, tuple(at[bone].T), 1.0)
+    for _ in range(200):  # fills what has no bone from its neighbours, a cell a round
+        if (count > 0).all():
+            break
+        padded = [np.pad(a, 1) for a in (total, count)]
+        spread = [sum(a[1 + i: a.shape[0] - 1 + i, 1 + k: a.shape[1] - 1 + k] for i in (-1, 0, 1) for k in (-1, 0, 1)) for a in padded]
+        new = (count == 0) & (spread[1] > 0)
+        total[new], count[new] = spread[0][new] / spread[1][new], 1.0
+    y = total / np.maximum(count, 1e-9)
+    for _ in range(2):
+        padded = np.pad(y, 1, mode="edge")
+        y = sum(padded[1 + i: padded.shape[0] - 1 + i, 1 + k: padded.shape[1] - 1 + k] for i in (-1, 0, 1) for k in (-1, 0, 1)) / 9
+    return y[tuple(at.T)]
+
+
+def cut_actor(grid, values, behind, colours):
+    """The tets that lie `behind` the cut (so says a flag each), whole, so that their shape shows; coloured per tet."""
     array = numpy_to_vtk(np.ascontiguousarray(values, np.float64), deep=True)
     array.SetName("shown")
     grid.GetCellData().SetScalars(array)
-    plane = vtkPlane()
-    plane.SetOrigin(0, y, 0)
-    plane.SetNormal(0, -1, 0)
-    half = vtkExtractGeometry()
+    half = vtkExtractCells()
     half.SetInputData(grid)
-    half.SetImplicitFunction(plane)
+    chosen = vtkIdList()
+    rows = np.flatnonzero(behind)
+    chosen.SetNumberOfIds(len(rows))
+    for place, row in enumerate(rows):
+        chosen.SetId(place, int(row))
+    half.SetCellList(chosen)
     skin = vtkGeometryFilter()
     skin.SetInputConnection(half.GetOutputPort())
     mapper = vtkPolyDataMapper()
@@ -205,12 +238,19 @@ def cut_actor(grid, values, y, colours):
     return actor
 
 
-def discrete(count):
+def discrete(count, colours=None):
+    """One colour a whole number."""
     table = vtkColorTransferFunction()
     for index in range(count):
         for edge in (-0.499, 0.499):
-            table.AddRGBPoint(index + edge, *distinct(index))
+            table.AddRGBPoint(index + edge, *(colours[index] if colours else distinct(index)))
     return table
+
+
+def paired(names):
+    """A colour for each name, the same for both sides of one thing: `thigh_left`, `thigh_right`."""
+    kinds = {}
+    return [distinct(1 + kinds.setdefault(name.removesuffix("_left").removesuffix("_right"), len(kinds))) for name in names]
 
 
 def ramp(low, high, stops):
@@ -224,26 +264,59 @@ WEIGHT_STOPS = [(0, (0.23, 0.30, 0.75)), (0.25, (0.55, 0.69, 0.99)), (0.5, (0.87
                 (1, (0.71, 0.02, 0.15))]
 
 
-def tet_cuts(body, y, segment, height):
-    """(suffix, picture) per colouring that the tets carry."""
-    bounds = np.array(body.tets.GetBounds())
-    low, high = bounds[0::2], bounds[1::2]
-    y = (low[1] + high[1]) / 2 if y is None else y
+def legend_of(names, colours, shown):
+    """[(name, colour)] of what is shown; two sides as one."""
+    entries = {}
+    for index in sorted(shown):
+        name = names[index].removesuffix("_left").removesuffix("_right")
+        entries.setdefault(name if names[index] == name else name + " (both sides)", colours[index])
+    return list(entries.items())
+
+
+def tet_cuts(body, plane, at, segment, height):
+    """(suffix, picture) per colouring that the tets carry. A coronal cut goes through the bones as they lie in the scan, so that it meets
+    every joint in every pose; the others, and with `at` this one too, are planes of the scan: at that coordinate, or in the middle."""
+    corners = vtk_to_numpy(body.tets.GetCells().GetConnectivityArray()).reshape(-1, 4)
+    points = vtk_to_numpy(body.tets.GetPoints().GetData()).astype(float)
+    moved = body.tets.GetPointData().GetArray("displacement")
+    rest = points - vtk_to_numpy(moved) if moved else points
+    centres = rest[corners].mean(axis=1)
     cells = body.tets.GetCellData()
     arrays = {cells.GetArrayName(i): vtk_to_numpy(cells.GetArray(i)) for i in range(cells.GetNumberOfArrays())}
-    for name in ("label", "owner"):
-        if name in arrays:
-            values = arrays[name]
-            colours = discrete(int(values.max()) + 1)
-            yield f"tets_{name}", shoot([cut_actor(body.tets, values, y, colours)], "front", height, (low, high))
-    for name in ("det_f",):
-        if name in arrays:
-            colours = ramp(0, 2, WEIGHT_STOPS)
-            yield f"tets_{name}", shoot([cut_actor(body.tets, arrays[name], y, colours)], "front", height, (low, high))
+    bone = arrays["label"] > 0 if "label" in arrays else np.zeros(len(corners), bool)
+    axis, view, side = PLANES[plane]
+    if plane == "coronal" and at is None and bone.any():
+        behind, where = centres[:, 1] > bone_sheet(centres, bone), "cut through the bones"
+    else:
+        at = (centres[:, axis].min() + centres[:, axis].max()) / 2 if at is None else at
+        behind, where = side * centres[:, axis] > side * at, f"cut at {'xyz'[axis]} = {at:.0f} mm"
+    where += f", seen {SEEN[view]}"
+
+    def shot(values, colours):
+        return shoot([cut_actor(body.tets, values, behind, colours)], view, height)
+
+    def picture(values, colours, title, **more):
+        return Picture(annotate.image_of(annotate.annotated(annotate.pixels(shot(values, colours).image), f"{body.name}: {title}, {where}", view,
+                                                            **more)))
+
+    if "label" in arrays:
+        values = arrays["label"]
+        names = ["soft tissue"] + [(body.bones or [])[i] if i < len(body.bones or []) else f"bone {i + 1}" for i in range(int(values.max()))]
+        colours = [distinct(0)] + paired(names[1:])
+        yield "tets_label", picture(values, discrete(len(names), colours), "tets by bone",
+                                    legend=legend_of(names, colours, set(np.unique(values[behind]).astype(int))))
+    if "owner" in arrays and body.segments:
+        values, colours = arrays["owner"], paired(body.segments)
+        yield "tets_owner", picture(values, discrete(len(colours), colours), "tets by the segment of the largest weight",
+                                    legend=legend_of(body.segments, colours, set(np.unique(values[behind]).astype(int))))
+    if "det_f" in arrays:
+        colours = ramp(0, 2, WEIGHT_STOPS)
+        yield "tets_det_f", picture(arrays["det_f"], colours, "change of volume",
+                                    bar=("det F: 1 unchanged, below 0 inverted (shown as 0)", 0, 2, colours.GetColor))
     if body.weights:
         name = segment or body.segments[min(2, len(body.segments) - 1)]
         if name not in body.weights:
             raise SystemExit(f"error: --segment: no segment '{name}' (one of {', '.join(body.segments)})")
-        corners = vtk_to_numpy(body.tets.GetCells().GetConnectivityArray()).reshape(-1, 4)
-        values = body.weights[name][corners].mean(axis=1)
-        yield f"tets_weight_{name}", shoot([cut_actor(body.tets, values, y, ramp(0, 1, WEIGHT_STOPS))], "front", height, (low, high))
+        colours = ramp(0, 1, WEIGHT_STOPS)
+        yield f"tets_weight_{name}", picture(body.weights[name][corners].mean(axis=1), colours, f"weight of {name}",
+                                             bar=(f"skinning weight of {name}", 0, 1, colours.GetColor))

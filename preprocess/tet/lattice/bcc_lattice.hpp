@@ -26,6 +26,7 @@ class BccLattice {
   BccLattice() = default;
   BccLattice(const Eigen::Vector3d& low, double side, const Cell& cubes);
 
+  const Eigen::Vector3d& low() const { return low_; }  ///< the first corner, mm
   double side() const { return side_; }
   const Cell& cubes() const { return cubes_; }
   std::int64_t cube_count() const { return std::int64_t{cubes_[0]} * cubes_[1] * cubes_[2]; }

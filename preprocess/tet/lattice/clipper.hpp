@@ -30,8 +30,10 @@ class Clipper {
   /// The lattice alone, over the whole image with `margin` cubes to spare, an even number along each axis
   /// where `even`: cubes of `side` mm, or a little more.
   BccLattice lay(double side, int margin, bool even) const;
-  /// The tets of that lattice. The boundary is a manifold, and no bone is lost. Throws
-  /// Error{data} where two bones want the same only tet.
+  /// The tets of cubes of `side` mm. The boundary is a manifold, and no bone is lost. The lattice keeps the
+  /// image's proportions, so that a body gives the same tets wherever it lies and whatever its size; its
+  /// places are not yet those of float32 (float_places.hpp). Throws Error{data} where two bones want the same
+  /// only tet.
   Clipped clip(double side) const;
 
  private:
@@ -43,6 +45,7 @@ class Clipper {
     std::vector<std::uint16_t> label;
   };
 
+  BccLattice about(double side) const;
   Blocks summarize() const;
   /// What all voxels near a cube's tets have in common, or `mixed`.
   std::uint16_t common_label(const Blocks& blocks, const Eigen::Vector3d& corner, double side) const;

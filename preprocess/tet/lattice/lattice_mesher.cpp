@@ -7,6 +7,7 @@
 #include "preprocess/tet/lattice/clipper.hpp"
 #include "preprocess/tet/lattice/cut_lattice.hpp"
 #include "preprocess/tet/lattice/fit_points.hpp"
+#include "preprocess/tet/lattice/float_places.hpp"
 #include "preprocess/tet/lattice/octree.hpp"
 #include "preprocess/tet/mesher.hpp"
 
@@ -50,11 +51,11 @@ class LatticeMesher : public Mesher {
         case Kind::cut:
           return cut(clipper.lay(side, kCutMargin, true), input, context);
         case Kind::graded:
-          return grade(clipper.clip(side), context);
+          return grade(on_float_places(clipper.clip(side)), context);
         case Kind::uniform:
           break;
       }
-      return gather(clipper.clip(side));
+      return gather(on_float_places(clipper.clip(side)));
     };
     const bool graded = kind_ != Kind::uniform;
     TetMesh mesh = make();

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """preprocess --cache: what is taken, what is made again, and that the model is the same either way."""
+import contextlib
 import json
 import os
 import pathlib
@@ -61,12 +62,18 @@ class Cache(unittest.TestCase):
         half = []
         for _ in range(30):  # until it is killed while it writes
             process = subprocess.Popen(self.words(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            part = self.folder / f".{process.pid}.part.m.hdf"
-            while process.poll() is None and not part.exists():
+            def parts():
+                return list(self.folder.glob(f".{process.pid}.*.part.m.hdf"))
+
+            def begun(part):
+                with contextlib.suppress(FileNotFoundError):  # an empty one only tries whether the folder can be written to
+                    return part.stat().st_size > 0
+
+            while process.poll() is None and not any(begun(part) for part in parts()):
                 pass
             process.send_signal(signal.SIGKILL)
             process.wait()
-            half += [part] if part.exists() else []
+            half += parts()
             if half:
                 break
         self.assertTrue(half, "no writer was killed in time")

@@ -12,6 +12,8 @@ import tempfile
 import time
 import unittest
 
+import meshio
+
 ECORCHE = os.environ["ECORCHE_BIN"]
 CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
 MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
@@ -165,6 +167,10 @@ class Cli(unittest.TestCase):
         self.assertIn(f"\n{tets} 4 1\n", files[2].read_text())
         self.assertTrue((self.folder / "a.node").is_file())
         self.assertIn("*Elset, elset=Set-material_tally_001", files[4].read_text())
+        self.assertEqual(run("export", MODEL, "-o", files[0], "--weights").returncode, 0)
+        weights = {name: values for name, values in meshio.read(files[0]).point_data.items() if name.startswith("weight_")}
+        self.assertEqual(len(weights), len(json.loads(run("--json", "info", MODEL).stdout)["rig"]))
+        self.assertLess(abs(sum(weights.values()) - 1).max(), 1e-5)
         self.assert_error(run("export", MODEL, "-o", self.folder / "a.txt"), 64, "cannot write tets as '.txt'")
         self.assert_error(run("export", self.folder / "none.hdf", "-o", self.folder / "b.msh"), 66)
         pose = self.folder / "pose.yaml"
@@ -175,7 +181,7 @@ class Cli(unittest.TestCase):
                    "--tissues", "none", "--volumes", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(sorted(path.name for path in out.iterdir()),
-                         ["body.ele", "body.mcnp.inp", "body.msh", "body.node", "quality.json"])
+                         ["body.ele", "body.mcnp.inp", "body.msh", "body.node", "pose.yaml", "posed.json", "quality.json"])
 
     def test_json_is_one_object(self):
         info = json.loads(run("--json", "info", MODEL).stdout)

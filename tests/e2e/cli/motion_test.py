@@ -275,6 +275,25 @@ class Motion(unittest.TestCase):
         self.assertGreater(large - small, 8)
         self.assertLess(high - low, 3)
 
+    # A clip in inches, read as a .bvh is.
+    def test_a_figure_of_another_size_is_said_with_its_unit(self):
+        scaled = re.sub(r"OFFSET (\S+) (\S+) (\S+)", lambda m: "OFFSET " + " ".join(str(float(x) / 2.54) for x in m.groups()), WALK.read_text())
+        inches = self.put("inches.bvh", scaled)
+
+        def warnings(*words):
+            done = subprocess.run([ECORCHE, *map(str, self.motion(inches, *words))], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return [line for line in done.stderr.splitlines() if "limbs of its figure" in line]
+
+        said = r"^warning: .*inches\.bvh: the limbs of its figure are {} times as long as the patient's, read in {}: --motion-unit in would " \
+               r"make that (1|1\.0\d|0\.9\d+): --motion-unit body would fit them to the patient$"
+        for words, figure, unit in (((), r"0\.[34]\d+", "cm"), (("--motion-unit", "17"), r"0\.[67]\d+", "17")):
+            lines = warnings(*words)
+            self.assertEqual(len(lines), 1, lines)
+            self.assertRegex(lines[0], said.format(figure, unit))
+        self.assertEqual(warnings("--motion-unit", "in"), [])
+        self.assertEqual(warnings("--motion-unit", "body"), [])
+
     def test_refusals(self):
         text = WALK.read_text()
         self.refused(66, "none.bvh", *self.motion(self.folder / "none.bvh"))

@@ -74,6 +74,19 @@ class Probe(unittest.TestCase):
             self.assertLess(np.abs(F.T @ F - np.eye(3)).max(), 1e-2)
             self.assertGreater(np.abs(F - np.eye(3)).max(), 0.3, "the knee bends by 50 degrees")
 
+    def test_a_body_far_away_is_probed_as_exactly(self):
+        far = self.folder / "far.yaml"
+        far.write_text(AWAY.replace("joints:", "root: {translation_mm: [90000, -90000, 90000], rotation: [0.5, -0.5, -0.5, -0.5]}\njoints:"))
+        points = self.inside_of("tissues/liver.stl")
+        words = ("--direction", "rest-to-posed", "--gradient", "--volumes", "none", "--pose")
+        near, away = (self.table(self.text_of(points), *words, pose) for pose in (self.folder / "away.yaml", far))
+        self.assertEqual([row["tet"] for row in near], [row["tet"] for row in away])
+        for a, b in zip(near, away):
+            dets = [np.linalg.det(np.array([float(row["f_" + i + j]) for i in "xyz" for j in "xyz"]).reshape(3, 3)) for row in (a, b)]
+            self.assertAlmostEqual(dets[0], dets[1], delta=1e-5)
+        back = self.table(self.text_of(self.at(away, "to_")), "--pose", far)
+        self.assertLess(np.abs(self.at(back, "to_") - points).max(), 0.02, "float32 tells places 90 m away apart by 0.008 mm")
+
     def test_outside_says_so(self):
         (self.folder / "points.csv").write_text("5000,0,0\n")
         result = run("--json", "probe", MODEL, "--points", self.folder / "points.csv")

@@ -16,7 +16,6 @@ import yaml
 ECORCHE = os.environ["ECORCHE_BIN"]
 CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
 ERROR_LINE = re.compile(r"^error: .+: .+ \(.+\)$", re.M)
-NAMES = {"spine_lumbar": "lumbar", "spine_thoracic": "thorax", "shoulder_girdle_left": "girdle_left", "shoulder_girdle_right": "girdle_right"}
 
 
 def run(*words):
@@ -31,7 +30,7 @@ class Rig(unittest.TestCase):
     def case(self, skeleton, keep=lambda bone: True, segments=True):
         """The phantom's bones and skin alone, with another skeleton."""
         case = yaml.safe_load((CASE / "case.yaml").read_text())
-        bones = [dict(bone, file=str(CASE / bone["file"]), segment=NAMES.get(bone["segment"], bone["segment"])) for bone in case["bones"] if keep(bone)]
+        bones = [dict(bone, file=str(CASE / bone["file"]), segment=bone["segment"]) for bone in case["bones"] if keep(bone)]
         if not segments:
             bones = [{key: value for key, value in bone.items() if key != "segment"} for bone in bones]
         text = {"name": "phantom", "frame": "LPS", "unit": "mm", "skeleton": skeleton, "skin": str(CASE / "skin.stl"), "bones": bones}

@@ -241,6 +241,9 @@ class Thin(unittest.TestCase):
         real = write_image(self.folder / "real.mha", np.zeros((3, 4, 5), np.float32))
         self.refused(64, "--labels: the voxels are f32, no whole numbers (give a threshold)", words=["thin", real, "-o", out, "--labels", "3"])
         self.refused(64, "is needed for voxels of type f32 (say which values are the object, as LOW:HIGH)", words=["thin", real, "-o", out])
+        ct = write_image(self.folder / "ct.mha", np.full((3, 4, 5), -1000, np.int16))
+        self.refused(64, "--threshold: is needed for values below 0, as of a CT: 0 is not their background (say which values are the object, as LOW:HIGH, or --labels)",
+                     words=["thin", ct, "-o", out])
         self.refused(65, "no voxel is left", words=["thin", self.bar, "-o", out, "--tp", "2"])
         self.refused(66, "none.mha", words=["thin", self.folder / "none.mha", "-o", out])
         self.refused(66, "none.yaml", words=["thin", self.bar, "-o", out, "--skeleton", self.folder / "none.yaml"])

@@ -74,8 +74,9 @@ class Unpose(unittest.TestCase):
         posed, back = self.pose("--tissues", "all", "--volumes", "all", "--field"), self.folder / "back"
         out = json.loads(self.ok("--json", "unpose", posed, "-o", back).stdout)
         self.assertTrue(out["ok"])
-        self.assertLess(out["round_trip"]["mean_mm"], 0.05 * 6)
-        self.assertLess(out["round_trip"]["elsewhere_share"], 0.01)
+        self.assertLess(out["round_trip"]["soft"]["mean_mm"], 0.05)
+        for row in out["round_trip"]["images"]:
+            self.assertLess(row["elsewhere_share"], 0.05)  # most of them voxels of the skin, half outside
         self.assertFalse((back / "displacement.nrrd").exists(), "a field lies in no body")
         self.assertEqual(len(out["files"]), len(list(back.iterdir())))
         self.assertLess(np.abs(corners(CASE / "tissues/liver.stl") - corners(back / "liver.stl")).max(), 0.01)
@@ -87,8 +88,8 @@ class Unpose(unittest.TestCase):
     def test_a_posed_case_comes_back(self):
         back = self.folder / "back"
         self.ok("unpose", self.pose("--as-case"), "-o", back)
-        for bone in ("femur_right", "tibia_right"):  # they went rigidly, and come back through the tets that they cut
-            self.assertLess(np.abs(corners(CASE / f"bones/{bone}.stl") - corners(back / f"bones/{bone}.stl")).mean(), 1)
+        for bone in ("femur_right", "tibia_right"):  # they went rigidly, and so they come back
+            self.assertLess(np.abs(corners(CASE / f"bones/{bone}.stl") - corners(back / f"bones/{bone}.stl")).max(), 0.01)
         self.assertLess(self.labels_that_differ(back / "volumes/labels.nrrd"), 0.06)
 
     def test_unfolding_leaves_less_inverted_and_comes_back(self):
@@ -103,9 +104,9 @@ class Unpose(unittest.TestCase):
         self.assertEqual(after["unfolded"]["inverted_tets_before"], before["inverted_tets"])
         self.assertGreater(before["inverted_tets"], 20)
         self.assertLess(after["inverted_rest_mm3"], 0.5 * before["inverted_rest_mm3"])
-        # What is no longer inverted fills a place of its own, where another part may lie: ways back differ, and are told.
-        self.assertNotEqual(again["mean_mm"], there["mean_mm"])
-        self.assertLess(again["mean_mm"], 2)
+        # Of the skin's vertices fewer hang on tets that are inside out.
+        self.assertLess(again["soft"]["folded"], there["soft"]["folded"])
+        self.assertLess(again["soft"]["mean_mm"], 0.05)
         self.assertEqual(after["bone_rigidity_mm"], before["bone_rigidity_mm"])
 
     def test_what_is_drawn_on_the_posed_body_comes_back(self):
@@ -113,11 +114,11 @@ class Unpose(unittest.TestCase):
         drawn = self.folder / "target.ply"
         shutil.copy(posed / "liver.ply", drawn)
         self.ok("unpose", posed / "body.vtu", drawn, posed / "ct.mha", "-o", self.folder / "back", "--labels", "ct")
-        self.assertEqual(sorted(path.name for path in (self.folder / "back").iterdir()), ["ct.mha", "target.ply"])
+        self.assertEqual(sorted(path.name for path in (self.folder / "back").iterdir()), ["ct.mha", "folds-mask.nrrd", "target.ply"])
 
     def test_refusals(self):
         posed, back = self.pose("--tissues", "liver", "--tets"), self.folder / "back"
-        self.assert_error(run("unpose", self.folder, "-o", back), 66, "body.vtu")
+        self.assert_error(run("unpose", self.folder, "-o", back), 66, "body.vtu", "is not there, and the way back is in it")
         self.assert_error(run("unpose", posed, posed / "quality.json", "-o", back), 64, "quality.json", "neither a surface nor an image")
         self.assert_error(run("unpose", posed, self.folder / "none.stl", "-o", back), 66, "none.stl")
         self.assert_error(run("unpose", posed, "-o", back, "--sampling", "cubic"), 64, "cubic")

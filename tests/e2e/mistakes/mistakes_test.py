@@ -106,9 +106,8 @@ class Mistakes(unittest.TestCase):
         """Or else every row above would prove nothing."""
         check = run(("check", self.good))
         self.assertEqual(check.returncode, 0, check.stderr)
-        out = self.folder / "posed"
-        for words in (table.POSE, table.MOVE):
-            self.assertEqual(run(self.words(words, self.good, out)).returncode, 0)
+        for words, name in ((table.POSE, "posed"), (table.MOVE, "moved")):
+            self.assertEqual(run(self.words(words, self.good, self.folder / name)).returncode, 0)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,9 @@ def small_files_only():
 
 
 def whole_files(folder):
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file() and not p.name.startswith(".")}
+    """None of those that are still hidden, nor what lies in a hidden folder."""
+    files = {p.relative_to(folder): p for p in folder.rglob("*") if p.is_file()}
+    return {str(below): p.read_bytes() for below, p in files.items() if not any(part.startswith(".") for part in below.parts)}
 
 
 class Stops(unittest.TestCase):

@@ -107,7 +107,9 @@ IMAGE_ROWS = [
     ("mha_text_voxels", put("labels.mha", body.mha(bytes(60), BinaryData="False")), CHECK, 65, "voxels are text"),
     ("mha_type_unknown", put("labels.mha", body.mha(bytes(60), ElementType="MET_STRING")), CHECK, 65, "MET_STRING"),
     ("mha_truncated", put("labels.mha", body.mha(bytes(30))), CHECK, 65, "labels.mha"),
-    ("labels_of_floats", put("labels.mha", body.mha(bytes(240), ElementType="MET_FLOAT")), CHECK, 65, "labels.mha: labels are f32"),
+    ("labels_form_unknown", swap("case.yaml", "labels: {file: labels.mha,", "labels: {file: labels.mha, form: both,"), CHECK, 78,
+     "'both' is no form of a NIfTI (write qform or sform)"),
+    ("labels_of_floats", put("labels.mha", body.mha(struct.pack("<60f", *[0.5] * 60), ElementType="MET_FLOAT")), CHECK, 65, "labels.mha: 60 of 60 labels are no whole numbers, the first 0.5 at voxel (0, 0, 0)"),
 ]
 
 CASE_ROWS = [

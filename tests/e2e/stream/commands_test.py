@@ -60,7 +60,12 @@ class Commands(unittest.TestCase):
             self.assertEqual(report["mismatches"], 0)
 
             data = bytearray(recording.read_bytes())
-            (self.path / "cut.ecrec").write_bytes(data[:-20])
+            (self.path / "cut.ecrec").write_bytes(data[:-5])  # within its last words
+            cut = run("stream", server.address, "--replay", self.path / "cut.ecrec", "--json")
+            self.assertEqual(cut.returncode, 0, cut.stderr)
+            self.assertEqual({**json.loads(cut.stdout), "cut": False}, report)
+            self.assertTrue(json.loads(cut.stdout)["cut"])
+            (self.path / "cut.ecrec").write_bytes(data[:20])
             cut = run("stream", server.address, "--replay", self.path / "cut.ecrec")
             self.assertEqual(cut.returncode, 65, cut.stderr)
             self.assertIn("give a file of ecorche serve --record-dir", cut.stderr)
@@ -71,6 +76,30 @@ class Commands(unittest.TestCase):
             result = run("stream", server.address, "--replay", recording, "--json")
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn("is not the one that was recorded", result.stderr)
+
+    def test_a_killed_server_leaves_what_it_recorded(self):
+        with Server(MODEL, options=["--record-dir", str(self.path / "recordings")]) as server:
+            with Client("127.0.0.1", server.port) as client:
+                pose = client.open().rest_pose()
+                client.subscribe_mesh(["skin"])
+                client.record("crash")
+                sent = 0
+                until = time.monotonic() + 2.5
+                while time.monotonic() < until:
+                    pose[1] = (np.cos(0.001 * sent), np.sin(0.001 * sent), 0, 0)
+                    client.send_pose(pose)
+                    sent += 1
+                    list(client.frames(1 / 60))
+                server.process.send_signal(signal.SIGKILL)
+                server.process.wait(10)
+        part = self.path / "recordings" / "crash.ecrec.part"
+        with Server(MODEL) as server:
+            result = run("stream", server.address, "--replay", part, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads(result.stdout)
+        self.assertTrue(report["cut"])
+        self.assertEqual(report["mismatches"], 0)
+        self.assertGreater(report["poses"], 0.5 * sent, "all but the last second of 2.5")
 
     def test_what_was_watched_is_replayed_however_often_it_changed(self):
         with Server(MODEL, options=["--record-dir", str(self.path / "recordings"), "--max-subscriptions", "4"]) as server:
@@ -139,6 +168,9 @@ class Commands(unittest.TestCase):
         shutil.copy(MODEL, model)
         with Server(model) as server, Client("127.0.0.1", server.port) as client, Client("127.0.0.1", server.port) as other:
             before = client.open().message
+            with self.assertRaises(ServerError):
+                other.reload("body")  # who shows nothing asks for nothing
+            other.open()
             client.subscribe_mesh(["skin"])
             list(client.frames(0.3))
             model.write_bytes(b"not a model")
@@ -153,6 +185,36 @@ class Commands(unittest.TestCase):
             self.assertTrue(client.model_changed)
             self.assertNotEqual(client.open().message.identity, before.identity)
 
+    def test_hanging_up_reads_again_and_does_not_end(self):
+        model = self.path / "body.hdf"
+        shutil.copy(MODEL, model)
+        with Server(model, options=["--clips", str(self.path / "clips")]) as server, Client("127.0.0.1", server.port) as client:
+            client.open()
+
+            def wait_for(holds):
+                until = time.monotonic() + 30
+                while not holds():
+                    self.assertLess(time.monotonic(), until, "it was not read again")
+                    list(client.frames(0.05))
+
+            shutil.copy(self.path / "clips" / "walk.bvh", self.path / "clips" / "stroll.bvh")
+            server.process.send_signal(signal.SIGHUP)
+            wait_for(lambda: [clip.name for clip in client.clips()] == ["stroll", "walk"])
+            self.assertFalse(client.model_changed)
+            changed = self.path / "changed.hdf"
+            shutil.copy(OTHER_MODEL, changed)
+            changed.rename(model)
+            server.process.send_signal(signal.SIGHUP)
+            wait_for(lambda: client.model_changed)
+            client.open()
+            server.process.send_signal(signal.SIGTERM)
+            with self.assertRaises(ServerError) as goodbye:
+                list(client.frames(10))
+            self.assertEqual(goodbye.exception.code, 14)
+            _, err = server.process.communicate(timeout=30)  # another signal would end it at once
+            self.assertEqual(server.process.returncode, 0, err)
+            self.assertIn("model body: read again", err)
+
     def test_one_of_two_models_is_read_again_while_both_are_shown(self):
         model = self.path / "body.hdf"
         other = self.path / "other.hdf"
@@ -166,6 +228,7 @@ class Commands(unittest.TestCase):
                 Client("127.0.0.1", server.port) as asks:
             before = body.open("body").message
             beside.open("other")
+            asks.open("other")
             for client in (body, beside):
                 client.subscribe_mesh(["skin"])
 

@@ -25,8 +25,8 @@ def run(*words):
 
 class SlowLink:
     """`near` and `far` are namespaces, in which NEAR and FAR are addresses. Each way: `rate` in bit/s, `delay` in seconds, `loss`
-    as a share of packets. `congestion`: how TCP meets that where nothing else is asked for. Raises OSError or CalledProcessError where the system
-    does not let us."""
+    as a share of packets. `congestion`: how TCP meets that where nothing else is asked for. Raises OSError or CalledProcessError
+    where the system does not let us."""
 
     def __init__(self, rate=100e6, delay=0.025, loss=0.01, congestion="reno"):
         self.near, self.far = (f"ecorche-{end}-{os.getpid()}" for end in ("near", "far"))

@@ -106,8 +106,9 @@ TEST_F(CaseRefusals, Names) {
   refused("{1:", "{0:", "13:labels.table.0: label 0 is nothing");
   refused(" 2:", " 01:", "13:labels.table.01: label 01 stands twice");
   Image field(small_case().labels->image.grid, ScalarType::f32);
+  field.scalars<float>()[1] = 0.25F;
   write_image(scratch_ / "volumes" / "field.nrrd", field);
-  expect_error(ErrorKind::data, "field.nrrd: labels are f32 x 1 (labels are whole numbers, one a voxel)",
+  expect_error(ErrorKind::data, "labels are no whole numbers, the first 0.25 at voxel (1, 0, 0)",
                [&] { read(changed(kCase, "labels.nrrd", "field.nrrd")); });
 }
 

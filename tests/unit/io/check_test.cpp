@@ -202,7 +202,14 @@ TEST(Inspect, WhatCannotBelongTogether) {
   patient.skeleton.segments.push_back({.name = "toe", .parent = 1, .joint = {}, .aliases = {}});
   const Report report = inspect(patient, Context{});
   EXPECT_NE(find(report, "rectus_femoris", "lies wholly outside the skin's bounds"), nullptr);
-  EXPECT_NE(find(report, "ct", "this volume and the skin do not meet"), nullptr);
+  EXPECT_NE(find(report, "ct", "has the label map's voxels, but lies up to 5.04e+03 mm from it"), nullptr);
+  patient.labels.reset();
+  EXPECT_NE(find(inspect(patient, Context{}), "ct", "does not meet the skin: they lie 4.94e+03 mm apart"),
+            nullptr);
+  patient.volumes[0].image.grid = {{100, 100, 200}, {-50, -50, -200}, {1, 1, 1}};  // 100 mm below
+  EXPECT_NE(
+      find(inspect(patient, Context{}), "ct", "50 % of the skin lies outside of this image, by up to 101 mm"),
+      nullptr);
   const Finding* toe = find(report, "toe", "no bone belongs to this segment");
   ASSERT_NE(toe, nullptr);
   EXPECT_NE(toe->mend.find("'thigh_right'"), std::string::npos);

@@ -20,17 +20,17 @@ class Described(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
         self.random = numpy.random.default_rng(5)
 
-    def describe(self, path):
+    def describe(self, path, *form):
         """The grid, and the voxels: components, then i, j, k."""
         raw = self.folder / "raw"
-        done = subprocess.run([IO_FILES, "describe", str(path), str(raw)], capture_output=True, text=True)
+        done = subprocess.run([IO_FILES, "describe", str(path), str(raw), *form], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         grid = json.loads(done.stdout)
         shape = [grid["components"], *grid["size"]]
         return grid, numpy.frombuffer(raw.read_bytes(), TYPES[grid["type"]]).reshape(shape, order="F")
 
-    def refused(self, path, *parts):
-        done = subprocess.run([IO_FILES, "describe", str(path), str(self.folder / "raw")], capture_output=True, text=True)
+    def refused(self, path, *parts, form=()):
+        done = subprocess.run([IO_FILES, "describe", str(path), str(self.folder / "raw"), *form], capture_output=True, text=True)
         self.assertEqual(done.returncode, 65, done.stdout + done.stderr)
         self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
         for part in parts:

@@ -119,7 +119,7 @@ TEST(RiggedGlb, OthersReadTheSame) {
     clip.rotation.emplace_back(AngleAxisd(0.4 * f, Vector3d(1, 2, 3).normalized()));
     clip.rotation.emplace_back(AngleAxisd(-2.5 * f, Vector3d::UnitX()));  // more than half a turn in all
   }
-  SkinnedSurface skin{"skin", {Points(3, 3), Triangles(1, 3)}, {}};
+  SkinnedSurface skin{"skin", Group::skin, {Points(3, 3), Triangles(1, 3)}, {}};
   skin.mesh.V << 0, 0, 0, 100, 0, 0, 0, 0, 100;
   skin.mesh.F << 0, 1, 2;
   skin.influences.joint.assign(3, {1, 0, 0, 0});

@@ -88,7 +88,7 @@ class Headers(Described):
         for name in ("scanner-xyz", "3D-right-handed"):
             self.refused(self.nrrd("a.nrrd", body, space=name), f"its space is '{name}', which does not say where the patient lies "
                          "(write it as left-posterior-superior)")
-        self.refused(self.nrrd("a.nrrd", body, space_origin="(1,2)"), "(write the image again)")
+        self.refused(self.nrrd("a.nrrd", body, space_origin="(1,2)"), "its origin is nan (it must be finite, mm)")
         self.refused(self.nrrd("a.nrrd", body, space=None, space_dimension=3), "a.nrrd: ReadImageInformation: ",
                      "(write the image again)")
 

@@ -54,11 +54,22 @@ class Nifti(Described):
                     self.assert_ras_frame(grid, affine)
                     numpy.testing.assert_allclose(voxels[0], nibabel.load(path).get_fdata(), atol=1e-4)
 
-    def test_where_both_forms_stand_the_qform_counts(self):
+    def test_where_both_forms_stand_they_agree_or_one_is_chosen(self):
         array = self.random.integers(0, 100, (4, 5, 3)).astype("i2")
+        aside = oblique()
+        aside[:3, 3] += [0, 100, 0]
         for version in (nibabel.Nifti1Image, nibabel.Nifti2Image):
-            path = self.save(array, oblique(), "a.nii", lambda image: image.set_sform(TURN, code=2), version)
+            path = self.save(array, oblique(), "a.nii", lambda image: image.set_sform(aside, code=2), version)
+            self.refused(path, "its qform and its sform lie 100 mm apart (write the image with one of them, or say in the case "
+                               "which counts: form: qform, or form: sform)")
+            self.assert_ras_frame(self.describe(path, "qform")[0], oblique())
+            self.assert_ras_frame(self.describe(path, "sform")[0], aside)
+            near = oblique()
+            near[:3, 3] += 1e-3
+            path = self.save(array, oblique(), "a.nii", lambda image: image.set_sform(near, code=2), version)
             self.assert_ras_frame(self.describe(path)[0], oblique())
+            path = self.save(array, oblique(), "a.nii", lambda image: image.set_sform(None, code=0), version)
+            self.refused(path, "has no sform: its code is 0 (leave out form: sform)", form=("sform",))
         self.refused(self.save(array, numpy.diag([2e6, 1, 1, 1]), "far.nii"), "its spacing is 2000000.000000 (it must be positive, mm)")
         self.save(array, TURN, "a.nii").rename(self.folder / "b.nii")
         (self.folder / "c.nii").write_bytes(self.save(array, TURN, "c.nii.gz").read_bytes())
@@ -129,8 +140,10 @@ class Nifti(Described):
         self.refused(changed(344, b"ni1\0"), "its voxels are in another file")
         self.refused(changed(344, b"\0\0\0\0"), "lacks the magic 'n+1'")
         self.refused(changed(0, b"xxxx"), "is no NIfTI")
+        (self.folder / "short.nii").write_bytes(good[:100])
+        self.refused(self.folder / "short.nii", "is no NIfTI: it has 100 bytes of header")
         self.refused(changed(123, b"\1"), "its unit of length is NIfTI's 1 (write it in mm)")
-        self.refused(changed(70, (1024).to_bytes(2, "little")), "voxels of NIfTI type 1024 cannot be read")
+        self.refused(changed(70, (1792).to_bytes(2, "little")), "voxels of NIfTI type 1792 cannot be read")
         self.refused(changed(42, (30000).to_bytes(2, "little")), "declares 900000 bytes of voxels, but has 120")
         self.refused(changed(42, b"\xff\xff"), "axis 1 has -1 voxels")
         self.refused(changed(108, b"\0\0\0\0"), "its voxels begin at byte 0")

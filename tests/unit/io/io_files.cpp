@@ -6,14 +6,18 @@
 
 #include "core/values/error.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/nifti_form.hpp"
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::io {
 namespace {
 
 // The grid as JSON on stdout, the voxels as they lie in memory into a file.
-void describe(const char* path, const char* raw) {
-  const Image image = read_image(path);
+void describe(const char* path, const char* raw, const std::string& form) {
+  const Image image = read_image(path, {},
+                                 form == "qform"   ? NiftiForm::qform
+                                 : form == "sform" ? NiftiForm::sform
+                                                   : NiftiForm::either);
   std::ofstream(raw, std::ios::binary)
       .write(reinterpret_cast<const char*>(image.bytes.data()),
              static_cast<std::streamsize>(image.bytes.size()));
@@ -54,7 +58,7 @@ void tets(const std::filesystem::path& folder) {
 int run(int argc, char** argv) {
   const std::string what = argc > 3 ? argv[1] : "";
   if (what == "describe") {
-    describe(argv[2], argv[3]);
+    describe(argv[2], argv[3], argc > 4 ? argv[4] : "");
   } else if (what == "copy") {
     write_image(argv[3], read_image(argv[2]));
   } else if (what == "tets") {

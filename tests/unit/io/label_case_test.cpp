@@ -54,7 +54,7 @@ class LabelCase : public ::testing::Test {
     }
     write_image(scratch_ / "seg.nrrd", seg);
     write_image(scratch_ / "regions.nrrd", regions);
-    Image field(grid, ScalarType::f32);
+    Image field(grid, ScalarType::u8, 2);
     write_image(scratch_ / "field.nrrd", field);
     grid.spacing[1] = 2.1;
     write_image(scratch_ / "other.nrrd", Image(grid, ScalarType::u8));
@@ -102,6 +102,41 @@ TEST_F(LabelCase, TheRestMayLeaveLabelsOut) {
   EXPECT_EQ(patient.tissues[1].name, "muscle_leg");
   refused("{labels: rest,", "{labels: rest, except: [Vesels],",
           "10:tissues[1].except[0]: unknown label 'Vesels' (did you mean 'Vessels'?)");
+  // However it is written: names out of a table's file are small letters.
+  EXPECT_EQ(read(changed(kCase, "{labels: rest,", "{labels: rest, except: [vesSELS, 8, 9],")).tissues.size(),
+            2u);
+  EXPECT_EQ(read(changed(kCase, "{labels: rest,", "{labels: rest, except: [MUSCLE_leg],")).tissues.size(),
+            3u);
+}
+
+// Names out of a table's file become identifiers; the case may name them as they stand there.
+TEST_F(LabelCase, NamesMayBeThoseOfTheTablesFile) {
+  scratch_.put("t.ctbl", "1 vertebrae_S1 0 0 0 0\n2 Femur-left 0 0 0 0\n3 femur_left 0 0 0 0\n");
+  const std::string text =
+      "name: a\nskeleton: skeleton.yaml\nlabels: {file: seg.nrrd, table: t.ctbl}\nbones:\n"
+      "  - {name: sacrum, labels: [vertebrae_S1], segment: pelvis}\n"
+      "  - {name: femur, labels: [femur_left], segment: thigh_right}\n";
+  EXPECT_EQ(read(text).bones[0].source->ids, std::vector<std::int64_t>{1});
+  EXPECT_EQ(read(text).bones[1].source->ids, std::vector<std::int64_t>{2});
+  EXPECT_EQ(read(changed(text, "[femur_left]", "[Femur-left]")).bones[1].source->ids,
+            std::vector<std::int64_t>{2});
+  expect_error(ErrorKind::config,
+               "5:bones[0].labels[0]: unknown label 'vertebrae_S2' (did you mean 'vertebrae_s1'?)",
+               [&] { read(changed(text, "vertebrae_S1", "vertebrae_S2")); });
+  // Two names of a map written by hand that differ only so stay two.
+  const std::string inlined = changed(text, "table: t.ctbl", "table: {1: A b, 2: a-b}");
+  EXPECT_EQ(read(changed(changed(inlined, "vertebrae_S1", "A b"), "femur_left", "a-b")).bones[1].source->ids,
+            std::vector<std::int64_t>{2});
+  expect_error(ErrorKind::config, "unknown label 'a_b'",
+               [&] { read(changed(changed(inlined, "vertebrae_S1", "a_b"), "femur_left", "a-b")); });
+}
+
+TEST_F(LabelCase, AFolderOfDicomIsNamed) {
+  scratch_.put("ct/IM0001", std::string(128, '\0') + "DICM");
+  const std::string text = kCase + "volumes:\n  - {name: ct, file: ct}\n";
+  expect_error(ErrorKind::data,
+               "/ct: is a folder of DICOM files (make one file of the series first: dcm2niix",
+               [&] { read(text); });
 }
 
 TEST_F(LabelCase, BecomesSurfaces) {

@@ -49,6 +49,42 @@ TEST(Rules, EverySourceReadsBack) {
   EXPECT_EQ(placed.named.regions.size(), 2U);
 }
 
+TEST(Rules, WhatIsPossibleReadsBack) {
+  const std::string size = "size_mm: {least: 40, whole: 300, most: 3000, source: \"a book\"}";
+  const std::string possible =
+      "{radius_mm: [15, null], axis_to_shaft_deg: [75, 105], rest_deg: {x: [-35, 130], z: [null, 10]}, "
+      "source: \"two books\"}";
+  std::string text =
+      two("center: {cylinder_fit: {segment: b, facing_segment: a, along: [1, 0, 0]}}, possible: " + possible);
+  text.insert(text.find("segments:"), size + "\n");
+  const PlacedSkeleton placed = parse(text);
+  ASSERT_TRUE(placed.size);
+  EXPECT_EQ(placed.size->whole, 300);
+  EXPECT_EQ("size_mm: " + size_to_yaml(*placed.size), size);
+  const JointRule& rule = *placed.skeleton.segments[1].joint.how;
+  EXPECT_EQ(rule.center.on.along, Eigen::Vector3d(1, 0, 0));
+  EXPECT_TRUE(rule.possible.radius_mm.holds(1e9));
+  EXPECT_FALSE(rule.possible.radius_mm.holds(14.9));
+  EXPECT_EQ(bounds_to_yaml(rule.possible), possible);
+  const std::string again = skeleton_to_yaml(placed.skeleton, placed.size);
+  EXPECT_EQ(skeleton_to_yaml(parse(again).skeleton, parse(again).size), again);
+}
+
+TEST(Rules, WhatIsNotPossibleIsRefused) {
+  const auto refused = [](const std::string& joint, const std::string& part) {
+    expect_error(ErrorKind::config, part, [&] { parse(two("center: [0, 0, 0], possible: " + joint)); });
+  };
+  refused("{radius_mm: [1]}", "possible.radius_mm: is a range of 1 values (write [least, most])");
+  refused("{axis_to_shaft_deg: [9, 8]}", "axis_to_shaft_deg: the range ends before it begins");
+  refused("{rest_deg: {bend: [0, 1]}}", "unknown angle 'bend'");
+  expect_error(ErrorKind::config, "along: is for vertices that face another segment (name that segment)",
+               [] { parse(two("center: {centroid: {segment: b, along: [1, 0, 0]}}")); });
+  std::string text = two("center: [0, 0, 0]");
+  text.insert(text.find("segments:"), "size_mm: {least: 5, most: 4}\n");
+  expect_error(ErrorKind::config, "size_mm: is no range of sizes (write 0 < least <= whole <= most, in mm)",
+               [&] { parse(text); });
+}
+
 TEST(Rules, AFrameTurnsPointsAndDirections) {
   const Frame ras{(Eigen::Matrix3d() << -1, 0, 0, 0, -1, 0, 0, 0, 1).finished(), 10};
   const Skeleton s =

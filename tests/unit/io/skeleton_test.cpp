@@ -254,6 +254,8 @@ TEST(Skeleton, TheSchemaListsTheReadersKeys) {
   same(parts.at("direction"), skeleton_keys::direction);
   same(parts.at("region"), skeleton_keys::region);
   same(parts.at("axes"), skeleton_keys::axes);
+  same(schema.at("properties").at("size_mm"), skeleton_keys::size);
+  same(parts.at("joint").at("properties").at("possible"), skeleton_keys::possible);
   same(parts.at("coupling"), skeleton_keys::coupling);
   EXPECT_EQ(
       parts.at("joint").at("properties").at("kind").at("enum"),

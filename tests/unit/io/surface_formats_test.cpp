@@ -153,6 +153,19 @@ TEST(SurfaceFormats, OffWithColoursAndCommentsIsRead) {
   EXPECT_EQ(read_surface(scratch.put("b.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).F.rows(), 1);
 }
 
+// Its words may stand on any line; behind the last corner of a face its line belongs to it.
+TEST(SurfaceFormats, OffWhoseFacesWrapOverLinesIsRead) {
+  const Scratch scratch;
+  const std::string plain = "OFF\n5 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n5 0 1 2 3 4\n3 0 1 4\n";
+  const std::string wrapped =
+      "OFF\n5\n2 0\n0 0 0\n1 0\n0\n1 1 0\n0 1 0\n0 0 1\n5 0 1 # half\n\n  2 3\n4 255 0 0\n3\n0\n1\n4\n";
+  const SurfaceMesh one = read_surface(scratch.put("a.off", plain));
+  const SurfaceMesh other = read_surface(scratch.put("b.off", wrapped));
+  EXPECT_EQ(one.F.rows(), 4);
+  EXPECT_EQ(other.V, one.V);
+  EXPECT_EQ(other.F, one.F);
+}
+
 TEST(SurfaceFormats, PlyStripsAndForeignElementsAreRead) {
   const Scratch scratch;
   const std::string ply =

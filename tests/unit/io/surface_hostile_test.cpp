@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <sys/mman.h>
+#include <zlib.h>
 
 #include <cstdlib>
 #include <functional>
@@ -112,6 +113,20 @@ std::vector<Sample> samples() {
   }
   out.push_back({"a.gltf", text, true});
   return out;
+}
+
+// Three blocks of 12 bytes in a VTP's words of 64 bits: the first claims 2^64 - 1 packed bytes, and is whole.
+std::string wrapping_blocks() {
+  const std::string zeros(12, '\0');
+  std::string stream(64, '\0');
+  uLongf size = stream.size();
+  EXPECT_EQ(compress(reinterpret_cast<Bytef*>(stream.data()), &size,
+                     reinterpret_cast<const Bytef*>(zeros.data()), zeros.size()),
+            Z_OK);
+  stream.resize(size);
+  const std::array<std::uint64_t, 6> head{3, 12, 12, ~std::uint64_t{0}, stream.size(), 0};
+  // The words and the blocks are base64 texts of their own.
+  return std::string(reinterpret_cast<const char*>(head.data()), sizeof head) + stream;
 }
 
 // True where a mesh came out.
@@ -280,6 +295,7 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
   refused("a.ply", ply + "element vertex 1\nend_header\n", "element 'vertex' is declared twice");
   refused("a.ply", "ply\nelement vertex 1\nend_header\n", "its header lacks 'format'");
   refused("a.off", "OFF\n1 1 0\n0 0 0\n99 0 0 0\n", "a.off:4: a face has 99 corners");
+  refused("a.off", "OFF\n1 1 0\n0 0 0\n0 0 0 0\n", "a.off:4: a face has 0 corners");
   refused("a.vtk", vtk + "POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 8\n3 0 1 2 0 0 0 0\n",
           "its cells are fewer than their list");
   refused("a.vtp", "<VTKFile type=\"PolyData\"><AppendedData encoding=\"raw\">",
@@ -318,6 +334,13 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
   refused("a.vtp", packed({3, 12, 12, 1, 1, 0xfffffff}, "ab"),
           "a.vtp: an array of 268435457 bytes ends early");
   refused("a.vtp", packed({1, 36, 0, 9}, "123456789"), "its compressed arrays are damaged");
+  // Two whole blocks of 2^31 bytes; and sizes of packed blocks that together wrap round, with a whole stream
+  // in the first of them.
+  refused("a.vtp", packed({3, 0x80000000, 0, 1, 1, 1}, "a"), "a.vtp: an array is larger than its counts say");
+  std::string wide = vtp("NumberOfComponents=\"3\" format=\"binary\">" + base64(wrapping_blocks()), "3");
+  wide.insert(wide.find("type="), "header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\" ");
+  EXPECT_LT(wide.size(), 640U);
+  refused("a.vtp", wide, "a.vtp: the packed sizes of an array are more than can be counted (save");
   refused("a.vtp", packed({9, 12, 12, 1, 1, 1, 1, 1, 1, 1, 1, 1}, "123456789"),
           "a.vtp: an array is larger than its counts say (save");
   std::string bomb = packed({1, 36000, 0, 1}, "a");
@@ -345,7 +368,8 @@ TEST(HostileSurfaces, EveryMistakeIsNamed) {
 }
 
 TEST(HostileSurfaces, PointsAreCountedIn32Bits) {
-  MeshBuilder mesh("a.obj", 2);
+  files::Budget budget(0, {}, "a.obj");
+  MeshBuilder mesh(budget, 2);
   mesh.add_point({0, 0, 0});
   mesh.add_point({1, 0, 0});
   expect_error(ErrorKind::data, "a.obj: has more points than can be counted", [&] {

@@ -164,10 +164,14 @@ TEST(Surface, OtherFilesAreRefused) {
   });
   expect_error(ErrorKind::usage, "cannot write '.fbx' surfaces (use .stl, .obj, .ply, .off, .vtp or .glb)",
                [&] { write_surface(scratch / "a.fbx", block()); });
+  expect_error(ErrorKind::usage, "a.stl: '.stl' does not hold several surfaces (use .glb)",
+               [&] { write_surfaces(scratch / "a.stl", {}); });
   expect_error(ErrorKind::cannot_create, "a.ply",
                [&] { write_surface(scratch / "none" / "a.ply", block()); });
-  expect_error(ErrorKind::usage, "cannot write tets as '.vtk' (use .vtu, .msh, .ele, .inp or .mcnp.inp)",
-               [&] { write_tets(scratch / "a.vtk", {}, {}, {}, {}); });
+  expect_error(
+      ErrorKind::usage,
+      "cannot write tets as '.vtk' (use .vtu, .msh, .ele, .inp or .mcnp.inp; a rig goes into .glb or .bvh)",
+      [&] { write_tets(scratch / "a.vtk", {}, {}, {}, {}); });
 }
 
 TEST(Surface, NothingIsLeftWhereWritingFails) {

@@ -212,5 +212,25 @@ TEST(MotionReport, GlidingFeetAndBentLimits) {
   EXPECT_EQ(made.limits[0].worst_frame, 20U);
 }
 
+// A clip's elbow twists a little in every frame, and stands on its limit within what is printed as 0.0:
+// neither passes it.
+TEST(MotionReport, TurnsThatAHingeCannotMakePassNoLimit) {
+  Rig rig = test::legs();
+  Joint& knee = rig.skeleton.segments[2].joint;
+  knee.kind = JointKind::hinge;
+  knee.sequence[0].min = 0;
+  knee.sequence[0].max = 60 * kDegree;
+  const auto pose = [&](std::size_t frame) {
+    Pose p = Pose::rest(7);
+    const double bend = frame == 7 ? 75 : frame % 2 == 0 ? 60.3 : 30;
+    p.rotation[2] = rotation_from_angles(knee, {bend * kDegree, 4 * kDegree, 3 * kDegree});
+    return p;
+  };
+  const MotionReport made = report(rig, 10, 0.01, pose);
+  ASSERT_EQ(made.limits.size(), 1U);
+  EXPECT_NEAR(made.limits[0].share, 0.1, 1e-12);
+  EXPECT_NEAR(made.limits[0].worst, 15 * kDegree, 0.5 * kDegree);
+}
+
 }  // namespace
 }  // namespace ecorche::kinematics

@@ -121,6 +121,47 @@ TEST(Resolve, RefusesASourceWithoutVoxels) {
   }
 }
 
+// As where a label falls to `rest` of which one voxel was left in a corner by a slip.
+TEST(Resolve, AStrayVoxelIsNamedAndLeftOutMoreAreRefused) {
+  const auto with_strays = [](int count) {
+    Case patient = labelled_case();
+    auto voxels = patient.labels->image.scalars<std::uint8_t>();
+    for (int n = 0; n < count; ++n)
+      voxels[patient.labels->image.grid.offset(2 * (n % 15), 2 * (n / 15), 0)] = 77;
+    patient.tissues.push_back({"gall_bladder", Group::organ, {}, ids({77})});
+    patient.tissues.back().source->where = "case.yaml:9:tissues[2]";
+    return patient;
+  };
+  Case one = with_strays(1);
+  std::vector<std::string> warnings;
+  Context context;
+  context.log = [&](LogLevel, std::string_view line) { warnings.emplace_back(line); };
+  resolve(one, context);
+  EXPECT_EQ(one.tissues.size(), 2U);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_TRUE(warnings[0].starts_with("case.yaml:9:tissues[2]: 'gall_bladder': its only voxel, at ["))
+      << warnings[0];
+  EXPECT_TRUE(warnings[0].ends_with("], lies off the body; it is left out")) << warnings[0];
+  Case many = with_strays(65);
+  const Case before = many;
+  try {
+    resolve(many, context);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::config);
+    EXPECT_NE(std::string(error.what())
+                  .find("'gall_bladder': all of its 65 voxels lie off the body, the first at ["),
+              std::string::npos)
+        << error.what();
+    EXPECT_NE(std::string(error.what()).find("join it to the body by the skin's close_mm"),
+              std::string::npos);
+  }
+  Case bone = before;  // a bone is never left out
+  bone.tissues.pop_back();
+  bone.bones.push_back({"patella", "", {}, ids({77})});
+  EXPECT_THROW(resolve(bone, context), Error);
+}
+
 TEST(Resolve, RefusesAPictureForALabelMap) {
   Case patient = labelled_case();
   Image noise(cube_grid(41), ScalarType::i32);

@@ -281,6 +281,32 @@ TEST_F(Hostile, AnotherMajorVersion) {
                  {"format", "not a model"});
 }
 
+// What 1.1 did not write: read as it was, with no number for what was not measured then.
+TEST_F(Hostile, AnOlderMinorVersionLacksWhatCameLater) {
+  Model model = toy_model();
+  std::fill(model.tet_label.begin(), model.tet_label.end(), TetMesh::soft);
+  model.contested = {1, 2, 3};
+  model.certificate.bone_tet_change = 0.5;
+  model_file::write(model, file("a.hdf"), {});
+  expect_same(model_file::read(file("a.hdf"), {}), model);
+  {
+    Forge forge(file("a.hdf"));
+    Forge::Table rows = forge.table();
+    std::erase_if(rows, [](const auto& row) {
+      return row.first == "/ecorche/labels/contested" || row.first == "/ecorche/quality/bone_tet_change";
+    });
+    forge.set_table(rows);
+  }
+  EXPECT_EQ(error_of([&] { model_file::read(file("a.hdf"), {}); }).kind(), ErrorKind::data);
+  {
+    Forge forge(file("a.hdf"));
+    set_format(forge.file(), {1, 1});
+  }
+  const Model older = model_file::read(file("a.hdf"), {});
+  EXPECT_TRUE(older.contested.empty());
+  EXPECT_TRUE(std::isnan(older.certificate.bone_tet_change));
+}
+
 // What a newer minor version may add, and what anybody may put beside a model.
 TEST_F(Hostile, UnknownGroupsAreLeftAlone) {
   {

@@ -64,6 +64,16 @@ const std::vector<Break> kBreaks{
     {"/VTKHDF/Connectivity", [](Model& m) { m.tets.resize(0, 4), m.tet_label.clear(); }},
     {"/VTKHDF/CellData/label", [](Model& m) { m.tet_label[9] = 4; }},
     {"/VTKHDF/CellData/label", [](Model& m) { m.tet_label.pop_back(); }},
+    {"/VTKHDF/CellData/label", [](Model& m) { m.contested = {1}; }},  // tets of bones do not come first
+    {"/ecorche/labels/contested", [](Model& m) { m.contested.assign(m.tet_count() + 1, 1); }},
+    {"/ecorche/labels/contested",
+     [](Model& m) {
+       std::fill(m.tet_label.begin(), m.tet_label.end(), 0), m.contested = {1, 0};
+     }},
+    {"/ecorche/labels/contested",
+     [](Model& m) {
+       std::fill(m.tet_label.begin(), m.tet_label.end(), 0), m.contested = {1, 4};
+     }},
     {"/ecorche/labels/bone", [](Model& m) { m.bone_names[0] = m.bone_names[1]; }},
     {"/ecorche/labels/segment", [](Model& m) { m.bone_segment[0] = 3; }},
     {"/ecorche/labels/segment", [](Model& m) { m.bone_segment[0] = -1; }},

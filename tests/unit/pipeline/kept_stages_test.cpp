@@ -184,9 +184,12 @@ TEST(KeptStages, an_interrupted_run_goes_on_at_its_last_stage) {
 TEST(KeptStages, warnings_come_again) {
   MemoryStore store;
   Case patient = test::two_bones();
-  patient.tissues[0].surface.V.rowwise() += Eigen::RowVector3d(0, 0, 60);  // 30 mm out of the top
-  const Result first = run(patient, coarse(), {}, {.store = &store});
-  const Result again = run(patient, coarse(), {}, {.store = &store});
+  patient.tissues[0].surface.V.rowwise() +=
+      Eigen::RowVector3d(0, 0, 46);  // 12 mm out of the top: over five voxels
+  Options options = coarse();
+  options.voxel_mm = 2;
+  const Result first = run(patient, options, {}, {.store = &store});
+  const Result again = run(patient, options, {}, {.store = &store});
   EXPECT_FALSE(first.warnings.empty());
   EXPECT_EQ(again.warnings, first.warnings);
   EXPECT_NE(taken(again).find("mapping"), std::string::npos);

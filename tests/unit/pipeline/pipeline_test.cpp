@@ -99,7 +99,7 @@ TEST_P(EveryMesher, makes_a_model_within_its_bounds) {
     EXPECT_GT(result.stages[s].peak_rss_mib, 1);
   }
   const Model& model = result.model;
-  EXPECT_TRUE(broken_bounds(model.certificate).empty());
+  EXPECT_TRUE(broken_bounds(model.certificate, body_size(model)).empty());
   EXPECT_EQ(model.name, "two_bones");
   EXPECT_GT(model.tet_count(), 500U);
   EXPECT_EQ(model.tet_label.size(), model.tet_count());
@@ -184,19 +184,21 @@ TEST(Pipeline, a_tissue_in_another_frame_is_warned_of_and_then_refused) {
 
 TEST(Pipeline, a_tissue_that_sticks_out_is_only_warned_of) {
   Case patient = test::two_bones();
-  patient.tissues[0].surface.V.rowwise() += Eigen::RowVector3d(0, 0, 60);  // 30 mm out of the top
-  const Result result = run(patient, coarse("lattice"), {}, {});
+  patient.tissues[0].surface.V.rowwise() += Eigen::RowVector3d(0, 0, 42);  // 12 mm out of the top
+  Options options = coarse("lattice");
+  options.voxel_mm = 2;
+  const Result result = run(patient, options, {}, {});
   ASSERT_FALSE(result.warnings.empty());
-  EXPECT_NE(result.warnings.back().find("vertices lie more than 25 mm outside"), std::string::npos)
+  EXPECT_NE(result.warnings.back().find("vertices lie more than 10 mm outside"), std::string::npos)
       << result.warnings.back();
   EXPECT_GT(result.model.certificate.outside_vertices, 10U);
-  EXPECT_NEAR(result.model.certificate.max_outside_mm, 30, 5);
+  EXPECT_NEAR(result.model.certificate.max_outside_mm, 12, 2);
 }
 
 TEST(Pipeline, options_out_of_range_are_refused_before_any_work) {
   const auto no_stage = [](std::string_view name, int, int) { ADD_FAILURE() << name << " was started"; };
   const std::pair<std::string, std::function<void(Options&)>> cases[] = {
-      {"--voxel", [](Options& o) { o.voxel_mm = 0.001; }},
+      {"--voxel", [](Options& o) { o.voxel_mm = 1e-4; }},
       {"--voxel", [](Options& o) { o.voxel_mm = std::nan(""); }},
       {"--max-tets", [](Options& o) { o.max_tets = 10; }},
       {"--max-nodes", [](Options& o) { o.max_nodes = -1; }},

@@ -185,8 +185,13 @@ TEST(Defects, AgreementIsSilentWhereThereIsNothingToAgree) {
 TEST(Defects, LabelIds) {
   Case patient = small_case();
   patient.labels->table = {{1, "pelvis_bone"}, {7, "femur_right"}};
-  finds(patient, "labels", "no voxel has the id 7 of 'femur_right'");
+  finds(patient, "labels", "no voxel has the id 7 'femur_right'");
   finds(patient, "labels", "1 id of the image is not in the table: 2");
+  for (int id = 10; id < 70; ++id) patient.labels->table[id] = "part_" + std::to_string(id);
+  finds(
+      patient, "labels",
+      "no voxel has 61 of the table's 62 ids: 7 'femur_right', 10 'part_10', 11 'part_11', 12 'part_12', 13 "
+      "'part_13', ...");
   const auto used = label_ids(patient.labels->image);
   ASSERT_EQ(used.size(), 2u);
   EXPECT_EQ(used.at(2).voxels, 20);

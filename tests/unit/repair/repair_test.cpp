@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 
 #include "preprocess/check/surface_figures.hpp"
 #include "preprocess/check/surface_parts.hpp"
+#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/repair/soup.hpp"
 #include "tests/unit/io/small_case.hpp"
 
@@ -73,6 +76,40 @@ TEST(Repair, FillsAHole) {
   EXPECT_EQ(kept.done.holes, 0);
   EXPECT_EQ(kept.done.holes_left, 1);
   EXPECT_EQ(check::measure(kept.mesh).open.count, 4);
+}
+
+// A tube of n sides, open at both ends, 100 mm long, 30 mm across.
+SurfaceMesh tube(int n) {
+  SurfaceMesh mesh;
+  mesh.V.resize(2 * n, 3);
+  mesh.F.resize(2 * n, 3);
+  for (int i = 0; i < n; ++i) {
+    const double a = 2 * std::numbers::pi * i / n;
+    mesh.V.row(i) << 15 * std::cos(a), 15 * std::sin(a), 0;
+    mesh.V.row(n + i) << 15 * std::cos(a), 15 * std::sin(a), 100;
+    const int j = (i + 1) % n;
+    mesh.F.row(2 * i) << i, j, n + i;
+    mesh.F.row(2 * i + 1) << j, n + j, n + i;
+  }
+  return mesh;
+}
+
+TEST(Repair, WhatClosesTheLargestHoleIsTold) {
+  for (const int n : {12, 300, 2500}) {  // of more than 800 edges corners are cut off first
+    const SurfaceMesh open = tube(n);
+    const geometry::LargestHole hole = geometry::largest_hole(open);
+    EXPECT_EQ(hole.holes, 2U);
+    EXPECT_EQ(hole.edges, static_cast<std::size_t>(n));
+    EXPECT_TRUE(hole.closed);
+    const double disc = 0.5 * n * 225 * std::sin(2 * std::numbers::pi / n);
+    EXPECT_NEAR(hole.filling_edge, std::sqrt(disc), 0.01);
+    EXPECT_EQ(mend(open, {.hole_mm = 0.99 * hole.filling_edge}).done.holes_left, 2);
+    const Mended mended = mend(open, {.hole_mm = 1.01 * hole.filling_edge});
+    EXPECT_EQ(mended.done.holes_left, 0);
+    const check::SurfaceFigures figures = check::measure(mended.mesh);
+    EXPECT_TRUE(figures.closed());
+    EXPECT_NEAR(figures.volume_mm3, 100 * disc, 0.01 * disc);
+  }
 }
 
 TEST(Repair, WeldsASlit) {

@@ -100,6 +100,20 @@ TEST(DataUri, what_is_no_picture_is_said) {
   }
 }
 
+// The mean over the bone's tets in the rows around, and nothing else.
+TEST(Slice, goes_where_the_bones_are) {
+  Model model = test::toy_model();
+  const Box box = box_of(model);
+  const View view = View::coronal().of(box.low, box.high, 40);
+  std::fill(model.tet_label.begin(), model.tet_label.end(), TetMesh::soft);
+  EXPECT_EQ(depth_of_bones(model, view), std::vector<double>(static_cast<std::size_t>(view.height), 0));
+  model.tet_label[0] = 1;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 4; ++c) centre += model.nodes.row(model.tets(0, c)).transpose().cast<double>() / 4;
+  for (const double depth : depth_of_bones(model, view))
+    EXPECT_NEAR(depth, (centre - view.centre).dot(view.toward), 1e-9);
+}
+
 // Every pixel against a search of all tets.
 TEST(Slice, shows_the_mixed_weights_of_the_tet_that_holds_each_pixel) {
   const Model model = test::toy_model();
@@ -107,11 +121,16 @@ TEST(Slice, shows_the_mixed_weights_of_the_tet_that_holds_each_pixel) {
   for (const View& from : {View::coronal(), View::sagittal(), View::axial()}) {
     View view = from.of(box.low, box.high, 60);
     view.centre += 0.013 * view.toward;  // off the nodes
-    const Picture picture = slice(model, view, kGround);
+    // The axial one through a sheet that bends.
+    std::vector<double> depth(static_cast<std::size_t>(view.height), 0);
+    for (std::size_t row = 0; from.up.y() != 0 && row < depth.size(); ++row)
+      depth[row] = 0.3 * std::sin(0.2 * static_cast<double>(row)) * view.pixel_mm;
+    const Picture picture = slice(model, view, kGround, depth);
     int inside = 0, right = 0;
     for (int row = 0; row < view.height; ++row) {
       for (int column = 0; column < view.width; ++column) {
-        const Eigen::Vector3d p = view.point(column, row);
+        const Eigen::Vector3d p =
+            view.point(column, row) + depth[static_cast<std::size_t>(row)] * view.toward;
         Colour expected = kGround;
         for (Eigen::Index t = 0; t < model.tets.rows(); ++t) {
           Eigen::Matrix4d corners = Eigen::Matrix4d::Ones();

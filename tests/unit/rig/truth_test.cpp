@@ -150,10 +150,6 @@ TEST(Truth, centres_within_two_millimetres_and_axes_within_two_degrees_on_spoilt
 
 TEST(Truth, the_human_template_finds_the_phantoms_joints_from_its_bones_alone) {
   const Landmarks at = phantom::make_landmarks(3);
-  const std::map<std::string, std::string> named{{"spine_lumbar", "lumbar"},
-                                                 {"spine_thoracic", "thorax"},
-                                                 {"shoulder_girdle_left", "girdle_left"},
-                                                 {"shoulder_girdle_right", "girdle_right"}};
   Case patient;
   patient.name = "phantom";
   io::PlacedSkeleton human = io::parse_skeleton(
@@ -161,10 +157,7 @@ TEST(Truth, the_human_template_finds_the_phantoms_joints_from_its_bones_alone) {
   patient.skeleton = human.skeleton;
   ASSERT_EQ(patient.skeleton.segments.size(), 22U);
   for (const phantom::Part& part : phantom::make_bones(at)) {
-    const auto other = named.find(part.segment);
-    const std::string segment = part.name == "mandible" ? "jaw"
-                                : other == named.end()  ? part.segment
-                                                        : other->second;
+    const std::string segment = part.name == "mandible" ? "jaw" : part.segment;
     if (part.mirror_of < 0) {
       patient.bones.push_back({part.name, segment, phantom::isosurface(part.shape, 4, {})});
       continue;

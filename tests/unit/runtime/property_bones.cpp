@@ -5,6 +5,8 @@
 #include <atomic>
 #include <cstdio>
 
+#include "io/case/pose_library.hpp"
+#include "runtime/quality/bone_tets.hpp"
 #include "runtime/quality/pose_quality.hpp"
 #include "tests/unit/runtime/bone_depth.hpp"
 #include "tests/unit/runtime/prepared_body.hpp"
@@ -44,6 +46,38 @@ TEST(Bones, MoveRigidlyOverTheWalk) {
     std::printf("%s: %zu bones over %zu frames, worst residual of the best rigid fit %.2e mm\n",
                 test::short_name(path).c_str(), bones.size(), poses.size(), worst);
     EXPECT_LE(worst, 1e-3);
+  }
+}
+
+TEST(Bones, TetsMoveRigidlyInEveryLibraryPoseAndOverTheWalk) {
+  for (const std::string& path : test::model_paths()) {
+    const auto model = test::read_model(path);
+    EXPECT_GT(model->certificate.bone_tets, 1000U);
+    EXPECT_LE(model->certificate.bone_tet_change, 1e-9);
+    std::vector<Pose> poses = test::walk(*model, 10);
+    for (const std::string& name : io::library_poses())
+      poses.push_back(io::library_pose(name, model->rig).pose);
+    const BodyPoser poser(model);
+    PosedBody body = poser.make_frame();
+    BoneTets worst;
+    for (const Pose& pose : poses) {
+      for (const Skinning skinning : test::all_skinnings) {
+        ASSERT_TRUE(poser.run(pose, skinning, {}, body).ok());
+        const BoneTets tets = measure_bone_tets(*model, body.nodes);
+        worst.count = tets.count;
+        worst.inverted += tets.inverted;
+        worst.changed += tets.changed;
+        worst.largest_change_mm = std::max(worst.largest_change_mm, tets.largest_change_mm);
+      }
+    }
+    std::printf(
+        "%s: %llu tets of bones, %zu contested, in %zu poses %llu inverted, %llu changed, by at most %.2e "
+        "mm\n",
+        test::short_name(path).c_str(), static_cast<unsigned long long>(worst.count), model->contested.size(),
+        poses.size(), static_cast<unsigned long long>(worst.inverted),
+        static_cast<unsigned long long>(worst.changed), worst.largest_change_mm);
+    EXPECT_EQ(worst.inverted, 0U) << path;
+    EXPECT_EQ(worst.changed, 0U) << path;
   }
 }
 

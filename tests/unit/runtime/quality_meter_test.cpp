@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "runtime/quality/verdict.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -30,21 +31,25 @@ TEST(QualityMeter, AllTetsGiveWhatTheSlowTwinGives) {
     const QualityMeter meter(bent.model);
     ASSERT_EQ(meter.tets(), bent.model->tet_count());
     const PoseQuality quick = meter.measure(bent.body, bent.poser.all_tissues());
-    const PoseQuality slow = measure(*bent.model, bent.body, bent.poser.all_tissues());
+    PoseQuality slow = measure(*bent.model, bent.body, bent.poser.all_tissues());
     EXPECT_EQ(quick.tets_measured, slow.tets_measured);
     EXPECT_EQ(quick.inverted_tets, slow.inverted_tets);
     EXPECT_NEAR(quick.inverted_share, slow.inverted_share, 1e-6);
     EXPECT_NEAR(quick.inverted_rest_mm3, slow.inverted_rest_mm3, 1e-2);
     EXPECT_NEAR(quick.min_det_f, slow.min_det_f, 1e-4);
     EXPECT_NEAR(quick.volume_change, slow.volume_change, 1e-5);
+    EXPECT_NEAR(quick.unsigned_volume_change, slow.unsigned_volume_change, 1e-5);
+    slow.places = {};  // only the slow one looks for the worst place
+    judge({}, slow);
+    EXPECT_EQ(quick.pass, slow.pass);
     EXPECT_EQ(quick.inverted_share_error, 0);
     EXPECT_EQ(quick.volume_change_error, 0);
     EXPECT_NEAR(quick.bone_rigidity_mm, slow.bone_rigidity_mm, 1e-3);
-    EXPECT_EQ(quick.pass, slow.pass);
     ASSERT_EQ(quick.tissues.size(), slow.tissues.size());
     for (std::size_t t = 0; t < slow.tissues.size(); ++t) {
       EXPECT_EQ(quick.tissues[t].name, slow.tissues[t].name);
       EXPECT_NEAR(quick.tissues[t].share, slow.tissues[t].share, 1e-5) << slow.tissues[t].name;
+      EXPECT_EQ(quick.tissues[t].max_share, slow.tissues[t].max_share);
     }
   }
 }

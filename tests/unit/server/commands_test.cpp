@@ -58,19 +58,6 @@ TEST(Control, GoesFromOneToTheOtherAndAllAreTold) {
   EXPECT_EQ(second.next_ack().status().code(), 0U);
 }
 
-TEST(Control, IsKeptForWhoLeftItUntilTheTimeIsOver) {
-  Limits limits;
-  limits.linger_seconds = 0.3;
-  const TestServer server(limits);
-  auto first = std::make_unique<TestClient>(server, "shared");
-  TestClient second(server, "shared");
-  first.reset();
-  second.next([](const v1::Envelope& e) { return e.has_control_changed() && e.control_changed().vacant(); });
-  EXPECT_EQ(error_of_call(second.client(), claim()), ErrorKind::refused);
-  std::this_thread::sleep_for(std::chrono::milliseconds(350));
-  EXPECT_TRUE(second.client().call(claim()).envelope.has_control_granted());
-}
-
 client::Access coming_back(const client::Client& client) {
   return {.authorities = {}, .token = {}, .resume_token = client.server().resume_token()};
 }

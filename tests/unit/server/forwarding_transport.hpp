@@ -29,6 +29,8 @@ class ForwardingTransport : public Transport {
   std::optional<Clock::time_point> moved() const override { return inner_->moved(); }
   bool hung_up() override { return inner_->hung_up(); }
   std::optional<bool> message_ended() const override { return inner_->message_ended(); }
+  bool wrong_kind() const override { return inner_->wrong_kind(); }
+  void ends_by(Farewell why) override { inner_->ends_by(why); }
 
  private:
   std::unique_ptr<Transport> inner_;

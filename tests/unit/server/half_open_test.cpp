@@ -12,6 +12,7 @@ Options few(std::uint32_t connections) {
   options.http = Endpoint{};
   options.limits.connections = connections;
   options.limits.hello_seconds = 60;
+  options.limits.peer_share = 1;
   return options;
 }
 

@@ -30,7 +30,7 @@ class Guest final : public Member {
     return finest;
   }
   void pose_done(const PoseOutcome&, const Skipped&) override {}
-  void control_changed(v1::Role, bool) override {}
+  void control_changed(v1::Role, bool, double) override {}
   void model_changed(std::uint64_t) override {}
 };
 
@@ -52,7 +52,7 @@ struct Open {
     v1::OpenModel request;
     request.set_session(name);
     std::shared_ptr<Session> session;
-    const Status status = house.open(request, session);
+    const Status status = house.open(request, {}, session);
     EXPECT_TRUE(status.ok() || status.code == StatusCode::resource_exhausted) << status.message;
     return session;
   }
@@ -165,15 +165,21 @@ TEST(House, ARecordingsNameIsTakenUntilItIsWritten) {
   {
     Open open({}, 1, folder);
     const auto session = open.open("body");
-    EXPECT_TRUE(open.house.room_for_recording("bow").ok());
-    session->record(std::make_shared<Recording>("bow", *session->model(), "test", std::size_t{1} << 20));
+    const auto other = open.open("other");
+    Recordings& recordings = open.house.recordings();
+    EXPECT_TRUE(recordings.begin(*session, "bow", {}).ok());
+    PoseRequest pose;
+    pose.sequence = 1;
+    pose.pose = Pose::rest(session->model()->model().segment_count());
+    session->recording()->add(pose);
     bool written = false;
-    open.house.finish_recording(*session, [&](const Status& status) { written = status.ok(); });
-    EXPECT_EQ(open.house.room_for_recording("bow").code, StatusCode::already_exists);
-    EXPECT_TRUE(open.house.room_for_recording("nod").ok());
+    recordings.finish(*session, [&](const Status& status) { written = status.ok(); });
+    EXPECT_EQ(recordings.begin(*other, "bow", {}).code, StatusCode::already_exists);
+    EXPECT_TRUE(recordings.begin(*other, "nod", {}).ok());
     for (int i = 0; i < 2000 && !written; ++i) open.io.run_for(std::chrono::milliseconds(5));
     EXPECT_TRUE(written);
-    EXPECT_TRUE(open.house.room_for_recording("bow").ok());  // a file has it now
+    EXPECT_EQ(recordings.begin(*session, "bow", {}).code, StatusCode::already_exists) << "a file has it now";
+    EXPECT_TRUE(recordings.begin(*session, "sway", {}).ok());
   }
   std::filesystem::remove_all(folder);
 }

@@ -109,9 +109,11 @@ TEST(Kept, WhatFindsNoRoomIsRefusedAlone) {
   options.http = Endpoint{};
   const std::uint64_t one = kept_by_scan(test::toy_model());
   options.limits.kept_bytes = 3 * one - 1;  // two, and room to grow
+  options.limits.peer_share = options.limits.connection_share = 1;
   const TestServer server(options);
   TestClient client(server), other(server);
   EXPECT_EQ(client.client().server().limits().kept_bytes(), options.limits.kept_bytes);
+  EXPECT_EQ(client.client().server().limits().record_bytes(), options.limits.record_bytes);
   v1::Envelope first = for_scan(server, 1), second = for_scan(server, 2), third = for_scan(server, 3);
   first.set_request_id(1), second.set_request_id(2), third.set_request_id(3);
   EXPECT_EQ(code_of(client, first), 0U);
@@ -143,6 +145,7 @@ TEST(Kept, WhatFindsNoRoomIsRefusedAlone) {
 TEST(Kept, WhoComesBackMayFindNoRoom) {
   Options options;
   options.limits.kept_bytes = kept_by_scan(test::toy_model());
+  options.limits.peer_share = options.limits.connection_share = 1;
   const TestServer server(options);
   std::string token;
   {

@@ -256,7 +256,7 @@ class Posing {
     ASSERT_EQ(reader.image.bytes, expected.bytes);
   }
 
-  FrameMemory memory_{std::uint64_t{1} << 30, std::uint64_t{1} << 30};
+  ServerMemory memory_{std::uint64_t{1} << 30, std::uint64_t{1} << 30};
   std::vector<Reader> readers_;
   std::vector<PosedFrame> frames_;
   std::uint64_t number_ = 0;

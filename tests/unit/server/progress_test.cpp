@@ -316,7 +316,7 @@ TEST(Movement, OfAWebSocketIsItsCarriers) {
   Sockets sockets(io);
   std::unique_ptr<Transport> transport;
   WebRoom room;
-  room.admit = [] { return true; };
+  room.admit = [](auto&&...) { return true; };
   room.welcome = [&](std::unique_ptr<Transport> welcomed, const std::string&, bool) {
     transport = std::move(welcomed);
   };

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "runtime/quality/quality_meter.hpp"
+#include "runtime/quality/verdict.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "tests/unit/server/test_server.hpp"
 
@@ -14,7 +15,7 @@ double angle_of(std::uint64_t sequence) {
 }
 
 // What the frame tells is what offline measuring says of the pose that it names.
-void expect_measured(const TestServer& server, const TestClient& client, const v1::MeshFrame& frame,
+void expect_measured(const TestServer& server, const Pose& pose, const v1::MeshFrame& frame,
                      const runtime::QualityThresholds& thresholds = {}) {
   ASSERT_TRUE(frame.has_quality()) << frame.pose_sequence();
   const v1::PoseQuality& told = frame.quality();
@@ -22,21 +23,39 @@ void expect_measured(const TestServer& server, const TestClient& client, const v
   const auto model = std::make_shared<const Model>(server.model());
   const runtime::BodyPoser poser(model);
   runtime::PosedBody body = poser.make_frame();
-  ASSERT_TRUE(
-      poser
-          .run(client.bent(angle_of(told.pose_sequence())), runtime::Skinning::cor, poser.all_tissues(), body)
-          .ok());
+  ASSERT_TRUE(poser
+                  .run(pose, runtime::Skinning::cor, poser.all_tissues(), body, runtime::NodesOf::body,
+                       runtime::Root::still)
+                  .ok());
   std::vector<std::uint32_t> tissues;
   for (const v1::TissueChange& change : told.tissues()) tissues.push_back(change.tissue());
   const runtime::PoseQuality expected = runtime::QualityMeter(model).measure(body, tissues, thresholds);
   EXPECT_EQ(told.inverted_tets(), expected.inverted_tets) << told.pose_sequence();
   EXPECT_EQ(told.min_det_f(), expected.min_det_f);
   EXPECT_EQ(told.volume_change(), expected.volume_change);
+  EXPECT_EQ(told.unsigned_volume_change(), expected.unsigned_volume_change);
   EXPECT_EQ(told.max_volume_change(), thresholds.max_volume_change);
+  EXPECT_EQ(told.tissue_factor(), thresholds.tissue_factor);
+  ASSERT_TRUE(told.has_worst_tissue());
+  EXPECT_EQ(told.worst_tissue(), tissues.at(runtime::worst_tissue(expected)));
+  ASSERT_EQ(told.doubtful_size(), static_cast<int>(expected.doubtful.size()));
+  for (int j = 0; j < told.doubtful_size(); ++j) {
+    const runtime::DoubtfulJoint& joint = expected.doubtful[static_cast<std::size_t>(j)];
+    EXPECT_EQ(told.doubtful(j).joint(), static_cast<std::uint32_t>(joint.joint));
+    EXPECT_EQ(told.doubtful(j).turned(), joint.turned);
+    EXPECT_EQ(told.doubtful(j).confidence(), joint.confidence);
+  }
   EXPECT_EQ(told.verdict(), expected.pass ? v1::PoseQuality::VERDICT_PASS : v1::PoseQuality::VERDICT_WARN);
-  for (std::size_t t = 0; t < tissues.size(); ++t)
-    EXPECT_EQ(told.tissues(static_cast<int>(t)).share(), expected.tissues[t].share)
-        << expected.tissues[t].name;
+  for (std::size_t t = 0; t < tissues.size(); ++t) {
+    const v1::TissueChange& change = told.tissues(static_cast<int>(t));
+    EXPECT_EQ(change.share(), expected.tissues[t].share) << expected.tissues[t].name;
+    EXPECT_EQ(change.max_share(), expected.tissues[t].max_share);
+  }
+}
+
+void expect_measured(const TestServer& server, const TestClient& client, const v1::MeshFrame& frame,
+                     const runtime::QualityThresholds& thresholds = {}) {
+  expect_measured(server, client.bent(angle_of(frame.quality().pose_sequence())), frame, thresholds);
 }
 
 TEST(Quality, IsThePosesOwnWhereNoneCameShortlyBefore) {
@@ -90,6 +109,40 @@ TEST(Quality, IsJudgedByThresholdsFromTheNextFrameOn) {
   const wire::Frame frame = client.next_mesh(200);
   expect_measured(server, client, frame.envelope.mesh_frame(), {.max_volume_change = 1e-9});
   EXPECT_EQ(frame.envelope.mesh_frame().quality().verdict(), v1::PoseQuality::VERDICT_WARN);
+}
+
+TEST(Quality, TissuesAreJudgedByTheirGroupsTimesAFactor) {
+  const TestServer server;
+  TestClient client(server);
+  client.subscribe_mesh();
+  client.next_mesh(0);
+  v1::Envelope request;
+  request.mutable_set_thresholds()->set_tissue_factor(1e-6);
+  client.client().call(request);
+  client.send(200, client.bent(angle_of(200)));
+  const wire::Frame frame = client.next_mesh(200);
+  expect_measured(server, client, frame.envelope.mesh_frame(), {.tissue_factor = 1e-6});
+  EXPECT_EQ(frame.envelope.mesh_frame().quality().verdict(), v1::PoseQuality::VERDICT_WARN);
+}
+
+TEST(Quality, OfABodyFarAwayIsThatOfTheBody) {
+  const TestServer server;
+  TestClient client(server);
+  client.subscribe_mesh();
+  client.next_mesh(0);
+  for (const std::uint64_t sequence : {100, 101, 102, 103}) {  // its own, then beside the stream
+    if (sequence < 102) std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    Pose pose = client.bent(0);
+    pose.rotation[0] = Eigen::AngleAxisd(2, Eigen::Vector3d(1, -2, 3).normalized());
+    pose.root_translation = Eigen::Vector3d(20000, 20000, -20000);
+    client.send(sequence, pose);
+    const wire::Frame frame = client.next_mesh(sequence);
+    const v1::PoseQuality& told = frame.envelope.mesh_frame().quality();
+    EXPECT_EQ(told.verdict(), v1::PoseQuality::VERDICT_PASS) << sequence;
+    EXPECT_NEAR(told.min_det_f(), 1, 1e-5);
+    EXPECT_LT(told.bone_rigidity(), 1e-4);
+    expect_measured(server, pose, frame.envelope.mesh_frame());
+  }
 }
 
 }  // namespace

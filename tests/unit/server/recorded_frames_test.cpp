@@ -17,11 +17,13 @@ namespace {
 wire::RecordedSession whole(Recording& recording) {
   const auto path = std::filesystem::temp_directory_path() / ("ecorche_frames_" + random_token());
   recording.finish();
-  EXPECT_TRUE(recording.write(path).ok());
+  RecordingFile file(path);
+  file.append(recording.take());
+  EXPECT_TRUE(file.commit().ok());
   std::string bytes;
   {
-    std::ifstream file(path, std::ios::binary);
-    bytes = {std::istreambuf_iterator<char>(file), {}};
+    std::ifstream written(path, std::ios::binary);
+    bytes = {std::istreambuf_iterator<char>(written), {}};
   }
   std::filesystem::remove(path);
   wire::RecordedSession session;
@@ -76,6 +78,7 @@ TEST(RecordedFrames, OfTheLastPoseCome) {
     ASSERT_TRUE(ended);
     stage.run_until([&] { return stage.session->present().sequence == 2; });
     stage.workers.drain();
+    stage.volume_workers.drain();  // where there is a volume
     stage.wait(milliseconds(20));
     ended = false;
     stage.session->end_recording([&] { ended = true; });

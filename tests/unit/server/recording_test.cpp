@@ -150,21 +150,28 @@ TEST_F(RecordingTest, NamesFoldersAndOrderAreChecked) {
     EXPECT_EQ(error_of_call(client.client(), record(true, name)), ErrorKind::protocol) << name;
   client.client().call(record(true, "bow"));
   EXPECT_EQ(error_of_call(client.client(), record(true, "nod")), ErrorKind::protocol);
+  client.send(1, client.bent(0.1));
+  client.next_ack();
   client.client().call(record(false));
   EXPECT_EQ(error_of_call(client.client(), record(true, "bow")), ErrorKind::protocol);  // there is one
   wire::RecordedSession session;
   EXPECT_TRUE(read(bytes("bow"), session).ok());
-  EXPECT_TRUE(session.steps.empty());
+  EXPECT_EQ(session.steps.size(), 1U);
 }
 
 TEST_F(RecordingTest, FourAtOnceAndAFolderThatIsNotFull) {
-  const TestServer server(options());
+  Options all = options();
+  all.limits.peer_share = 1;
+  all.limits.recordings_per_minute = 1e6;
+  const TestServer server(all);
   std::vector<std::unique_ptr<TestClient>> clients;
   for (int i = 0; i < 5; ++i) {
     clients.push_back(std::make_unique<TestClient>(server));
     if (i < 4) clients.back()->client().call(record(true, "take_" + std::to_string(i)));
   }
   EXPECT_EQ(error_of_call(clients[4]->client(), record(true, "take_4")), ErrorKind::temporary);
+  clients[0]->send(1, clients[0]->bent(0.1));
+  clients[0]->next_ack();
   clients[0]->client().call(record(false));
   for (int i = 0; i < 255; ++i) std::ofstream(folder_ / std::to_string(i)) << i;
   EXPECT_EQ(error_of_call(clients[4]->client(), record(true, "take_4")), ErrorKind::temporary);
@@ -201,7 +208,9 @@ TEST_F(RecordingTest, NeverGrowsBeyondItsLimit) {
     for (pose.sequence = 1; !recording.full(); ++pose.sequence) recording.add(pose);
     recording.finish();
     const std::string name = "bow_" + std::to_string(limit);
-    ASSERT_TRUE(recording.write(folder_ / (name + ".ecrec")).ok());
+    RecordingFile file(folder_ / (name + ".ecrec"));
+    file.append(recording.take());
+    ASSERT_TRUE(file.commit().ok());
     wire::RecordedSession session;
     EXPECT_TRUE(read(bytes(name), session).ok());
     EXPECT_LE(bytes(name).size(), limit);
@@ -246,8 +255,11 @@ TEST_F(RecordingTest, TwoOfOneNameDoNotRunAtOnce) {
         << error.what();
   }
   second.client().call(record(true, "nod"));
-  first.client().call(record(false));
-  second.client().call(record(false));
+  for (TestClient* client : {&first, &second}) {
+    client->send(1, client->bent(0.1));
+    client->next_ack();
+    client->client().call(record(false));
+  }
 }
 
 std::string file_of(const std::vector<v1::Envelope>& envelopes) {

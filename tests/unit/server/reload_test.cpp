@@ -79,6 +79,7 @@ TEST(Reload, OthersStreamOnAndAreNotTold) {
   TestServer server;
   client::Client twin(server.address(), "test"), asks(server.address(), "test");
   const v1::ModelOpened opened = twin.call(open("twin")).envelope.model_opened();
+  asks.call(open("twin"));
   v1::Envelope mesh;
   mesh.mutable_subscribe()->mutable_mesh();
   twin.call(mesh);
@@ -130,6 +131,7 @@ TEST(Reload, OthersStreamOnAndAreNotTold) {
 TEST(Reload, AModelGoesWithItsLastSession) {
   TestServer server;
   client::Client asks(server.address(), "test");
+  asks.call(open("twin"));
   std::vector<std::weak_ptr<const Model>> models;
   std::vector<std::unique_ptr<TestClient>> clients;
   for (int which = 1; which <= 4; ++which) {
@@ -174,12 +176,89 @@ TEST(Reload, APlaceOfTheModelThatWasIsNotComeBackTo) {
   }
   server.reads([] { return ModelParts{another(1)}; });
   client::Client asks(server.address(), "test");
+  asks.call(open("twin"));
   asks.call(reload("toy"));
   client::Client back(server.address(), "test", access);
   EXPECT_FALSE(back.server().has_resumed());
   v1::Envelope again = open("toy");
   again.mutable_open_model()->set_session("shared");
   EXPECT_EQ(back.call(again).envelope.model_opened().role(), v1::ROLE_CONTROLLER);
+}
+
+// Who may, and what is told of the file.
+TEST(Reload, IsForWhoControlsASession) {
+  TestServer server;
+  client::Client stranger(server.address(), "test");
+  EXPECT_EQ(error_of_call(stranger, reload("toy")), ErrorKind::protocol);  // FAILED_PRECONDITION
+  TestClient holder(server, "shared"), observer(server, "shared");
+  EXPECT_EQ(error_of_call(observer.client(), reload("toy")), ErrorKind::refused);
+  server.reads([]() -> ModelParts {
+    throw Error(ErrorKind::data, "/home/somebody/toy.hdf", "is cut", "copy it again");
+  });
+  v1::Envelope request = reload("toy");
+  request.set_request_id(900);
+  holder.client().send(request);
+  const v1::Status told =
+      holder.next([](const v1::Envelope& e) { return e.request_id() == 900; }).envelope.status();
+  EXPECT_EQ(told.code(), static_cast<std::uint32_t>(StatusCode::invalid_argument));
+  EXPECT_EQ(told.message(), "reload: cannot read model 'toy' (ask who runs the server: its log says why)");
+}
+
+// Clips are read with their model, also where that is what it was.
+TEST(Reload, NewMotionOfTheSameModelIsTakenUp) {
+  TestServer server;
+  TestClient client(server);
+  v1::Envelope list;
+  list.mutable_list_clips();
+  EXPECT_EQ(client.client().call(list).envelope.clip_list().clips_size(), 1);
+  Clip bow = turning_clip(server.model());
+  bow.name = "bow";
+  server.reads([&] {
+    return ModelParts{std::make_shared<const Model>(server.model()), {turning_clip(server.model()), bow}};
+  });
+  client.client().call(reload("toy"));
+  const v1::ClipList clips = client.client().call(list).envelope.clip_list();
+  ASSERT_EQ(clips.clips_size(), 2);
+  EXPECT_EQ(clips.clips(1).name(), "bow");
+}
+
+// Giving back what a model holds takes longer than a frame.
+TEST(Reload, ModelsDoNotGoOnTheThreadThatServes) {
+  std::atomic<std::thread::id> serves{};
+  TestServer server(Options{}, {.transport = {}, .timer_fails = {}, .handling = [&](bool) {
+                                  if (serves.load() == std::thread::id{}) serves = std::this_thread::get_id();
+                                }});
+  client::Client asks(server.address(), "test");
+  asks.call(open("twin"));
+  std::atomic<int> gone = 0, gone_there = 0;
+  const auto watched = [&](std::shared_ptr<const Model> model) {
+    const Model* const body = model.get();
+    return std::shared_ptr<const Model>(body, [&, model = std::move(model)](const Model*) mutable {
+      ++gone;
+      if (std::this_thread::get_id() == serves.load()) ++gone_there;
+    });
+  };
+  const auto read = [&](const std::shared_ptr<const Model>& model) {
+    server.reads([&, model] { return ModelParts{watched(model)}; });
+    asks.call(reload("toy"));
+  };
+  const auto wait_for = [&](int count) {
+    for (int i = 0; i < 2000 && gone < count; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_EQ(gone, count);
+  };
+  read(another(1));
+  read(another(1));  // what it was: not needed
+  wait_for(1);
+  read(another(2));  // in place of the first
+  wait_for(2);
+  {
+    TestClient client(server);
+    client.subscribe_mesh();
+    client.next_mesh(0);
+    read(another(3));  // the client has the one before
+  }
+  wait_for(3);
+  EXPECT_EQ(gone_there, 0);
 }
 
 }  // namespace

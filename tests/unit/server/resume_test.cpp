@@ -25,7 +25,9 @@ class Busy {
       if (!another) throw Error(ErrorKind::data, "toy.hdf", "is cut", "copy it again");
       return ModelParts{another};
     });
-    v1::Envelope reload;
+    v1::Envelope open, reload;
+    open.mutable_open_model()->set_model("twin");
+    asks_.call(open);
     reload.mutable_reload_model()->set_model("toy");
     asks_.send(reload);
     while (!state_->reads) std::this_thread::sleep_for(milliseconds(1));
@@ -67,6 +69,13 @@ void nodes(v1::MeshSelection& mesh) {
 
 std::string token_of(TestClient& client) {
   return client.client().server().resume_token();
+}
+
+// Of somebody who watched a coarse body, and is gone.
+std::string left(TestServer& server, const std::string& session = {}) {
+  TestClient before(server, session);
+  subscribe(before, coarse);
+  return token_of(before);
 }
 
 client::Access with(const std::string& token) {
@@ -150,12 +159,7 @@ TEST(ComingBack, WhatOthersWatchIsThere) {
 // Its place waits for its next try.
 TEST(ComingBack, WhoHangsUpMeanwhileDoesNotTakeItsPlace) {
   TestServer server;
-  std::string token;
-  {
-    TestClient before(server);
-    subscribe(before, coarse);
-    token = token_of(before);
-  }
+  const std::string token = left(server);
   Busy busy(server);
   {
     RawClient impatient(server);
@@ -175,16 +179,11 @@ TEST(ComingBack, WhoHangsUpMeanwhileDoesNotTakeItsPlace) {
 // Of two who show the token at once, and of a session whose model has become another one.
 TEST(ComingBack, WhatIsNoMoreDoesNotComeBack) {
   TestServer server;
-  const auto left = [&](const std::string& session) {
-    TestClient before(server, session);
-    subscribe(before, coarse);
-    return token_of(before);
-  };
   const auto resumed = [](RawClient& client) {
     const auto hello = client.receive();
     return hello && hello->envelope.has_server_hello() && hello->envelope.server_hello().has_resumed();
   };
-  const std::string token = left("");
+  const std::string token = left(server);
   RawClient first(server), second(server);
   {
     const Busy busy(server);
@@ -197,7 +196,7 @@ TEST(ComingBack, WhatIsNoMoreDoesNotComeBack) {
   EXPECT_FALSE(resumed(second));
 
   const TestClient watches(server, "old");  // which goes on
-  const std::string late = left("old");
+  const std::string late = left(server, "old");
   RawClient third(server);
   auto changed = std::make_shared<Model>(test::toy_model());
   changed->tissues[0].V.array() += 1e-3F;

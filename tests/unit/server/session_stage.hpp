@@ -47,6 +47,8 @@ class Watcher final : public Member {
     held_.clear();
     bytes_.reset();
   }
+  // As a client that does not read what it was sent, or does again.
+  void read(bool reads) { reads_ = reads; }
   // As if it had not got what the next frame is against.
   void lose_next() { loses_ = true; }
   Clock::time_point last() const { return last_; }
@@ -80,8 +82,9 @@ class Watcher final : public Member {
   std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool) override {
     return finest;
   }
+  bool may_take(std::uint32_t, std::uint64_t) override { return reads_; }
   void pose_done(const PoseOutcome&, const Skipped&) override {}
-  void control_changed(v1::Role, bool) override {}
+  void control_changed(v1::Role, bool, double) override {}
   void model_changed(std::uint64_t) override {}
 
   std::vector<bool> judged_, keyframes_;
@@ -91,7 +94,7 @@ class Watcher final : public Member {
   std::vector<std::uint64_t> numbers_;
   std::map<std::uint32_t, std::vector<std::uint64_t>> poses_;
   std::vector<std::shared_ptr<const wire::EncodedFrame>> held_;
-  bool loses_ = false, holds_ = false;
+  bool loses_ = false, holds_ = false, reads_ = true;
   Clock::time_point last_{};
 };
 
@@ -210,7 +213,7 @@ struct Stage {
 
   net::io_context io;
   Limits limits;
-  FrameMemory memory;
+  ServerMemory memory;
   Judging judging{io};
   Openings openings;
   Metrics metrics;

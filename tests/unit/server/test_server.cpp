@@ -49,7 +49,10 @@ Model TestServer::toy() {
 TestServer::TestServer(const Limits& limits, const Model& model) : TestServer(with(limits), {}, model) {}
 
 TestServer::TestServer(Options options, Seams seams, const Model& model)
-    : model_(std::make_shared<const Model>(model)), workers_(2, [](const Job& job) { job(); }) {
+    : model_(std::make_shared<const Model>(model)), workers_(2, [](const Job& job) {
+        if (on_its_threads) on_its_threads();
+        job();
+      }) {
   spdlog::set_level(spdlog::level::off);
   options.listen.port = 0;
   options.version = "test";
@@ -62,7 +65,10 @@ TestServer::TestServer(Options options, Seams seams, const Model& model)
       std::move(options),
       std::vector<NamedModel>{{"toy", model_, {turning_clip(*model_)}, read}, {"twin", model_}}, workers_,
       std::move(seams));
-  thread_ = std::thread([this] { server_->run(); });
+  thread_ = std::thread([this] {
+    if (on_its_threads) on_its_threads();
+    server_->run();
+  });
 }
 
 void TestServer::reads(std::function<ModelParts()> read) {

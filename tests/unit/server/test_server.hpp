@@ -39,6 +39,10 @@ class TestServer {
   /// Waits for run() to return.
   void join();
 
+  /// Called on the threads of every server: before it serves, and before each job of its poses. To be set
+  /// while there is none.
+  static inline std::function<void()> on_its_threads;
+
  private:
   static Model toy();
 

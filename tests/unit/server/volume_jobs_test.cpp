@@ -165,7 +165,7 @@ TEST(VolumeJobs, EndWhereNobodyWatches) {
 TEST(VolumeJobs, EndInTheirMidst) {
   const Model toy = test::toy_model();
   const auto model = std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(toy));
-  const FrameMemory memory(1 << 30, 1 << 30);
+  const ServerMemory memory(1 << 30, 1 << 30);
   for (const bool by_spheres : {false, true}) {
     for (const bool plane : {false, true}) {
       SCOPED_TRACE(std::string(by_spheres ? "spheres" : "tets") + (plane ? ", a plane" : ""));
@@ -209,7 +209,7 @@ TEST(VolumeJobs, FirstOnesWaitForMemory) {
   VolumeStage stage;
   const std::uint32_t volume = stage.subscribe_volume(stage.watcher);
   ASSERT_TRUE(stage.shows(volume, 0));
-  auto all = std::make_unique<FrameMemory::Room>(stage.memory, std::uint64_t{2} << 30);
+  auto all = std::make_unique<ServerMemory::Room>(stage.memory, std::uint64_t{2} << 30);
   const std::uint32_t plane = stage.subscribe_volume(stage.watcher, true);
   stage.pose(1);
   ASSERT_TRUE(stage.shows(volume, 1));

@@ -83,7 +83,7 @@ TEST(Volumes, ALatticeGrowsOnlyAsFarAsTheMemoryGoes) {
   const auto model = std::make_shared<const Model>(test::toy_model());
   const ServedModel served("toy", model);
   const std::uint64_t scan = model->volumes[0].image.bytes.size();
-  const FrameMemory memory(0, 9 * scan);  // three copies are kept
+  const ServerMemory memory(0, 9 * scan);  // three copies are kept
   const runtime::BodyPoser poser(model);
   const auto body_at = [&](double mm) {
     Pose pose = Pose::rest(model->segment_count());
@@ -95,13 +95,13 @@ TEST(Volumes, ALatticeGrowsOnlyAsFarAsTheMemoryGoes) {
   VolumeWant want;
   want.changed_bricks = true;
   const std::uint64_t voxels = model->volumes[0].image.grid.voxels();
-  VolumeStream first(want, voxels), second(want, voxels);
+  VolumeStream first(want, voxels, memory.kept_pool()), second(want, voxels, memory.kept_pool());
   std::uint64_t number = 0;
   const auto write = [&](VolumeStream& stream, double mm, v1::VolumeFrame& frame) {
     frame.Clear();
     frame.set_frame(++number);
     wire::Payload payload;
-    return stream.write(served, body_at(mm), 1U << 28, memory, false, frame, payload);
+    return stream.write(served, body_at(mm), 1U << 28, false, frame, payload);
   };
   v1::VolumeFrame frame;
   EXPECT_TRUE(write(first, 0, frame).ok());

@@ -21,7 +21,7 @@ class WebClient {
 
   /// A request without a body; returns the whole answer.
   std::string get(const std::string& target, const std::string& headers = {}) {
-    send("GET " + target + " HTTP/1.1\r\nHost: test\r\n" + headers + "\r\n");
+    send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n");
     return rest();
   }
 
@@ -90,11 +90,15 @@ class WebClient {
       }
       if (!want(head + size, seconds)) return std::nullopt;
       if (opcode < 8) data += bytes_.substr(head, size);
+      if (opcode == 8 && size >= 2) close_code_ = at(head) << 8 | at(head + 1);
       bytes_.erase(0, head + size);
       if (opcode == 8) return std::nullopt;
       if (opcode < 8 && last) return data;
     }
   }
+
+  /// Of the server's close frame, once message() has met it.
+  std::optional<int> close_code() const { return close_code_; }
 
   /// The next message as the frame that it must be.
   std::optional<wire::Frame> frame() {
@@ -137,6 +141,7 @@ class WebClient {
 
   client::Socket socket_;
   std::string bytes_;
+  std::optional<int> close_code_;
 };
 
 }  // namespace ecorche::server

@@ -92,8 +92,8 @@ TEST(Web, RequestsBeyondTheRateAreTurnedAway) {
   const TestServer server(options);
   int alive = 0, turned_away = 0;
   for (int i = 0; i < 40; ++i) {
-    const std::string answer = WebClient(server.http()).get("/healthz");
-    alive += starts(answer, "HTTP/1.1 200");
+    const std::string answer = WebClient(server.http()).get("/nothing");
+    alive += starts(answer, "HTTP/1.1 404");
     turned_away += starts(answer, "HTTP/1.1 429");
   }
   EXPECT_GE(alive, 4);  // a second's worth at once
@@ -185,10 +185,6 @@ TEST(WebSocketTest, AMessageMayComeInFragmentsButHoldsOneFrame) {
     ASSERT_TRUE(last) << wrong.size();
     EXPECT_EQ(last->envelope.status().code(), static_cast<std::uint32_t>(StatusCode::invalid_argument));
   }
-  WebClient text(server.http());
-  text.upgrade();
-  text.send_message(frame, 1);
-  EXPECT_FALSE(text.message());
 }
 
 TEST(WebSocketTest, HandshakesThatAreNotOursAreRefused) {

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <mutex>
+#include <string>
 
 #ifdef __linux__
 #include <sched.h>
@@ -27,6 +29,39 @@ TEST(Workers, FinishWhatWasSubmitted) {
   }
   EXPECT_EQ(done, 200);
   EXPECT_EQ(around, 200);
+}
+
+// Whoever had less comes first, of the wholes and of their parts; those on nobody's account before.
+TEST(Workers, TakeTurnsByWhatEachHad) {
+  std::string order;
+  {
+    std::mutex mutex;
+    mutex.lock();
+    Workers workers(1, [](const Job& job) { job(); });
+    const auto wait = [&] { const std::lock_guard lock(mutex); };
+    const auto busy = std::make_shared<Account>(), other = std::make_shared<Account>();
+    const auto first = std::make_shared<Account>(busy), second = std::make_shared<Account>(busy),
+               newcomer = std::make_shared<Account>(other);
+    first->use(2);
+    second->use(1);
+    const auto submit = [&](char name, const std::shared_ptr<Account>& by) {
+      workers.submit([&, name] { order += name; }, by);
+    };
+    workers.submit(wait);
+    submit('a', first);
+    submit('b', second);
+    submit('c', first);
+    submit('d', newcomer);
+    submit('e', nullptr);
+    mutex.unlock();
+    workers.drain();
+    EXPECT_EQ(order, "edbac");
+    // Who comes again has no more to get than those who stayed.
+    const auto late = std::make_shared<Account>();
+    workers.submit([] {}, late);
+    EXPECT_GE(late->used().second, 1.0);
+    workers.drain();
+  }
 }
 
 #ifdef __linux__

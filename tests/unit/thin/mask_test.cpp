@@ -57,8 +57,10 @@ TEST(Mask, ThresholdsOfEveryScalarTypeAndComponent) {
 TEST(Mask, LabelsAndNothingSaid) {
   const Image image = image_of<std::int16_t>(
       {8, 1, 1}, 1, [](int i, int, int, int) { return static_cast<std::int16_t>(i - 3); });
+  const Image positive =
+      image_of<std::int16_t>({8, 1, 1}, 1, [](int i, int, int, int) { return static_cast<std::int16_t>(i); });
   Segmentation how;
-  EXPECT_EQ(count(segment(image, how, {})), 7U);  // all but the one 0
+  EXPECT_EQ(count(segment(positive, how, {})), 7U);  // all but the one 0
   how.labels = {4, -2, 99};
   const Mask mask = segment(image, how, {});
   EXPECT_EQ(mask.inside, (std::vector<std::uint8_t>{0, 1, 0, 0, 0, 0, 0, 1}));
@@ -85,8 +87,11 @@ TEST(Mask, RefusesWhatItCannotMean) {
       EXPECT_EQ(e.where(), where);
     }
   };
+  const Image below = image_of<std::int16_t>(
+      {4, 1, 1}, 1, [](int i, int, int, int) { return static_cast<std::int16_t>(i - 1); });
   Segmentation how;
   fails(real, how, ErrorKind::usage, "--threshold");
+  fails(below, how, ErrorKind::usage, "--threshold");
   how.labels = {1};
   fails(real, how, ErrorKind::usage, "--labels");
   how.low = 0;

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <random>
 
-#include "preprocess/voxel/open_surface.hpp"
 #include "preprocess/voxel/triangle_box.hpp"
 #include "tests/unit/voxel/shapes.hpp"
+#include "tests/unit/voxel/slow_winding.hpp"
 
 namespace ecorche::voxel {
 namespace {
@@ -260,11 +260,30 @@ TEST(Closed, TellsOpenEdgesAndClosesHairlineSlits) {
   EXPECT_FALSE(snap(flipped, grid).closed);
 }
 
-TEST(OpenSurface, GeneralizedWindingOfASphere) {
+TEST(WindingTree, OfASphere) {
   const SurfaceMesh sphere = shapes::ellipsoid({0, 0, 0}, {5, 5, 5}, 8);
   EXPECT_NEAR(generalized_winding(sphere, {1, 2, 0}), 1, 1e-12);
   EXPECT_NEAR(generalized_winding(sphere, {7, 2, 0}), 0, 1e-12);
   EXPECT_NEAR(generalized_winding(shapes::inside_out(sphere), {1, 2, 0}), -1, 1e-12);
+}
+
+TEST(WindingTree, EqualsTheSumOverAllTriangles) {
+  SurfaceMesh whole = shapes::ellipsoid({30, -20, 7}, {10, 20, 5}, 24);
+  SurfaceMesh open = whole;
+  open.F.conservativeResize(whole.F.rows() * 2 / 3, 3);
+  SurfaceMesh soup = whole;  // every other triangle is turned over
+  for (Eigen::Index f = 0; f < soup.F.rows(); f += 2) std::swap(soup.F(f, 0), soup.F(f, 1));
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> draw(-1.6, 1.6);
+  for (const SurfaceMesh& surface : {whole, open, soup, SurfaceMesh{}}) {
+    const geometry::WindingTree tree(surface);
+    double worst = 0;
+    for (int n = 0; n < 2000; ++n) {
+      const Eigen::Vector3d p(30 + 10 * draw(random), -20 + 20 * draw(random), 7 + 5 * draw(random));
+      worst = std::max(worst, std::abs(tree(p) - generalized_winding(surface, p)));
+    }
+    EXPECT_LE(worst, 0.02);
+  }
 }
 
 }  // namespace

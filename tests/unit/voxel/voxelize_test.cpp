@@ -8,9 +8,9 @@
 #include <random>
 #include <string>
 
-#include "preprocess/voxel/open_surface.hpp"
 #include "tests/support/triangle_distance.hpp"
 #include "tests/unit/voxel/shapes.hpp"
+#include "tests/unit/voxel/slow_winding.hpp"
 
 namespace ecorche::voxel {
 namespace {
@@ -199,19 +199,21 @@ TEST(Voxelize, SurfaceWithASlitIsFilled) {
   EXPECT_NE(said.warnings[0].find("skin: the surface has open edges"), std::string::npos) << said.warnings[0];
 }
 
-TEST(Voxelize, SurfaceWithAWideHoleKeepsItsShellAndSaysSo) {
+TEST(Voxelize, BoneWithAWideHoleKeepsItsShellAndSaysSo) {
   SurfaceMesh sphere = shapes::ellipsoid({0, 0, 0}, {10, 10, 10}, 16);
   sphere.F.conservativeResize(sphere.F.rows() - 64, 3);
   Said said;
-  const Image image = voxelize(shapes::body(sphere), {.voxel_mm = 1}, said.context());
+  const Image image = voxelize(shapes::body(shapes::box({-15, -15, -15}, {15, 15, 15}), {sphere}),
+                               {.voxel_mm = 1}, said.context());
   const std::array<double, 3> middle = image.grid.index({0, 0, 0});
   EXPECT_EQ(image.scalars<std::uint16_t>()[image.grid.offset(static_cast<int>(std::lround(middle[0])),
                                                              static_cast<int>(std::lround(middle[1])),
                                                              static_cast<int>(std::lround(middle[2])))],
-            outside);
-  EXPECT_GT(count(image, soft), 800U);
+            soft);
+  EXPECT_GT(count(image, first_bone), 800U);
   ASSERT_EQ(said.warnings.size(), 1U);
-  EXPECT_NE(said.warnings[0].find("encloses nothing"), std::string::npos) << said.warnings[0];
+  EXPECT_NE(said.warnings[0].find("only the voxels that it touches count"), std::string::npos)
+      << said.warnings[0];
 }
 
 TEST(Voxelize, DefaultVoxelIsTheFinestThatFits) {
@@ -247,6 +249,47 @@ ErrorKind refusal(const Case& patient, const Options& options, const Context& co
   }
   ADD_FAILURE() << "nothing was thrown";
   return ErrorKind::internal;
+}
+
+// A tube open at both ends, as a CT that cuts off trunk and legs has it, and a ball with a wide hole.
+TEST(Voxelize, ASkinThatWouldBeHollowIsRefusedWithWhatClosesIt) {
+  const auto open_ball = [](Eigen::Index drop) {
+    SurfaceMesh ball = shapes::ellipsoid({0, 0, 0}, {10, 10, 10}, 16);
+    ball.F.conservativeResize(ball.F.rows() - drop, 3);
+    return ball;
+  };
+  SurfaceMesh tube = shapes::ellipsoid({0, 0, 0}, {10, 10, 30}, 16);
+  std::vector<Eigen::RowVector3i> kept;
+  for (Eigen::Index f = 0; f < tube.F.rows(); ++f) {
+    bool within = true;
+    for (Eigen::Index c = 0; c < 3; ++c) within = within && std::abs(tube.V(tube.F(f, c), 2)) < 20;
+    if (within) kept.emplace_back(tube.F.row(f));
+  }
+  tube.F.resize(static_cast<Eigen::Index>(kept.size()), 3);
+  for (std::size_t f = 0; f < kept.size(); ++f) tube.F.row(static_cast<Eigen::Index>(f)) = kept[f];
+  for (const SurfaceMesh& skin : {open_ball(64), tube}) {
+    std::string line;
+    EXPECT_EQ(refusal(shapes::body(skin), {.voxel_mm = 1}, {}, line), ErrorKind::data);
+    EXPECT_NE(line.find("skin: the surface is open: "), std::string::npos) << line;
+    EXPECT_NE(line.find("ml inside run out through its "), std::string::npos) << line;
+    EXPECT_NE(line.find("close it: ecorche repair --holes "), std::string::npos) << line;
+  }
+}
+
+TEST(Voxelize, ASkinWithoutAnInsideIsRefused) {
+  SurfaceMesh sheet;
+  sheet.V.resize(4, 3);
+  sheet.V << 0, 0, 0, 100, 0, 0, 100, 100, 0, 0, 100, 0;
+  sheet.F.resize(2, 3);
+  sheet.F << 0, 1, 2, 0, 2, 3;
+  SurfaceMesh both_sides = sheet;
+  both_sides.F.conservativeResize(4, 3);
+  both_sides.F.bottomRows(2) << 2, 1, 0, 3, 2, 0;
+  for (const SurfaceMesh& skin : {sheet, both_sides}) {
+    std::string line;
+    EXPECT_EQ(refusal(shapes::body(skin), {.voxel_mm = 2}, {}, line), ErrorKind::data);
+    EXPECT_NE(line.find("skin: encloses no volume"), std::string::npos) << line;
+  }
 }
 
 TEST(Voxelize, Refusals) {

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Posed images back to the scan.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "app/surfaces_back.hpp"
+#include "core/values/image.hpp"
+#include "core/values/model.hpp"
+#include "runtime/volume/resample.hpp"
+#include "runtime/volume/round_trip.hpp"
+
+namespace ecorche::app {
+
+class ImagesBack {
+ public:
+  ImagesBack(const PosedTets& body, const Context& context) : body_(body), context_(context) {}
+
+  /// `image` on its own lattice, as far as the body at rest reaches; outside of that what it holds outside of
+  /// the posed body.
+  Image bring(Image image, bool labels, runtime::Sampling sampling);
+  /// Where the voxels of what was brought last come from.
+  runtime::VoxelTrip trip() const;
+  /// 1 where a voxel of what was brought last is from elsewhere.
+  static Image mask(const ImageGrid& grid, const runtime::VoxelTrip& trip);
+
+ private:
+  runtime::Deformation way_there() const;
+
+  const PosedTets& body_;
+  const Context& context_;
+  runtime::InverseMap posed_,
+      scan_;  // tets on the posed image's lattice, and at rest on that of what came back
+};
+
+/// `back` held against the same volume of the model that was posed, voxel by voxel over what its label map
+/// holds: what differs, and of labels what does so off the boundary (none of the 26 neighbours has another
+/// label), in all and by the group of the tissue that the label is named after.
+nlohmann::json held_against(const Model& model, const ModelVolume& volume, const Image& back);
+
+}  // namespace ecorche::app

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/measured_pose.hpp"
+
+#include <algorithm>
+
+#include "runtime/settle/unfold.hpp"
+
+namespace ecorche::app {
+namespace {
+
+// Points that differ between `before` and `now` go to where the root takes them.
+void carry(const std::vector<float>& before, const std::vector<float>& now, const RigidTransform& root,
+           std::vector<float>& out) {
+  for (std::size_t i = 0; i < now.size(); i += 3) {
+    if (std::equal(&now[i], &now[i] + 3, &before[i])) continue;
+    const Eigen::Vector3d p = root * Eigen::Map<const Eigen::Vector3f>(&now[i]).cast<double>();
+    Eigen::Map<Eigen::Vector3f> there(&out[i]);
+    there = p.cast<float>();
+  }
+}
+
+}  // namespace
+
+MeasuredPose::MeasuredPose(const runtime::BodyPoser& poser)
+    : poser_(poser), body_(poser.make_frame()), still_(poser.make_frame()) {}
+
+Status MeasuredPose::run(const Pose& pose, runtime::Skinning skinning) {
+  if (Status status = poser_.run(pose, skinning, poser_.all_tissues(), body_); !status.ok()) return status;
+  moved_ = !runtime::stands_still(body_);
+  if (!moved_) return {};
+  return poser_.run(pose, skinning, poser_.all_tissues(), still_, runtime::NodesOf::body,
+                    runtime::Root::still);
+}
+
+nlohmann::json MeasuredPose::unfold(const Context& context) {
+  runtime::PosedBody& still = moved_ ? still_ : body_;
+  const std::vector<float> nodes = still.nodes;
+  const std::vector<std::vector<float>> tissues = moved_ ? still.tissues : std::vector<std::vector<float>>();
+  const runtime::Unfolding done = runtime::unfold(poser_.model(), still, context);
+  if (moved_) {
+    const RigidTransform& root = body_.segments[0];
+    carry(nodes, still.nodes, root, body_.nodes);
+    for (std::size_t t = 0; t < tissues.size(); ++t)
+      carry(tissues[t], still.tissues[t], root, body_.tissues[t]);
+  }
+  return {{"inverted_tets_before", done.inverted_before},
+          {"inverted_rest_mm3_before", done.rest_mm3_before},
+          {"squeezed_by_bones", done.held},
+          {"moved_nodes", done.moved_nodes},
+          {"largest_move_mm", done.largest_move_mm}};
+}
+
+}  // namespace ecorche::app

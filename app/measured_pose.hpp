@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// A posed body as it is written, and beside it as it is measured.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "core/values/context.hpp"
+#include "runtime/skin/body_poser.hpp"
+
+namespace ecorche::app {
+
+/// `body` stands where the pose takes it; `still` is the same body with its root as scanned, so that what is
+/// measured of it does not lose digits to where it stands (a float32 coordinate 9 m away has steps of 1e-3
+/// mm).
+class MeasuredPose {
+ public:
+  explicit MeasuredPose(const runtime::BodyPoser& poser);
+
+  /// Poses both, with all tissues. As BodyPoser::run.
+  Status run(const Pose& pose, runtime::Skinning skinning);
+  /// Unfolds both alike; what that did, as `unfolded` of quality.json.
+  nlohmann::json unfold(const Context& context);
+
+  const runtime::PosedBody& body() const { return body_; }
+  const runtime::PosedBody& still() const { return moved_ ? still_ : body_; }
+
+ private:
+  const runtime::BodyPoser& poser_;
+  runtime::PosedBody body_, still_;
+  bool moved_ = false;
+};
+
+}  // namespace ecorche::app

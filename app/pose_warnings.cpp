@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/pose_warnings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "core/kinematics/angles.hpp"
+#include "runtime/quality/verdict.hpp"
+
+namespace ecorche::app {
+namespace {
+
+using Eigen::Vector3d;
+using nlohmann::json;
+using runtime::Breach;
+using runtime::Figure;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kTurned = 1 / kDegrees;  // a joint that turns by less is not to blame
+
+double turn_of(const Pose& pose, std::size_t joint) {
+  const Eigen::Quaterniond& q = pose.rotation[joint];
+  return 2 * std::atan2(q.vec().norm(), std::abs(q.w()));
+}
+
+class Wording {
+ public:
+  Wording(const Model& model, const runtime::PosedBody& body, const runtime::PoseQuality& quality,
+          std::span<const float> det_f, const HowPosed& how)
+      : model_(model), body_(body), quality_(quality), det_f_(det_f), how_(how) {}
+
+  json of(const Breach& breach) const {
+    json out{{"value", breach.value}, {"threshold", breach.threshold}};
+    switch (breach.figure) {
+      case Figure::inverted_share:
+        return at(quality_.places.inverted.at, folds(), "inverted_share",
+                  fmt::format("{:.2f} % of the body is inverted, more than {:.2f} %", 100 * breach.value,
+                              100 * breach.threshold),
+                  std::move(out));
+      case Figure::place_inverted:
+        return at(quality_.places.inverted.at, folds(), "place_inverted",
+                  fmt::format("{:.1f} % of a cube of {:.0f} mm is inverted, more than {:.0f} %",
+                              100 * breach.value, quality_.places.edge_mm, 100 * breach.threshold),
+                  std::move(out));
+      case Figure::place_change:
+        return at(quality_.places.changed.at, {}, "place_change",
+                  fmt::format("the tets of a cube of {:.0f} mm change their volume by {:.0f} %, more than "
+                              "{:.0f} %",
+                              quality_.places.edge_mm, 100 * breach.value, 100 * breach.threshold),
+                  std::move(out));
+      case Figure::volume_change:
+        return at(quality_.places.changed.at, {}, "volume_change",
+                  fmt::format("the body's tets change their volume by {:.1f} %, more than {:.0f} %",
+                              100 * breach.value, 100 * breach.threshold),
+                  std::move(out));
+      case Figure::tissue_change:
+        return tissue(breach, std::move(out));
+      case Figure::doubtful_joint:
+        return joint(breach, std::move(out));
+      case Figure::bone_rigidity:
+        break;
+    }
+    out["kind"] = "bone_rigidity";
+    out["what"] = fmt::format("a bone bends by {:.1e} mm, more than {:.1e}", breach.value, breach.threshold);
+    out["mend"] = "ecorche verify the model";
+    return out;
+  }
+
+ private:
+  // What helps against folds besides turning less.
+  std::string folds() const {
+    std::string out;
+    if (!how_.unfolded) out = "add --unfold, or ";
+    if (how_.skinning == runtime::Skinning::cor) out += "use --skinning dqs, which folds less, or ";
+    return out;
+  }
+
+  json tissue(const Breach& breach, json out) const {
+    const runtime::TissueChange& change = quality_.tissues[breach.row];
+    out["value"] = change.share;
+    out["tissue"] = change.name;
+    out["group"] = group_name(change.group);
+    const auto row =
+        static_cast<std::size_t>(std::find_if(model_.tissues.begin(), model_.tissues.end(),
+                                              [&](const Tissue& t) { return t.name == change.name; }) -
+                                 model_.tissues.begin());
+    return at(place_of(model_.tissues[row], change.share < 0), {}, "tissue_change",
+              fmt::format("{} ({}) changes its volume by {:+.1f} %, more than {:.1f} %", change.name,
+                          group_name(change.group), 100 * change.share, 100 * breach.threshold),
+              std::move(out));
+  }
+
+  json joint(const Breach& breach, json out) const {
+    const runtime::DoubtfulJoint& doubtful = quality_.doubtful[breach.row];
+    const Joint& joint = model_.rig.skeleton.segments[static_cast<std::size_t>(doubtful.joint)].joint;
+    out["value"] = doubtful.turned * kDegrees;
+    out["threshold"] = breach.threshold * kDegrees;
+    out["kind"] = "doubtful_joint";
+    out["joint"] = joint.name;
+    out["confidence"] = doubtful.confidence;
+    out["at_mm"] = {joint.center.x(), joint.center.y(), joint.center.z()};
+    out["what"] =
+        fmt::format("{} turns by {:.0f} degrees though it was found with a confidence of only {:.2f}",
+                    joint.name, doubtful.turned * kDegrees, doubtful.confidence);
+    out["mend"] = "ecorche rig CASE says how it was found; give its center and axes in the skeleton";
+    return out;
+  }
+
+  json at(const Vector3d& place, const std::string& try_first, const char* kind, const std::string& what,
+          json out) const {
+    const std::optional<std::size_t> joint = joint_near(place);
+    out["kind"] = kind;
+    out["what"] = what;
+    out["at_mm"] = {place.x(), place.y(), place.z()};
+    if (!joint) {
+      out["mend"] = try_first + "prepare the case again with other weights";
+      return out;
+    }
+    const std::string& name = model_.rig.skeleton.segments[*joint].joint.name;
+    out["joint"] = name;
+    out["mend"] = fmt::format("{}turn {} less than its {:.0f} degrees", try_first, name,
+                              turn_of(body_.pose, *joint) * kDegrees);
+    return out;
+  }
+
+  // The joint nearest to it in the scan, of those that turn.
+  std::optional<std::size_t> joint_near(const Vector3d& place) const {
+    const auto& segments = model_.rig.skeleton.segments;
+    std::optional<std::size_t> out;
+    const auto away = [&](std::size_t s) { return (segments[s].joint.center - place).squaredNorm(); };
+    for (std::size_t s = 1; s < segments.size(); ++s) {
+      if (turn_of(body_.pose, s) < kTurned) continue;
+      if (!out || away(s) < away(*out)) out = s;
+    }
+    return out;
+  }
+
+  // The middle of the tet that most volume is lost in, or won, of those that hold the tissue's vertices.
+  Vector3d place_of(const Tissue& tissue, bool lost) const {
+    double most = -std::numeric_limits<double>::infinity();
+    Vector3d place = tissue.V.cast<double>().colwise().mean().transpose();
+    for (const std::int32_t t : tissue.tet) {
+      const auto corner = [&](int c) { return model_.nodes.row(model_.tets(t, c)); };
+      const double changed = (static_cast<double>(det_f_[static_cast<std::size_t>(t)]) - 1) *
+                             tet_det(corner(0), corner(1), corner(2), corner(3)) * (lost ? -1 : 1);
+      if (changed <= most) continue;
+      most = changed;
+      place = (corner(0) + corner(1) + corner(2) + corner(3)).cast<double>().transpose() / 4;
+    }
+    return place;
+  }
+
+  const Model& model_;
+  const runtime::PosedBody& body_;
+  const runtime::PoseQuality& quality_;
+  std::span<const float> det_f_;
+  HowPosed how_;
+};
+
+}  // namespace
+
+json warnings_json(const Model& model, const runtime::PosedBody& body, const runtime::PoseQuality& quality,
+                   std::span<const float> det_f, const HowPosed& how) {
+  const Wording wording(model, body, quality, det_f, how);
+  json out = json::array();
+  for (const Breach& breach : runtime::breaches(quality)) out.push_back(wording.of(breach));
+  return out;
+}
+
+json clamped_json(const Skeleton& skeleton, const Pose& pose, std::span<const ClampedJoint> clamped) {
+  constexpr double kAtLimit = 1e-6;  // radians
+  json out = json::array();
+  for (const ClampedJoint& c : clamped) {
+    const auto row = static_cast<std::size_t>(c.joint);
+    const Joint& joint = skeleton.segments[row].joint;
+    json limits = json::array();
+    if (joint.sequence.size() == 3) {
+      const std::array<double, 3> angles = kinematics::angles_from_rotation(joint, pose.rotation[row]);
+      for (std::size_t i = 0; i < 3; ++i) {
+        const AngleAxis& axis = joint.sequence[i];
+        for (const double limit : {std::min(axis.min, axis.rest), std::max(axis.max, axis.rest)}) {
+          if (axis.min == axis.max ||
+              std::abs(std::remainder(angles[i] - limit, 2 * std::numbers::pi)) > kAtLimit)
+            continue;
+          limits.push_back({{"angle", axis.name}, {"at_deg", limit * kDegrees}});
+        }
+      }
+    }
+    out.push_back({{"joint", joint.name}, {"removed_deg", c.removed * kDegrees}, {"limits", limits}});
+  }
+  return out;
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/solved_pose.hpp"
+
+#include <cstdio>
+#include <numbers>
+
+#include "core/kinematics/angles.hpp"
+#include "core/kinematics/forward.hpp"
+#include "io/case/ik_file.hpp"
+
+namespace ecorche::app {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kLookMm = 200;  // from where a look is as near as a target, as IkProblem::tolerance_mm says
+
+json vector_json(const Eigen::Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// The angles of every joint that has some, absolute, in degrees.
+json angles_json(const Rig& rig, const Pose& pose) {
+  json out = json::object();
+  for (std::size_t row = 0; row < rig.skeleton.segments.size(); ++row) {
+    const Joint& joint = rig.skeleton.segments[row].joint;
+    if (joint.sequence.empty()) continue;
+    const std::array<double, 3> angles = kinematics::angles_from_rotation(joint, pose.rotation[row]);
+    for (std::size_t a = 0; a < joint.sequence.size() && a < angles.size(); ++a)
+      out[joint.name][joint.sequence[a].name + "_deg"] = angles[a] * kDegrees;
+  }
+  return out;
+}
+
+void say_target(const Program& program, const std::string& name, const Eigen::Vector3d& at, double away,
+                double tolerance_mm) {
+  char text[320];
+  if (away <= tolerance_mm) {
+    std::snprintf(text, sizeof text, "note: %s is %.1f mm from its goal", name.c_str(), away);
+  } else {
+    std::snprintf(text, sizeof text,
+                  "warning: %s is %.1f mm from its goal: beyond reach, limits or the other goals (it came to "
+                  "[%.1f, %.1f, %.1f]: set the goal there, or write move_root: true, or a larger weight)",
+                  name.c_str(), away, at.x(), at.y(), at.z());
+  }
+  program.note(text);
+}
+
+void say_look(const Program& program, const std::string& name, double off, bool near) {
+  char text[200];
+  std::snprintf(text, sizeof text, "%s: %s is %.1f degrees off%s", near ? "note" : "warning", name.c_str(),
+                off * kDegrees,
+                near ? "" : " (look at a place that the neck can turn to, or write move_root: true)");
+  program.note(text);
+}
+
+}  // namespace
+
+SolvedPose solve_pose(const Program& program, const std::filesystem::path& file, const Rig& rig,
+                      double tolerance_mm) {
+  const io::IkRequest request = io::read_ik(file, rig);
+  const kinematics::IkProblem& problem = request.problem;
+  const kinematics::IkResult result = kinematics::solve_ik(rig, request.start, problem);
+  const std::vector<RigidTransform> motion = kinematics::forward(rig, result.pose);
+  SolvedPose out{result.pose, true, {}};
+  json targets = json::array(), looks = json::array();
+  for (std::size_t i = 0; i < problem.targets.size(); ++i) {
+    const kinematics::IkTarget& target = problem.targets[i];
+    const Eigen::Vector3d at = motion[target.segment] * target.point;
+    const bool near = result.away_mm[i] <= tolerance_mm;
+    out.reached = out.reached && near;
+    say_target(program, request.names[i], at, result.away_mm[i], tolerance_mm);
+    targets.push_back({{"name", request.names[i]},
+                       {"goal_mm", vector_json(target.goal)},
+                       {"at_mm", vector_json(at)},
+                       {"residual_mm", result.away_mm[i]},
+                       {"reached", near}});
+  }
+  for (std::size_t i = 0; i < problem.looks.size(); ++i) {
+    const std::string& name = request.names[problem.targets.size() + i];
+    const bool near = kLookMm * result.off[i] <= tolerance_mm;
+    out.reached = out.reached && near;
+    say_look(program, name, result.off[i], near);
+    looks.push_back({{"name", name}, {"off_deg", result.off[i] * kDegrees}, {"reached", near}});
+  }
+  const Eigen::Quaterniond& turn = result.pose.rotation.at(0);
+  out.report = {{"reached", out.reached},
+                {"tolerance_mm", tolerance_mm},
+                {"targets", std::move(targets)},
+                {"looks", std::move(looks)},
+                {"root",
+                 {{"translation_mm", vector_json(result.pose.root_translation)},
+                  {"rotation", {turn.w(), turn.x(), turn.y(), turn.z()}}}},
+                {"angles", angles_json(rig, result.pose)}};
+  return out;
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// `pose --ik`: the pose in which points are at their goals, and how far it misses them.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "app/command.hpp"
+#include "core/values/pose.hpp"
+#include "core/values/skeleton.hpp"
+
+namespace ecorche::app {
+
+/// Ten times what the solver stops at (IkProblem::tolerance_mm), and about a voxel of the finest CT: a goal
+/// missed by more was out of reach, and can be seen in what is posed.
+inline constexpr double kMissedMm = 1;
+
+struct SolvedPose {
+  Pose pose;
+  bool reached = false;   ///< every target within the tolerance, every look as near at 200 mm
+  nlohmann::json report;  ///< root, angles, and the residual of every target and look
+};
+
+/// Notes what came of each goal; warns, with where it came to and what helps, beyond `tolerance_mm`. Throws
+/// as io::read_ik.
+SolvedPose solve_pose(const Program& program, const std::filesystem::path& file, const Rig& rig,
+                      double tolerance_mm);
+
+}  // namespace ecorche::app

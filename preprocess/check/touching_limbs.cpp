@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/check/touching_limbs.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <numbers>
+
+namespace ecorche::check {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kSwing = 100 * std::numbers::pi / 180;
+// From the joint, in ways from there to the skin. Of a body that stands free no contact reaches kSure
+// (armpits of the built-in patient 3.3, its legs 2.3); where there is one it is counted from kFar on.
+constexpr double kFar = 2.5, kSure = 3.5;
+constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared
+constexpr std::int64_t kGrain = 1 << 14;
+
+// The uppermost segment of each limb, for every segment; -1: none.
+std::vector<int> limbs_of(const Skeleton& skeleton) {
+  std::vector<int> limb(skeleton.segments.size(), -1);
+  for (std::size_t s = 0; s < limb.size(); ++s) {  // parents come first
+    const Segment& segment = skeleton.segments[s];
+    if (segment.parent < 0) continue;
+    limb[s] = limb[static_cast<std::size_t>(segment.parent)];
+    if (limb[s] >= 0 || segment.joint.kind == JointKind::fixed) continue;
+    const std::size_t turns = segment.joint.kind == JointKind::hinge       ? 1
+                              : segment.joint.kind == JointKind::universal ? 2
+                                                                           : 3;
+    for (std::size_t a = 0; a < std::min(turns, segment.joint.sequence.size()); ++a) {
+      const AngleAxis& angle = segment.joint.sequence[a];
+      if (angle.max - angle.min > kSwing) limb[s] = static_cast<int>(s);
+    }
+  }
+  return limb;
+}
+
+// A piece of the surface u = 1/2 within a tet.
+struct Piece {
+  double area = 0;
+  Vector3d middle = Vector3d::Zero();
+  int own = -1, other = -1;
+  bool sure = false;
+};
+
+class Finder {
+ public:
+  Finder(const Model& model) : model_(model), limb_(limbs_of(model.rig.skeleton)) {}
+
+  const std::vector<int>& limbs() const { return limb_; }
+
+  std::vector<Piece> pieces(int top) const {
+    const auto nodes = static_cast<std::int64_t>(model_.node_count());
+    std::vector<float> share(static_cast<std::size_t>(nodes), 0);
+    in_pieces(nodes, [&](std::int64_t first, std::int64_t last, std::size_t) {
+      for (std::int64_t n = first; n < last; ++n) {
+        for_weights(n, [&](int segment, float weight) {
+          if (limb_[static_cast<std::size_t>(segment)] == top) share[static_cast<std::size_t>(n)] += weight;
+        });
+      }
+    });
+    const Vector3d joint = model_.rig.skeleton.segments[static_cast<std::size_t>(top)].joint.center;
+    const double way = to_skin(joint);
+    const auto tets = static_cast<std::int64_t>(model_.tet_count());
+    std::vector<std::vector<Piece>> found(static_cast<std::size_t>((tets + kGrain - 1) / kGrain));
+    in_pieces(tets, [&](std::int64_t first, std::int64_t last, std::size_t at) {
+      for (std::int64_t t = first; t < last; ++t) {
+        Piece piece = cut(t, share);
+        const double from = (piece.middle - joint).norm();
+        if (!(piece.area > 0) || from <= kFar * way) continue;
+        piece.sure = from > kSure * way;
+        owners(t, top, share, piece);
+        found[at].push_back(piece);
+      }
+    });
+    std::vector<Piece> out;
+    for (const std::vector<Piece>& some : found) out.insert(out.end(), some.begin(), some.end());
+    return out;
+  }
+
+ private:
+  template <class Body>
+  static void in_pieces(std::int64_t count, const Body& body) {
+    tbb::parallel_for(std::int64_t{0}, (count + kGrain - 1) / kGrain, [&](std::int64_t piece) {
+      body(piece * kGrain, std::min(count, (piece + 1) * kGrain), static_cast<std::size_t>(piece));
+    });
+  }
+
+  template <class Visit>
+  void for_weights(std::int64_t node, const Visit& visit) const {
+    const Weights& w = model_.weights;
+    for (std::uint64_t i = w.offsets[static_cast<std::size_t>(node)];
+         i < w.offsets[static_cast<std::size_t>(node) + 1]; ++i)
+      visit(static_cast<int>(w.segment[i]), w.weight[i]);
+  }
+
+  double to_skin(const Vector3d& joint) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Tissue& tissue : model_.tissues) {
+      if (tissue.group != Group::skin || tissue.V.rows() == 0) continue;
+      least = std::min(
+          least,
+          (tissue.V.rowwise() - joint.transpose().cast<float>()).rowwise().norm().cast<double>().minCoeff());
+    }
+    return least;
+  }
+
+  // By marching tets.
+  Piece cut(std::int64_t tet, const std::vector<float>& share) const {
+    std::array<double, 4> u{};
+    std::array<int, 4> order{};  // those of the limb first
+    int inside = 0, outside = 0;
+    for (int c = 0; c < 4; ++c) {
+      const auto at = static_cast<std::size_t>(c);
+      u[at] = static_cast<double>(share[static_cast<std::size_t>(model_.tets(tet, c))]) - 0.5;
+      order[static_cast<std::size_t>(u[at] > 0 ? inside++ : 3 - outside++)] = c;
+    }
+    Piece out;
+    if (inside == 0 || outside == 0) return out;
+    const auto point = [&](std::size_t a, std::size_t b) -> Vector3d {  // on the edge of two corners
+      const auto i = static_cast<std::size_t>(order[a]), j = static_cast<std::size_t>(order[b]);
+      const Vector3d p = model_.nodes.row(model_.tets(tet, order[a])).transpose().cast<double>();
+      const Vector3d q = model_.nodes.row(model_.tets(tet, order[b])).transpose().cast<double>();
+      return p + u[i] / (u[i] - u[j]) * (q - p);
+    };
+    std::array<Vector3d, 4> p;
+    int count = 3;
+    if (inside == 1) {
+      p = {point(0, 1), point(0, 2), point(0, 3), Vector3d::Zero()};
+    } else if (inside == 3) {
+      p = {point(0, 3), point(1, 3), point(2, 3), Vector3d::Zero()};
+    } else {
+      p = {point(0, 2), point(0, 3), point(1, 3), point(1, 2)};
+      count = 4;
+    }
+    for (int c = 2; c < count; ++c) {
+      const Vector3d &b = p[static_cast<std::size_t>(c) - 1], &d = p[static_cast<std::size_t>(c)];
+      const double area = 0.5 * (b - p[0]).cross(d - p[0]).norm();
+      out.area += area;
+      out.middle += area * (p[0] + b + d) / 3;
+    }
+    if (out.area > 0) out.middle /= out.area;
+    return out;
+  }
+
+  // The segments with the largest weights on either side.
+  void owners(std::int64_t tet, int top, const std::vector<float>& share, Piece& piece) const {
+    std::map<int, float> own, other;
+    for (int c = 0; c < 4; ++c) {
+      const std::int32_t node = model_.tets(tet, c);
+      const bool inside = share[static_cast<std::size_t>(node)] > 0.5F;
+      for_weights(node, [&](int segment, float weight) {
+        const bool of_limb = limb_[static_cast<std::size_t>(segment)] == top;
+        if (of_limb == inside) (inside ? own : other)[segment] += weight;
+      });
+    }
+    const auto largest = [](const std::map<int, float>& sums) {
+      const auto most = std::max_element(sums.begin(), sums.end(),
+                                         [](const auto& a, const auto& b) { return a.second < b.second; });
+      return most == sums.end() ? -1 : most->first;
+    };
+    piece.own = largest(own);
+    piece.other = largest(other);
+  }
+
+  const Model& model_;
+  std::vector<int> limb_;
+};
+
+std::string number(const char* format, double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+// One contact of all pieces between a limb and the same other.
+Touch joined(int limb, int other_limb, const std::vector<const Piece*>& pieces) {
+  Touch out;
+  out.limb = limb;
+  out.other_limb = other_limb;
+  Vector3d middle = Vector3d::Zero();
+  std::map<std::pair<int, int>, double> by_pair;
+  for (const Piece* piece : pieces) {
+    out.area_mm2 += piece->area;
+    middle += piece->area * piece->middle;
+    by_pair[{piece->own, piece->other}] += piece->area;
+  }
+  middle /= out.area_mm2;
+  const auto most = std::max_element(by_pair.begin(), by_pair.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  out.own = most->first.first;
+  out.other = most->first.second;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Piece* piece : pieces) {
+    const double d = (piece->middle - middle).squaredNorm();
+    if (d >= least) continue;
+    least = d;
+    out.at = piece->middle;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Touch> touching_limbs(const Model& model) {
+  std::vector<Touch> out;
+  if (model.tet_count() == 0) return out;
+  const Finder finder(model);
+  const double length =
+      static_cast<double>((model.nodes.colwise().maxCoeff() - model.nodes.colwise().minCoeff()).maxCoeff());
+  for (int top = 0; top < static_cast<int>(model.segment_count()); ++top) {
+    if (finder.limbs()[static_cast<std::size_t>(top)] != top) continue;
+    const std::vector<Piece> pieces = finder.pieces(top);
+    std::map<int, std::vector<const Piece*>> by_other;
+    for (const Piece& piece : pieces) {
+      if (piece.own >= 0 && piece.other >= 0)
+        by_other[finder.limbs()[static_cast<std::size_t>(piece.other)]].push_back(&piece);
+    }
+    for (const auto& [other, some] : by_other) {
+      double sure = 0;
+      for (const Piece* piece : some) sure += piece->sure ? piece->area : 0;
+      if (sure < kPatch * length * length) continue;
+      const Touch touch = joined(top, other, some);
+      const auto seen = std::find_if(out.begin(), out.end(), [&](const Touch& before) {
+        return before.limb == other && before.other_limb == top;
+      });
+      if (seen == out.end()) {
+        out.push_back(touch);
+      } else if (touch.area_mm2 > seen->area_mm2) {
+        *seen = touch;
+      }
+    }
+  }
+  return out;
+}
+
+std::string what(const Touch& touch, const Skeleton& skeleton) {
+  const auto name = [&](int s) { return skeleton.segments[static_cast<std::size_t>(s)].name; };
+  return "touches " + (touch.other_limb >= 0 ? name(touch.other_limb) : "the trunk") + ": " +
+         number("%.3g", touch.area_mm2 / 100) + " cm2 joined, most of " + name(touch.own) + " and " +
+         name(touch.other);
+}
+
+std::string said(const Touch& touch, const Skeleton& skeleton) {
+  return skeleton.segments[static_cast<std::size_t>(touch.limb)].name + " " + what(touch, skeleton) +
+         ", at [" + number("%.1f", touch.at.x()) + ", " + number("%.1f", touch.at.y()) + ", " +
+         number("%.1f", touch.at.z()) + "]";
+}
+
+double cube_mm(const PointsF& nodes, const Tets& tets) {
+  double volume = 0;
+  for (Eigen::Index t = 0; t < tets.rows(); ++t)
+    volume +=
+        tet_det(nodes.row(tets(t, 0)), nodes.row(tets(t, 1)), nodes.row(tets(t, 2)), nodes.row(tets(t, 3))) /
+        6;
+  return tets.rows() == 0 ? 0 : std::cbrt(12 * volume / static_cast<double>(tets.rows()));
+}
+
+std::string parting_advice(double cube_mm) {
+  return "either drags the other along; where a gap is narrower than " + number("%.3g", 1.5 * cube_mm) +
+         " mm tets of this size bridge it: more of them (--max-tets) or a smaller --voxel may part them; "
+         "what "
+         "touches in the scan is held apart under labels, apart, with a gap_mm of more than that";
+}
+
+}  // namespace ecorche::check

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/look_ahead.hpp"
+
+#include "preprocess/check/touching_limbs.hpp"
+#include "preprocess/pipeline.hpp"
+#include "preprocess/rig/fit_rig.hpp"
+#include "preprocess/tet/default_size.hpp"
+#include "preprocess/tet/mesher.hpp"
+#include "preprocess/tet/relax_slivers.hpp"
+#include "preprocess/voxel/voxelize.hpp"
+#include "preprocess/weights/harmonic.hpp"
+
+namespace ecorche::preprocess {
+namespace {
+
+// As far as weights; the skin is the only tissue.
+Model half_made(const Case& patient, const Context& context) {
+  Context quiet;  // what the stages would warn of has its own findings
+  quiet.stop = context.stop;
+  Model model;
+  model.rig = rig::fit(patient, quiet);
+  for (const CaseBone& bone : patient.bones)
+    model.bone_segment.push_back(model.rig.skeleton.find_segment(bone.segment));
+  context.report(0.1);
+  TetMesh mesh;
+  {
+    const Image labels = voxel::voxelize(patient, {}, quiet);
+    context.report(0.2);
+    tet::Options o;
+    o.max_tets = tet::default_tets(patient, labels);
+    mesh = tet::make_mesher("lattice")->mesh({patient, labels}, o, quiet);
+  }
+  tet::canonicalize(mesh);
+  context.report(0.4);
+  model.weights =
+      weights::solve_weights(mesh, patient, model.bone_segment, model.segment_count(), {}, quiet).weights;
+  context.report(0.9);
+  model.nodes = mesh.V.cast<float>();
+  model.tets = std::move(mesh.T);
+  Tissue& skin = model.tissues.emplace_back();
+  skin.group = Group::skin;
+  skin.V = patient.skin.V.cast<float>();
+  return model;
+}
+
+}  // namespace
+
+std::vector<check::Finding> look_ahead(const Case& patient, const Context& context) {
+  using check::Severity;
+  std::vector<check::Finding> out;
+  if (patient.skin.F.rows() == 0 || patient.bones.empty()) return out;
+  try {
+    const Model model = half_made(patient, context);
+    const std::string advice = check::parting_advice(check::cube_mm(model.nodes, model.tets));
+    for (const check::Touch& touch : check::touching_limbs(model)) {
+      const std::string& limb = model.rig.skeleton.segments[static_cast<std::size_t>(touch.limb)].name;
+      out.push_back({Severity::warning, limb, check::what(touch, model.rig.skeleton), touch.at, advice});
+    }
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::data && error.kind() != ErrorKind::config) throw;
+    out.push_back({Severity::error, error.where(), error.problem(), {}, error.mend()});
+  }
+  context.report(1);
+  return out;
+}
+
+}  // namespace ecorche::preprocess

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/rig/mirrored_joints.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <sstream>
+
+#include "core/kinematics/angles.hpp"
+#include "preprocess/rig/other_side.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kApart = 10, kTurned = 10;  // mm, degrees: what bench/rig_damage calls bad
+constexpr double kCut = 0.9;                 // of the other's length: sides differ by a few hundredths
+constexpr double kMirrored = 0.4, kTurnedBack = 0.3, kAssumed = 0.1;
+
+std::string degrees(double radians) {
+  return std::to_string(std::lround(radians * kDegrees));
+}
+
+// One side's joint as the bones show it.
+struct Shown {
+  std::size_t row = 0;
+  std::string bones;  // the segment on whose bones it is found
+  Vector3d center = Vector3d::Zero(), axis = Vector3d::Zero();
+  double confidence = 0;
+};
+
+class Pairs {
+ public:
+  Pairs(const Skeleton& skeleton, JointSources& sources, const Context& context)
+      : skeleton_(skeleton), sources_(sources), context_(context) {}
+
+  void run() {
+    for (std::size_t row = 0; row < skeleton_.segments.size(); ++row) {
+      const Joint& left = skeleton_.segments[row].joint;
+      if (!left.name.ends_with("_left") || !left.how) continue;
+      const int other = skeleton_.find_joint(other_side(left.name));
+      if (other < 0 || !skeleton_.segments[static_cast<std::size_t>(other)].joint.how) continue;
+      context_.check_stop();
+      compare(shown(row), shown(static_cast<std::size_t>(other)));
+    }
+  }
+
+ private:
+  const Joint& joint(std::size_t row) const { return skeleton_.segments[row].joint; }
+
+  Shown shown(std::size_t row) {
+    Shown out;
+    out.row = row;
+    out.bones = sources_.shown_on(row);
+    const FoundPoint& found = sources_.center(row);
+    out.center = found.at;
+    out.confidence = found.fit.confidence;
+    if (joint(row).kind == JointKind::hinge && !joint(row).sequence.empty()) {
+      const int axis = joint(row).sequence[0].axis;
+      const auto along = sources_.shown_axis(row, axis);
+      out.axis = along ? along->along : sources_.axes(row).first.col(axis);
+      if (along) out.confidence = std::min(out.confidence, along->confidence);
+    }
+    return out;
+  }
+
+  // From the longer bone's space to the shorter's.
+  const std::optional<Laid>& laid(const std::string& longer, const std::string& shorter) {
+    const auto [entry, fresh] = laid_.try_emplace(longer);
+    if (fresh) entry->second = laid_onto(sources_.bones(longer), sources_.bones(shorter));
+    return entry->second;
+  }
+
+  double length(const std::string& segment) {
+    const Points& V = sources_.bones(segment).V;
+    return V.rows() == 0 ? 0 : (V.colwise().maxCoeff() - V.colwise().minCoeff()).norm();
+  }
+
+  void compare(const Shown& left, const Shown& right) {
+    if (left.bones.empty() || other_side(left.bones) != right.bones) return;
+    const double a = length(left.bones), b = length(right.bones);
+    if (!(a > 0 && b > 0)) return;
+    const Shown& longer = a >= b ? left : right;
+    const Shown& shorter = a >= b ? right : left;
+    const auto& lies = laid(longer.bones, shorter.bones);
+    if (!lies) return;
+    const bool cut = lies->share < kCut;
+    const bool shorter_is_worse = cut || shorter.confidence <= longer.confidence;
+    const Shown& worse = shorter_is_worse ? shorter : longer;
+    const Shown& better = shorter_is_worse ? longer : shorter;
+    if (better.confidence < JointSources::least_confidence) return;
+    const Eigen::Affine3d map = shorter_is_worse ? lies->map : Eigen::Affine3d(lies->map.inverse());
+    const Vector3d to = map * better.center;
+    // Axes point to the left on both sides: mirrored, and turned round.
+    const Vector3d axis = better.axis.isZero() ? better.axis : Vector3d(-(map.linear() * better.axis));
+    Vector3d off = worse.center - to;
+    double turned = 0;
+    if (!axis.isZero()) {
+      off -= axis * axis.dot(off);
+      turned = std::acos(std::min(1.0, std::abs(axis.dot(worse.axis)))) * kDegrees;
+    }
+    const bool missing = worse.confidence <= 0;
+    if (!missing && off.norm() <= kApart && turned <= kTurned) return;
+    const double known = std::min(kMirrored, better.confidence);
+    FoundPoint found;
+    found.at = to;
+    found.fit = sources_.center(better.row).fit;
+    found.fit.rule = CenterRule::joint;
+    found.fit.confidence = known;
+    std::ostringstream line;
+    line << "joint " << joint(worse.row).name << ": its bones show it " << std::lround(off.norm()) << " mm";
+    if (!axis.isZero()) line << " and " << std::lround(turned) << " degrees";
+    line << " off the mirror image of " << joint(better.row).name;
+    if (cut) line << ", on a bone with " << std::lround(100 * lies->share) << " % of the other's length";
+    line << ": it is taken from there, with confidence " << std::lround(100 * known) << " %";
+    context_.warn(line.str());
+    sources_.settle(worse.row, found);
+    if (!axis.isZero()) sources_.settle_axis(worse.row, joint(worse.row).sequence[0].axis, {axis, known});
+  }
+
+  const Skeleton& skeleton_;
+  JointSources& sources_;
+  const Context& context_;
+  std::map<std::string, std::optional<Laid>> laid_;
+};
+
+// The anatomical angles that lead from the parent's axes to the joint's.
+std::array<double, 3> rest_of(const Skeleton& skeleton, JointSources& sources, std::size_t row) {
+  const Segment& segment = skeleton.segments[row];
+  const Eigen::Matrix3d parent = sources.axes(static_cast<std::size_t>(segment.parent)).first;
+  const Eigen::Matrix3d turn = parent.transpose() * sources.axes(row).first;
+  return kinematics::angles_from_rotation(segment.joint, Eigen::Quaterniond(turn));
+}
+
+}  // namespace
+
+void take_other_sides(const Skeleton& skeleton, JointSources& sources, const Context& context) {
+  Pairs(skeleton, sources, context).run();
+}
+
+void keep_rest_possible(const Skeleton& skeleton, JointSources& sources, const Context& context) {
+  for (std::size_t row = 0; row < skeleton.segments.size(); ++row) {
+    const Segment& segment = skeleton.segments[row];
+    const Joint& joint = segment.joint;
+    if (segment.parent < 0 || !joint.how || !joint.how->measured_rest || joint.how->possible.rest.empty())
+      continue;
+    std::array<double, 3> rest = rest_of(skeleton, sources, row);
+    double known = 1;
+    std::string said;
+    for (const auto& [name, range] : joint.how->possible.rest) {
+      for (std::size_t a = 0; a < joint.sequence.size() && a < 3; ++a) {
+        if (joint.sequence[a].name != name || range.holds(rest[a])) continue;
+        const int twin = skeleton.find_joint(other_side(joint.name));
+        const double other = twin < 0 ? 0 : rest_of(skeleton, sources, static_cast<std::size_t>(twin))[a];
+        const bool good = twin >= 0 && range.holds(other);
+        const double to = good ? other : std::clamp(0.0, range.least, range.most);
+        said += (said.empty() ? "" : ", ") + name + " at " + degrees(rest[a]) + " degrees (possible are " +
+                degrees(range.least) + " to " + degrees(range.most) + "; taken as " + degrees(to) +
+                (good ? ", as the other side" : "") + ")";
+        rest[a] = to;
+        known = std::min(known, good ? kTurnedBack : kAssumed);
+      }
+    }
+    if (said.empty()) continue;
+    context.warn("joint " + joint.name + ": its bones show it resting with " + said);
+    const auto [parent, of_parent] = sources.axes(static_cast<std::size_t>(segment.parent));
+    const Eigen::Matrix3d turn = kinematics::rotation_from_angles(joint, rest).toRotationMatrix();
+    sources.settle_axes(row, parent * turn, std::min({known, of_parent, sources.axes(row).second}));
+  }
+}
+
+}  // namespace ecorche::rig

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is not used of what bones show, and what stands in for it.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include "preprocess/rig/joint_sources.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+constexpr double kLong = 4;  // a shaft's variance, in variances across it
+
+// The first place that a source looks at; nothing where it looks at none.
+const RegionUse* first_use(const PointSource& source) {
+  const RegionUse& on = source.on;
+  if (!on.region.empty() || !on.bone.empty() || !on.segment.empty()) return &on;
+  for (const PointSource& part : source.parts) {
+    if (const RegionUse* use = first_use(part)) return use;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+bool JointSources::possible_radius(double radius) {
+  const JointRule* how = rule_of(bounded_);
+  if (how == nullptr || how->possible.radius_mm.holds(radius)) return true;
+  std::ostringstream line;
+  line.precision(3);
+  line << "a sphere of radius " << radius << " mm on its bones is not used: possible are "
+       << how->possible.radius_mm.least << " to " << how->possible.radius_mm.most;
+  note(line.str());
+  return false;
+}
+
+std::optional<Eigen::Vector3d> JointSources::shaft(int row) {
+  if (row < 0) return std::nullopt;
+  const int parent = skeleton_.segments[static_cast<std::size_t>(row)].parent;
+  if (parent < 0) return std::nullopt;
+  const Points& V = bones_.segment(skeleton_.segments[static_cast<std::size_t>(parent)].name).V;
+  if (V.rows() < 4) return std::nullopt;
+  const Points from = V.rowwise() - V.colwise().mean();
+  const Eigen::Matrix3d scatter = from.transpose() * from;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  if (eigen.eigenvalues()[2] <= kLong * eigen.eigenvalues()[1]) return std::nullopt;
+  return Eigen::Vector3d(eigen.eigenvectors().col(2));
+}
+
+bool JointSources::crosses_shaft(const Eigen::Vector3d& axis) {
+  const JointRule* how = rule_of(bounded_);
+  if (how == nullptr || how->possible.axis_to_shaft.any()) return true;
+  const auto along = shaft(bounded_);
+  if (!along) return true;
+  // Neither has a side: what is possible is so from either.
+  const double angle = std::acos(std::clamp(along->dot(axis), -1.0, 1.0));
+  const auto& possible = how->possible.axis_to_shaft;
+  if (possible.holds(angle) || possible.holds(std::numbers::pi - angle)) return true;
+  std::ostringstream line;
+  line << "an axis " << std::lround(angle * 180 / std::numbers::pi)
+       << " degrees to the shaft is not used: possible are "
+       << std::lround(possible.least * 180 / std::numbers::pi) << " to "
+       << std::lround(possible.most * 180 / std::numbers::pi);
+  note(line.str());
+  return false;
+}
+
+Eigen::Vector3d JointSources::across_shaft(const Eigen::Vector3d& said) {
+  const JointRule* how = rule_of(bounded_);
+  const auto along = how == nullptr || how->possible.axis_to_shaft.any() ? std::nullopt : shaft(bounded_);
+  if (!along) return said;
+  const Eigen::Vector3d across = said - *along * along->dot(said);
+  return across.norm() > 0.5 ? Eigen::Vector3d(across.normalized()) : said;
+}
+
+void JointSources::note(std::string line) {
+  std::vector<std::string>& notes = notes_[static_cast<std::size_t>(bounded_)];
+  if (std::find(notes.begin(), notes.end(), line) == notes.end()) notes.push_back(std::move(line));
+}
+
+void JointSources::settle(std::size_t row, const FoundPoint& center) {
+  settled_[row] = center;
+  settled_[row]->fit.joint = skeleton_.segments[row].joint.name;
+  forget();
+}
+
+void JointSources::settle_axis(std::size_t row, int axis, const FoundDirection& along) {
+  settled_axis_[{row, axis}] = along;
+  forget();
+}
+
+void JointSources::settle_axes(std::size_t row, const Eigen::Matrix3d& axes, double confidence) {
+  settled_axes_[row] = std::pair(axes, confidence);
+  forget();
+}
+
+void JointSources::forget() {
+  centers_ = settled_;
+  axes_ = settled_axes_;
+}
+
+std::string JointSources::shown_on(std::size_t row) const {
+  const JointRule* how = rule_of(static_cast<int>(row));
+  const RegionUse* use = how == nullptr ? nullptr : first_use(how->center);
+  if (use == nullptr) return "";
+  return use->region.empty() ? use->segment : bones_.segment_of(use->region);
+}
+
+}  // namespace ecorche::rig

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// The human template on the phantom's legs, cut, tilted and unlike: what a bone does not show is not made up.
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <set>
+
+#include "io/case/case_rules.hpp"
+#include "io/case/skeleton_file.hpp"
+#include "phantom/body.hpp"
+#include "phantom/bones.hpp"
+#include "phantom/isosurface.hpp"
+#include "preprocess/rig/fit_rig.hpp"
+#include "preprocess/rig/joint_sources.hpp"
+#include "preprocess/rig/other_side.hpp"
+#include "tests/unit/rig/balls.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+using Eigen::Vector3d;
+
+SurfaceMesh mirrored(SurfaceMesh mesh) {
+  mesh.V.col(0) = -mesh.V.col(0);
+  mesh.F.col(1).swap(mesh.F.col(2));
+  return mesh;
+}
+
+/// Pelvis, thighs, shanks and feet of both sides; the right ones are the left ones' mirror images.
+const std::vector<CaseBone>& legs() {
+  static const std::vector<CaseBone> made = [] {
+    const std::set<std::string> below{"thigh_left", "shank_left", "foot_left"};
+    std::vector<CaseBone> bones;
+    for (const phantom::Part& part : phantom::make_bones(phantom::make_landmarks(3))) {
+      if (part.mirror_of >= 0 || (part.segment != "pelvis" && !below.contains(part.segment))) continue;
+      bones.push_back({part.name, part.segment, phantom::isosurface(part.shape, 4, {})});
+      if (part.segment == "pelvis") continue;
+      bones.push_back({other_side(part.name), other_side(part.segment), mirrored(bones.back().surface)});
+      if (bones.back().name.empty()) bones.back().name = part.name + "_right";
+    }
+    // A pelvis that is given by its left half only is made whole.
+    for (std::size_t b = 0, count = bones.size(); b < count; ++b) {
+      if (bones[b].segment != "pelvis" || bones[b].surface.V.col(0).minCoeff() < -30) continue;
+      bones.push_back({bones[b].name + "_mirrored", "pelvis", mirrored(bones[b].surface)});
+    }
+    return bones;
+  }();
+  return made;
+}
+
+struct Found {
+  Rig rig;
+  std::vector<std::string> warnings;
+  std::size_t row(const std::string& joint) const {
+    return static_cast<std::size_t>(rig.skeleton.find_joint(joint));
+  }
+  const Joint& joint(const std::string& name) const { return rig.skeleton.segments[row(name)].joint; }
+  double confidence(const std::string& name) const { return rig.fits[row(name)].confidence; }
+  bool said(const std::string& joint, const std::string& what) const {
+    return std::any_of(warnings.begin(), warnings.end(), [&](const std::string& line) {
+      return line.starts_with("joint " + joint + ": ") && line.find(what) != std::string::npos;
+    });
+  }
+};
+
+Found found(const std::vector<CaseBone>& bones) {
+  io::PlacedSkeleton human = io::parse_skeleton(
+      io::yaml::Value::parse(io::skeleton_template("human").value(), "human.yaml"), io::Frame{});
+  Case patient;
+  patient.name = "legs";
+  patient.skeleton = human.skeleton;
+  patient.bones = bones;
+  io::place_regions({}, human.regions, patient);
+  Found out;
+  Context context;
+  context.log = [&](LogLevel level, std::string_view line) {
+    if (level == LogLevel::warning) out.warnings.emplace_back(line);
+  };
+  out.rig = fit(patient, context);
+  return out;
+}
+
+const Found& whole() {
+  static const Found made = found(legs());
+  return made;
+}
+
+// The bones, those of one segment without what `keep` refuses.
+template <class Keep>
+std::vector<CaseBone> cut(const std::string& segment, Keep&& keep) {
+  std::vector<CaseBone> bones = legs();
+  for (CaseBone& bone : bones) {
+    if (bone.segment == segment) bone.surface = test::part_of(bone.surface, keep);
+  }
+  return bones;
+}
+
+double degrees(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
+}
+
+void expect_near(const Found& now, const std::string& joint, double mm, double most_degrees) {
+  const Joint &is = now.joint(joint), &was = whole().joint(joint);
+  const Vector3d axis = was.axes.col(0);
+  Vector3d off = is.center - was.center;
+  if (was.kind == JointKind::hinge) off -= axis * axis.dot(off);
+  EXPECT_LT(off.norm(), mm) << joint;
+  EXPECT_LT(degrees(is.axes.col(0), axis), most_degrees) << joint;
+  EXPECT_LT(degrees(is.axes.col(2), was.axes.col(2)), most_degrees) << joint;
+}
+
+TEST(Damage, both_sides_of_a_symmetric_body_rest_alike) {
+  for (const std::string joint : {"hip", "knee", "ankle"}) {
+    const auto &left = whole().joint(joint + "_left").sequence,
+               &right = whole().joint(joint + "_right").sequence;
+    EXPECT_NEAR(left[0].rest, right[0].rest, 0.05) << joint;
+  }
+}
+
+TEST(Damage, a_femur_cut_at_a_quarter_takes_its_hip_from_the_other_side) {
+  const double top = whole().joint("hip_right").center.z(), knee = whole().joint("knee_right").center.z();
+  const Found now =
+      found(cut("thigh_right", [&](const Vector3d& p) { return p.z() < knee + 0.25 * (top - knee); }));
+  expect_near(now, "hip_right", 15, 10);
+  expect_near(now, "knee_right", 5, 5);
+  EXPECT_LT(now.confidence("hip_right"), JointSources::least_confidence);
+  EXPECT_TRUE(now.said("hip_right", "off the mirror image of hip_left, on a bone with"));
+  // The root stays amid both, however badly one of them is known.
+  EXPECT_LT((now.joint("pelvis").center - whole().joint("pelvis").center).norm(), 8);
+  EXPECT_LT(now.confidence("pelvis"), JointSources::least_confidence);
+}
+
+TEST(Damage, a_femur_without_its_condyles_does_not_kick_sideways) {
+  const double knee = whole().joint("knee_right").center.z();
+  std::vector<CaseBone> bones = cut("thigh_right", [&](const Vector3d& p) { return p.z() > knee + 60; });
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.35, Vector3d::UnitY()).toRotationMatrix();
+  for (CaseBone& bone : bones) bone.surface.V = bone.surface.V * tilt.transpose();
+  const Found now = found(bones);
+  EXPECT_LT(degrees(now.joint("knee_right").axes.col(0), tilt * whole().joint("knee_right").axes.col(0)), 12);
+  EXPECT_LT(now.confidence("knee_right"), JointSources::least_confidence);
+}
+
+TEST(Damage, both_femurs_cut_by_the_field_of_view_rest_as_bodies_do) {
+  const double top = whole().joint("hip_right").center.z();
+  std::vector<CaseBone> bones;
+  for (const CaseBone& bone : legs()) {
+    if (bone.segment != "pelvis" && !bone.segment.starts_with("thigh")) continue;
+    bones.push_back(bone);
+    if (bone.segment != "pelvis")
+      bones.back().surface = test::part_of(bone.surface, [&](const Vector3d& p) { return p.z() > top - 60; });
+  }
+  const Found now = found(bones);
+  for (const std::string side : {"left", "right"}) {
+    for (const AngleAxis& angle : now.joint("hip_" + side).sequence)
+      EXPECT_LT(std::abs(angle.rest), 15 * std::numbers::pi / 180) << side << " " << angle.name;
+    EXPECT_LT(now.confidence("hip_" + side), JointSources::least_confidence);
+  }
+}
+
+TEST(OtherSide, names) {
+  EXPECT_EQ(other_side("thigh_left"), "thigh_right");
+  EXPECT_EQ(other_side("thigh_right"), "thigh_left");
+  EXPECT_EQ(other_side("pelvis"), "");
+  EXPECT_EQ(other_side("_left"), "");
+}
+
+TEST(OtherSide, a_piece_is_laid_onto_its_mirrored_fellow) {
+  const SurfaceMesh femur = phantom::isosurface(phantom::femur_bone(phantom::make_landmarks(3)), 4, {});
+  const Eigen::Affine3d turn =
+      Eigen::Translation3d(20, -30, 40) * Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized());
+  SurfaceMesh other = mirrored(femur);
+  const double low = other.V.col(2).minCoeff(), high = other.V.col(2).maxCoeff();
+  SurfaceMesh piece =
+      test::part_of(other, [&](const Vector3d& p) { return p.z() < low + 0.3 * (high - low); });
+  for (Eigen::Index v = 0; v < piece.V.rows(); ++v)
+    piece.V.row(v) = (turn * piece.V.row(v).transpose()).transpose();
+  const auto laid = laid_onto(femur, piece);
+  ASSERT_TRUE(laid);
+  EXPECT_LT(laid->share, 0.4);
+  EXPECT_LT(laid->rms_mm, 1);
+  const Vector3d p(80, 10, 900);
+  EXPECT_LT((laid->map * p - turn * Vector3d(-80, 10, 900)).norm(), 10);
+  EXPECT_FALSE(laid_onto({}, piece));
+  EXPECT_FALSE(laid_onto(test::ball({0, 0, 0}, 400, 12), femur)) << "no two bones";
+}
+
+}  // namespace
+}  // namespace ecorche::rig
