@@ -54,10 +54,11 @@ Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, b
 Connection::~Connection() = default;
 
 // Says nothing where there is no memory for it.
-void Connection::log(spdlog::level::level_enum level, const char* what, const std::string& why) const {
+void Connection::log(spdlog::level::level_enum level, std::string_view what,
+                     std::string_view why) const noexcept {
   try {
-    house_.journal().line(level, address_, peer_, what + why);
-  } catch (const std::bad_alloc&) {
+    house_.journal().line(level, address_, peer_, std::string(what).append(why));
+  } catch (const std::exception&) {
   }
 }
 

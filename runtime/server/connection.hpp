@@ -11,6 +11,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "runtime/server/house.hpp"
 #include "runtime/server/outbox.hpp"
@@ -141,7 +142,7 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
 
   void spawn(net::awaitable<void> work);
   std::uint64_t held() const;
-  void log(spdlog::level::level_enum level, const char* what, const std::string& why) const;
+  void log(spdlog::level::level_enum level, std::string_view what, std::string_view why) const noexcept;
   /// What was found for this connection elsewhere. Whatever goes wrong ends this connection alone.
   void take_back(const std::function<void()>& answer);
   net::awaitable<bool> open_transport();
