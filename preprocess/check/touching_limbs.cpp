@@ -224,7 +224,8 @@ std::vector<Touch> touching_limbs(const Model& model) {
       if (piece.own >= 0 && piece.other >= 0)
         by_other[finder.limbs()[static_cast<std::size_t>(piece.other)]].push_back(&piece);
     }
-    for (const auto& [other, some] : by_other) {
+    for (const auto& [beside, some] : by_other) {
+      const int other = beside;  // clang 14 takes no structured binding into a lambda
       double sure = 0;
       for (const Piece* piece : some) sure += piece->sure ? piece->area : 0;
       if (sure < kPatch * length * length) continue;

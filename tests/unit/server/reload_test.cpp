@@ -225,12 +225,12 @@ TEST(Reload, NewMotionOfTheSameModelIsTakenUp) {
 // Giving back what a model holds takes longer than a frame.
 TEST(Reload, ModelsDoNotGoOnTheThreadThatServes) {
   std::atomic<std::thread::id> serves{};
+  std::atomic<int> gone = 0, gone_there = 0;  // the last model goes with the server
   TestServer server(Options{}, {.transport = {}, .timer_fails = {}, .handling = [&](bool) {
                                   if (serves.load() == std::thread::id{}) serves = std::this_thread::get_id();
                                 }});
   client::Client asks(server.address(), "test");
   asks.call(open("twin"));
-  std::atomic<int> gone = 0, gone_there = 0;
   const auto watched = [&](std::shared_ptr<const Model> model) {
     const Model* const body = model.get();
     return std::shared_ptr<const Model>(body, [&, model = std::move(model)](const Model*) mutable {
