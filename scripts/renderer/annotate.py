@@ -76,6 +76,34 @@ def bar_rows(label, low, high, colour_at, columns, size):
     return out
 
 
+def folded(text, columns, size):
+    """Lines of `text` that fit into `columns`, as far as its words allow."""
+    lines = [""]
+    for part in text.split():
+        longer = f"{lines[-1]} {part}".strip()
+        if lines[-1] and word(longer, size).shape[1] > columns:
+            lines.append(part)
+        else:
+            lines[-1] = longer
+    return lines
+
+
+def centred(row, columns):
+    """`row` in the middle of a strip of paper."""
+    out = strip(columns, row.shape[0])
+    left = (columns - row.shape[1]) // 2
+    out[:, left: left + row.shape[1]] = row
+    return out
+
+
+def beside(pictures, titles, view):
+    """Pictures of one height side by side, each below its title, with room for the letters of its sides."""
+    wide = max(rgb.shape[1] for rgb in pictures) + pictures[0].shape[0] // 10
+    done = [annotated(centred(rgb, wide), title, view) for rgb, title in zip(pictures, titles)]
+    rows = max(one.shape[0] for one in done)
+    return np.concatenate([np.concatenate([strip(one.shape[1], rows - one.shape[0]), one]) for one in done], axis=1)
+
+
 def annotated(rgb, title, view=None, legend=(), bar=None, dark=False):
     """`rgb` below its title, with the sides of `view` at its edges and a legend [(name, colour)] or a bar (label, low, high, colour_at)
     below. `dark`: the picture is, so that letters on it are light."""
@@ -86,14 +114,15 @@ def annotated(rgb, title, view=None, legend=(), bar=None, dark=False):
         for side, text in zip((0, 1), SIDES[view]):
             big = int(1.4 * size)
             put(rgb, text, size // 2 if side == 0 else rgb.shape[1] - size // 2 - word(text, big).shape[1], rgb.shape[0] // 2, big, colour)
-    columns = max(rgb.shape[1], word(title, size).shape[1] + size)
-    rows = [strip(columns, 2 * size)]
-    put(rows[0], title, size // 2, size // 2, size)
+    columns = max(rgb.shape[1], 32 * size)  # a narrow picture stands in the middle of its words
+    lines = folded(title, columns - size, size)
+    rows = [strip(columns, int(1.5 * size) * len(lines) + size // 2)]
+    for number, text in enumerate(lines):
+        put(rows[0], text, (columns - word(text, size).shape[1]) // 2, int(1.5 * size) * number + size // 2, size)
     rows.append(rgb)
     if legend:
         rows.append(legend_rows(legend, columns, size))
     if bar:
         rows.append(bar_rows(*bar, columns, size))
     columns = max(row.shape[1] for row in rows)
-    return np.concatenate([np.concatenate([row, strip(columns - row.shape[1], row.shape[0])], axis=1) if row.shape[1] < columns else row
-                           for row in rows])
+    return np.concatenate([centred(row, columns) for row in rows])

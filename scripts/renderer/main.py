@@ -22,6 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
+import annotate  # noqa: E402
 import bodies  # noqa: E402
 import scene  # noqa: E402
 import skeletons  # noqa: E402
@@ -68,7 +69,7 @@ def main():
     elif all(path.suffix == ".nrrd" for path in args.paths):
         frames = volumes.rendered(args.paths, args.view, args.height, args.grey)
         if args.beside:
-            save(slices.picture(np.concatenate(frames, axis=1)), "beside")
+            save(slices.picture(annotate.beside(frames, [path.stem for path in args.paths], args.view)), "beside")
         else:
             for number, frame in enumerate(frames):
                 save(slices.picture(frame), f"{number:04d}")

@@ -6,13 +6,13 @@ import zlib
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
-from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkRenderer, vtkRenderWindow, vtkVolume, vtkVolumeProperty, vtkWindowToImageFilter
+from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkLight, vtkRenderer, vtkRenderWindow, vtkVolume, vtkVolumeProperty, vtkWindowToImageFilter
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 import vtkmodules.vtkRenderingVolumeOpenGL2  # noqa: F401
 
 import bodies
-from scene import VIEWS, distinct
+from scene import BACKGROUND, VIEWS, distinct
 
 
 def property_for(voxels, grey):
@@ -29,12 +29,15 @@ def property_for(voxels, grey):
         opacity.AddPoint(2, 0.5)
         look.SetInterpolationTypeToNearest()
     else:
-        for at, shade in ((0, (0.3, 0.1, 0.08)), (0.45, (0.80, 0.52, 0.42)), (0.7, (0.95, 0.88, 0.75)), (1, (1, 1, 0.97))):
+        for at, shade in ((0, (0.85, 0.55, 0.45)), (0.45, (0.80, 0.52, 0.42)), (0.7, (0.95, 0.88, 0.75)), (1, (1, 1, 0.97))):
             colour.AddRGBPoint(low + at * (high - low), *shade)
         for at, much in ((0, 0), (0.25, 0), (0.42, 0.02), (0.55, 0.03), (0.72, 0.35), (1, 0.8)):
             opacity.AddPoint(low + at * (high - low), much)
         look.SetInterpolationTypeToLinear()
         look.ShadeOn()
+        # Within flesh of one grey there is no surface to be lit: by what is scattered alone it would be black (see `light`).
+        look.SetAmbient(0.5)
+        look.SetDiffuse(0.55)
     look.SetColor(colour)
     look.SetScalarOpacity(opacity)
     return look
@@ -65,8 +68,12 @@ def shot(image, look, bounds, view, height):
     middle, size = (low + high) / 2, high - low
     tall, wide = (1.04 * np.abs(axis) @ size for axis in (np.cross(direction, right), right))
     renderer, window = vtkRenderer(), vtkRenderWindow()
-    renderer.SetBackground(0.97, 0.97, 0.97)
+    renderer.SetBackground(*BACKGROUND)
     renderer.AddVolume(volume)
+    light = vtkLight()
+    light.SetLightTypeToHeadlight()
+    light.SetAmbientColor(1, 1, 1)  # black, unless one says so
+    renderer.AddLight(light)
     window.SetOffScreenRendering(1)
     window.SetSize(max(int(height * wide / tall), 16), height)
     window.AddRenderer(renderer)
