@@ -12,6 +12,7 @@ import threading
 import time
 import unittest
 
+import h5py
 import numpy as np
 from ecorche_client import Client, ServerError
 from serving import ECORCHE, Server
@@ -140,6 +141,41 @@ class Commands(unittest.TestCase):
             self.assertEqual(there["tissue"][2], -1)
             back = client.probe(there["points"][inside], to_rest=False)
             np.testing.assert_allclose(back["points"], middle[inside], atol=1e-2)
+
+    def test_a_probe_goes_where_the_mesh_goes(self):
+        """What follows the tets is drawn where a probe of its rest place goes. A bone is drawn rigidly, and to the last vertex: where
+        one of its surface lies in a soft tet beside it (a tet is what most of it is), the probe bends with that tet, near joints by
+        millimetres; so it does where the bones of two segments contest a tet, which for what was soft stays soft."""
+        with h5py.File(MODEL) as file:
+            rest = {name: group["points"][()] for name, group in file["ecorche/tissues"].items()}
+            bones = {name for name, group in file["ecorche/tissues"].items() if np.ravel(group["segment"][()])[0] >= 0}
+        rig = [row["segment"] for row in json.loads(run("--json", "info", MODEL).stdout)["rig"]]
+        with Server(MODEL) as server, Client("127.0.0.1", server.port) as client:
+            pose = client.open().rest_pose()
+            for segment in ("shank_right", "thigh_left", "forearm_left"):
+                pose[rig.index(segment)] = (np.cos(0.35), np.sin(0.35), 0, 0)  # by 40 degrees
+            client.subscribe_mesh()
+            sequence = client.send_pose(pose)
+            drawn = [frame for frame in client.frames(2) if frame.pose_sequence == sequence][0].positions
+            self.assertEqual(drawn.keys(), rest.keys())
+            apart, bent, vertices = [], [], 0
+            for name, points in rest.items():
+                probed = client.probe(points, to_rest=False, gradient=True)
+                away = np.linalg.norm(probed["points"] - drawn[name], axis=1)
+                outside = np.isnan(away)  # a probe knows the body alone, which is its tets; a mesh is carried along outside of them
+                self.assertTrue(not outside.any() or name == "skin" or outside.sum() <= 1, f"{name}: {outside.sum()} outside")
+                vertices += len(points)
+                far = away > 0.1
+                self.assertTrue(name in bones or not far.any(), f"{name} is no bone, and off by {np.nanmax(away):.2f} mm")
+                if not far.any():
+                    continue
+                apart += list(away[far])
+                F = probed["gradient"][far].reshape(-1, 3, 3)
+                bent += list(np.abs(np.swapaxes(F, 1, 2) @ F - np.eye(3)).max(axis=(1, 2)))
+        print(f"{len(apart)} of {vertices} vertices are drawn apart from their probes, by {max(apart):.2f} mm at worst")
+        self.assertLess(len(apart), 0.01 * vertices)
+        self.assertLess(max(apart), 16, "on the head of the femur, whose thigh turns by 40 degrees")
+        self.assertGreater(np.mean(np.array(bent) > 1e-3), 0.9)
 
     def test_what_is_no_clip(self):
         for name, content, code, message in (("Run.bvh", "", 78, "clients could not ask for a clip of this name"),
