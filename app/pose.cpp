@@ -152,12 +152,18 @@ class FrameWriter {
 
   void write_tissue(std::uint32_t row) {
     const std::vector<float>& posed = body_.tissues[row];
-    SurfaceMesh mesh;
+    io::NamedSurface named{model_.tissues[row].name, model_.tissues[row].group, {}};
+    SurfaceMesh& mesh = named.mesh;
     mesh.V = Eigen::Map<const PointsF>(posed.data(), static_cast<Eigen::Index>(posed.size() / 3), 3)
                  .cast<double>();
     mesh.F = model_.tissues[row].F;
     for (const std::string& format : settings_.formats) {
-      io::write_surface(next(model_.tissues[row].name + "." + format), mesh);
+      const fs::path file = next(named.name + "." + format);
+      if (format == "glb") {
+        io::write_surfaces(file, {&named, 1});  // with the tissue's name and material
+      } else {
+        io::write_surface(file, mesh);
+      }
     }
   }
 
@@ -338,7 +344,10 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
   add_bridge_option(*command, s->bridge);
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');
-  command->add_option("--format", s->formats, "of the tissues: stl, obj, ply, off, vtp, glb, or several")
+  command
+      ->add_option(
+          "--format", s->formats,
+          "of the tissues, a file each: stl, obj, ply, off, vtp, glb (with name and colour), or several")
       ->delimiter(',')
       ->check(CLI::IsMember({"stl", "obj", "ply", "off", "vtp", "glb"}))
       ->capture_default_str();

@@ -2,8 +2,8 @@
 // What others make of a .glb of ours: the Khronos validator, and three.js playing it.
 //
 // usage: node check_glb.mjs FILE.glb SECONDS   (node_modules: see scripts/setup --tests)
-// Prints one JSON object: the validator's issues, and of each skinned mesh where three.js puts its vertices at that time,
-// in LPS mm.
+// Prints one JSON object: the validator's issues, and of each mesh where three.js puts its vertices at that time, in LPS mm,
+// its material, and the names of the nodes.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { AnimationMixer, Vector3 } from "three";
@@ -24,9 +24,10 @@ if (gltf.animations.length > 0) {
 }
 gltf.scene.updateMatrixWorld(true);
 const meshes = {};
+const materials = {};
 gltf.scene.traverse((object) => {
-  if (!object.isSkinnedMesh) return;
-  object.skeleton.update();
+  if (!object.isMesh) return;
+  if (object.isSkinnedMesh) object.skeleton.update();
   const at = new Vector3();
   const points = [];
   for (let i = 0; i < object.geometry.attributes.position.count; ++i) {
@@ -34,12 +35,17 @@ gltf.scene.traverse((object) => {
     points.push([1000 * at.x, -1000 * at.z, 1000 * at.y]);
   }
   // three.js makes the names of its objects unique; the file's stand in its JSON.
-  meshes[gltf.parser.json.meshes[gltf.parser.associations.get(object).meshes].name] = points;
+  const name = gltf.parser.json.meshes[gltf.parser.associations.get(object).meshes].name;
+  meshes[name] = points;
+  const { name: called, transparent, opacity, color } = object.material;
+  materials[name] = { name: called, transparent, opacity, color: color.toArray() };
 });
 console.log(
   JSON.stringify({
     issues: report.issues,
     animations: gltf.animations.map((clip) => ({ name: clip.name, seconds: clip.duration, tracks: clip.tracks.length })),
     meshes,
+    materials,
+    nodes: gltf.parser.json.nodes.map((node) => node.name),
   }),
 );

@@ -75,6 +75,22 @@ class Gltf(unittest.TestCase):
             self.assertLess(apart, 0.1 if name in bones else cut["worst"] + 0.1, name)
         print(f"four influences: {cut}")
 
+    def test_a_posed_tissue_has_its_name_and_its_look(self):
+        folder = self.folder / "still"
+        run("pose", MODEL, "-o", folder, "--pose", "lib:anatomical", "--format", "glb,obj", "--tissues", "all")
+        exported = self.elsewhere(self.glb, 0)["materials"]
+        tissues = {tissue["name"]: tissue["group"] for tissue in run("info", MODEL)["tissues"]}
+        one_of_each = {group: name for name, group in tissues.items()}
+        self.assertGreaterEqual(set(one_of_each), {"skin", "bone", "muscle", "organ"})
+        for group, name in one_of_each.items():
+            read = self.elsewhere(folder / f"{name}.glb", 0)
+            self.assertEqual([read["issues"][kind] for kind in ("numErrors", "numWarnings", "numInfos", "numHints")], [0, 0, 0, 0], name)
+            self.assertEqual(read["nodes"], [name])
+            self.assertLess(farthest(read["meshes"][name], vertices(folder / f"{name}.obj")), 1e-3, name)
+            self.assertEqual(read["materials"][name], exported[name], "as export colours it")
+            self.assertEqual(read["materials"][name]["transparent"], group == "skin", "skin hides nothing")
+        self.assertEqual(len(list(folder.glob("*.glb"))), len(tissues))
+
     def test_the_motion_comes_back(self):
         for file in (self.glb, self.bvh):
             back = run("motion", file, "--model", MODEL, "--against", self.bvh)
