@@ -64,6 +64,12 @@ server::Endpoint endpoint(const std::string& text) {
   return {.host = address.host, .port = address.port};
 }
 
+// As `endpoint` reads it.
+std::string written(const std::string& host, std::uint16_t port) {
+  const bool v6 = host.find(':') != host.npos;
+  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
 int run_serve(const Settings& settings, const Program& program) {
   use_tidy_heap();
   // stdout is for the result.
@@ -73,8 +79,9 @@ int run_serve(const Settings& settings, const Program& program) {
 
   server::Options options = settings.options;
   options.listen = endpoint(settings.listen);
-  const std::string host = options.listen.host;
   if (!settings.http.empty()) options.http = endpoint(settings.http);
+  const std::string host = options.listen.host, http_host = options.http ? options.http->host : "";
+  const char* scheme = options.certificate.empty() ? "http" : "https";
   if (!settings.token_file.empty()) options.token = read_token(settings.token_file);
   options.version = ECORCHE_VERSION;
   if (!options.record_folder.empty()) files::make_folder(options.record_folder);
@@ -90,15 +97,19 @@ int run_serve(const Settings& settings, const Program& program) {
                 "give it CAP_SYS_NICE or an RLIMIT_RTPRIO of 1 (ulimit -r 1), or serve without");
   }
 
-  const std::string where = host + ":" + std::to_string(server.port());
+  const std::string where = written(host, server.port());
   if (!settings.port_file.empty()) {
     std::string ports = std::to_string(server.port()) + "\n";
     if (server.http_port() != 0) ports += std::to_string(server.http_port()) + "\n";
     files::write_text(settings.port_file, ports);
   }
   nlohmann::json report{{"address", where}, {"port", server.port()}, {"models", settings.models.size()}};
-  if (server.http_port() != 0) report["http_port"] = server.http_port();
-  program.result("listening on " + where, report);
+  std::string text = "listening on " + where;
+  if (server.http_port() != 0) {
+    report["http_port"] = server.http_port();
+    text += std::string(", and ") + scheme + "://" + written(http_host, server.http_port());
+  }
+  program.result(text, report);
 
   const std::stop_callback on_stop(program.stop, [&server] { server.stop(); });
   const OnHangup on_hangup([&server] { server.reload(); });

@@ -84,6 +84,11 @@ class Access(unittest.TestCase):
                 get(server, "/metrics")
             self.assertEqual(caught.exception.code, 401)
             caught.exception.close()
+            _, out, _ = server.stop()
+            self.assertEqual(out, f"listening on {server.address}, and https://127.0.0.1:{server.http_port}\n", "both ports are named")
+        with Server(MODEL, options=["--http", "[::1]:0"], host="[::1]") as server:
+            _, out, _ = server.stop()
+            self.assertEqual(out, f"listening on {server.address}, and http://[::1]:{server.http_port}\n")
 
     def test_real_time_is_for_who_may(self):
         """One thread of the server alone, and none where the system does not let it."""
