@@ -204,6 +204,7 @@ int run(const Program& program, const Settings& s) {
     throw Error(ErrorKind::usage, "--volume",
                 "its voxels are not cubic, so the two do not pose it on one lattice", "resample it");
   const std::vector<Frame> frames = read_frames(program, s.frames, model->rig);
+  note_missed(program, frames);
   const runtime::BodyPoser poser(model);
   const runtime::VolumeBalls balls(*model, *volume, s.bridge, program.context("seams"));
   json rows = json::array();

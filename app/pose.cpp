@@ -284,6 +284,10 @@ int run(const Program& program, const Settings& settings) {
         quality_json(*model, body, runtime::measure(*model, posed.still(), poser.all_tissues(), {}, closed),
                      det_f, {skinning, settings.unfold});
     if (settings.unfold) quality["unfolded"] = unfolded;
+    if (!frame.missed.empty()) {
+      quality["verdict"] = "warn";
+      quality["warnings"].insert(quality["warnings"].begin(), frame.missed.begin(), frame.missed.end());
+    }
     if (quality["verdict"] == "warn") program.warn();
     const fs::path folder = frame.name.empty() ? settings.output : settings.output / frame.name;
     PosedFolder target(folder);
@@ -302,7 +306,7 @@ int run(const Program& program, const Settings& settings) {
                                 {"files", std::move(written)},
                                 {"quality", quality}});
     if (!frame.ik.is_null()) result["frames"].back()["ik"] = frame.ik;
-    if (frame.missed) result["ok"] = false;
+    if (!frame.missed.empty()) result["ok"] = false;
     text += line_of(result["frames"].back());
   }
   program.result(text, result);

@@ -82,9 +82,9 @@ std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice
   }
   if (!choice.ik.empty()) {
     SolvedPose solved = solve_pose(program, choice.ik, rig, choice.ik_tolerance_mm);
-    return {{"", std::move(solved.pose), !solved.reached, std::move(solved.report)}};
+    return {{"", std::move(solved.pose), std::move(solved.report), std::move(solved.warnings)}};
   }
-  if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig), false, {}}};
+  if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig), {}, nlohmann::json::array()}};
   if (choice.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
   const auto motion = open_motion(program, choice.motion, rig);
   std::vector<Frame> frames;
@@ -92,9 +92,17 @@ std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice
   for (const std::size_t f : numbers) {
     char name[32] = "";
     if (numbers.size() > 1) std::snprintf(name, sizeof name, "frame_%04zu", f);
-    frames.push_back({name, motion->at(f), false, {}});
+    frames.push_back({name, motion->at(f), {}, nlohmann::json::array()});
   }
   return frames;
+}
+
+void note_missed(const Program& program, const std::vector<Frame>& frames) {
+  for (const Frame& frame : frames) {
+    for (const nlohmann::json& missed : frame.missed)
+      program.note("warning: " + missed["what"].get<std::string>() + " (" +
+                   missed["mend"].get<std::string>() + ")");
+  }
 }
 
 }  // namespace ecorche::app

@@ -30,12 +30,15 @@ void add_frame_options(CLI::App& command, FrameChoice& choice);
 struct Frame {
   std::string name;  ///< empty for a single pose, which needs no folder of its own
   Pose pose;
-  bool missed = false;  ///< a goal of --ik
-  nlohmann::json ik;    ///< of --ik alone: what was found
+  nlohmann::json ik;                                ///< of --ik alone: what was found
+  nlohmann::json missed = nlohmann::json::array();  ///< goals of --ik, as warnings of quality.json
 };
 
 /// The poses, in order; notes what the clip moves nothing by, and where its zero pose was aligned. Throws
 /// Error{usage} for a choice that names no pose, and as the readers do.
 std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig);
+
+/// Notes the missed goals, for commands that give no verdict.
+void note_missed(const Program& program, const std::vector<Frame>& frames);
 
 }  // namespace ecorche::app

@@ -219,6 +219,7 @@ int run(const Program& program, const Settings& s) {
       seams = runtime::seams_of(runtime::balls_at_rest(skeleton, lattice), skeleton.segment, rig.skeleton,
                                 program.context("seams"));
     const std::vector<Frame> frames = s.poses() ? read_frames(program, s.frames, rig) : std::vector<Frame>(1);
+    note_missed(program, frames);
     for (const Frame& frame : frames) {
       std::size_t clamped = 0;
       runtime::BallSet set = s.poses() ? posed_balls(skeleton, lattice, rig, frame.pose, seams, clamped)

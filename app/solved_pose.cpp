@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/solved_pose.hpp"
 
-#include <cstdio>
+#include <fmt/format.h>
+
 #include <numbers>
 
 #include "core/kinematics/angles.hpp"
@@ -33,26 +34,25 @@ json angles_json(const Rig& rig, const Pose& pose) {
   return out;
 }
 
-void say_target(const Program& program, const std::string& name, const Eigen::Vector3d& at, double away,
-                double tolerance_mm) {
-  char text[320];
-  if (away <= tolerance_mm) {
-    std::snprintf(text, sizeof text, "note: %s is %.1f mm from its goal", name.c_str(), away);
-  } else {
-    std::snprintf(text, sizeof text,
-                  "warning: %s is %.1f mm from its goal: beyond reach, limits or the other goals (it came to "
-                  "[%.1f, %.1f, %.1f]: set the goal there, or write move_root: true, or a larger weight)",
-                  name.c_str(), away, at.x(), at.y(), at.z());
-  }
-  program.note(text);
+json missed_target(const std::string& name, const Eigen::Vector3d& at, double away, double tolerance_mm) {
+  return {{"kind", "missed_goal"},
+          {"goal", name},
+          {"value", away},
+          {"threshold", tolerance_mm},
+          {"what",
+           fmt::format("{} is {:.1f} mm from its goal: beyond reach, limits or the other goals", name, away)},
+          {"mend", fmt::format("it came to [{:.1f}, {:.1f}, {:.1f}]: set the goal there, or write move_root: "
+                               "true, or a larger weight",
+                               at.x(), at.y(), at.z())}};
 }
 
-void say_look(const Program& program, const std::string& name, double off, bool near) {
-  char text[200];
-  std::snprintf(text, sizeof text, "%s: %s is %.1f degrees off%s", near ? "note" : "warning", name.c_str(),
-                off * kDegrees,
-                near ? "" : " (look at a place that the neck can turn to, or write move_root: true)");
-  program.note(text);
+json missed_look(const std::string& name, double off, double tolerance_mm) {
+  return {{"kind", "missed_look"},
+          {"goal", name},
+          {"value", off * kDegrees},
+          {"threshold", tolerance_mm / kLookMm * kDegrees},
+          {"what", fmt::format("{} is {:.1f} degrees off", name, off * kDegrees)},
+          {"mend", "look at a place that the neck can turn to, or write move_root: true"}};
 }
 
 }  // namespace
@@ -63,14 +63,16 @@ SolvedPose solve_pose(const Program& program, const std::filesystem::path& file,
   const kinematics::IkProblem& problem = request.problem;
   const kinematics::IkResult result = kinematics::solve_ik(rig, request.start, problem);
   const std::vector<RigidTransform> motion = kinematics::forward(rig, result.pose);
-  SolvedPose out{result.pose, true, {}};
+  SolvedPose out{result.pose, {}, json::array()};
   json targets = json::array(), looks = json::array();
   for (std::size_t i = 0; i < problem.targets.size(); ++i) {
     const kinematics::IkTarget& target = problem.targets[i];
     const Eigen::Vector3d at = motion[target.segment] * target.point;
     const bool near = result.away_mm[i] <= tolerance_mm;
-    out.reached = out.reached && near;
-    say_target(program, request.names[i], at, result.away_mm[i], tolerance_mm);
+    if (near)
+      program.note(fmt::format("note: {} is {:.1f} mm from its goal", request.names[i], result.away_mm[i]));
+    else
+      out.warnings.push_back(missed_target(request.names[i], at, result.away_mm[i], tolerance_mm));
     targets.push_back({{"name", request.names[i]},
                        {"goal_mm", vector_json(target.goal)},
                        {"at_mm", vector_json(at)},
@@ -80,12 +82,14 @@ SolvedPose solve_pose(const Program& program, const std::filesystem::path& file,
   for (std::size_t i = 0; i < problem.looks.size(); ++i) {
     const std::string& name = request.names[problem.targets.size() + i];
     const bool near = kLookMm * result.off[i] <= tolerance_mm;
-    out.reached = out.reached && near;
-    say_look(program, name, result.off[i], near);
+    if (near)
+      program.note(fmt::format("note: {} is {:.1f} degrees off", name, result.off[i] * kDegrees));
+    else
+      out.warnings.push_back(missed_look(name, result.off[i], tolerance_mm));
     looks.push_back({{"name", name}, {"off_deg", result.off[i] * kDegrees}, {"reached", near}});
   }
   const Eigen::Quaterniond& turn = result.pose.rotation.at(0);
-  out.report = {{"reached", out.reached},
+  out.report = {{"reached", out.warnings.empty()},
                 {"tolerance_mm", tolerance_mm},
                 {"targets", std::move(targets)},
                 {"looks", std::move(looks)},

@@ -17,12 +17,13 @@ inline constexpr double kMissedMm = 1;
 
 struct SolvedPose {
   Pose pose;
-  bool reached = false;   ///< every target within the tolerance, every look as near at 200 mm
   nlohmann::json report;  ///< root, angles, and the residual of every target and look
+  /// One for each goal beyond the tolerance, a look at 200 mm: as those of quality.json.
+  nlohmann::json warnings = nlohmann::json::array();
 };
 
-/// Notes what came of each goal; warns, with where it came to and what helps, beyond `tolerance_mm`. Throws
-/// as io::read_ik.
+/// Notes how near each goal within `tolerance_mm` is; the others, with where they came to and what helps, are
+/// returned. Throws as io::read_ik.
 SolvedPose solve_pose(const Program& program, const std::filesystem::path& file, const Rig& rig,
                       double tolerance_mm);
 

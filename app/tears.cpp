@@ -73,6 +73,7 @@ json look_at_frames(const Program& program, const Settings& s, const Body& body)
   json frames = json::array();
   std::size_t torn = 0;
   const std::vector<Frame> poses = read_frames(program, s.frames, body.rig);
+  note_missed(program, poses);
   const Context context = program.context("frames");
   for (const Frame& frame : poses) {
     Pose pose = frame.pose;

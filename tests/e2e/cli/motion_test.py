@@ -160,7 +160,7 @@ class Motion(unittest.TestCase):
         far = self.put("far.yaml", text.replace(str(goal), "[0, -5000, 0]"))
         result = run("pose", MODEL, "-o", self.folder / "far", "--ik", far, "--tissues", "skin")
         self.assertEqual(result.returncode, 0)
-        self.assertIn("mm from its goal: beyond reach", result.stderr)
+        self.assertIn("mm from its goal: beyond reach", result.stdout)
         self.refused(64, "--ik stands beside", "pose", MODEL, "-o", self.folder / "x", "--ik", file, "--pose", "lib:sitting")
         self.refused(78, "unknown segment", "pose", MODEL, "-o", self.folder / "x", "--ik", self.put("bad.yaml", text.replace("hand_left", "wing")))
 

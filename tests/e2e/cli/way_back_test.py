@@ -263,9 +263,17 @@ class Ik(Case):
         self.assertFalse(out["frames"][0]["ik"]["reached"])
         hand = out["frames"][0]["ik"]["targets"][0]
         self.assertGreater(hand["residual_mm"], 1000)
-        self.assertIn(f"warning: hand_left is {hand['residual_mm']:.1f} mm from its goal: beyond reach, limits or the other goals "
-                      f"(it came to [{', '.join(f'{x:.1f}' for x in hand['at_mm'])}]: set the goal there", result.stderr)
-        self.assertTrue(json.loads(self.ok(*words, "--ik-tolerance", "9000").stdout)["ok"], "as far as one may miss")
+        quality = json.loads((self.folder / "ik" / "quality.json").read_text())
+        self.assertEqual((quality["verdict"], quality["warnings"][0]["kind"]), ("warn", "missed_goal"))
+        self.assertEqual(quality["warnings"][0]["value"], hand["residual_mm"])
+        told = run(*words[1:], "--fail-on-warn")  # the same, as people read it
+        self.assertEqual(told.returncode, 1, told.stderr)
+        self.assertRegex(told.stdout, r"^\S+: warn, ")
+        self.assertIn(f"  warning: hand_left is {hand['residual_mm']:.1f} mm from its goal: beyond reach, limits or the other goals "
+                      f"(it came to [{', '.join(f'{x:.1f}' for x in hand['at_mm'])}]: set the goal there", told.stdout)
+        near = json.loads(self.ok(*words, "--ik-tolerance", "9000").stdout)
+        self.assertTrue(near["ok"], "as far as one may miss")
+        self.assertEqual([w for w in near["frames"][0]["quality"]["warnings"] if w["kind"].startswith("missed")], [])
 
 
 if __name__ == "__main__":
