@@ -108,6 +108,7 @@ int run(const Program& program, const Settings& settings) {
                     {"what", f.what},
                     {"mend", f.mend}});
     possible = possible && f.severity != check::Severity::error;
+    if (f.severity == check::Severity::warning) program.warn();
     text += std::string(check::severity_name(f.severity)) + ": " + f.where + ": " + f.what + " (" + f.mend +
             ")\n";
   }

@@ -293,6 +293,7 @@ class Stream {
                         {"bytes", client_.bytes_received()}};
     if (!settings_.volume.empty()) json["volume_latency_ms"] = volumes_.percentiles();
     if (settings_.quality) json["frames_with_warning"] = warned_;
+    if (warned_ > 0) program_.warn();
     if (check_) {
       json["same_model"] = same_model_;
       json["checked"] = checked.checked;

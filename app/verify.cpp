@@ -102,6 +102,7 @@ void declare_verify(CLI::App& app, Program& program, Run& chosen) {
     chosen = [path, &program] {
       const Verdict verdict = verify(*path, program);
       for (const std::string& fault : verdict.faults) program.note("fault: " + fault);
+      if (!verdict.contacts.empty()) program.warn();
       nlohmann::json report = model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr,
                                            verdict.found, verdict.checked, verdict.bad);
       report["contacts"] = verdict.contacts;

@@ -136,6 +136,24 @@ class Cli(unittest.TestCase):
         self.assertEqual(refused.returncode, 65, refused.stderr)
         self.assertIn(re.search(r"(?m)^error: ([^:]*: [^,(]*)", looked.stdout).group(1).strip(), refused.stderr)
 
+    def test_warnings_fail_where_that_is_asked(self):
+        good = [("check", CASE), ("rig", CASE), ("verify", MODEL)]
+        coarse = self.folder / "coarse.hdf"  # arms grow together with the trunk
+        warned = [("preprocess", CASE, "-o", coarse, "--max-tets", 15000), ("verify", coarse)]
+        case = self.folder / "case"
+        shutil.copytree(CASE, case)
+        data = bytearray((case / "bones" / "tibia_right.stl").read_bytes())
+        data[80:84] = (int.from_bytes(data[80:84], "little") - 3).to_bytes(4, "little")
+        (case / "bones" / "tibia_right.stl").write_bytes(data[:-150])  # three triangles less: a hole
+        warned.append(("check", case))
+        for words in good:
+            self.assertEqual(run("--fail-on-warn", *words).returncode, 0, words)
+        for words in warned:
+            asked = run("--fail-on-warn", *words)
+            self.assertEqual(asked.returncode, 1, f"{words}: {asked.stderr}")
+            self.assertNotEqual(asked.stdout, "", "all is written")
+            self.assertEqual(run(*words).returncode, 0, words)
+
     def test_a_wrong_pose_is_refused(self):
         pose = self.folder / "pose.yaml"
         skeleton = re.search(r"^name: (\S+)", (CASE / "skeleton.yaml").read_text(), re.M).group(1)
