@@ -298,9 +298,8 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
                    "pose --deformer spheres")
       ->check(CLI::Range(thin::least_thinness, thin::most_thinness));
   CLI::Option* cache = command->add_option("--cache", settings->cache,
-                                           "a folder that keeps what the stages made: a run that was "
-                                           "interrupted goes on from there, and a run with "
-                                           "other options makes again only what they change");
+                                           "a folder that keeps what the stages made: resumes an interrupted "
+                                           "run and recomputes only what changed");
   command
       ->add_option("--cache-gib", settings->cache_gib,
                    "the folder's limit; what was not used for longest goes first")
