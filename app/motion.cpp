@@ -49,7 +49,9 @@ json joints_json(const Rig& rig, MotionSource& source, const kinematics::Retarge
 }
 
 json report_json(const kinematics::MotionReport& report) {
-  json out{{"foot_sliding", json::array()}, {"beyond_limits", json::array()}};
+  json out{{"foot_sliding", json::array()},
+           {"ground_mm_per_s", {report.ground.x(), report.ground.y()}},
+           {"beyond_limits", json::array()}};
   for (const kinematics::FootSliding& foot : report.feet)
     out["foot_sliding"].push_back({{"joint", foot.joint},
                                    {"contact_share", foot.contact_share},
@@ -81,7 +83,10 @@ std::string to_text(const json& result) {
                 moved, match["segments"].size(), still.empty() ? "none" : still.c_str(),
                 text(match["reference"]).c_str(), match["figure_to_patient"].get<double>());
   }
-  out += "\nfoot sliding: joint, in contact (% of frames), mean and worst (mm/s)\n";
+  const json& ground = result["ground_mm_per_s"];
+  const double speed = std::hypot(ground[0].get<double>(), ground[1].get<double>());
+  if (speed > 0) out += line("walks in place: the ground goes by at %.0f mm/s, as on a treadmill", speed);
+  out += "\nfoot sliding over the ground: joint, in contact (% of frames), mean and worst (mm/s)\n";
   for (const json& foot : result["foot_sliding"])
     out += line("  %-28s %6.1f %8.1f %8.1f", text(foot["joint"]).c_str(),
                 100 * foot["contact_share"].get<double>(), foot["mean_mm_per_s"].get<double>(),

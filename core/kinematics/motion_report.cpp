@@ -12,10 +12,13 @@ namespace ecorche::kinematics {
 namespace {
 
 using Eigen::Quaterniond;
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kContact = 25;  // mm
 constexpr double kFloorShare = 0.05;
+constexpr double kSlowest = 50;   // mm/s: slower than anybody walks
+constexpr double kInPlace = 0.2;  // of the ground's speed, what the body may travel meanwhile
 
 constexpr double kBeyond = 0.5 / 57.29577951308232;  // radians: half a degree less is printed as none
 
@@ -46,6 +49,51 @@ std::vector<std::size_t> feet(const Skeleton& skeleton) {
   return out;
 }
 
+// One foot in every frame: in floats, since a long clip is not to need memory.
+struct Track {
+  std::vector<float> height;              // mm; over the floor once all are known
+  std::vector<Eigen::Vector2f> velocity;  // from the frame before, mm/s; of the first, 0
+  Vector3d last = Vector3d::Zero();
+
+  explicit Track(std::size_t frames) {
+    height.reserve(frames);
+    velocity.reserve(frames);
+  }
+  void add(const Vector3d& at, double frame_seconds) {
+    const Vector2d step = height.empty() ? Vector2d(0, 0) : Vector2d((at - last).head<2>() / frame_seconds);
+    height.push_back(static_cast<float>(at.z()));
+    velocity.push_back(step.cast<float>());
+    last = at;
+  }
+  void stand_on_floor() {
+    std::vector<float> sorted = height;
+    const auto low =
+        sorted.begin() + static_cast<std::ptrdiff_t>(kFloorShare * static_cast<double>(sorted.size()));
+    std::nth_element(sorted.begin(), low, sorted.end());
+    for (float& h : height) h = std::max(h - *low, 0.0F);
+  }
+  // 0: not in contact.
+  double weight(std::size_t frame) const {
+    const double h = static_cast<double>(height[frame]);
+    return h < kContact ? 2 - std::exp2(h / kContact) : 0;
+  }
+};
+
+// Feet that go one way while they stand, of a body that does not get there, walk on a ground that moves.
+Vector2d ground_of(const std::vector<Track>& feet, const Vector2d& travel) {
+  Vector2d sum = Vector2d::Zero();
+  double weight = 0;
+  for (const Track& foot : feet) {
+    for (std::size_t frame = 1; frame < foot.height.size(); ++frame) {
+      if (foot.weight(frame - 1) == 0) continue;  // comes down from the air
+      sum += foot.weight(frame) * foot.velocity[frame].cast<double>();
+      weight += foot.weight(frame);
+    }
+  }
+  const Vector2d mean = weight > 0 ? Vector2d(sum / weight) : Vector2d::Zero();
+  return mean.norm() > kSlowest && travel.norm() < kInPlace * mean.norm() ? mean : Vector2d::Zero();
+}
+
 }  // namespace
 
 MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
@@ -56,10 +104,9 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
   std::vector<ClampedJoint> clamped;
   MotionReport out;
   std::vector<LimitViolation> limits(joints);
-  std::vector<std::vector<float>> heights(foot.size());
-  const auto place = [&](std::size_t f) -> Vector3d {
-    return motion[foot[f]] * rig.skeleton.segments[foot[f]].joint.center;
-  };
+  std::vector<Track> tracks;
+  for (std::size_t f = 0; f < foot.size(); ++f) tracks.emplace_back(frames);
+  Vector3d begin = Vector3d::Zero(), end = begin;  // of the root
   for (std::size_t frame = 0; frame < frames; ++frame) {
     Pose now = pose(frame);
     const Pose asked = now;
@@ -77,14 +124,10 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
       limit.worst = std::max(limit.worst, removed);
     }
     forward(rig, now, motion);
-    for (std::size_t f = 0; f < foot.size(); ++f) heights[f].push_back(static_cast<float>(place(f).z()));
-  }
-  std::vector<double> floor(foot.size(), 0);
-  for (std::size_t f = 0; f < foot.size() && frames > 0; ++f) {
-    const auto low =
-        heights[f].begin() + static_cast<std::ptrdiff_t>(kFloorShare * static_cast<double>(frames));
-    std::nth_element(heights[f].begin(), low, heights[f].end());
-    floor[f] = static_cast<double>(*low);
+    for (std::size_t f = 0; f < foot.size(); ++f)
+      tracks[f].add(motion[foot[f]] * rig.skeleton.segments[foot[f]].joint.center, frame_seconds);
+    end = motion[0] * rig.skeleton.segments[0].joint.center;
+    if (frame == 0) begin = end;
   }
   for (std::size_t j = 0; j < joints; ++j) {
     if (limits[j].share == 0) continue;
@@ -97,29 +140,24 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
                    [](const LimitViolation& a, const LimitViolation& b) { return a.worst > b.worst; });
 
   for (const std::size_t s : foot) out.feet.push_back({rig.skeleton.segments[s].joint.name, 0, 0, 0});
-  std::vector<Vector3d> before(foot.size());
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    Pose now = pose(frame);
-    clamped.clear();
-    constrain(rig.skeleton, now, clamped);
-    forward(rig, now, motion);
-    for (std::size_t f = 0; f < foot.size(); ++f) {
-      const Vector3d at = place(f);
-      const double height = std::max(at.z() - floor[f], 0.0);
-      if (height < kContact) {
-        ++out.feet[f].contact_share;
-        if (frame > 0) {
-          const double step = (at - before[f]).head<2>().norm() * (2 - std::exp2(height / kContact));
-          out.feet[f].mean_mm_per_s += step / frame_seconds;
-          out.feet[f].worst_mm_per_s = std::max(out.feet[f].worst_mm_per_s, step / frame_seconds);
-        }
-      }
-      before[f] = at;
+  if (frames == 0) return out;
+  for (Track& track : tracks) track.stand_on_floor();
+  const Vector2d travel =
+      (end - begin).head<2>() / (frame_seconds * static_cast<double>(std::max<std::size_t>(frames - 1, 1)));
+  out.ground = ground_of(tracks, travel);
+  for (std::size_t f = 0; f < foot.size(); ++f) {
+    FootSliding& sliding = out.feet[f];
+    for (std::size_t frame = 0; frame < frames; ++frame) {
+      const double weight = tracks[f].weight(frame);
+      if (weight == 0) continue;
+      ++sliding.contact_share;
+      if (frame == 0) continue;  // nobody knows what led to it
+      const double speed = (tracks[f].velocity[frame].cast<double>() - out.ground).norm() * weight;
+      sliding.mean_mm_per_s += speed;
+      sliding.worst_mm_per_s = std::max(sliding.worst_mm_per_s, speed);
     }
-  }
-  for (FootSliding& f : out.feet) {
-    if (f.contact_share > 0) f.mean_mm_per_s /= f.contact_share;
-    f.contact_share /= static_cast<double>(frames);
+    if (sliding.contact_share > 0) sliding.mean_mm_per_s /= sliding.contact_share;
+    sliding.contact_share /= static_cast<double>(frames);
   }
   return out;
 }

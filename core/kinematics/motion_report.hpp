@@ -13,7 +13,8 @@ namespace ecorche::kinematics {
 
 /// Sliding of one point near the ground, after Zhang et al., Mode-Adaptive Neural Networks for Quadruped
 /// Motion Control (2018): a step of the point over the ground counts by 2 - 2^(h / 25 mm), with h its height
-/// over the lowest place it comes to, and not at all above 25 mm.
+/// over the lowest place it comes to, and not at all above 25 mm. Over the ground as `MotionReport::ground`
+/// has it.
 struct FootSliding {
   std::string joint;          ///< whose centre is the point: ankle, or toes
   double contact_share = 0;   ///< of the frames, h < 25 mm
@@ -33,10 +34,13 @@ struct LimitViolation {
 
 struct MotionReport {
   std::vector<FootSliding> feet;
+  /// How the ground moves, mm/s: not at all, but for a body that walks in place, as on a treadmill, where it
+  /// goes as feet do in the mean while they stand.
+  Eigen::Vector2d ground = Eigen::Vector2d::Zero();
   std::vector<LimitViolation> limits;  ///< joints that are ever beyond theirs, the worst first
 };
 
-/// Looks at every frame, twice: `pose(frame)` is called for 0 to frames - 1, then again. Angles are told as
+/// Looks at every frame once: `pose(frame)` is called for 0 to frames - 1. Angles are told as
 /// asked, feet as they stand after the limits. Feet are the segments with the names of feet and toes
 /// (joint_names.hpp).
 MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,

@@ -106,6 +106,10 @@ class Motion(unittest.TestCase):
         self.assertTrue(all(segment["moved"] for segment in report["match"]["segments"]))
         self.assertAlmostEqual(report["match"]["figure_to_patient"], 1, delta=0.05)
         self.assertEqual(len(report["foot_sliding"]), 4)
+        # It walks in place, by curves that nobody walked: over the ground that goes by its feet slide by less than that goes.
+        self.assertTrue(600 < report["ground_mm_per_s"][1] < 850 and abs(report["ground_mm_per_s"][0]) < 20, report["ground_mm_per_s"])
+        self.assertLess(max(foot["mean_mm_per_s"] for foot in report["foot_sliding"]), 450)
+        self.assertIn("walks in place: the ground goes by at 7", run(*self.motion(WALK)).stdout)
         self.assertIn("beyond limits", run(*self.motion(WALK)).stdout)
 
     def test_against(self):

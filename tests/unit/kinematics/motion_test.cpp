@@ -212,6 +212,35 @@ TEST(MotionReport, GlidingFeetAndBentLimits) {
   EXPECT_EQ(made.limits[0].worst_frame, 20U);
 }
 
+// On a treadmill: feet go back while they stand, forward in the air, and the body gets nowhere.
+TEST(MotionReport, FeetThatWalkInPlaceDoNotSlide) {
+  const Rig rig = test::legs();
+  const auto walk = [](double stray_mm) {
+    return [stray_mm](std::size_t frame) {
+      const std::size_t at = frame % 50;
+      const bool stands = at < 26;
+      Pose p = Pose::rest(7);
+      p.root_translation = {frame == 10 ? stray_mm : 0.0,
+                            stands ? 4.0 * static_cast<double>(at) : 4.0 * static_cast<double>(50 - at),
+                            stands ? 0.0 : 300.0};
+      return p;
+    };
+  };
+  const MotionReport made = report(rig, 101, 0.01, walk(0));
+  EXPECT_NEAR(made.ground.y(), 400, 1e-9);
+  // But for the two steps down from the air, which go against the ground.
+  for (const FootSliding& foot : made.feet) EXPECT_NEAR(foot.mean_mm_per_s, 2 * 800.0 / 53, 1e-6);
+  EXPECT_GT(report(rig, 101, 0.01, walk(50)).feet[0].worst_mm_per_s, 4000)
+      << "a slip is one on a treadmill, too";
+  const auto gone = [&](std::size_t frame) {
+    Pose p = walk(0)(frame);
+    p.root_translation.y() += 4.0 * static_cast<double>(frame);
+    return p;
+  };
+  EXPECT_EQ(report(rig, 101, 0.01, gone).ground, Eigen::Vector2d::Zero())
+      << "who gets on has a ground that stays";
+}
+
 // A clip's elbow twists a little in every frame, and stands on its limit within what is printed as 0.0:
 // neither passes it.
 TEST(MotionReport, TurnsThatAHingeCannotMakePassNoLimit) {
