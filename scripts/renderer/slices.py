@@ -21,7 +21,7 @@ def stretched(image, height, pixel_mm, mm):
     rows = np.minimum((np.arange(int(image.shape[0] * mm[0] / pixel_mm)) * pixel_mm / mm[0]).astype(int), image.shape[0] - 1)
     columns = np.minimum((np.arange(int(image.shape[1] * mm[1] / pixel_mm)) * pixel_mm / mm[1]).astype(int), image.shape[1] - 1)
     out = image[rows][:, columns]
-    frame = np.full((height, out.shape[1], 3), 20, np.uint8)
+    frame = annotate.strip(out.shape[1], height)
     frame[: min(height, out.shape[0])] = out[:height]
     return frame
 
@@ -47,7 +47,7 @@ def three_planes(volume, height, title):
         annotate.put(rgb, name, size // 2, size // 2, size, (235, 235, 235))
         for x, side in zip((size // 2, rgb.shape[1] - 2 * size), sides):
             annotate.put(rgb, side, x, min(height // 2, int(plane.shape[0] * edges[0] / pixel / 2)), size, (235, 235, 235))
-        drawn += [rgb, np.full((height, 8, 3), 247, np.uint8)]
+        drawn += [rgb, annotate.strip(8, height)]
     seen = sorted({int(v) for _, _, plane, _ in planes for v in np.unique(plane)} - {0}) if volume.labels else []
     legend = [(str(volume.names.get(v, f"label {v}")), coloured(np.array([[v]]))[0, 0] / 255) for v in seen]
     bar = None if volume.labels else ("grey value", float(low), float(high), lambda v: [np.clip((v - low) / max(high - low, 1e-6), 0, 1)] * 3)
