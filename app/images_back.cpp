@@ -109,9 +109,9 @@ json differs_json(const Differs& sums, bool labels) {
 
 }  // namespace
 
-runtime::Deformation ImagesBack::way_there() const {
-  return {body_.tets, numbers(body_.rest), numbers(body_.posed)};
-}
+ImagesBack::ImagesBack(const PosedTets& body, const Context& context)
+    : drawn_(runtime::drawn_body(body.tets, numbers(body.rest), numbers(body.posed), body.copies)),
+      context_(context) {}
 
 Image ImagesBack::bring(Image image, bool labels, runtime::Sampling sampling) {
   const runtime::Deformation there = way_there(), back = there.back();

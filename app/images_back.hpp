@@ -6,17 +6,18 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "app/surfaces_back.hpp"
+#include "app/posed_tets.hpp"
 #include "core/values/image.hpp"
 #include "core/values/model.hpp"
 #include "runtime/volume/resample.hpp"
+#include "runtime/volume/rigid_copies.hpp"
 #include "runtime/volume/round_trip.hpp"
 
 namespace ecorche::app {
 
 class ImagesBack {
  public:
-  ImagesBack(const PosedTets& body, const Context& context) : body_(body), context_(context) {}
+  ImagesBack(const PosedTets& body, const Context& context);
 
   /// `image` on its own lattice, as far as the body at rest reaches; outside of that what it holds outside of
   /// the posed body.
@@ -27,9 +28,9 @@ class ImagesBack {
   static Image mask(const ImageGrid& grid, const runtime::VoxelTrip& trip);
 
  private:
-  runtime::Deformation way_there() const;
+  runtime::Deformation way_there() const { return {drawn_.tets, drawn_.rest, drawn_.posed}; }
 
-  const PosedTets& body_;
+  runtime::DrawnBody drawn_;  // contested tets, too, as the posed images were drawn of them
   const Context& context_;
   runtime::InverseMap posed_,
       scan_;  // tets on the posed image's lattice, and at rest on that of what came back

@@ -14,6 +14,7 @@
 #include "app/pose_report.hpp"
 #include "app/posed_case.hpp"
 #include "app/posed_folder.hpp"
+#include "app/posed_tets.hpp"
 #include "app/tet_regions.hpp"
 #include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
@@ -174,7 +175,9 @@ class FrameWriter {
     const auto write = [&](const std::string& ending) {
       io::write_tets(next("body." + ending), posed, model_.tets,
                      {{"displacement", 3, {moved.data(), moved.data() + moved.size()}}},
-                     {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}}, {"det_f", 1, det_f_}},
+                     {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}},
+                      {std::string(kTetSegment), 1, segment_of_tets(model_)},
+                      {"det_f", 1, det_f_}},
                      tet_regions(model_));
       if (ending == "ele") written_.push_back((folder_ / "body.node").string());
     };

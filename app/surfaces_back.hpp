@@ -7,16 +7,12 @@
 #include <vector>
 
 #include "app/posed_manifest.hpp"
+#include "app/posed_tets.hpp"
 #include "core/values/mesh.hpp"
 #include "io/surface/tied_surfaces.hpp"
 
 namespace ecorche::app {
 
-/// Posed tets and their rest.
-struct PosedTets {
-  PointsF rest, posed;
-  Tets tets;
-};
 
 /// How the vertices of one surface came back, held against the scan's.
 struct SurfaceTrip {

@@ -8,6 +8,7 @@
 
 #include "app/command.hpp"
 #include "app/images_back.hpp"
+#include "app/posed_tets.hpp"
 #include "app/surfaces_back.hpp"
 #include "app/unpose_report.hpp"
 #include "core/files/atomic_file.hpp"
@@ -41,38 +42,6 @@ bool is_surface(const fs::path& file) {
 
 bool is_body(const fs::path& file) {
   return is_surface(file) || kImages.contains(file.extension().string());
-}
-
-PosedTets read_posed(const fs::path& file) {
-  if (!fs::exists(file))
-    throw Error(ErrorKind::missing_input, file.string(), "is not there, and the way back is in it",
-                "give a folder that pose wrote with its tets: --tets, or all of it");
-  io::TetFile read = io::read_tets(file);
-  const auto moved = std::find_if(
-      read.point_data.begin(), read.point_data.end(),
-      [](const io::GridArray& array) { return array.name == "displacement" && array.components == 3; });
-  if (moved == read.point_data.end()) {
-    throw Error(ErrorKind::data, file.string(),
-                "its nodes carry no displacement, so nothing says where they came from",
-                "give the body.vtu that ecorche pose wrote");
-  }
-  PosedTets out;
-  out.rest = read.V - Eigen::Map<const PointsF>(moved->values.data(), read.V.rows(), 3);
-  // Rounded, a sliver may lose its volume; many that have none are not the rest of this body.
-  Eigen::Index flat = 0;
-  for (Eigen::Index t = 0; t < read.T.rows(); ++t) {
-    const auto corner = [&](int c) { return out.rest.row(read.T(t, c)); };
-    flat += tet_det(corner(0), corner(1), corner(2), corner(3)) > 0 ? 0 : 1;
-  }
-  if (1000 * flat > read.T.rows()) {
-    throw Error(ErrorKind::data, file.string(),
-                std::to_string(flat) + " of its " + std::to_string(read.T.rows()) +
-                    " tets have no volume at rest: the displacement is not theirs",
-                "give the body.vtu that ecorche pose wrote");
-  }
-  out.posed = std::move(read.V);
-  out.tets = std::move(read.T);
-  return out;
 }
 
 // `labels`, `labels_2`, ... and what the user names.
@@ -179,7 +148,7 @@ class WayBack {
         source_(source),
         model_(model),
         context_(context),
-        body_(read_posed(source.tets())),
+        body_(read_posed_tets(source.tets())),
         images_(body_, context) {}
 
   void bring(const Item& item) {

@@ -59,12 +59,12 @@ struct GridArray {
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
                    const std::vector<GridArray>& point_data = {});
 
-/// Tets out of a file, with what it holds of each node. Nothing is said of the tets' volumes: posed ones may
+/// Tets out of a file, with what it holds of each node and of each tet. Nothing is said of the tets' volumes: posed ones may
 /// be inverted.
 struct TetFile {
   PointsF V;
   Tets T;
-  std::vector<GridArray> point_data;
+  std::vector<GridArray> point_data, cell_data;
 };
 
 /// Reads tets as `write_tets` writes `.vtu` (or VTK: text, base64 or appended, plain or zlib). Throws

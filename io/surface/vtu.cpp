@@ -18,7 +18,7 @@ constexpr std::int64_t kTet = 10;  // VTK_TETRA
 struct Grid {
   std::vector<float> points;
   std::vector<std::int32_t> corners;
-  std::vector<GridArray> arrays;
+  std::vector<GridArray> of_points, of_cells;
 };
 
 void append_floats(const std::vector<double>& from, std::vector<float>& to, const std::string& where) {
@@ -38,8 +38,9 @@ class PieceReader {
     const std::vector<double> x = vtk_xml::points_of(piece_, document_, where_);
     document_.storage.budget->spend_points(x.size() / 3);
     append_floats(x, grid.points, where_);
-    read_cells(x.size() / 3, before, grid);
-    read_arrays(x.size() / 3, before == 0, grid);
+    const std::uint64_t cells = read_cells(x.size() / 3, before, grid);
+    read_arrays("PointData", x.size() / 3, before == 0, grid.of_points);
+    read_arrays("CellData", cells, before == 0, grid.of_cells);
   }
 
  private:
@@ -51,9 +52,10 @@ class PieceReader {
     return out;
   }
 
-  void read_cells(std::uint64_t points, std::uint64_t before, Grid& grid) const {
+  // How many.
+  std::uint64_t read_cells(std::uint64_t points, std::uint64_t before, Grid& grid) const {
     const std::uint64_t count = vtk_xml::count_of(piece_, "NumberOfCells", document_, where_);
-    if (count == 0) return;
+    if (count == 0) return 0;
     const std::vector<std::int64_t> types = cells("types", count), ends = cells("offsets", count);
     for (std::size_t c = 0; c < count; ++c) {
       if (types[c] != kTet || ends[c] != 4 * static_cast<std::int64_t>(c + 1))
@@ -65,10 +67,13 @@ class PieceReader {
         refuse(where_, "a cell uses point " + std::to_string(corner) + " of " + std::to_string(points));
       grid.corners.push_back(static_cast<std::int32_t>(before + static_cast<std::uint64_t>(corner)));
     }
+    return count;
   }
 
-  void read_arrays(std::uint64_t points, bool first, Grid& grid) const {
-    const auto data = piece_.sections.find("PointData");
+  // Of each of `count` points or cells. What is not in every piece is left out.
+  void read_arrays(const std::string& section, std::uint64_t count, bool first,
+                   std::vector<GridArray>& arrays) const {
+    const auto data = piece_.sections.find(section);
     std::vector<GridArray> kept;
     if (data != piece_.sections.end()) {
       for (const auto& entry : data->second) {
@@ -79,12 +84,12 @@ class PieceReader {
         if (!components || *components < 1 || *components > 64)
           refuse(where_, "array '" + name.substr(0, 60) + "' has '" + std::string(word.substr(0, 40)) +
                              "' components");
-        const auto found = std::find_if(grid.arrays.begin(), grid.arrays.end(),
+        const auto found = std::find_if(arrays.begin(), arrays.end(),
                                         [&](const GridArray& other) { return other.name == name; });
-        if (!first && (found == grid.arrays.end() || found->components != *components)) continue;
+        if (!first && (found == arrays.end() || found->components != *components)) continue;
         GridArray out{name, static_cast<int>(*components),
                       first ? std::vector<float>() : std::move(found->values)};
-        const std::uint64_t values = points * static_cast<std::uint64_t>(*components);
+        const std::uint64_t values = count * static_cast<std::uint64_t>(*components);
         const std::vector<double> read = vtp::reals(array, document_.storage, values, where_);
         if (read.size() != values)
           vtk_xml::fail_count("values of '" + name.substr(0, 60) + "'", values, read.size(), where_);
@@ -92,7 +97,7 @@ class PieceReader {
         kept.push_back(std::move(out));
       }
     }
-    grid.arrays = std::move(kept);
+    arrays = std::move(kept);
   }
 
   const vtk_xml::Piece& piece_;
@@ -105,7 +110,7 @@ class PieceReader {
 TetFile decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
   files::Budget budget(file.size(), limits, where);
   const vtk_xml::Document document =
-      vtk_xml::parse(file, "UnstructuredGrid", {"Points", "Cells", "PointData"},
+      vtk_xml::parse(file, "UnstructuredGrid", {"Points", "Cells", "PointData", "CellData"},
                      "save it as XML UnstructuredGrid (.vtu)", budget);
   Grid grid;
   for (const vtk_xml::Piece& piece : document.pieces) PieceReader(piece, document, where).read(grid);
@@ -113,7 +118,8 @@ TetFile decode(std::string_view file, const std::string& where, const files::Rea
   TetFile out;
   out.V = Eigen::Map<const PointsF>(grid.points.data(), static_cast<Eigen::Index>(grid.points.size() / 3), 3);
   out.T = Eigen::Map<const Tets>(grid.corners.data(), static_cast<Eigen::Index>(grid.corners.size() / 4), 4);
-  out.point_data = std::move(grid.arrays);
+  out.point_data = std::move(grid.of_points);
+  out.cell_data = std::move(grid.of_cells);
   return out;
 }
 

@@ -51,6 +51,9 @@ TEST(Vtu, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.point_data[0].components, 3);
   EXPECT_EQ(read.point_data[0].values.back(), 15.5F);
   EXPECT_EQ(read.point_data[1].values, (std::vector<float>{1, 2, 3, 4, 5}));
+  ASSERT_EQ(read.cell_data.size(), 1u);
+  EXPECT_EQ(read.cell_data[0].name, "label");
+  EXPECT_EQ(read.cell_data[0].values, (std::vector<float>{7, 8}));
 }
 
 TEST(Vtu, PiecesFollowOneAnother) {
