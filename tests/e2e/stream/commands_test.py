@@ -14,6 +14,7 @@ import unittest
 
 import h5py
 import numpy as np
+from ecorche.v1 import envelope_pb2
 from ecorche_client import Client, ServerError
 from serving import ECORCHE, Server
 
@@ -122,6 +123,43 @@ class Commands(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             report = json.loads(result.stdout)
             self.assertGreaterEqual(report["frames"], 2 * 6 + 6)
+            self.assertEqual(report["mismatches"], 0)
+
+    def test_a_pose_that_is_refused_spoils_no_recording(self):
+        """The farthest number of all, then what a server numbers itself, and another client's poses."""
+        options = ["--clips", str(self.path / "clips"), "--record-dir", str(self.path / "recordings")]
+        with Server(MODEL, options=options) as server:
+            with Client("127.0.0.1", server.port) as bad, Client("127.0.0.1", server.port) as other:
+                pose = bad.open(session="shared").rest_pose()
+                other.open(session="shared")
+                bad._sequence = 2**63 - 2
+                bad.send_pose(pose)
+                list(bad.frames(0.3))
+                self.assertEqual([ack.status.code for ack in bad.acks], [11], "OUT_OF_RANGE")
+                bad.play("walk", speed=4)
+                time.sleep(0.3)
+                bad.play("")
+                release, claim = envelope_pb2.Envelope(), envelope_pb2.Envelope()
+                release.release_control.SetInParent()
+                claim.claim_control.SetInParent()
+                bad._call(release)
+                last = other._call(claim)[0].control_granted.last_sequence
+                self.assertLess(last, 2**24)
+                other.subscribe_mesh(["skin"])
+                other.record("after")
+                other._sequence = last
+                for turn in range(1, 6):
+                    pose[1] = (np.cos(0.02 * turn), np.sin(0.02 * turn), 0, 0)
+                    sequence = other.send_pose(pose)
+                    shown = [frame.pose_sequence for frame in other.frames(0.3)]
+                    self.assertIn(sequence, shown)
+                other.record(None)
+                self.assertEqual({ack.status.code for ack in other.acks}, {0})
+            result = run("stream", server.address, "--replay", self.path / "recordings" / "after.ecrec", "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads(result.stdout)
+            self.assertEqual(report["poses"], 5)
+            self.assertEqual(report["frames"], 5)
             self.assertEqual(report["mismatches"], 0)
 
     def test_points_go_both_ways(self):
