@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/convert.hpp"
+#include "runtime/server/reserve.hpp"
 #include "runtime/server/shares.hpp"
 
 namespace ecorche::server {
@@ -64,15 +65,31 @@ void Connection::log(spdlog::level::level_enum level, std::string_view what,
 
 void Connection::start() {
   log(spdlog::level::debug, "connected", {});
-  spawn(read_frames());
+  spawn(Part::reader, read_frames());
 }
 
 // A coroutine that ends by an exception (out of memory, most likely) ends its connection, and nothing else.
-void Connection::spawn(net::awaitable<void> work) {
+void Connection::spawn(Part part, net::awaitable<void> work) {
+  const MustNotFail begins_with_asio;
   net::co_spawn(transport_->executor(), std::move(work),
-                [self = shared_from_this()](const std::exception_ptr& failed) {
-                  if (failed) self->close("failed");
+                [self = shared_from_this(), part](const std::exception_ptr& failed) {
+                  if (failed) self->failed(part);
                 });
+}
+
+// The client is told, where it has what came before whole: the other part goes on, and this one begins anew,
+// once, to write the last words, or to read past what is left.
+void Connection::failed(Part part) {
+  if (closed_) return;
+  const bool again = std::exchange(failing_, true);
+  if (again || !writer_ || (part == Part::writer && writing_)) return close("failed");
+  try {
+    end({StatusCode::internal, "connection: the server failed at it (report it)"});
+    spawn(part, part == Part::reader ? discard() : write_frames());
+    wake_.cancel();
+  } catch (const std::exception&) {
+    close("failed");
+  }
 }
 
 void Connection::start_refused(const Status& status) {
@@ -117,6 +134,7 @@ void Connection::end(v1::Envelope last, Farewell why) {
 
 void Connection::close(const char* why) {
   if (std::exchange(closed_, true)) return;
+  const MustNotFail half_way;
   log(spdlog::level::debug, "closed: ", why);
   transport_->close();
   wake_.cancel();
@@ -144,6 +162,7 @@ void Connection::leave_place() {
 }
 
 void Connection::give_up() {
+  const MustNotFail half_way;
   try {
     house_.let_go(outbox_.clear());
     end({StatusCode::aborted,
@@ -270,7 +289,8 @@ net::awaitable<void> Connection::read_frames() {
     close("no handshake");
     co_return;
   }
-  spawn(write_frames());
+  spawn(Part::writer, write_frames());
+  writer_ = true;
   boost::system::error_code ec;
   while (!closed_ && !ending_) {
     // What is long goes where it stays.
@@ -315,6 +335,7 @@ void Connection::take_in(std::size_t n, bool last) {
   if (ending_) return;  // said goodbye meanwhile
   if (reader_.between_frames()) reading_since_ = heard_;
   const Handling handling(house_.seams());
+  const MayFail may_fail;
   try {
     if (const Status status = reader_.advance(n); !status.ok()) {
       house_.metrics().hit("frame");
@@ -329,19 +350,24 @@ void Connection::take_in(std::size_t n, bool last) {
     reading_since_.reset();
     handle(reader_.take());
   } catch (const std::exception& error) {
-    log(spdlog::level::err, "failed: ", error.what());
-    end({StatusCode::internal, "message: the server failed at it (report it)"});
+    fail("message: the server failed at it (report it)", error);
   }
 }
 
 void Connection::take_back(const std::function<void()>& answer) {
   const Handling handling(house_.seams());
+  const MayFail may_fail;
   try {
     answer();
   } catch (const std::exception& error) {
-    log(spdlog::level::err, "failed: ", error.what());
-    close("failed");
+    fail("answer: the server failed at it (report it)", error);
   }
+}
+
+void Connection::fail(const char* what, const std::exception& error) noexcept {
+  const MustNotFail last_words;
+  log(spdlog::level::err, "failed: ", error.what());
+  told([&] { end({StatusCode::internal, what}); });
 }
 
 net::awaitable<void> Connection::hold_back() {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -140,7 +141,11 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   /// ends soon after, and the others hear what they should.
   void told(const std::function<void()>& tell) noexcept;
 
-  void spawn(net::awaitable<void> work);
+  enum class Part : std::uint8_t { reader, writer };
+  void spawn(Part part, net::awaitable<void> work);
+  void failed(Part part);
+  /// Ends it for what the server failed at.
+  void fail(const char* what, const std::exception& error) noexcept;
   std::uint64_t held() const;
   void log(spdlog::level::level_enum level, std::string_view what, std::string_view why) const noexcept;
   /// What was found for this connection elsewhere. Whatever goes wrong ends this connection alone.
@@ -169,6 +174,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
   bool ending_ = false;   ///< the last message is queued
   bool closed_ = false;
   bool departed_ = false;  ///< the client said goodbye
+  bool writer_ = false;    ///< there is one
+  bool failing_ = false;   ///< a coroutine ended too early
   bool failed_ = false;    ///< it could not be told something: it closes as soon as it can
   double allowance_;       ///< messages that may be read at once
   Clock::time_point allowance_at_;

@@ -81,10 +81,9 @@ void House::coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tiss
     if (seams_.may_coarsen && !seams_.may_coarsen()) return;
     try {
       model->make_levels({tissue});
-    } catch (const std::bad_alloc&) {
-      return;  // who asks is told
+      coarsen(std::move(model), tissue + 1);
+    } catch (const std::bad_alloc&) {  // who asks is told
     }
-    coarsen(std::move(model), tissue + 1);
   });
 }
 

@@ -47,13 +47,13 @@ void Judging::stop() {
 void Judging::done(Clock::duration cost) {
   busy_ = false;
   if (stopped_) return;
-  resting_ = true;
   timer_.expires_after(pause * cost);
   timer_.async_wait([this](const boost::system::error_code& ec) {
     if (ec) return;
     resting_ = false;
     next();
   });
+  resting_ = true;
 }
 
 bool judged_by(const v1::PoseQuality& quality, const runtime::QualityThresholds& thresholds) {

@@ -16,7 +16,7 @@ struct Seams {
   /// Asked before every wait; true: the wait ends at once, with an error.
   std::function<bool()> timer_fails;
   /// A message is being handled, from true to false, or what its answer waits for is made, on another thread.
-  /// What finds no memory meanwhile ends its connection; Asio itself, between messages, ends the process.
+  /// What finds no memory meanwhile ends its connection; what the I/O thread does else has a Reserve.
   std::function<void(bool)> handling;
   /// Asked before each tissue's levels of detail are made that nobody waits for, on the thread that makes
   /// them; false: no more of this model.

@@ -5,10 +5,14 @@
 
 #include <algorithm>
 #include <map>
+#include <new>
+#include <thread>
 #include <utility>
 
 #include "runtime/server/connection.hpp"
+#include "runtime/server/post_back.hpp"
 #include "runtime/server/rates.hpp"
+#include "runtime/server/reserve.hpp"
 #include "runtime/server/shares.hpp"
 #include "runtime/server/tls.hpp"
 #include "runtime/server/web.hpp"
@@ -117,6 +121,7 @@ struct Server::Impl {
   bool room_for_request(Clock::time_point now);
   void make_room(Clock::time_point now, Clock::duration patience);
   void begin_shutdown();
+  void without_memory();
   std::string metrics();
 
   // Destroyed last: everything below it posts to it.
@@ -131,6 +136,7 @@ struct Server::Impl {
   std::unique_ptr<House> house;
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
+  Reserve* reserve = nullptr;  ///< while it runs
   bool stopping = false;
   std::map<WebKind, Rates> admitted;  ///< requests
 };
@@ -149,6 +155,8 @@ std::uint16_t Server::http_port() const {
 }
 
 void Server::run() {
+  Reserve reserve;
+  impl_->reserve = &reserve;
   net::co_spawn(impl_->io, impl_->accept(impl_->acceptor, false), net::detached);
   if (impl_->http_port != 0)
     net::co_spawn(impl_->io, impl_->accept(impl_->http_acceptor, true), net::detached);
@@ -167,11 +175,11 @@ void Server::run() {
 }
 
 void Server::stop() {
-  net::post(impl_->io, [this] { impl_->begin_shutdown(); });
+  post_back(impl_->io, [this] { impl_->begin_shutdown(); });
 }
 
 void Server::reload() {
-  net::post(impl_->io, [this] {
+  post_back(impl_->io, [this] {
     spdlog::info("asked to read the models again");
     impl_->house->reload_all();
   });
@@ -193,18 +201,29 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
       house->journal().line(spdlog::level::warn, std::string("accept: ") + error.what());
       failed = true;
     }
-    co_await pause(next, failed ? kTick : kBetween);
+    try {
+      co_await pause(next, failed ? kTick : kBetween);
+    } catch (const std::bad_alloc&) {
+      without_memory();
+    }
   }
 }
 
 void Server::Impl::receive(tcp::socket socket, bool web) {
   std::string peer = peer_of(socket);
   const Clock::duration in_kernel = waited(socket);
-  std::unique_ptr<Transport> transport = carrier->carry(std::move(socket));
-  if (wrap) transport = wrap(std::move(transport));
+  std::unique_ptr<Transport> transport;
+  {
+    const MayFail may_fail;  // then it is hung up
+    transport = carrier->carry(std::move(socket));
+    if (wrap) transport = wrap(std::move(transport));
+  }
   if (!web) return welcome(std::move(transport), std::move(peer), false, in_kernel);
   if (!room_for_request(Clock::now())) return house->metrics().hit("connections");
-  requests.push_back(web_request(std::move(transport), std::move(peer), room));
+  {
+    const MayFail may_fail;
+    requests.push_back(web_request(std::move(transport), std::move(peer), room));
+  }
   requests.back()->start();
 }
 
@@ -246,8 +265,11 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   if (!let_in) house->metrics().hit("connections");
   if (connections.size() >= limit + kMostRefusals) return;
-  connections.push_back(
-      std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *house));
+  {
+    const MayFail may_fail;  // as in receive()
+    connections.push_back(
+        std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *house));
+  }
   if (let_in) return connections.back()->start();
   connections.back()->start_refused(
       {StatusCode::resource_exhausted, "connection: " + std::to_string(beyond ? own : alive) + " clients " +
@@ -290,7 +312,11 @@ net::awaitable<void> Server::Impl::watch() {
     } catch (const std::exception& error) {
       spdlog::error("server: {}", error.what());
     }
-    co_await pause(tick, next);
+    try {
+      co_await pause(tick, next);
+    } catch (const std::bad_alloc&) {
+      without_memory();
+    }
   }
   house->end_recordings();
   // Until the last client had its goodbye, the HTTP port tells that the server stops.
@@ -318,6 +344,10 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
     next = std::min(next, kRoomTick);
   }
   house->sweep(now);
+  if (const std::size_t used = reserve->refill())
+    house->journal().line(spdlog::level::warn,
+                          "out of memory: " + std::to_string(used * Reserve::piece_bytes / 1024) +
+                              " KiB of what is put by for that were used");
   return std::max(next, kShortTick);
 }
 
@@ -345,6 +375,12 @@ void Server::Impl::begin_shutdown() {
       connection->close("stopping");
     }
   }
+}
+
+// Not even the reserve has enough to wait: what others let go of fills it.
+void Server::Impl::without_memory() {
+  std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  reserve->refill();
 }
 
 // So long, or not at all where even the wait finds no memory.

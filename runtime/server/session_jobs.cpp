@@ -117,7 +117,7 @@ void Session::start_jobs() {
 // The lane's next job has to wait: it is started then.
 bool Session::too_early(Lane& lane, Clock::time_point now) {
   if (now >= lane.next) return false;
-  if (std::exchange(lane.pacing, true)) return true;
+  if (lane.pacing) return true;
   lane.pace.expires_at(lane.next);
   lane.pace.async_wait([weak = weak_from_this(), &lane](const boost::system::error_code&) {
     const auto self = weak.lock();
@@ -125,6 +125,7 @@ bool Session::too_early(Lane& lane, Clock::time_point now) {
     lane.pacing = false;
     self->start_jobs();
   });
+  lane.pacing = true;
   return true;
 }
 
@@ -374,7 +375,7 @@ void Session::keep_time() {
     if (row.refresh_at) next = std::min(next.value_or(Clock::time_point::max()), *row.refresh_at);
   }
   if (next == clock_at_) return;
-  clock_at_ = next;
+  clock_at_.reset();
   if (!next) {
     clock_.cancel();
     return;
@@ -392,6 +393,7 @@ void Session::keep_time() {
     self->keep_time();
     self->start_jobs();
   });
+  clock_at_ = next;
 }
 
 void Session::finish_pose(const PoseOutcome& outcome, const Skipped& skipped, const PoseJob& job,

@@ -7,14 +7,17 @@
 namespace ecorche::server {
 
 /// Hello, a model, a subscription and one of a level of detail, two poses, inverse kinematics, a few points
-/// and many, a clip, goodbye. True when every answer came, each within `seconds`.
-inline bool converse(const TestServer& server, double seconds) {
+/// and many, a clip, goodbye. True when every answer came, each within `seconds`. `why`: what the server said
+/// where it ended the connection.
+inline bool converse(const TestServer& server, double seconds, std::string* why = nullptr) {
   try {
     RawClient client(server);
     const auto receive = [&](auto&& wanted) -> std::optional<v1::Envelope> {
       while (auto frame = client.receive(seconds)) {
         if (wanted(frame->envelope)) return std::move(frame->envelope);
-        if (frame->envelope.has_status() && frame->envelope.request_id() == 0) break;
+        if (!frame->envelope.has_status() || frame->envelope.request_id() != 0) continue;
+        if (why) *why = frame->envelope.status().message();
+        break;
       }
       return std::nullopt;
     };

@@ -6,8 +6,23 @@
 
 namespace ecorche::server {
 
-/// The allocation that fails, counted where a thread handles something.
+/// The allocation that fails, counted where a thread handles something, or, `everywhere`, on all threads but
+/// those that are spared.
 extern Countdown allocations;
-extern thread_local bool handling;
+extern thread_local bool handling, spared;
+extern std::atomic<bool> everywhere;
+
+/// While it lives, threads that are not spared have so many bytes more than they had, and what they let go
+/// of.
+class Drought {
+ public:
+  explicit Drought(std::int64_t bytes);
+  ~Drought();
+  Drought(const Drought&) = delete;
+  Drought& operator=(const Drought&) = delete;
+
+  /// Allocations that failed.
+  static int failed();
+};
 
 }  // namespace ecorche::server
