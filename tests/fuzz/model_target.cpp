@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <unistd.h>
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +6,7 @@
 
 #include "core/model_file/model_file.hpp"
 #include "core/values/error.hpp"
+#include "tests/fuzz/place.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/toy_model.hpp"
 
@@ -20,32 +19,13 @@ extern "C" const char* __lsan_default_suppressions() {
 // NOLINTEND(bugprone-reserved-identifier)
 
 namespace ecorche::fuzz {
-namespace {
-
-// A file of this process alone, in memory where there is such a place.
-class Place {
- public:
-  Place() {
-    const std::filesystem::path memory = "/dev/shm";
-    const auto folder = std::filesystem::exists(memory) ? memory : std::filesystem::temp_directory_path();
-    path_ = folder / ("ecorche_fuzz_" + std::to_string(getpid()) + ".hdf");
-  }
-  ~Place() { std::filesystem::remove(path_); }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-}  // namespace
 
 void model(Bytes bytes) {
   static const Place place;
   static const std::string good = [] {
-    model_file::write(test::toy_model(), place.path(), Context{});
-    std::ifstream file(place.path(), std::ios::binary);
+    const std::filesystem::path path = place.put("model.hdf", "");
+    model_file::write(test::toy_model(), path, Context{});
+    std::ifstream file(path, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(file), {});
   }();
   std::string spoilt = good;
@@ -57,9 +37,9 @@ void model(Bytes bytes) {
   }
   // A rest of a byte or two cuts the file there.
   if (!bytes.empty()) spoilt.resize(spoilt.size() * std::to_integer<std::size_t>(bytes[0]) / 256);
-  std::ofstream(place.path(), std::ios::binary) << spoilt;
+  const std::filesystem::path path = place.put("model.hdf", spoilt);
   try {
-    const Model read = model_file::read(place.path(), Context{});
+    const Model read = model_file::read(path, Context{});
     if (read.segment_count() == 0) std::abort();
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::data && error.kind() != ErrorKind::missing_input) std::abort();

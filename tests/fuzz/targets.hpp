@@ -3,7 +3,6 @@
 // kept corpora. They return where the bytes are refused, and abort where a promise is broken.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 
@@ -11,39 +10,29 @@ namespace ecorche::fuzz {
 
 using Bytes = std::span<const std::byte>;
 
-/// FrameReader: the first byte says in pieces of which size the rest arrives. What was read is written again.
-void framing(Bytes bytes);
-/// An Envelope, its arrays against a payload, and everything that is converted to a value of ours.
-void messages(Bytes bytes);
-/// Frames one after another, as a client's decoders see them: MeshDecoder, VolumeDecoder.
-void meshes(Bytes bytes);
-void volumes(Bytes bytes);
-/// wire::read_recording.
-void recording(Bytes bytes);
-/// model_file::read of a good model of which bytes were changed: u24 offset, u8 value, again and again.
-void model(Bytes bytes);
-/// Motion: a `.bvh`; an `.asf`, a zero byte and its `.amc`; a `.gltf` or `.glb`; a `.mot`; a `.trc`. Frames
-/// over their length are read too.
-void bvh(Bytes bytes);
-void acclaim(Bytes bytes);
-void gltf_clip(Bytes bytes);
-void angle_table(Bytes bytes);
-void marker_table(Bytes bytes);
+/// framing: FrameReader; the first byte says in pieces of which size the rest arrives. What was read is
+///   written again.
+/// messages: an Envelope, its arrays against a payload, and everything that is converted to a value of ours.
+/// meshes, volumes: frames one after another, as a client's decoders see them.
+/// recording: wire::read_recording.
+/// model: model_file::read of a good model of which bytes were changed: u24 offset, u8 value, again and
+/// again. bvh, acclaim, gltf_clip, angle_table, marker_table: motion; `acclaim` is an `.asf`, a zero byte and
+/// its
+///   `.amc`. Frames over their length are read too.
+/// stl to gltf_mesh: surfaces and tets; nrrd, mha, nifti: images; *_yaml: our own files as people write them.
+///   These are held to a budget, reader_targets.cpp.
+#define ECORCHE_TARGET(name) void name(Bytes bytes);
+#include "tests/fuzz/targets.def"
+#undef ECORCHE_TARGET
 
 struct Target {
   const char* name;
   void (*run)(Bytes);
 };
-inline constexpr std::array<Target, 11> targets{{{"framing", framing},
-                                                 {"messages", messages},
-                                                 {"meshes", meshes},
-                                                 {"volumes", volumes},
-                                                 {"recording", recording},
-                                                 {"model", model},
-                                                 {"bvh", bvh},
-                                                 {"acclaim", acclaim},
-                                                 {"gltf_clip", gltf_clip},
-                                                 {"angle_table", angle_table},
-                                                 {"marker_table", marker_table}}};
+inline constexpr Target targets[] = {
+#define ECORCHE_TARGET(name) {#name, name},
+#include "tests/fuzz/targets.def"
+#undef ECORCHE_TARGET
+};
 
 }  // namespace ecorche::fuzz
