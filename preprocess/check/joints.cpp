@@ -150,11 +150,14 @@ class Joints {
   std::string advice(std::size_t row) const {
     if (said(row)) {
       for (const Change& change : changes()) {
-        bool mends = true;
-        for (std::size_t other = 0; other < skeleton_.segments.size() && mends; ++other)
-          mends = !said(other) || is_root(other) || possible(other, change.apply(joint(other).center));
+        bool mends = possible(row, change.apply(joint(row).center)), joined = false;
+        for (std::size_t other = 0; other < skeleton_.segments.size() && mends; ++other) {
+          if (!said(other) || is_root(other)) continue;
+          mends = possible(other, change.apply(joint(other).center));
+          joined = true;
+        }
         // A root alone is near anything: another joint must say so too.
-        if (mends && !is_root(row)) return change.mend;
+        if (mends && joined) return change.mend;
       }
     }
     const auto gap = is_root(row) ? std::nullopt : gap_between(bones_[row], bones_[parent(row)]);

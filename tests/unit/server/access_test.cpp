@@ -145,7 +145,7 @@ TEST_F(Access, WhatGoesWrongWithTlsIsSaid) {
                    }),
                    "no TLS handshake in time"));
   Options options = encrypted();
-  options.limits.hello_seconds = 0.1;
+  options.limits.hello_seconds = 1;
   const TestServer server(options);
   client::Socket socket(server.address(), client::Clock::now() + 5s, file("ours.pem"));
   std::array<std::byte, 256> bytes{};
