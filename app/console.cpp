@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 
+#include "app/abandonable.hpp"
 #include "app/command.hpp"
 
 namespace ecorche::app {
@@ -61,6 +62,7 @@ Context Program::context(std::string label) const {
   auto bar = std::make_shared<Bar>(std::move(label));
   Context context;
   context.stop = stop;
+  context.run_apart = [stop = stop](std::function<void()> work) { run_abandonable(std::move(work), stop); };
   context.progress = [bar](double fraction) { bar->draw(fraction); };
   context.log = [bar, warned = warned_](LogLevel level, std::string_view text) {
     if (level == LogLevel::warning) *warned = true;

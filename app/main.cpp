@@ -11,9 +11,11 @@
 #include <new>
 #include <string_view>
 
+#include "app/abandonable.hpp"
 #include "app/command.hpp"
 #include "app/command_line.hpp"
 #include "app/signals.hpp"
+#include "core/model_file/model_file.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -106,23 +108,26 @@ int fail(const Error& error, bool json) {
   return exit_code(error.kind());
 }
 
+int exit_code_of(int argc, char** argv) {
+  const bool json = wants_json(argc, argv);
+  try {
+    return run_command(argc, argv);
+  } catch (const Error& error) {
+    return fail(error, json);
+  } catch (const std::bad_alloc&) {
+    return fail(Error(ErrorKind::internal, "memory", "not enough memory", "use coarser voxels or fewer tets"),
+                json);
+  } catch (const std::exception& error) {
+    return fail(
+        Error(ErrorKind::internal, "ecorche", error.what(), "this is a bug: report it with the command"),
+        json);
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::app
 
 int main(int argc, char** argv) {
-  using ecorche::Error;
-  using ecorche::ErrorKind;
-  const bool json = ecorche::app::wants_json(argc, argv);
-  try {
-    return ecorche::app::run_command(argc, argv);
-  } catch (const Error& error) {
-    return ecorche::app::fail(error, json);
-  } catch (const std::bad_alloc&) {
-    return ecorche::app::fail(
-        Error(ErrorKind::internal, "memory", "not enough memory", "use coarser voxels or fewer tets"), json);
-  } catch (const std::exception& error) {
-    return ecorche::app::fail(
-        Error(ErrorKind::internal, "ecorche", error.what(), "this is a bug: report it with the command"),
-        json);
-  }
+  ecorche::model_file::leave_hdf5_open_at_exit();
+  return ecorche::app::leave(ecorche::app::exit_code_of(argc, argv));
 }

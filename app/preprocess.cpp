@@ -172,8 +172,7 @@ int run(const Program& program, const Settings& settings) {
 
   // The pipeline has one context for all stages; each stage has a bar of its own.
   Context bar = program.context("preprocess");
-  Context context;
-  context.stop = program.stop;
+  Context context = bar.quiet();
   context.progress = [&](double fraction) { bar.report(fraction); };
   context.log = [&](LogLevel level, std::string_view line) { bar.log(level, line); };
   preprocess::Hooks hooks;

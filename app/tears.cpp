@@ -120,7 +120,7 @@ json sweep(const Program& program, const Settings& s, const Body& body) {
     for (int a = 0; a < angles_of(joint); ++a) {
       const AngleAxis& angle = joint.sequence[static_cast<std::size_t>(a)];
       for (const double sign : {1.0, -1.0}) {
-        const Context quiet{nullptr, nullptr, context.stop};
+        const Context quiet = context.quiet();
         const auto breaks = [&](double gain, bool bridged) {
           return first_tear(body, j, angle, sign, s.step_deg, gain, bridged, quiet);
         };

@@ -72,8 +72,7 @@ std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resol
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
     const Part& part = parts[i];
     if (part.mirror_of >= 0 || context.stop.stop_requested()) return;
-    Context quiet;
-    quiet.stop = context.stop;
+    const Context quiet = context.quiet();
     meshes[i] = isosurface(part.shape, std::min(resolution.spacing, resolution.thin * part.detail), quiet);
     if (!resolution.simplify) return;
     meshes[i] = simplify(meshes[i], part.small_vertices);

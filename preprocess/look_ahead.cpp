@@ -15,8 +15,7 @@ namespace {
 
 // As far as weights; the skin is the only tissue.
 Model half_made(const Case& patient, const Context& context) {
-  Context quiet;  // what the stages would warn of has its own findings
-  quiet.stop = context.stop;
+  const Context quiet = context.quiet();  // what the stages would warn of has its own findings
   Model model;
   model.rig = rig::fit(patient, quiet);
   for (const CaseBone& bone : patient.bones)

@@ -1,6 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/model_file/hdf.hpp"
 
+#include "core/model_file/model_file.hpp"
+
+namespace ecorche::model_file {
+
+void leave_hdf5_open_at_exit() {
+  H5dont_atexit();
+}
+
+}  // namespace ecorche::model_file
+
 namespace ecorche::model_file::hdf {
 namespace {
 
@@ -17,9 +27,6 @@ herr_t keep_description(unsigned, const H5E_error2_t* error, void* text) {
 }  // namespace
 
 Session::Session() : lock_(library_mutex()) {
-  // After it has refused a damaged file HDF5 1.10 cannot close itself ("infinite loop closing library", on
-  // stderr, at the end of the process). Every file is closed here anyway.
-  [[maybe_unused]] static const herr_t stays_open = H5dont_atexit();
   H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }

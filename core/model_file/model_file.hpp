@@ -14,6 +14,11 @@ namespace ecorche::model_file {
 inline constexpr int format_major = 1;
 inline constexpr int format_minor = 2;
 
+/// For the main of a program, before anything else here: after it has refused a damaged file HDF5 1.10 cannot
+/// close itself ("infinite loop closing library", on stderr, at the end of the process). Every file is closed
+/// here anyway.
+void leave_hdf5_open_at_exit();
+
 /// Writes `model` to a temporary name beside `path`, flushes it to the disk and renames it; on failure or a
 /// stop nothing is left and an older file of that name stays whole. `path` must end in `.hdf` (ParaView asks
 /// for it). Throws Error{usage, cannot_create, io, interrupted}.

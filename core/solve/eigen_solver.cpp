@@ -2,7 +2,6 @@
 #include <Eigen/SparseCholesky>
 #include <memory>
 
-#include "core/solve/abandonable.hpp"
 #include "core/solve/spd_solver.hpp"
 
 namespace ecorche::solve {
@@ -16,7 +15,7 @@ class EigenSolver final : public SpdSolver {
     auto state = std::make_shared<State>();
     state->A = A;
     state_ = nullptr;
-    run_abandonable([state] { state->cholesky.compute(state->A); }, context);
+    context.run_unstoppable([state] { state->cholesky.compute(state->A); });
     if (state->cholesky.info() != Eigen::Success) {
       throw Error(ErrorKind::data, "solver eigen",
                   "the matrix of " + std::to_string(A.rows()) + " unknowns is not positive definite",
@@ -30,12 +29,12 @@ class EigenSolver final : public SpdSolver {
     if (!state_) throw Error(ErrorKind::internal, "solver eigen", "solve before factor", "report it");
     auto rhs = std::make_shared<Block>(B);
     auto X = std::make_shared<Block>();
-    run_abandonable([state = state_, rhs, X] { *X = state->cholesky.solve(*rhs); }, context);
+    context.run_unstoppable([state = state_, rhs, X] { *X = state->cholesky.solve(*rhs); });
     return std::move(*X);
   }
 
  private:
-  /// Shared with a factorization that may outlive this object (run_abandonable).
+  /// Shared with a factorization that may outlive this object (Context::run_apart).
   struct State {
     SparseMatrix A;
     Eigen::SimplicialLLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>> cholesky;

@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "core/values/error.hpp"
 
@@ -21,6 +22,10 @@ struct Context {
   std::function<void(LogLevel level, std::string_view line)> log;
   /// Set by Ctrl-C. Stages look at it at least ten times a second.
   std::stop_token stop;
+  /// Runs work that cannot be asked to stop (a factorization in a foreign library); empty: the caller runs
+  /// it. A program that must end at once on a stop may throw Error{interrupted} here and leave it running:
+  /// such work owns all that it touches (shared pointers captured by value), never the caller's references.
+  std::function<void(std::function<void()> work)> run_apart = {};
 
   void report(double fraction) const {
     if (progress) progress(fraction);
@@ -30,6 +35,19 @@ struct Context {
   }
   void warn(std::string_view line) const {
     if (log) log(LogLevel::warning, line);
+  }
+  /// Runs `work` where `run_apart` says, and waits for it; rethrows what it throws.
+  void run_unstoppable(std::function<void()> work) const {
+    check_stop();
+    if (run_apart) return run_apart(std::move(work));
+    work();
+  }
+  /// The same without a voice: for what is only part of a stage.
+  Context quiet() const {
+    Context out;
+    out.stop = stop;
+    out.run_apart = run_apart;
+    return out;
   }
   /// Throws Error{interrupted} once a stop was requested.
   void check_stop() const {

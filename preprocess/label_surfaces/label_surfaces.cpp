@@ -70,8 +70,7 @@ void resolve(Case& patient, const Context& context) {
   // The largest first, so that no thread is left alone with it; each job is one thread's.
   std::stable_sort(jobs.begin(), jobs.end(), [](const Job& a, const Job& b) { return a.work > b.work; });
 
-  Context quiet;
-  quiet.stop = context.stop;
+  const Context quiet = context.quiet();
   std::atomic<std::size_t> next{0};
   std::size_t done = 0;
   std::mutex mutex;

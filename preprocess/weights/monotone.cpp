@@ -51,8 +51,7 @@ MonotoneResult solve_monotone(solve::SparseMatrix& L, const std::vector<std::uin
   if (result.violation > kSmallViolation) first = result.harmonic.values;
   const auto most = static_cast<std::int64_t>(kMostMended * static_cast<double>(fixed.size()));
   std::vector<std::uint8_t> marked(fixed.size(), 0);
-  Context quiet;  // progress has come to its end with the first solution
-  quiet.stop = context.stop;
+  const Context quiet = context.quiet();  // progress has come to its end with the first solution
   while (result.violation > kSmallViolation) {
     const std::int64_t before = result.mended_nodes;
     for (std::size_t n = 0; n < fixed.size(); ++n) {

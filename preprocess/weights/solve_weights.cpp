@@ -24,12 +24,6 @@ constexpr double kStored =
     1e-6;  ///< smallest weight that is kept: the centres of rotation need them this small
 constexpr double kLargestChange = 1e-2;  ///< of a repair
 
-Context stop_only(const Context& context) {
-  Context inner;
-  inner.stop = context.stop;
-  return inner;
-}
-
 /// Segments that own at least one fixed node, ascending: the columns of the block.
 std::vector<std::int32_t> live_segments(const std::vector<std::int32_t>& owner, std::size_t segments) {
   std::vector<std::uint8_t> live(segments, 0);
@@ -240,7 +234,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
   const auto unknowns = std::count(fixed.begin(), fixed.end(), std::uint8_t{0});
   result.solver = options.solver == "auto" ? solver_for(unknowns) : options.solver;
   const auto solver = make_solver(result.solver);
-  Context scaled = stop_only(context);
+  Context scaled = context.quiet();
   scaled.progress = [&](double fraction) { context.report(0.2 + 0.7 * fraction); };
   MonotoneResult monotone = solve_monotone(L, fixed, std::move(boundary), *solver, scaled);
   certify_mending(monotone, certificate);
@@ -249,7 +243,7 @@ WeightsResult solve_weights(const TetMesh& mesh, const Case& patient,
     solve::SparseMatrix().swap(L);
     solve::SparseMatrix bent =
         stiffness(mesh.V, mesh.T, quasi_harmonic_conductivity(mesh.T, monotone.harmonic.values), nullptr);
-    monotone = solve_monotone(bent, fixed, std::move(monotone.harmonic.values), *solver, stop_only(context));
+    monotone = solve_monotone(bent, fixed, std::move(monotone.harmonic.values), *solver, context.quiet());
     certify_mending(monotone, certificate);
   }
   if (monotone.violation > kSmallViolation) {

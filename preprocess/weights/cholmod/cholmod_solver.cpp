@@ -7,9 +7,14 @@
 #include <memory>
 #include <string>
 
-#include "core/solve/abandonable.hpp"
+#include "core/solve/spd_solver.hpp"
 
-extern "C" void openblas_set_num_threads(int threads);
+extern "C" {
+int openblas_get_num_threads();
+void openblas_set_num_threads(int threads);
+int omp_get_max_active_levels();
+void omp_set_max_active_levels(int levels);
+}
 
 namespace ecorche::weights {
 namespace {
@@ -22,7 +27,7 @@ using solve::SparseMatrix;
 }
 
 /// CHOLMOD's workspace and the factor in it; shared with work that may outlive the solver
-/// (solve::run_abandonable).
+/// (Context::run_apart).
 struct State {
   cholmod_common common{};
   cholmod_factor* factor = nullptr;
@@ -61,6 +66,25 @@ struct State {
   }
 };
 
+/// While it lives neither OpenBLAS nor CHOLMOD's own loops (OpenMP, four threads on any machine) start
+/// threads; then both are as they were.
+class OneThread {
+ public:
+  OneThread() {
+    openblas_set_num_threads(1);
+    omp_set_max_active_levels(0);
+  }
+  ~OneThread() {
+    omp_set_max_active_levels(levels_);
+    openblas_set_num_threads(blas_);
+  }
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  int blas_ = openblas_get_num_threads(), levels_ = omp_get_max_active_levels();
+};
+
 /// A view of `A`, lower triangle, without a copy.
 cholmod_sparse view(SparseMatrix& A) {
   cholmod_sparse v{};
@@ -88,24 +112,20 @@ class CholmodSolver final : public solve::SpdSolver {
     auto matrix = std::make_shared<SparseMatrix>(A);
     matrix->makeCompressed();
     state_ = nullptr;
-    solve::run_abandonable(
-        [state, matrix] {
-          cholmod_sparse a = view(*matrix);
-          state->factor = cholmod_analyze(&a, &state->common);
-          if (state->common.status == CHOLMOD_NOT_INSTALLED) {
-            state->common.method[0].ordering = CHOLMOD_AMD;
-            state->factor = cholmod_analyze(&a, &state->common);
-          }
-        },
-        context);
+    context.run_unstoppable([state, matrix] {
+      cholmod_sparse a = view(*matrix);
+      state->factor = cholmod_analyze(&a, &state->common);
+      if (state->common.status == CHOLMOD_NOT_INSTALLED) {
+        state->common.method[0].ordering = CHOLMOD_AMD;
+        state->factor = cholmod_analyze(&a, &state->common);
+      }
+    });
     state->check(A.rows());
-    solve::run_abandonable(
-        [state, matrix] {
-          openblas_set_num_threads(1);
-          cholmod_sparse a = view(*matrix);
-          cholmod_factorize(&a, state->factor, &state->common);
-        },
-        context);
+    context.run_unstoppable([state, matrix] {
+      const OneThread one;
+      cholmod_sparse a = view(*matrix);
+      cholmod_factorize(&a, state->factor, &state->common);
+    });
     state->check(A.rows());
     state_ = std::move(state);
   }
@@ -115,22 +135,20 @@ class CholmodSolver final : public solve::SpdSolver {
     if (B.size() == 0) return B;
     auto rhs = std::make_shared<Eigen::MatrixXd>(B);  // CHOLMOD's are column by column
     auto X = std::make_shared<Eigen::MatrixXd>(B.rows(), B.cols());
-    solve::run_abandonable(
-        [state = state_, rhs, X] {
-          openblas_set_num_threads(1);
-          cholmod_dense b{};
-          b.nrow = b.d = static_cast<std::size_t>(rhs->rows());
-          b.ncol = static_cast<std::size_t>(rhs->cols());
-          b.nzmax = b.nrow * b.ncol;
-          b.x = rhs->data();
-          b.xtype = CHOLMOD_REAL;
-          b.dtype = CHOLMOD_DOUBLE;
-          cholmod_dense* x = cholmod_solve(CHOLMOD_A, state->factor, &b, &state->common);
-          if (x == nullptr) return;  // told by the status
-          std::copy_n(static_cast<const double*>(x->x), b.nzmax, X->data());
-          cholmod_free_dense(&x, &state->common);
-        },
-        context);
+    context.run_unstoppable([state = state_, rhs, X] {
+      const OneThread one;
+      cholmod_dense b{};
+      b.nrow = b.d = static_cast<std::size_t>(rhs->rows());
+      b.ncol = static_cast<std::size_t>(rhs->cols());
+      b.nzmax = b.nrow * b.ncol;
+      b.x = rhs->data();
+      b.xtype = CHOLMOD_REAL;
+      b.dtype = CHOLMOD_DOUBLE;
+      cholmod_dense* x = cholmod_solve(CHOLMOD_A, state->factor, &b, &state->common);
+      if (x == nullptr) return;  // told by the status
+      std::copy_n(static_cast<const double*>(x->x), b.nzmax, X->data());
+      cholmod_free_dense(&x, &state->common);
+    });
     state_->check(B.rows());
     return *X;
   }
