@@ -113,7 +113,7 @@ class Wording {
 
   json at(const Vector3d& place, const std::string& try_first, const char* kind, const std::string& what,
           json out) const {
-    const std::optional<std::size_t> joint = joint_near(place);
+    const std::optional<std::size_t> joint = joint_to_blame(place);
     out["kind"] = kind;
     out["what"] = what;
     out["at_mm"] = {place.x(), place.y(), place.z()};
@@ -128,15 +128,32 @@ class Wording {
     return out;
   }
 
-  // The joint nearest to it in the scan, of those that turn.
-  std::optional<std::size_t> joint_near(const Vector3d& place) const {
-    const auto& segments = model_.rig.skeleton.segments;
+  // The joint that shears what lies there most: one that turns far, with about as much of the weights there
+  // on its own side as on the other.
+  std::optional<std::size_t> joint_to_blame(const Vector3d& place) const {
+    const std::vector<double> moved = moved_by_joints(place);
     std::optional<std::size_t> out;
-    const auto away = [&](std::size_t s) { return (segments[s].joint.center - place).squaredNorm(); };
-    for (std::size_t s = 1; s < segments.size(); ++s) {
-      if (turn_of(body_.pose, s) < kTurned) continue;
-      if (!out || away(s) < away(*out)) out = s;
+    double most = 0;
+    for (std::size_t s = 1; s < moved.size(); ++s) {
+      const double turn = turn_of(body_.pose, s), shear = turn * moved[s] * (1 - moved[s]);
+      if (turn < kTurned || shear <= most) continue;
+      most = shear;
+      out = s;
     }
+    return out;
+  }
+
+  // Of each joint, how much of the weights of the node nearest to the place it moves: its segment's, and
+  // those of all segments that hang on it.
+  std::vector<double> moved_by_joints(const Vector3d& place) const {
+    const auto& segments = model_.rig.skeleton.segments;
+    Eigen::Index nearest = 0;
+    (model_.nodes.rowwise() - place.transpose().cast<float>()).rowwise().squaredNorm().minCoeff(&nearest);
+    const auto node = static_cast<std::size_t>(nearest);
+    std::vector<double> out(segments.size());
+    for (std::uint64_t i = model_.weights.offsets[node]; i < model_.weights.offsets[node + 1]; ++i)
+      for (int s = model_.weights.segment[i]; s >= 0; s = segments[static_cast<std::size_t>(s)].parent)
+        out[static_cast<std::size_t>(s)] += static_cast<double>(model_.weights.weight[i]);
     return out;
   }
 
