@@ -144,6 +144,7 @@ struct Solid {
 constexpr double kMostLost = 0.05;
 
 std::string rounded(double x) {
+  if (std::abs(x) >= 1000) return std::to_string(std::llround(x));
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.4g", x);
   return text.data();
