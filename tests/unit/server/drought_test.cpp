@@ -55,8 +55,8 @@ TEST_F(DroughtTest, TheNthAllocationOfAll) {
   EXPECT_GT(reasons["message: the server failed at it (report it)"], 0);
   EXPECT_GT(reasons["answer: the server failed at it (report it)"], 0);
   std::printf("%d allocations failed, one by one; %d conversations went on all the same\n", n - 1, survived);
-  EXPECT_GT(n, 500);
-  server.reset();  // it stops
+  EXPECT_GT(n, 200);  // how many there are is the threads' affair: a busy machine has more
+  server.reset();     // it stops
 }
 
 // Hello and a model over a WebSocket, and a page beside it.
