@@ -14,9 +14,9 @@ namespace ecorche::model_file {
 inline constexpr int format_major = 1;
 inline constexpr int format_minor = 2;
 
-/// For the main of a program, before anything else here: after it has refused a damaged file HDF5 1.10 cannot
-/// close itself ("infinite loop closing library", on stderr, at the end of the process). Every file is closed
-/// here anyway.
+/// For the main of a program that reads others' models, before anything else of HDF5: after it has refused a
+/// damaged file HDF5 1.10 cannot close itself (it complains, or crashes, as the process ends). Every file of
+/// ours is closed anyway; what else uses HDF5 then closes its own.
 void leave_hdf5_open_at_exit();
 
 /// Writes `model` to a temporary name beside `path`, flushes it to the disk and renames it; on failure or a

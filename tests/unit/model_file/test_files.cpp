@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "core/model_file/figures.hpp"
+#include "core/model_file/model_file.hpp"
 #include "tests/support/toy_model.hpp"
 
 // HDF5 1.10 itself loses a block whenever H5Gopen or H5Dopen refuses a damaged header; a C program of those
@@ -23,6 +24,7 @@ namespace ecorche::test {
 namespace fs = std::filesystem;
 
 ModelFileTest::ModelFileTest() {
+  model_file::leave_hdf5_open_at_exit();  // as a program does that reads damaged models
   std::string pattern = (fs::temp_directory_path() / "ecorche-model-XXXXXX").string();
   if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
   folder_ = pattern;
