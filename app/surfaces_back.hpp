@@ -13,7 +13,6 @@
 
 namespace ecorche::app {
 
-
 /// How the vertices of one surface came back, held against the scan's.
 struct SurfaceTrip {
   std::string tissue;

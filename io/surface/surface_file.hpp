@@ -59,8 +59,8 @@ struct GridArray {
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
                    const std::vector<GridArray>& point_data = {});
 
-/// Tets out of a file, with what it holds of each node and of each tet. Nothing is said of the tets' volumes: posed ones may
-/// be inverted.
+/// Tets out of a file, with what it holds of each node and of each tet. Nothing is said of the tets' volumes:
+/// posed ones may be inverted.
 struct TetFile {
   PointsF V;
   Tets T;
