@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `verify` and `preprocess` say of a model under --json (DESIGN 7).
+// What `verify` and `preprocess` say of a model under --json.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bounds beyond which a model is refused (DESIGN 7): a number and a reason each, said here once.
+// The bounds beyond which a model is refused: a number and a reason each, said here once.
 #pragma once
 
 #include <optional>

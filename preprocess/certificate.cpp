@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is measured on a model before it is believed (DESIGN 7).
+// What is measured on a model before it is believed.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 

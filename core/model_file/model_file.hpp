@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The model on disk: one HDF5 file that VTKHDF readers open (DESIGN 7).
+// The model on disk: one HDF5 file that VTKHDF readers open.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A case: one patient as it was scanned, everything in LPS mm (DESIGN 5).
+// A case: one patient as it was scanned, everything in LPS mm.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where joints come from: named regions of bones, shapes fitted to them, and the points and directions made
-// of those (DESIGN 6; Sujar18 3.1).
+// of those (Sujar18 3.1).
 #pragma once
 
 #include <array>

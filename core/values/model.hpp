@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A prepared body: what `preprocess` makes and everything else reads (DESIGN 7).
+// A prepared body: what `preprocess` makes and everything else reads.
 #pragma once
 
 #include <cstdint>
@@ -54,7 +54,7 @@ struct ModelVolume {
   std::map<std::int64_t, std::string> table;  ///< names of the label ids
 };
 
-/// What was measured on the model when it was made; `verify` measures it again (DESIGN 7).
+/// What was measured on the model when it was made; `verify` measures it again.
 struct Certificate {
   // As solved, in double precision, before repair.
   double solver_residual = 0;  ///< largest relative residual over the right-hand sides
@@ -101,7 +101,7 @@ struct Model {
   std::vector<std::uint16_t> tet_label;  ///< #T, see TetMesh; tets of bones come first
   /// Of the soft tets that follow those of bones, in that order: the label of the bone that each lies in. A
   /// corner of it belongs to another segment's bone, so that it cannot move rigidly with its own; drawn, it
-  /// does (runtime/volume/drawn_tets.hpp).
+  /// does (runtime/volume/rigid_copies.hpp).
   std::vector<std::uint16_t> contested;
   std::vector<std::string> bone_names;     ///< bone i has label i + 1
   std::vector<std::int32_t> bone_segment;  ///< #bones, row of the owning segment

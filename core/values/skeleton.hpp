@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual skeleton: segments, each with the one joint about which it turns (DESIGN 6).
+// The virtual skeleton: segments, each with the one joint about which it turns.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading `case.yaml` and everything it names (DESIGN 5).
+// Reading `case.yaml` and everything it names.
 #include "io/case/case_file.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `case.yaml`, skeletons and poses as files (DESIGN 5, 6). Every mistake is Error{config} with file, line and
+// `case.yaml`, skeletons and poses as files. Every mistake is Error{config} with file, line and
 // key.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frame and unit of a file, and the way from there to LPS mm (DESIGN 3, 5).
+// The frame and unit of a file, and the way from there to LPS mm.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose file: rotations from the scanned rest pose, or absolute anatomical angles (DESIGN 6).
+// A pose file: rotations from the scanned rest pose, or absolute anatomical angles.
 #include <algorithm>
 #include <cmath>
 

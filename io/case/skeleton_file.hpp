@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The skeleton file's keys and how they become a Skeleton (DESIGN 6).
+// The skeleton file's keys and how they become a Skeleton.
 #pragma once
 
 #include <array>

@@ -16,7 +16,7 @@ struct SliverReport {
   double largest_surface_move_mm = 0;  ///< of a node of the skin or of a bone's surface
 };
 
-/// Dihedral angles that a tet should keep. Flatter tets break the bounds of harmonic weights (DESIGN 7).
+/// Dihedral angles that a tet should keep. Flatter tets break the bounds of harmonic weights.
 struct SliverBounds {
   double min_deg = 10;
   double max_deg = 165;

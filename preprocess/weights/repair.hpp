@@ -11,7 +11,7 @@
 
 namespace ecorche::weights {
 
-/// Linear elements keep 0 <= w <= 1 only where no off-diagonal is positive; slivers break it (DESIGN 7). The
+/// Linear elements keep 0 <= w <= 1 only where no off-diagonal is positive; slivers break it. The
 /// rule: a row that left [0, 1] is clamped and divided by its sum, which moves its weights by about as much
 /// as they had left.
 struct Repair {

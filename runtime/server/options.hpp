@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a server may be told, and the safe defaults (DESIGN 8).
+// What a server may be told, and the safe defaults.
 #pragma once
 
 #include <cstdint>

@@ -81,7 +81,7 @@ bool stands_still(const PosedBody& body);
 /// caller's TBB arena; results are the same bytes for any number of threads.
 class BodyPoser {
  public:
-  /// Drops weights below 1e-4 and renormalises their rows (DESIGN 7). Throws Error{data} for a model whose
+  /// Drops weights below 1e-4 and renormalises their rows. Throws Error{data} for a model whose
   /// arrays do not fit together, Error{config} for a rig that cannot be constrained.
   explicit BodyPoser(std::shared_ptr<const Model> model);
   ~BodyPoser();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tissue vertices by the affine map of their tet (Sujar18 4), bones by their segment (DESIGN 7).
+// Tissue vertices by the affine map of their tet (Sujar18 4), bones by their segment.
 #pragma once
 
 #include <cstdint>

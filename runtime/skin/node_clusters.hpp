@@ -36,7 +36,7 @@ struct NodeClusters {
   std::size_t slabs() const { return (node.size() + slab - 1) / slab; }
 };
 
-/// Weights below 1e-4 are dropped and their rows renormalised (DESIGN 7). `kind`: #nodes, the same for nodes
+/// Weights below 1e-4 are dropped and their rows renormalised. `kind`: #nodes, the same for nodes
 /// that the same tissues hang on, 0 for those without one: so a frame of few tissues skins few clusters.
 /// Throws Error{data} where weights or centres do not fit the nodes.
 NodeClusters cluster_nodes(const Model& model, std::span<const std::uint32_t> kind);
