@@ -71,10 +71,10 @@ class Groups {
                                      [](const ModelVolume& volume) { return volume.labels; });
     if (labels == model.volumes.end()) return;
     labels_ = &labels->image;
-    for (const auto& [id, name] : labels->table) {
+    for (const auto& row : labels->table) {
       const auto tissue = std::find_if(model.tissues.begin(), model.tissues.end(),
-                                       [&](const Tissue& one) { return one.name == name; });
-      if (tissue != model.tissues.end()) group_[id] = group_name(tissue->group);
+                                       [&](const Tissue& one) { return one.name == row.second; });
+      if (tissue != model.tissues.end()) group_[row.first] = group_name(tissue->group);
     }
   }
 

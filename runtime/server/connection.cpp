@@ -32,7 +32,7 @@ constexpr double kRetrySeconds = 1;
 
 }  // namespace
 
-Connection::Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven,
+Connection::Connection(std::unique_ptr<Transport> transport, const std::string& peer, bool proven,
                        Clock::duration waited, House& house)
     : transport_(std::move(transport)),
       house_(house),

@@ -37,8 +37,8 @@ class Connection final : public std::enable_shared_from_this<Connection>, privat
  public:
   /// `proven`: the client has shown its right to connect already. `waited`: to be let in; half of the time
   /// for a hello is left in any case.
-  Connection(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited,
-             House& house);
+  Connection(std::unique_ptr<Transport> transport, const std::string& peer, bool proven,
+             Clock::duration waited, House& house);
   /// address_of() its peer.
   const std::string& address() const { return address_; }
   ~Connection() override;
