@@ -6,6 +6,7 @@
 
 #include "proto/convert.hpp"
 #include "runtime/server/connection.hpp"
+#include "runtime/server/guarded.hpp"
 #include "runtime/server/mesh_streams.hpp"
 #include "runtime/server/tls.hpp"
 
@@ -256,18 +257,15 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   made->asked = {.id = 0, .want = want, .request = request.subscribe()};
   house_.set_aside(
       [made, model = session_->model()] {
-        try {
+        made->status = guarded("subscribe", [&]() -> Status {
           made->asked.streams = open_streams(*model, std::get<MeshWant>(made->asked.want));
           if (empty(made->asked.streams)) {
-            made->status = {StatusCode::invalid_argument,
-                            "subscribe: no vertex of the tissues lies in the region (make it larger)"};
-            return;
+            return {StatusCode::invalid_argument,
+                    "subscribe: no vertex of the tissues lies in the region (make it larger)"};
           }
           made->payload = describe(*model, made->asked.streams, made->told);
-        } catch (const std::bad_alloc&) {
-          made->status = {StatusCode::resource_exhausted,
-                          "subscribe: the server is out of memory (ask for less)"};
-        }
+          return {};
+        });
       },
       [weak = weak_from_this(), made, id, session = session_] {
         const auto self = weak.lock();

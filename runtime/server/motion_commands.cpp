@@ -7,6 +7,7 @@
 #include "core/kinematics/ik.hpp"
 #include "proto/convert.hpp"
 #include "runtime/server/connection.hpp"
+#include "runtime/server/guarded.hpp"
 
 namespace ecorche::server {
 
@@ -78,13 +79,10 @@ void Connection::handle_solve(const v1::Envelope& request) {
   const auto outcome = std::make_shared<IkOutcome>();
   const auto work = [outcome, problem = std::move(problem), start = std::move(start),
                      model = session_->model()] {
-    try {
+    outcome->status = guarded("ik", [&] {
       outcome->result = kinematics::solve_ik(model->model().rig, start, problem);
-    } catch (const Error& error) {
-      outcome->status = to_status(error);
-    } catch (const std::exception& error) {
-      outcome->status = {StatusCode::internal, error.what()};
-    }
+      return Status{};
+    });
   };
   house_.offload(
       work,

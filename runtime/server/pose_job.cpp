@@ -2,10 +2,10 @@
 #include "runtime/server/pose_job.hpp"
 
 #include <algorithm>
-#include <new>
 #include <utility>
 
 #include "proto/convert.hpp"
+#include "runtime/server/guarded.hpp"
 #include "runtime/server/judging.hpp"
 #include "runtime/server/mesh_stream.hpp"
 #include "runtime/server/recording.hpp"
@@ -17,20 +17,6 @@ namespace {
 
 std::uint64_t microseconds(Clock::duration time) {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(time).count());
-}
-
-// Calls `work`; what it throws comes back as a status.
-template <class Work>
-Status guarded(Work&& work) {
-  try {
-    return work();
-  } catch (const Error& error) {
-    return to_status(error);
-  } catch (const std::bad_alloc&) {
-    return {StatusCode::resource_exhausted, "pose: the server is out of memory (ask for less)"};
-  } catch (const std::exception& error) {
-    return {StatusCode::internal, error.what()};
-  }
 }
 
 // What the tissues of the model are posed for: every tissue that some subscription shows.
@@ -233,7 +219,7 @@ Status show_volume(const PoseJob& job, const Subscription& subscription, const r
   const std::shared_ptr<wire::Payload> payload = subscription.volume->payload();
   Context context;
   context.stop = job.stop;
-  Status status = guarded([&] {
+  Status status = guarded("pose", [&] {
     return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
                                       frame, *payload, context);
   });
@@ -314,7 +300,7 @@ Status run(const PoseJob& job) {
   outcome.timings.set_waited(microseconds(start - job.request.arrived));
   BodyPool::Lease body;
   const auto pose_all = [&] {
-    outcome.status = guarded([&] {
+    outcome.status = guarded("pose", [&] {
       body = (job.aside ? job.model->bodies_aside : job.model->bodies).take();
       return pose(job, *body);
     });
@@ -325,7 +311,7 @@ Status run(const PoseJob& job) {
     pose_all();
     const v1::ServerTimings timings = outcome.timings;
     const bool posed = outcome.status.ok();
-    status = guarded([&] {
+    status = guarded("pose", [&] {
       if (posed) outcome.clamped = body->clamped;
       job.on_outcome(std::move(outcome));
       return posed ? show(job, *body, timings) : Status{};

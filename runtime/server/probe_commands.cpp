@@ -5,6 +5,7 @@
 
 #include "proto/arrays.hpp"
 #include "runtime/server/connection.hpp"
+#include "runtime/server/guarded.hpp"
 
 namespace ecorche::server {
 
@@ -61,16 +62,13 @@ Status read_request(const v1::ProbePoints& request, const wire::Payload& payload
 }
 
 void ask(const ServedModel& model, const ProbeFrame& body, ProbeAsked& asked) {
-  try {
+  asked.status = guarded("probe", [&] {
     if (asked.to_rest)
       model.probe().posed_to_rest(body.tree, asked.points, asked.wants, asked.found);
     else
       model.probe().rest_to_posed(body.tree, asked.points, asked.wants, asked.found);
-  } catch (const Error& error) {
-    asked.status = to_status(error);
-  } catch (const std::exception& error) {
-    asked.status = {StatusCode::internal, error.what()};
-  }
+    return Status{};
+  });
 }
 
 // `rows` rows, of which each source has its share: {numbers, how many a row}.

@@ -9,6 +9,8 @@
 #include <string>
 #include <utility>
 
+#include "runtime/server/guarded.hpp"
+
 namespace ecorche::server {
 
 std::filesystem::path RecordingFile::part_of(const std::filesystem::path& path) {
@@ -27,7 +29,7 @@ void RecordingFile::fail(const char* what) noexcept {
     status_ = {StatusCode::resource_exhausted, "record: its file cannot be " + std::string(what) + ": " +
                                                    std::strerror(error) + " (ask who runs the server)"};
   } catch (const std::exception&) {
-    status_ = {StatusCode::resource_exhausted, {}};
+    status_ = {StatusCode::resource_exhausted, "out of memory"};
   }
 }
 
@@ -48,17 +50,19 @@ void RecordingFile::append(std::string_view bytes) noexcept {
 }
 
 Status RecordingFile::commit() noexcept {
-  if (!status_.ok()) return status_;
-  if (::fsync(file_) != 0) {
-    fail("flushed");
+  return guarded("record", [&]() -> Status {
+    if (!status_.ok()) return status_;
+    if (::fsync(file_) != 0) {
+      fail("flushed");
+      return status_;
+    }
+    std::error_code ec;
+    if (std::filesystem::exists(path_, ec)) {
+      return {StatusCode::already_exists, "record: there is a recording of this name (choose another)"};
+    }
+    if (::rename(part_.c_str(), path_.c_str()) != 0) fail("renamed");
     return status_;
-  }
-  std::error_code ec;
-  if (std::filesystem::exists(path_, ec)) {
-    return {StatusCode::already_exists, "record: there is a recording of this name (choose another)"};
-  }
-  if (::rename(part_.c_str(), path_.c_str()) != 0) fail("renamed");
-  return status_;
+  });
 }
 
 }  // namespace ecorche::server

@@ -7,8 +7,10 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <new>
 #include <string>
 
+#include "runtime/server/guarded.hpp"
 #include "tests/unit/server/conversation.hpp"
 #include "tests/unit/server/failing_new.hpp"
 #include "tests/unit/server/web_client.hpp"
@@ -98,6 +100,25 @@ TEST_F(DroughtTest, TheNthAllocationOfAWebSocket) {
   }
   std::printf("%d allocations failed, one by one; %d conversations went on all the same\n", n - 1, survived);
   EXPECT_GT(n, 200);
+}
+
+// Who says that there was no memory has none for the words either.
+TEST_F(DroughtTest, AStatusWithoutAByte) {
+  const auto fails = []() -> Status { throw std::bad_alloc(); };
+  const auto speaks = []() -> Status { return {StatusCode::not_found, std::string(100, '.')}; };
+  EXPECT_EQ(guarded("pose", fails).message, "pose: the server is out of memory (ask for less)");
+  Status failed, spoke;
+  {
+    const Drought drought(0);
+    spared = false;
+    failed = guarded("pose", fails);
+    spoke = guarded("pose", speaks);
+    spared = true;
+  }
+  for (const Status& status : {failed, spoke}) {
+    EXPECT_EQ(status.code, StatusCode::resource_exhausted);
+    EXPECT_EQ(status.message, "out of memory");
+  }
 }
 
 // Not one, but all that would take more: without a Reserve, Asio ends the process here.
