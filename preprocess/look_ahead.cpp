@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/look_ahead.hpp"
 
+#include <algorithm>
+
 #include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/pipeline.hpp"
 #include "preprocess/rig/fit_rig.hpp"
@@ -12,6 +14,15 @@
 
 namespace ecorche::preprocess {
 namespace {
+
+// Weights by whole limbs, which are few, tell where limbs touch as well as those of all segments.
+std::vector<std::int32_t> limbs_of_bones(const Model& model) {
+  const std::vector<int> limb = check::limbs_of(model.rig.skeleton);
+  std::vector<std::int32_t> out;
+  for (const std::int32_t segment : model.bone_segment)
+    out.push_back(std::max(0, limb[static_cast<std::size_t>(segment)]));  // the trunk goes by its root
+  return out;
+}
 
 // As far as weights; the skin is the only tissue.
 Model half_made(const Case& patient, const Context& context) {
@@ -32,10 +43,11 @@ Model half_made(const Case& patient, const Context& context) {
   tet::canonicalize(mesh);
   context.report(0.4);
   model.weights =
-      weights::solve_weights(mesh, patient, model.bone_segment, model.segment_count(), {}, quiet).weights;
+      weights::solve_weights(mesh, patient, limbs_of_bones(model), model.segment_count(), {}, quiet).weights;
   context.report(0.9);
   model.nodes = mesh.V.cast<float>();
   model.tets = std::move(mesh.T);
+  model.tet_label = std::move(mesh.label);
   Tissue& skin = model.tissues.emplace_back();
   skin.group = Group::skin;
   skin.V = patient.skin.V.cast<float>();

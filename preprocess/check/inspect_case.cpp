@@ -9,10 +9,12 @@
 #include <cmath>
 #include <cstdio>
 #include <mutex>
+#include <optional>
 
 #include "preprocess/check/frames.hpp"
 #include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inside.hpp"
+#include "preprocess/check/inside_cells.hpp"
 #include "preprocess/check/label_ids.hpp"
 #include "preprocess/check/self_intersections.hpp"
 #include "preprocess/check/surface_parts.hpp"
@@ -106,7 +108,9 @@ class Inspector {
     parts_.resize(meshes_.size());
     if (patient_.skin.V.rows() > 0)
       skin_mm_ = (patient_.skin.V.colwise().maxCoeff() - patient_.skin.V.colwise().minCoeff()).maxCoeff();
-    const Inside inside(patient_.skin);
+    inside_.emplace(patient_.skin);
+    report_.surfaces[0].figures = measure(patient_.skin);
+    if (report_.surfaces[0].figures.closed()) cells_.emplace(patient_.skin, *inside_);
     const geometry::FaceTree skin(patient_.skin);
     std::size_t all = 1, done = 0;
     for (const SurfaceMesh* mesh : meshes_) all += static_cast<std::size_t>(mesh->F.rows());
@@ -115,7 +119,7 @@ class Inspector {
       context_.check_stop();
       const SurfaceMesh& mesh = *meshes_[i];
       SurfaceLine& line = report_.surfaces[i];
-      line.figures = measure(mesh);
+      if (i > 0) line.figures = measure(mesh);
       parts_[i] = surface_parts(mesh);
       for (std::int32_t p = 0; p < parts_[i].classes.count; ++p) {
         line.specks += parts_[i].speck(p, speck_mm);
@@ -123,21 +127,20 @@ class Inspector {
       }
       line.drawn = options_.drawn.contains(line.name);
       if (!line.drawn) line.intersections = self_intersections(mesh, context_);
-      if (i > 0 && patient_.skin.F.rows() > 0) line.outside = measure_outside(mesh, inside, skin);
+      if (i > 0 && patient_.skin.F.rows() > 0) line.outside = measure_outside(mesh, skin);
       const std::lock_guard lock(mutex);
       context_.report(static_cast<double>(done += static_cast<std::size_t>(mesh.F.rows())) /
                       static_cast<double>(all));
     });
   }
 
-  Outside measure_outside(const SurfaceMesh& mesh, const Inside& inside,
-                          const geometry::FaceTree& skin) const {
+  Outside measure_outside(const SurfaceMesh& mesh, const geometry::FaceTree& skin) const {
     Outside out;
     std::int32_t hint = -1;
     for (Eigen::Index v = 0; v < mesh.V.rows(); ++v) {
       if (v % 4096 == 0) context_.check_stop();
       const Vector3d p = mesh.V.row(v).transpose();
-      if (inside(p)) continue;
+      if (cells_ ? (*cells_)(p) : (*inside_)(p)) continue;
       const geometry::FaceTree::Hit hit = skin.nearest(p, hint);
       hint = hit.face;
       const double distance = std::sqrt(hit.squared);
@@ -275,7 +278,7 @@ class Inspector {
       points.insert(points.end(), some.begin(), some.end());
     }
     const SurfaceFigures& skin = report_.surfaces.front().figures;
-    const auto found = find_agreement(points, Inside(patient_.skin), (skin.high - skin.low).maxCoeff());
+    const auto found = find_agreement(points, *inside_, (skin.high - skin.low).maxCoeff());
     if (!found) return;
     std::string what = "bones and skin do not agree: ";
     std::string mend;
@@ -365,7 +368,9 @@ class Inspector {
   const Case& patient_;
   const Context& context_;
   const Options& options_;
-  double skin_mm_ = 0;  // its largest extent
+  double skin_mm_ = 0;                // its largest extent
+  std::optional<Inside> inside_;      // of the skin
+  std::optional<InsideCells> cells_;  // of a closed one
   Report report_;
   std::vector<const SurfaceMesh*> meshes_;  // of report_.surfaces
   std::vector<SurfaceParts> parts_;

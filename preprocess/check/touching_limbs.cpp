@@ -11,6 +11,9 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
+
+#include "preprocess/geometry/nearest_point.hpp"
 
 namespace ecorche::check {
 namespace {
@@ -24,30 +27,11 @@ constexpr double kFar = 2.5, kSure = 3.5;
 constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared
 constexpr std::int64_t kGrain = 1 << 14;
 
-// The uppermost segment of each limb, for every segment; -1: none.
-std::vector<int> limbs_of(const Skeleton& skeleton) {
-  std::vector<int> limb(skeleton.segments.size(), -1);
-  for (std::size_t s = 0; s < limb.size(); ++s) {  // parents come first
-    const Segment& segment = skeleton.segments[s];
-    if (segment.parent < 0) continue;
-    limb[s] = limb[static_cast<std::size_t>(segment.parent)];
-    if (limb[s] >= 0 || segment.joint.kind == JointKind::fixed) continue;
-    const std::size_t turns = segment.joint.kind == JointKind::hinge       ? 1
-                              : segment.joint.kind == JointKind::universal ? 2
-                                                                           : 3;
-    for (std::size_t a = 0; a < std::min(turns, segment.joint.sequence.size()); ++a) {
-      const AngleAxis& angle = segment.joint.sequence[a];
-      if (angle.max - angle.min > kSwing) limb[s] = static_cast<int>(s);
-    }
-  }
-  return limb;
-}
-
 // A piece of the surface u = 1/2 within a tet.
 struct Piece {
   double area = 0;
   Vector3d middle = Vector3d::Zero();
-  int own = -1, other = -1;
+  int other_limb = -1;
   bool sure = false;
 };
 
@@ -77,7 +61,7 @@ class Finder {
         const double from = (piece.middle - joint).norm();
         if (!(piece.area > 0) || from <= kFar * way) continue;
         piece.sure = from > kSure * way;
-        owners(t, top, share, piece);
+        piece.other_limb = beside(t, top);
         found[at].push_back(piece);
       }
     });
@@ -151,24 +135,18 @@ class Finder {
     return out;
   }
 
-  // The segments with the largest weights on either side.
-  void owners(std::int64_t tet, int top, const std::vector<float>& share, Piece& piece) const {
-    std::map<int, float> own, other;
+  // What has the largest share of the tet after the limb itself.
+  int beside(std::int64_t tet, int top) const {
+    std::map<int, float> shares;
     for (int c = 0; c < 4; ++c) {
-      const std::int32_t node = model_.tets(tet, c);
-      const bool inside = share[static_cast<std::size_t>(node)] > 0.5F;
-      for_weights(node, [&](int segment, float weight) {
-        const bool of_limb = limb_[static_cast<std::size_t>(segment)] == top;
-        if (of_limb == inside) (inside ? own : other)[segment] += weight;
+      for_weights(model_.tets(tet, c), [&](int segment, float weight) {
+        const int limb = limb_[static_cast<std::size_t>(segment)];
+        if (limb != top) shares[limb] += weight;
       });
     }
-    const auto largest = [](const std::map<int, float>& sums) {
-      const auto most = std::max_element(sums.begin(), sums.end(),
-                                         [](const auto& a, const auto& b) { return a.second < b.second; });
-      return most == sums.end() ? -1 : most->first;
-    };
-    piece.own = largest(own);
-    piece.other = largest(other);
+    const auto most = std::max_element(shares.begin(), shares.end(),
+                                       [](const auto& a, const auto& b) { return a.second < b.second; });
+    return most == shares.end() ? -1 : most->first;
   }
 
   const Model& model_;
@@ -181,23 +159,60 @@ std::string number(const char* format, double value) {
   return text.data();
 }
 
+// The segments of bones, by the nodes of their tets.
+class Bones {
+ public:
+  Bones(const Model& model, const std::vector<int>& limb)
+      : model_(model),
+        limb_(limb),
+        nodes_(model.nodes.cast<double>()),
+        segment_(static_cast<std::size_t>(nodes_.rows()), -1) {
+    for (std::size_t t = 0; t < model.tet_label.size(); ++t) {
+      if (model.tet_label[t] == TetMesh::soft) continue;
+      for (int c = 0; c < 4; ++c)
+        segment_[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(t), c))] =
+            model.bone_segment[static_cast<std::size_t>(model.tet_label[t]) - 1];
+    }
+  }
+
+  // Of the bones of the limb (-1: of none), the segment that is nearest to most of the contact; -1: it has no
+  // bones.
+  int nearest_to(const std::vector<const Piece*>& pieces, int limb) const {
+    std::vector<std::int32_t> own;
+    for (std::size_t n = 0; n < segment_.size(); ++n) {
+      if (segment_[n] >= 0 && limb_[static_cast<std::size_t>(segment_[n])] == limb)
+        own.push_back(static_cast<std::int32_t>(n));
+    }
+    if (own.empty()) return -1;
+    const geometry::NearestPoint nearest(nodes_, std::move(own));
+    std::map<int, double> areas;
+    for (const Piece* piece : pieces) {
+      double distance2 = 0;
+      areas[segment_[static_cast<std::size_t>(nearest.find(piece->middle, distance2))]] += piece->area;
+    }
+    return std::max_element(areas.begin(), areas.end(),
+                            [](const auto& a, const auto& b) { return a.second < b.second; })
+        ->first;
+  }
+
+ private:
+  const Model& model_;
+  const std::vector<int>& limb_;
+  Points nodes_;
+  std::vector<int> segment_;  // of each node; -1: of no bone
+};
+
 // One contact of all pieces between a limb and the same other.
 Touch joined(int limb, int other_limb, const std::vector<const Piece*>& pieces) {
   Touch out;
   out.limb = limb;
   out.other_limb = other_limb;
   Vector3d middle = Vector3d::Zero();
-  std::map<std::pair<int, int>, double> by_pair;
   for (const Piece* piece : pieces) {
     out.area_mm2 += piece->area;
     middle += piece->area * piece->middle;
-    by_pair[{piece->own, piece->other}] += piece->area;
   }
   middle /= out.area_mm2;
-  const auto most = std::max_element(by_pair.begin(), by_pair.end(),
-                                     [](const auto& a, const auto& b) { return a.second < b.second; });
-  out.own = most->first.first;
-  out.other = most->first.second;
   double least = std::numeric_limits<double>::infinity();
   for (const Piece* piece : pieces) {
     const double d = (piece->middle - middle).squaredNorm();
@@ -210,26 +225,46 @@ Touch joined(int limb, int other_limb, const std::vector<const Piece*>& pieces) 
 
 }  // namespace
 
+std::vector<int> limbs_of(const Skeleton& skeleton) {
+  std::vector<int> limb(skeleton.segments.size(), -1);
+  for (std::size_t s = 0; s < limb.size(); ++s) {  // parents come first
+    const Segment& segment = skeleton.segments[s];
+    if (segment.parent < 0) continue;
+    limb[s] = limb[static_cast<std::size_t>(segment.parent)];
+    if (limb[s] >= 0 || segment.joint.kind == JointKind::fixed) continue;
+    const std::size_t turns = segment.joint.kind == JointKind::hinge       ? 1
+                              : segment.joint.kind == JointKind::universal ? 2
+                                                                           : 3;
+    for (std::size_t a = 0; a < std::min(turns, segment.joint.sequence.size()); ++a) {
+      const AngleAxis& angle = segment.joint.sequence[a];
+      if (angle.max - angle.min > kSwing) limb[s] = static_cast<int>(s);
+    }
+  }
+  return limb;
+}
+
 std::vector<Touch> touching_limbs(const Model& model) {
   std::vector<Touch> out;
   if (model.tet_count() == 0) return out;
   const Finder finder(model);
   const double length =
       static_cast<double>((model.nodes.colwise().maxCoeff() - model.nodes.colwise().minCoeff()).maxCoeff());
+  std::optional<Bones> bones;
   for (int top = 0; top < static_cast<int>(model.segment_count()); ++top) {
     if (finder.limbs()[static_cast<std::size_t>(top)] != top) continue;
     const std::vector<Piece> pieces = finder.pieces(top);
     std::map<int, std::vector<const Piece*>> by_other;
-    for (const Piece& piece : pieces) {
-      if (piece.own >= 0 && piece.other >= 0)
-        by_other[finder.limbs()[static_cast<std::size_t>(piece.other)]].push_back(&piece);
-    }
+    for (const Piece& piece : pieces) by_other[piece.other_limb].push_back(&piece);
     for (const auto& [beside, some] : by_other) {
       const int other = beside;  // clang 14 takes no structured binding into a lambda
       double sure = 0;
       for (const Piece* piece : some) sure += piece->sure ? piece->area : 0;
       if (sure < kPatch * length * length) continue;
-      const Touch touch = joined(top, other, some);
+      if (!bones) bones.emplace(model, finder.limbs());
+      Touch touch = joined(top, other, some);
+      touch.own = bones->nearest_to(some, top);
+      touch.other = bones->nearest_to(some, other);
+      if (touch.own < 0 || touch.other < 0) continue;
       const auto seen = std::find_if(out.begin(), out.end(), [&](const Touch& before) {
         return before.limb == other && before.other_limb == top;
       });

@@ -14,19 +14,24 @@ namespace ecorche::check {
 struct Touch {
   int limb = -1;        ///< its uppermost segment
   int other_limb = -1;  ///< the uppermost segment of the other limb; -1: the rest of the body
-  int own = -1;         ///< the segment of the limb that most of the contact is of, ...
-  int other = -1;       ///< ... and the segment that it touches
+  int own = -1;         ///< the segment of the limb whose bones most of the contact is nearest to, ...
+  int other = -1;       ///< ... and the like segment of what it touches
   double area_mm2 = 0;
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< on the contact, near its middle, mm
 };
 
-/// Both are dragged along by either when the limb moves. A limb begins at the uppermost segment of each chain
-/// whose joint turns by more than 100 degrees about one of its angles (hips and shoulders; no joint of the
-/// spine). Its share u of a node is the sum of the weights of all its segments, which is harmonic: 1 on its
-/// bones, 0 on all others. Where u = 1/2 it ends; that lies about its joint, unless something touches: what
-/// lies farther from the joint than 2.5 times the way from there to the skin is contact, where 10 cm2 of a
-/// body of 1.7 m (the like share of others) lie beyond 3.5 times it. By limbs; the larger side of two limbs.
-/// O(limbs * (#nodes + #tets)); the same for any number of threads.
+/// For every segment the uppermost segment of the limb that it is of; -1: of none. A limb begins at the
+/// uppermost segment of each chain whose joint turns by more than 100 degrees about one of its angles (hips
+/// and shoulders; no joint of the spine).
+std::vector<int> limbs_of(const Skeleton& skeleton);
+
+/// Both are dragged along by either when the limb moves. Its share u of a node is the sum of the weights of
+/// all its segments, which is harmonic: 1 on its bones, 0 on all others; so weights by whole limbs do as
+/// well. Where u = 1/2 it ends; that lies about its joint, unless something touches: what lies farther from
+/// the joint than 2.5 times the way from there to the skin is contact, where 10 cm2 of a body of 1.7 m (the
+/// like share of others) lie beyond 3.5 times it. By limbs; the larger side of two limbs. Of the model the
+/// rig, the skin, the mesh with its labels and the weights are read. O(limbs * (#nodes + #tets)); the same
+/// for any number of threads.
 std::vector<Touch> touching_limbs(const Model& model);
 
 /// `touches the trunk: 47 cm2 joined, most of hand_left and pelvis`.

@@ -77,7 +77,7 @@ FaceTree::Hit FaceTree::nearest(const Eigen::Vector3d& p, std::int32_t hint) con
     double squared;
     std::size_t level, box;
   };
-  std::array<Entry, 64> stack;  // at most three siblings wait on each of 16 levels
+  std::array<Entry, kMostWaiting> stack;
   std::size_t depth = 0;
   stack[depth++] = {levels_.back()[0].squaredExteriorDistance(p), levels_.size() - 1, 0};
   while (depth > 0) {

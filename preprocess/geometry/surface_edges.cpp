@@ -97,19 +97,31 @@ class Walker {
 }  // namespace
 
 std::vector<HalfEdge> sorted_edges(const Triangles& F) {
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * static_cast<std::size_t>(F.rows()));
-  for (Eigen::Index f = 0; f < F.rows(); ++f) {
-    const auto corner = [&](int c) { return F(f, c % 3); };
-    if (corner(0) == corner(1) || corner(1) == corner(2) || corner(2) == corner(0)) continue;
-    for (int c = 0; c < 3; ++c) {
-      const auto [low, high] = std::minmax({corner(c), corner(c + 1)});
-      edges.push_back({low, high, static_cast<std::int32_t>(f), corner(c) == low});
+  const auto each = [&](auto&& visit) {
+    for (Eigen::Index f = 0; f < F.rows(); ++f) {
+      const auto corner = [&](int c) { return F(f, c % 3); };
+      if (corner(0) == corner(1) || corner(1) == corner(2) || corner(2) == corner(0)) continue;
+      for (int c = 0; c < 3; ++c) {
+        const auto [low, high] = std::minmax({corner(c), corner(c + 1)});
+        visit(HalfEdge{low, high, static_cast<std::int32_t>(f), corner(c) == low});
+      }
     }
+  };
+  // Counted by the lower vertex; of each there are few.
+  const std::size_t vertices = F.rows() == 0 ? 0 : static_cast<std::size_t>(F.maxCoeff()) + 1;
+  std::vector<std::size_t> past(vertices + 1, 0);
+  each([&](const HalfEdge& edge) { ++past[static_cast<std::size_t>(edge.low) + 1]; });
+  std::partial_sum(past.begin(), past.end(), past.begin());
+  std::vector<HalfEdge> edges(past.back());
+  each([&](const HalfEdge& edge) { edges[past[static_cast<std::size_t>(edge.low)]++] = edge; });
+  std::size_t begin = 0;
+  for (std::size_t v = 0; v < vertices; ++v) {
+    std::sort(edges.begin() + static_cast<std::ptrdiff_t>(begin),
+              edges.begin() + static_cast<std::ptrdiff_t>(past[v]), [](const HalfEdge& a, const HalfEdge& b) {
+                return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+              });
+    begin = past[v];
   }
-  std::sort(edges.begin(), edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
   return edges;
 }
 

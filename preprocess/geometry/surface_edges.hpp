@@ -18,7 +18,7 @@ struct HalfEdge {
 };
 
 /// All edges of all triangles, by (low, high, triangle); triangles with two equal corners have none.
-/// O(#F log #F).
+/// O(#F).
 std::vector<HalfEdge> sorted_edges(const Triangles& F);
 
 /// Calls `visit(span of the half edges of one edge)` for every edge of `sorted`.

@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "preprocess/weights/nearest_point.hpp"
+#include "preprocess/geometry/nearest_point.hpp"
 
 namespace ecorche::weights {
 
@@ -53,7 +53,7 @@ std::vector<std::int32_t> attachments(const Points& V, const Parts& parts,
     nodes[part].push_back(static_cast<std::int32_t>(n));
     if (boned[part]) all_boned.push_back(static_cast<std::int32_t>(n));
   }
-  const NearestPoint anywhere(V, all_boned);
+  const geometry::NearestPoint anywhere(V, all_boned);
   for (std::size_t part = 0; part < nodes.size(); ++part) {
     if (boned[part]) continue;
     context.check_stop();
@@ -63,7 +63,7 @@ std::vector<std::int32_t> attachments(const Points& V, const Parts& parts,
       const std::int32_t near = anywhere.find(V.row(n), d2);
       best = std::min(best, {d2, near});
     }
-    const NearestPoint there(
+    const geometry::NearestPoint there(
         V, nodes[static_cast<std::size_t>(parts.of_node[static_cast<std::size_t>(best.second)])]);
     tbb::parallel_for(std::size_t{0}, nodes[part].size(), [&](std::size_t i) {
       const std::int32_t n = nodes[part][i];

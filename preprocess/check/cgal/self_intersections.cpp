@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// Pairs of triangles that meet where they should not: candidates by CGAL's box intersection, decided by exact
+// Pairs of triangles that meet where they should not: those whose bounds meet, decided by exact
 // predicates as CGAL's Polygon Mesh Processing does, but on triangles that need not form a manifold.
 #include "preprocess/check/self_intersections.hpp"
 
 #include <CGAL/Bbox_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/box_intersection_d.h>
 #include <CGAL/intersections.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
+#include <vector>
+
+#include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::check {
 namespace {
@@ -19,7 +24,6 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 using Segment = Kernel::Segment_3;
 using Triangle = Kernel::Triangle_3;
-using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::int32_t>;
 
 class Pairs {
  public:
@@ -65,32 +69,53 @@ class Pairs {
   const SurfaceMesh& mesh_;
 };
 
+using Pair = std::pair<std::int32_t, std::int32_t>;  // of faces, the lower one first
+
+constexpr Pair kNone{std::numeric_limits<std::int32_t>::max(), 0};
+
+struct Met {
+  std::int64_t count = 0;
+  Pair first = kNone;
+};
+
+Met join(const Met& a, const Met& b) {
+  return {a.count + b.count, std::min(a.first, b.first)};
+}
+
+// The middle of what their boxes share: on the crossing, or near it.
+Eigen::Vector3d place(const CGAL::Bbox_3& x, const CGAL::Bbox_3& y) {
+  Eigen::Vector3d at;
+  for (int k = 0; k < 3; ++k) at[k] = 0.5 * (std::max(x.min(k), y.min(k)) + std::min(x.max(k), y.max(k)));
+  return at;
+}
+
 }  // namespace
 
 namespace cgal {
 
 Offenders self_intersections(const SurfaceMesh& mesh, const Context& context) {
   const Pairs pairs(mesh);
-  std::vector<Box> boxes;
-  for (std::int32_t f = 0; f < mesh.F.rows(); ++f) {
-    if (!pairs.degenerate(f)) boxes.emplace_back(pairs.bounds(f), f);
-  }
+  const geometry::FaceTree tree(mesh);
+  std::vector<std::uint8_t> degenerate(static_cast<std::size_t>(mesh.F.rows()));
+  for (std::size_t f = 0; f < degenerate.size(); ++f)
+    degenerate[f] = pairs.degenerate(static_cast<std::int32_t>(f));
+  const Met all = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, tree.leaf_count(), 256), Met{},
+      [&](const tbb::blocked_range<std::size_t>& range, Met met) {
+        context.check_stop();
+        for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) {
+          tree.each_pair_of(leaf, [&](std::int32_t f, std::int32_t g) {
+            if (degenerate[static_cast<std::size_t>(f)] != 0 || degenerate[static_cast<std::size_t>(g)] != 0)
+              return;
+            if (pairs.meet(f, g)) met = join(met, {1, {f, g}});
+          });
+        }
+        return met;
+      },
+      join);
   Offenders out;
-  std::pair<std::int32_t, std::int32_t> first{};
-  std::size_t looked = 0;
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& x, const Box& y) {
-    if (++looked % 4096 == 0) context.check_stop();
-    const std::int32_t low = std::min(x.info(), y.info()), high = std::max(x.info(), y.info());
-    if (!pairs.meet(low, high)) return;
-    ++out.count;
-    if (out.first && !(std::pair(low, high) < first)) return;
-    first = {low, high};
-    // The middle of what their boxes share: on the crossing, or near it.
-    Eigen::Vector3d at;
-    for (int k = 0; k < 3; ++k)
-      at[k] = 0.5 * (std::max(x.min_coord(k), y.min_coord(k)) + std::min(x.max_coord(k), y.max_coord(k)));
-    out.first = at;
-  });
+  out.count = all.count;
+  if (all.count > 0) out.first = place(pairs.bounds(all.first.first), pairs.bounds(all.first.second));
   return out;
 }
 

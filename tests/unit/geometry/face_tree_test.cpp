@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <utility>
 
 #include "preprocess/geometry/closest_point.hpp"
 #include "tests/support/triangle_distance.hpp"
@@ -50,6 +52,33 @@ class Soup : public testing::Test {
   std::mt19937 random_{17};
   std::vector<FaceTree::Corners> faces_;
 };
+
+TEST_F(Soup, pairs_equal_a_search_through_all) {
+  for (auto& face : faces_) {
+    for (Vector3d& corner : face) corner += 5 * (corner - face[0]);  // so that many meet
+  }
+  for (const std::size_t count : {0, 1, 5, 16, 17, 702}) {
+    const std::vector<FaceTree::Corners> some(faces_.begin(),
+                                              faces_.begin() + static_cast<std::ptrdiff_t>(count));
+    const auto bounds = [&](std::size_t f) {
+      return Eigen::AlignedBox3d(some[f][0]).extend(some[f][1]).extend(some[f][2]);
+    };
+    std::vector<std::pair<std::int32_t, std::int32_t>> expected, found;
+    for (std::size_t a = 0; a < count; ++a) {
+      for (std::size_t b = a + 1; b < count; ++b) {
+        if (bounds(a).intersects(bounds(b))) expected.emplace_back(a, b);
+      }
+    }
+    const FaceTree tree(some);
+    for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
+      tree.each_pair_of(leaf, [&](std::int32_t a, std::int32_t b) { found.emplace_back(a, b); });
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, expected);
+    if (count == 702) {
+      EXPECT_GT(found.size(), 1000U);
+    }
+  }
+}
 
 TEST_F(Soup, nearest_equals_a_search_through_all) {
   const FaceTree tree(faces_);

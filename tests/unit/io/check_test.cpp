@@ -7,6 +7,7 @@
 #include <random>
 
 #include "preprocess/check/inside.hpp"
+#include "preprocess/check/inside_cells.hpp"
 #include "preprocess/check/inspect_case.hpp"
 #include "tests/unit/io/small_case.hpp"
 
@@ -126,6 +127,30 @@ TEST(Inside, EqualsTheWindingNumber) {
     within += winding > 0.5;
   }
   EXPECT_GT(within, 300);
+}
+
+TEST(InsideCells, EqualInside) {
+  SurfaceMesh shells = sphere({3, -2, 7}, 10, 24);  // and one within another: a cavity
+  const Eigen::Index V = shells.V.rows(), F = shells.F.rows();
+  const SurfaceMesh cavity = sphere({4, -1, 6}, 6, 24);
+  shells.V.conservativeResize(2 * V, 3);
+  shells.V.bottomRows(V) = cavity.V;
+  shells.F.conservativeResize(2 * F, 3);
+  shells.F.bottomRows(F) = cavity.F.rowwise().reverse().array() + static_cast<std::int32_t>(V);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> uniform(-12, 12);
+  for (const SurfaceMesh& mesh :
+       {shells, box({-1, -1, -1}, {1, 1, 1}), box({0, 0, 0}, {10, 0, 3}), SurfaceMesh()}) {
+    const Inside inside(mesh);
+    const InsideCells cells(mesh, inside);
+    for (int i = 0; i < 20'000; ++i) {
+      Vector3d p(uniform(random), uniform(random), uniform(random));
+      if (i % 4 == 0 && mesh.V.rows() > 0)
+        p[i / 4 % 3] =
+            mesh.V(static_cast<Eigen::Index>(random() % static_cast<unsigned>(mesh.V.rows())), i / 4 % 3);
+      ASSERT_EQ(cells(p), inside(p)) << p.transpose();
+    }
+  }
 }
 
 TEST(Inside, RaysThroughEdgesAndCorners) {

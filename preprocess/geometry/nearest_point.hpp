@@ -8,7 +8,7 @@
 
 #include "core/values/mesh.hpp"
 
-namespace ecorche::weights {
+namespace ecorche::geometry {
 
 /// About two points a cell. `V` must outlive it.
 class NearestPoint {
@@ -33,4 +33,4 @@ class NearestPoint {
   double edge_ = 1;
 };
 
-}  // namespace ecorche::weights
+}  // namespace ecorche::geometry

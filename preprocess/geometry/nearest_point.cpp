@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/weights/nearest_point.hpp"
+#include "preprocess/geometry/nearest_point.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace ecorche::weights {
+namespace ecorche::geometry {
 
 NearestPoint::NearestPoint(const Points& V, std::vector<std::int32_t> subset) : V_(V) {
   for (const std::int32_t n : subset) box_.extend(V.row(n).transpose());
@@ -67,4 +67,4 @@ std::int32_t NearestPoint::find(const Eigen::Vector3d& p, double& distance2) con
   return best;
 }
 
-}  // namespace ecorche::weights
+}  // namespace ecorche::geometry
