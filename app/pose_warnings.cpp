@@ -118,7 +118,8 @@ class Wording {
     out["what"] = what;
     out["at_mm"] = {place.x(), place.y(), place.z()};
     if (!joint) {
-      out["mend"] = try_first + "prepare the case again with other weights";
+      out["mend"] =
+          try_first + "pose with another --skinning, or prepare the case again with --weights quasi-harmonic";
       return out;
     }
     const std::string& name = model_.rig.skeleton.segments[*joint].joint.name;

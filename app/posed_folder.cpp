@@ -41,12 +41,16 @@ class Naming {
   Naming(const Model& model, bool field) : model_(model), field_(field) {}
 
   PosedFile of(const fs::path& file) const {
-    PosedFile out{file.generic_string(), PosedKind::other, "", 0, 0};
+    PosedFile out{file.generic_string(), PosedKind::other, "", 0, 0, {}};
     const std::string name = file.filename().string(), stem = name.substr(0, name.find('.')),
                       ending = file.extension().string();
     if (name == kPoseFile) out.kind = PosedKind::pose;
     if (name == "quality.json") out.kind = PosedKind::quality;
-    if (name == kTets) out.kind = PosedKind::tets;
+    if (name == kTets) {
+      out.kind = PosedKind::tets;
+      out.labels.emplace(TetMesh::soft, "soft");
+      for (const std::string& bone : model_.bone_names) out.labels.emplace(out.labels.size(), bone);
+    }
     if (name == kScanSurfaces) out.kind = PosedKind::scan;
     if (const Tissue* tissue = kSurfaceEndings.contains(ending) ? tissue_of(stem) : nullptr) {
       out.kind = PosedKind::surface;
@@ -58,6 +62,7 @@ class Naming {
     } else if (const ModelVolume* volume = named(model_.volumes, stem)) {
       out.kind = volume->labels ? PosedKind::labels : PosedKind::image;
       out.of = stem;
+      out.labels = volume->table;
     }
     return out;
   }

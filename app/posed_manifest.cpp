@@ -25,9 +25,10 @@ std::string hex(std::uint64_t number) {
   return text;
 }
 
-std::uint64_t from_hex(const std::string& text) {
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, 16);
+template <class T>
+T number_from(const std::string& text, int base) {
+  T number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
   if (error != std::errc() || end != text.data() + text.size()) throw std::invalid_argument(text);
   return number;
 }
@@ -66,15 +67,19 @@ PosedFile file_from(const json& from) {
   const std::string kind = from.at("is");
   const auto found = std::find(kKinds.begin(), kKinds.end(), kind);
   if (found == kKinds.end()) throw std::invalid_argument(kind);
-  return {from.at("file"), static_cast<PosedKind>(found - kKinds.begin()), from.value("of", ""),
-          from.at("bytes"), from_hex(from.at("xxh64"))};
+  PosedFile out{from.at("file"),  static_cast<PosedKind>(found - kKinds.begin()),   from.value("of", ""),
+                from.at("bytes"), number_from<std::uint64_t>(from.at("xxh64"), 16), {}};
+  const json labels = from.value("labels", json::object());
+  for (const auto& [value, name] : labels.items())
+    out.labels.emplace(number_from<std::int64_t>(value, 10), name);
+  return out;
 }
 
 PosedManifest manifest_from(const json& from) {
   if (from.at("ecorche_posed") != 1) throw std::invalid_argument("version");
   PosedManifest out;
   out.model = from.at("model").at("name");
-  out.identity = from_hex(from.at("model").at("identity"));
+  out.identity = number_from<std::uint64_t>(from.at("model").at("identity"), 16);
   out.skinning = from.at("skinning");
   out.deformer = from.at("deformer");
   out.unfolded = from.at("unfolded");
@@ -104,6 +109,7 @@ std::string to_json(const PosedManifest& manifest) {
                      {"bytes", file.bytes},
                      {"xxh64", hex(file.digest)}});
     if (!file.of.empty()) files.back()["of"] = file.of;
+    for (const auto& [value, name] : file.labels) files.back()["labels"][std::to_string(value)] = name;
   }
   const json out{{"ecorche_posed", 1},
                  {"model", {{"name", manifest.model}, {"identity", hex(manifest.identity)}}},

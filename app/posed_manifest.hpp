@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,8 +36,9 @@ std::string_view kind_name(PosedKind kind);
 struct PosedFile {
   std::string file;  ///< below the folder, with slashes
   PosedKind kind = PosedKind::other;
-  std::string of;                       ///< the tissue or volume; empty for others
-  std::uint64_t bytes = 0, digest = 0;  ///< XXH64
+  std::string of;                              ///< the tissue or volume; empty for others
+  std::uint64_t bytes = 0, digest = 0;         ///< XXH64
+  std::map<std::int64_t, std::string> labels;  ///< of labels and tets: what each value stands for
 };
 
 struct PosedManifest {

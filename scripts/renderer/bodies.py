@@ -151,20 +151,25 @@ def read_case(folder):
 def read_posed(folder):
     quality = json.loads((folder / "quality.json").read_text())
     groups = {entry["name"]: entry.get("group", "other") for entry in quality["tissues"]}
-    tissues, volumes, tets = [], [], None
+    written = {file["file"]: file for file in json.loads((folder / "posed.json").read_text())["files"]}
+    tissues, volumes, tets, bones = [], [], None, []
     for path in sorted(folder.iterdir()):
         if path.suffix in SURFACES and path.stem in groups:
             tissues.append(Tissue(path.stem, groups[path.stem], read_surface(path)))
         elif path.suffix == ".nrrd" and path.stem not in ("displacement", "mask"):
             voxels, spacing = read_image(path)
             if voxels is not None:
-                volumes.append(Volume(path.stem, voxels, spacing, path.stem == "labels"))
+                file = written.get(path.name, {})
+                names = {int(value): name for value, name in file.get("labels", {}).items()}
+                volumes.append(Volume(path.stem, voxels, spacing, file.get("is") == "labels", names))
         elif path.suffix == ".vtu":
             reader = vtkXMLUnstructuredGridReader()
             reader.SetFileName(str(path))
             reader.Update()
             tets = reader.GetOutput()
-    return Body(folder.name, tissues, volumes, tets)
+            names = written.get(path.name, {}).get("labels", {})
+            bones = [names[str(label)] for label in range(1, len(names))]
+    return Body(folder.name, tissues, volumes, tets, bones=bones)
 
 
 def text(value):
