@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <memory>
 #include <numbers>
 
 #include "core/values/error.hpp"
@@ -84,6 +85,7 @@ class Joints {
       : patient_(patient),
         skeleton_(rig.skeleton),
         bones_(bones_of(patient, rig.skeleton)),
+        in_bones_(bones_.size()),
         inside_(patient.skin),
         skin_(patient.skin) {}
 
@@ -131,7 +133,15 @@ class Joints {
     const Place is = place_of(skeleton_, bones_, row, at);
     if (is_root(row)) return !std::isfinite(is.own) || is.own <= 2 * body_length(patient_);
     const bool off_skin = beyond_skin(at) > kOutside * is.length && is.nearest() > kOutside * is.length;
-    return !off_skin && is.nearest() <= is.near();
+    return (!off_skin && is.nearest() <= is.near()) || in_bones(row, at) || in_bones(parent(row), at);
+  }
+
+  // A femoral head's middle is right, though it lies deep in the bone and the scan's skin may end below it.
+  bool in_bones(std::size_t row, const Vector3d& p) const {
+    if (!bones_[row].tree || !bones_[row].box.contains(p)) return false;
+    std::unique_ptr<Inside>& inside = in_bones_[row];
+    if (!inside) inside = std::make_unique<Inside>(bones_[row].surface);
+    return (*inside)(p);
   }
 
   void check_center(std::size_t row) {
@@ -221,6 +231,7 @@ class Joints {
   const Case& patient_;
   const Skeleton& skeleton_;
   std::vector<SegmentBones> bones_;
+  mutable std::vector<std::unique_ptr<Inside>> in_bones_;  // of those that were asked
   Inside inside_;
   geometry::FaceTree skin_;
   std::vector<Finding> findings_;

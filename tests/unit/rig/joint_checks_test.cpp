@@ -57,6 +57,15 @@ TEST(JointChecks, a_knee_at_its_bones_is_right_wherever_its_hip_is) {
   EXPECT_TRUE(joints_of(patient).empty());
 }
 
+TEST(JointChecks, a_joint_deep_in_its_bone_is_right_where_the_skin_is_cut) {
+  Case patient = knee();
+  patient.skin = box({-150, -80, 530}, {-30, 80, 1000});
+  patient.skeleton.segments[1].joint.center = {-88, 0, 505};  // 15 mm below the femur's surfaces
+  EXPECT_TRUE(joints_of(patient).empty());
+  patient.skeleton.segments[1].joint.center = {-62, 0, 505};  // 11 mm beside it
+  EXPECT_EQ(joints_of(patient).size(), 1u);
+}
+
 TEST(JointChecks, a_body_in_another_frame_than_its_skeleton) {
   Case patient = knee();
   move(patient, {176, 0, 0});
