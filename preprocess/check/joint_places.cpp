@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/check/joint_places.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -43,10 +45,10 @@ double SegmentBones::distance(const Eigen::Vector3d& p) const {
 }
 
 std::vector<SegmentBones> bones_of(const Case& patient, const Skeleton& skeleton) {
-  std::vector<SegmentBones> out;
-  for (const Segment& segment : skeleton.segments) {
-    SegmentBones bones;
-    bones.surface = merged(patient, segment.name);
+  std::vector<SegmentBones> out(skeleton.segments.size());
+  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t row) {
+    SegmentBones& bones = out[row];
+    bones.surface = merged(patient, skeleton.segments[row].name);
     const Points& V = bones.surface.V;
     if (bones.surface.F.rows() > 0) {
       bones.tree = std::make_unique<geometry::FaceTree>(bones.surface);
@@ -56,8 +58,7 @@ std::vector<SegmentBones> bones_of(const Case& patient, const Skeleton& skeleton
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
       if (eigen.eigenvalues()[2] > kLong * eigen.eigenvalues()[1]) bones.shaft = eigen.eigenvectors().col(2);
     }
-    out.push_back(std::move(bones));
-  }
+  });
   return out;
 }
 
@@ -86,7 +87,6 @@ Place place_of(const Skeleton& skeleton, const std::vector<SegmentBones>& bones,
   const SegmentBones& other = bones[static_cast<std::size_t>(parent)];
   out.parent = other.distance(at);
   out.length = std::max(out.length, other.length());
-  if (const auto gap = gap_between(bones[row], other)) out.gap = gap->mm;
   return out;
 }
 

@@ -41,12 +41,11 @@ std::optional<Gap> gap_between(const SegmentBones& a, const SegmentBones& b);
 struct Place {
   double own = 0, parent = 0;
   double length = 0;  ///< of the longer of both bones, mm
-  double gap = 0;     ///< between both
   double nearest() const { return std::min(own, parent); }
   /// A joint lies in or between the ends of its bones: a tenth of the longer bone is more than half of what a
-  /// knee is wide (a femur's condyles measure 0.18 of its length, Terzidis et al. 2012), and no joint space
-  /// is wider than the gap.
-  double near() const { return 0.1 * length + gap; }
+  /// knee is wide (a femur's condyles measure 0.18 of its length, Terzidis et al. 2012). No joint space is
+  /// wider than the gap between both bones, which comes on top.
+  double near() const { return 0.1 * length; }
 };
 Place place_of(const Skeleton& skeleton, const std::vector<SegmentBones>& bones, std::size_t row,
                const Eigen::Vector3d& at);

@@ -85,9 +85,7 @@ class Joints {
       : patient_(patient),
         skeleton_(rig.skeleton),
         bones_(bones_of(patient, rig.skeleton)),
-        in_bones_(bones_.size()),
-        inside_(patient.skin),
-        skin_(patient.skin) {}
+        in_bones_(bones_.size()) {}
 
   std::vector<Finding> run(const Context& context) {
     for (std::size_t row = 0; row < skeleton_.segments.size(); ++row) {
@@ -124,16 +122,25 @@ class Joints {
   }
 
   double beyond_skin(const Vector3d& p) const {
-    if (patient_.skin.F.rows() == 0 || inside_(p)) return 0;
-    return std::sqrt(skin_.nearest(p).squared);
+    if (patient_.skin.F.rows() == 0) return 0;
+    if (!inside_) inside_ = std::make_unique<Inside>(patient_.skin);
+    if ((*inside_)(p)) return 0;
+    if (!skin_) skin_ = std::make_unique<geometry::FaceTree>(patient_.skin);
+    return std::sqrt(skin_->nearest(p).squared);
   }
 
   // A root joins nothing: it may lie between the feet, or beyond where a scan ends, but not in another unit.
   bool possible(std::size_t row, const Vector3d& at) const {
     const Place is = place_of(skeleton_, bones_, row, at);
     if (is_root(row)) return !std::isfinite(is.own) || is.own <= 2 * body_length(patient_);
-    const bool off_skin = beyond_skin(at) > kOutside * is.length && is.nearest() > kOutside * is.length;
-    return (!off_skin && is.nearest() <= is.near()) || in_bones(row, at) || in_bones(parent(row), at);
+    const auto near = [&] {
+      if (is.nearest() <= is.near()) return true;
+      const auto gap = gap_between(bones_[row], bones_[parent(row)]);
+      return gap && is.nearest() <= is.near() + gap->mm;
+    };
+    const double some = kOutside * is.length;
+    return (near() && (is.nearest() <= some || beyond_skin(at) <= some)) || in_bones(row, at) ||
+           in_bones(parent(row), at);
   }
 
   // A femoral head's middle is right, though it lies deep in the bone and the scan's skin may end below it.
@@ -231,9 +238,10 @@ class Joints {
   const Case& patient_;
   const Skeleton& skeleton_;
   std::vector<SegmentBones> bones_;
-  mutable std::vector<std::unique_ptr<Inside>> in_bones_;  // of those that were asked
-  Inside inside_;
-  geometry::FaceTree skin_;
+  // Made when first asked for: most joints need none.
+  mutable std::vector<std::unique_ptr<Inside>> in_bones_;
+  mutable std::unique_ptr<Inside> inside_;
+  mutable std::unique_ptr<geometry::FaceTree> skin_;
   std::vector<Finding> findings_;
 };
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "preprocess/geometry/winding_tree.hpp"
@@ -47,47 +48,85 @@ std::vector<std::size_t> flood(const Vec3i& size, std::vector<std::uint8_t>& pas
   return part;
 }
 
-constexpr std::size_t kLooks = 20'000;  // a share of a tenth is then known to 1 in 50
-
 Eigen::Vector3d centre(const ImageGrid& grid, const Vec3i& voxel) {
   const std::array<double, 3> p = grid.point(voxel[0], voxel[1], voxel[2]);
   return {p[0], p[1], p[2]};
 }
 
-/// Asks winding numbers at voxels evenly spread over the mask.
-void look_over(const geometry::WindingTree& winding_at, const ImageGrid& grid, const VoxelMask& mask,
-               OpenInside& out) {
-  const std::size_t voxels = static_cast<std::size_t>(mask.size[0]) * static_cast<std::size_t>(mask.size[1]) *
-                             static_cast<std::size_t>(mask.size[2]);
-  const std::size_t looks = std::min(kLooks, voxels);
-  std::vector<std::uint8_t> seen(looks, 0);  // 1: inside, 2: inside and lost
-  tbb::parallel_for(std::size_t{0}, looks, [&](std::size_t n) {
-    // Steps of the golden section fall on no pattern of rows and layers.
-    const double share = static_cast<double>(n) * 0.6180339887498949;
-    const auto v = static_cast<std::size_t>((share - std::floor(share)) * static_cast<double>(voxels));
+/// Voxels that lie neither on the surface nor within, but see it along three of the six axes or more: half of
+/// what an inside sees.
+std::vector<std::size_t> half_enclosed(const VoxelMask& mask, const std::vector<std::uint8_t>& touched) {
+  std::vector<std::uint8_t> seen(touched.size(), 0);
+  std::size_t stride = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto along = static_cast<std::size_t>(mask.size[axis]);
+    for (std::size_t line = 0; line < touched.size() / along; ++line) {
+      const std::size_t first = line / stride * stride * along + line % stride;
+      bool met = false;
+      const auto pass = [&](std::size_t n) {
+        const std::size_t voxel = first + n * stride;
+        met = met || touched[voxel] != 0;
+        seen[voxel] = static_cast<std::uint8_t>(seen[voxel] + (met ? 1 : 0));
+      };
+      for (std::size_t n = 0; n < along; ++n) pass(n);
+      met = false;
+      for (std::size_t n = along; n-- > 0;) pass(n);
+    }
+    stride *= along;
+  }
+  std::vector<std::size_t> out;
+  for (std::size_t v = 0; v < touched.size(); ++v) {
+    if (touched[v] != 0 || seen[v] < 3) continue;
     const Vec3i at = place(mask, v);
-    if (mask.is_touched(at[0], at[1], at[2]) || std::abs(winding_at(centre(grid, at))) < 0.5) return;
-    seen[n] = mask.is_inside(at[0], at[1], at[2]) ? 1 : 2;
-  });
-  const auto inside = std::count_if(seen.begin(), seen.end(), [](std::uint8_t s) { return s != 0; });
-  const auto lost = std::count(seen.begin(), seen.end(), std::uint8_t{2});
-  const double ml = 1e-3 * grid.spacing[0] * grid.spacing[1] * grid.spacing[2];
-  out.expected_ml =
-      ml * static_cast<double>(voxels) * static_cast<double>(inside) / static_cast<double>(looks);
-  if (inside > 0) out.lost = static_cast<double>(lost) / static_cast<double>(inside);
+    if (!mask.is_inside(at[0], at[1], at[2])) out.push_back(v);
+  }
+  return out;
+}
+
+/// Asks winding numbers at some of `voxels`: until few are lost for sure, or none of many is, or so many were
+/// asked that what is lost is known to 1 in 50.
+void look_over(const geometry::WindingTree& winding_at, const ImageGrid& grid, const VoxelMask& mask,
+               const std::vector<std::size_t>& voxels, OpenInside& out, const Context& context) {
+  constexpr std::size_t kAtOnce = 64, kNone = 512, kMost = 20'000;
+  const auto all = static_cast<double>(voxels.size()), kept = static_cast<double>(out.voxels);
+  const std::size_t most = std::min(kMost, voxels.size());
+  double lost = 0;
+  out.expected_ml = kept;
+  for (std::size_t asked = 0; asked < most;) {
+    context.check_stop();
+    const std::size_t past = std::min(asked + kAtOnce, most);
+    std::array<std::uint8_t, kAtOnce> within{};
+    tbb::parallel_for(asked, past, [&](std::size_t n) {
+      // Steps of the golden section fall on no pattern of rows and layers.
+      const double share = static_cast<double>(n) * 0.6180339887498949;
+      const std::size_t v =
+          most == voxels.size() ? n : static_cast<std::size_t>((share - std::floor(share)) * all);
+      within[n - asked] = std::abs(winding_at(centre(grid, place(mask, voxels[v])))) >= 0.5 ? 1 : 0;
+    });
+    lost += static_cast<double>(std::count(within.begin(), within.end(), std::uint8_t{1}));
+    asked = past;
+    const double looks = static_cast<double>(asked), share = lost / looks;
+    out.expected_ml = kept + share * all;
+    out.lost = lost == 0 ? 0 : share * all / out.expected_ml;
+    // Three standard deviations, and the three that none of so many leave possible.
+    const double surely = all * (share + 3 * std::sqrt(share * (1 - share) / looks) + 3 / looks);
+    if (surely < OpenInside::most_lost * (kept + surely) || (lost == 0 && asked >= kNone)) break;
+  }
+  out.expected_ml *= 1e-3 * grid.spacing[0] * grid.spacing[1] * grid.spacing[2];
 }
 
 }  // namespace
 
 OpenInside mark_inside_open(const SurfaceMesh& surface, const ImageGrid& grid, VoxelMask& mask,
                             const Context& context) {
-  std::vector<std::uint8_t> passed(static_cast<std::size_t>(mask.size[0]) *
-                                   static_cast<std::size_t>(mask.size[1]) *
-                                   static_cast<std::size_t>(mask.size[2]));
-  for (std::size_t v = 0; v < passed.size(); ++v) {
+  std::vector<std::uint8_t> touched(static_cast<std::size_t>(mask.size[0]) *
+                                    static_cast<std::size_t>(mask.size[1]) *
+                                    static_cast<std::size_t>(mask.size[2]));
+  for (std::size_t v = 0; v < touched.size(); ++v) {
     const Vec3i at = place(mask, v);
-    passed[v] = mask.is_touched(at[0], at[1], at[2]);
+    touched[v] = mask.is_touched(at[0], at[1], at[2]);
   }
+  std::vector<std::uint8_t> passed = touched;
   flood(mask.size, passed, 0, context);
   std::vector<std::vector<std::size_t>> parts;
   for (std::size_t v = 0; v < passed.size(); ++v)
@@ -111,7 +150,7 @@ OpenInside mark_inside_open(const SurfaceMesh& surface, const ImageGrid& grid, V
       mask.inside[mask.word(at[0], at[1], at[2])] |= VoxelMask::bit(at[0]);
     }
   }
-  look_over(winding_at, grid, mask, out);
+  look_over(winding_at, grid, mask, half_enclosed(mask, touched), out, context);
   return out;
 }
 

@@ -7,8 +7,11 @@
 
 namespace ecorche::voxel {
 
-/// What was found inside, and what a look at some 20 000 voxels all over says of the rest.
+/// What was found inside, and what a look at up to 20 000 voxels says of the rest: at those from which the
+/// surface is seen along three of the six axes.
 struct OpenInside {
+  static constexpr double most_lost = 0.05;  ///< holes that take more leave a shell, not a body
+
   std::size_t voxels = 0;  ///< marked as inside
   double expected_ml = 0;  ///< of the untouched space that winding numbers call inside
   double lost = 0;         ///< the share of it that flooded away

@@ -140,9 +140,6 @@ struct Solid {
   std::string warning;
 };
 
-/// Holes that take more of the inside leave a shell, not a body.
-constexpr double kMostLost = 0.05;
-
 std::string rounded(double x) {
   if (std::abs(x) >= 1000) return std::to_string(std::llround(x));
   std::array<char, 32> text{};
@@ -171,7 +168,7 @@ Solid solid(const SurfaceMesh& surface, const std::string& name, bool is_skin, c
   Solid out{rasterize(snapped, snapped.closed, snapped.closed ? 0 : 1, context), {}};
   if (!snapped.closed) {
     const OpenInside inside = mark_inside_open(surface, grid, out.mask, context);
-    if (inside.lost > kMostLost) {
+    if (inside.lost > OpenInside::most_lost) {
       const geometry::LargestHole hole = geometry::largest_hole(surface);
       const std::string what = "the surface is open: " + rounded(inside.lost * inside.expected_ml) +
                                " of some " + rounded(inside.expected_ml) + " ml inside run out through its " +
