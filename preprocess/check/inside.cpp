@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/check/inside.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +27,7 @@ int passes(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
 }  // namespace
 
 Inside::Inside(const SurfaceMesh& surface) : surface_(surface) {
-  for (int axis = 0; axis < 3; ++axis) columns_[static_cast<std::size_t>(axis)] = build(axis);
+  tbb::parallel_for(0, 3, [&](int axis) { columns_[static_cast<std::size_t>(axis)] = build(axis); });
 }
 
 Inside::Columns Inside::build(int axis) const {

@@ -2,6 +2,7 @@
 #include "preprocess/check/inspect_case.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -108,10 +109,10 @@ class Inspector {
     parts_.resize(meshes_.size());
     if (patient_.skin.V.rows() > 0)
       skin_mm_ = (patient_.skin.V.colwise().maxCoeff() - patient_.skin.V.colwise().minCoeff()).maxCoeff();
-    inside_.emplace(patient_.skin);
-    report_.surfaces[0].figures = measure(patient_.skin);
+    std::optional<geometry::FaceTree> skin;
+    tbb::parallel_invoke([&] { inside_.emplace(patient_.skin); }, [&] { skin.emplace(patient_.skin); },
+                         [&] { report_.surfaces[0].figures = measure(patient_.skin); });
     if (report_.surfaces[0].figures.closed()) cells_.emplace(patient_.skin, *inside_);
-    const geometry::FaceTree skin(patient_.skin);
     std::size_t all = 1, done = 0;
     for (const SurfaceMesh* mesh : meshes_) all += static_cast<std::size_t>(mesh->F.rows());
     std::mutex mutex;
@@ -127,7 +128,7 @@ class Inspector {
       }
       line.drawn = options_.drawn.contains(line.name);
       if (!line.drawn) line.intersections = self_intersections(mesh, context_);
-      if (i > 0 && patient_.skin.F.rows() > 0) line.outside = measure_outside(mesh, skin);
+      if (i > 0 && patient_.skin.F.rows() > 0) line.outside = measure_outside(mesh, *skin);
       const std::lock_guard lock(mutex);
       context_.report(static_cast<double>(done += static_cast<std::size_t>(mesh.F.rows())) /
                       static_cast<double>(all));
