@@ -163,8 +163,7 @@ std::string number(const char* format, double value) {
 class Bones {
  public:
   Bones(const Model& model, const std::vector<int>& limb)
-      : model_(model),
-        limb_(limb),
+      : limb_(limb),
         nodes_(model.nodes.cast<double>()),
         segment_(static_cast<std::size_t>(nodes_.rows()), -1) {
     for (std::size_t t = 0; t < model.tet_label.size(); ++t) {
@@ -184,7 +183,7 @@ class Bones {
         own.push_back(static_cast<std::int32_t>(n));
     }
     if (own.empty()) return -1;
-    const geometry::NearestPoint nearest(nodes_, std::move(own));
+    const geometry::NearestPoint nearest(nodes_, own);
     std::map<int, double> areas;
     for (const Piece* piece : pieces) {
       double distance2 = 0;
@@ -196,7 +195,6 @@ class Bones {
   }
 
  private:
-  const Model& model_;
   const std::vector<int>& limb_;
   Points nodes_;
   std::vector<int> segment_;  // of each node; -1: of no bone

@@ -7,7 +7,7 @@
 
 namespace ecorche::geometry {
 
-NearestPoint::NearestPoint(const Points& V, std::vector<std::int32_t> subset) : V_(V) {
+NearestPoint::NearestPoint(const Points& V, const std::vector<std::int32_t>& subset) : V_(V) {
   for (const std::int32_t n : subset) box_.extend(V.row(n).transpose());
   const Eigen::Vector3d extent = box_.sizes().cwiseMax(1e-6 * box_.sizes().maxCoeff()).cwiseMax(1e-9);
   edge_ = std::cbrt(extent.prod() * 2 / static_cast<double>(subset.size()));

@@ -14,7 +14,7 @@ namespace ecorche::geometry {
 class NearestPoint {
  public:
   /// Over the rows `subset` of V, of which there must be at least one.
-  NearestPoint(const Points& V, std::vector<std::int32_t> subset);
+  NearestPoint(const Points& V, const std::vector<std::int32_t>& subset);
   /// Row of V of the point nearest to `p`, ties to the lower row; `distance2` receives the squared distance,
   /// mm^2.
   std::int32_t find(const Eigen::Vector3d& p, double& distance2) const;
@@ -22,7 +22,10 @@ class NearestPoint {
  private:
   Eigen::Vector3i cell(const Eigen::Vector3d& p) const;
   std::size_t offset(int i, int j, int k) const {
-    return static_cast<std::size_t>(i + size_[0] * (j + size_[1] * k));
+    return static_cast<std::size_t>(i) +
+           static_cast<std::size_t>(size_[0]) *
+               (static_cast<std::size_t>(j) +
+                static_cast<std::size_t>(size_[1]) * static_cast<std::size_t>(k));
   }
 
   const Points& V_;
