@@ -8,7 +8,7 @@
 namespace ecorche::voxel {
 
 /// What was found inside, and what a look at up to 20 000 voxels says of the rest: at those from which the
-/// surface is seen along three of the six axes.
+/// surface is seen along three of the six axes or more (in the mouth of a wide opening it is not).
 struct OpenInside {
   static constexpr double most_lost = 0.05;  ///< holes that take more leave a shell, not a body
 

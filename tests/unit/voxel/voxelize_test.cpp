@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "preprocess/voxel/open_surface.hpp"
 #include "tests/support/triangle_distance.hpp"
 #include "tests/unit/voxel/shapes.hpp"
 #include "tests/unit/voxel/slow_winding.hpp"
@@ -214,6 +215,39 @@ TEST(Voxelize, BoneWithAWideHoleKeepsItsShellAndSaysSo) {
   ASSERT_EQ(said.warnings.size(), 1U);
   EXPECT_NE(said.warnings[0].find("only the voxels that it touches count"), std::string::npos)
       << said.warnings[0];
+}
+
+TEST(OpenSurface, WhatIsLostIsWhatAllWindingNumbersSay) {
+  // Closed but for a slit, with a cap cut off, a bowl, and a pipe that is open at both ends.
+  for (const int cut : {1, 64, 500, -1}) {
+    SurfaceMesh surface = shapes::ellipsoid({0, 0, 0}, {10, 8, 12}, 16);
+    if (cut > 0) {
+      surface.F.conservativeResize(surface.F.rows() - cut, 3);
+    } else {
+      surface = shapes::box({-6, -5, -12}, {6, 5, 12});
+      surface.F.conservativeResize(8, 3);  // without the walls below and above
+    }
+    const ImageGrid grid =
+        voxelize(shapes::body(shapes::box({-15, -15, -15}, {15, 15, 15}), {}), {.voxel_mm = 1}, {}).grid;
+    VoxelMask mask = rasterize(snap(surface, grid), false, 1, {});
+    const OpenInside found = mark_inside_open(surface, grid, mask, {});
+    double kept = 0, lost = 0;
+    for (int k = mask.low[2]; k < mask.low[2] + mask.size[2]; ++k) {
+      for (int j = mask.low[1]; j < mask.low[1] + mask.size[1]; ++j) {
+        for (int i = mask.low[0]; i < mask.low[0] + mask.size[0]; ++i) {
+          if (mask.is_touched(i, j, k)) continue;
+          const std::array<double, 3> p = grid.point(i, j, k);
+          if (std::abs(generalized_winding(surface, {p[0], p[1], p[2]})) < 0.5) continue;
+          (mask.is_inside(i, j, k) ? kept : lost) += 1;
+        }
+      }
+    }
+    // In the mouth of the bowl the surface is seen along two axes only.
+    EXPECT_NEAR(found.expected_ml, 1e-3 * (kept + lost), (cut == 500 ? 0.1e-3 : 0.03e-3) * (kept + lost))
+        << cut;
+    EXPECT_NEAR(found.lost, lost / (kept + lost), 0.02) << cut;
+    EXPECT_EQ(found.lost > OpenInside::most_lost, cut != 1) << cut;
+  }
 }
 
 TEST(Voxelize, DefaultVoxelIsTheFinestThatFits) {
