@@ -1,39 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-include(GoogleTest OPTIONAL)
-
-# ecorche_precompiled(TARGET PCH): the target reads PCH's headers precompiled, where ECORCHE_PCH is on.
-function(ecorche_precompiled name pch)
-  if(ECORCHE_PCH)
-    target_precompile_headers(${name} REUSE_FROM ${pch})
-  endif()
-endfunction()
-
-if(ECORCHE_PCH)
-  find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-  find_package(GTest REQUIRED)
-  file(WRITE ${CMAKE_BINARY_DIR}/pch.cpp "")
-  set(_common <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <algorithm> <filesystem> <functional> <map> <optional> <span>
-    <string> <vector>)
-  add_library(ecorche_pch OBJECT ${CMAKE_BINARY_DIR}/pch.cpp)
-  target_link_libraries(ecorche_pch PRIVATE ecorche_flags ecorche_sanitizers Eigen3::Eigen)
-  target_precompile_headers(ecorche_pch PRIVATE ${_common})
-  add_library(ecorche_test_pch OBJECT ${CMAKE_BINARY_DIR}/pch.cpp)
-  target_link_libraries(ecorche_test_pch PRIVATE ecorche_flags ecorche_sanitizers Eigen3::Eigen GTest::gtest)
-  target_precompile_headers(ecorche_test_pch PRIVATE ${_common} <gtest/gtest.h>)
-  # Without the time of making: what reads it can then be found in the cache again.
-  target_compile_options(ecorche_flags INTERFACE "SHELL:-Xclang -fno-pch-timestamp")
-endif()
-
-# ecorche_library(NAME [FOREIGN] [CGAL] SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
-#   FOREIGN: mostly somebody else's templates (CGAL, ITK, VTK): built without sanitizers and with -O2 at most.
-#   CGAL:    compiled in the job pool of one.
+# ecorche_library(NAME [FOREIGN] [CGAL] [PRECOMPILED kind] SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
+#   FOREIGN:     mostly somebody else's templates (CGAL, ITK, VTK): built without sanitizers and precompiled headers.
+#   CGAL:        compiled in the job pool of one.
+#   PRECOMPILED: which headers (ecorche_precompiled.cmake); `plain` where it is not said, `none` for none.
 function(ecorche_library name)
-  cmake_parse_arguments(A "FOREIGN;CGAL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(A "FOREIGN;CGAL" "PRECOMPILED" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  if(NOT A_PRECOMPILED)
+    set(A_PRECOMPILED plain)
+  endif()
   add_library(${name} STATIC ${A_SOURCES})
   target_link_libraries(${name} PUBLIC ${A_PUBLIC} PRIVATE ecorche_flags ${A_PRIVATE})
   if(NOT A_FOREIGN)
     target_link_libraries(${name} PRIVATE ecorche_sanitizers)
-    ecorche_precompiled(${name} ecorche_pch)
+    ecorche_precompiled(${name} ${A_PRECOMPILED})
   elseif(ECORCHE_FUZZ)
     # libFuzzer goes where it sees branches: those of tinygltf decide what a glTF holds.
     target_compile_options(${name} PRIVATE -fsanitize=fuzzer-no-link,address)
@@ -46,10 +25,14 @@ endfunction()
 # What the sanitizers build.
 add_custom_target(unit_tests)
 
-# ecorche_test(NAME SOURCES ... [LIBS ...] [ARGS ...] [TIMEOUT seconds] [LABELS ...] [FIXTURES ...])
-# One gtest executable and one ctest entry: a process start per case would cost more than the cases.
+# ecorche_test(NAME SOURCES ... [LIBS ...] [ARGS ...] [PRECOMPILED kind] [TIMEOUT seconds] [LABELS ...] [FIXTURES ...])
+# One gtest executable and one ctest entry: a process start per case would cost more than the cases. Its sources are
+# compiled six at a time, as one: what they share is then read and instantiated once.
 function(ecorche_test name)
-  cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;LIBS;ARGS;LABELS;FIXTURES" ${ARGN})
+  cmake_parse_arguments(A "" "PRECOMPILED;TIMEOUT" "SOURCES;LIBS;ARGS;LABELS;FIXTURES" ${ARGN})
+  if(NOT A_PRECOMPILED)
+    set(A_PRECOMPILED test)
+  endif()
   if(NOT A_TIMEOUT)
     set(A_TIMEOUT 120)
   endif()
@@ -58,7 +41,8 @@ function(ecorche_test name)
   target_link_libraries(${name} PRIVATE ecorche_flags ecorche_sanitizers ${A_LIBS} GTest::gtest GTest::gtest_main)
   # Tests themselves are compiled a fifth faster so; what they test keeps its own options.
   target_compile_options(${name} PRIVATE -O1)
-  ecorche_precompiled(${name} ecorche_test_pch)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+  ecorche_precompiled(${name} ${A_PRECOMPILED})
   if(name MATCHES "^unit_" AND NOT A_LABELS MATCHES "release_only|slow")
     add_dependencies(unit_tests ${name})
   endif()
@@ -86,7 +70,7 @@ function(ecorche_test_properties name)
   if(NOT A_FIXTURES)
     return()
   endif()
-  set(folder ${CMAKE_BINARY_DIR}/fixtures)
+  set(folder ${PROJECT_BINARY_DIR}/fixtures)
   set(first lattice)
   set(models ${folder}/small_lattice.hdf)
   if(ECORCHE_GPL)

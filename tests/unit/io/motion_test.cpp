@@ -17,10 +17,10 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kRadiansADegree = std::numbers::pi / 180;
 
 double degrees_between(const Quaterniond& a, const Quaterniond& b) {
-  return 2 * std::atan2((a.conjugate() * b).vec().norm(), std::abs((a.conjugate() * b).w())) / kDegree;
+  return 2 * std::atan2((a.conjugate() * b).vec().norm(), std::abs((a.conjugate() * b).w())) / kRadiansADegree;
 }
 
 Quaterniond random_turn(std::mt19937& random) {
@@ -46,9 +46,9 @@ Clip random_clip(std::size_t frames) {
   }
   // Where the middle angle of ZXY is a quarter turn, the other two are not told apart. In LPS that turn is
   // about x too.
-  clip.rotation[1] = Quaterniond(AngleAxisd(90 * kDegree, Vector3d::UnitX())) *
+  clip.rotation[1] = Quaterniond(AngleAxisd(90 * kRadiansADegree, Vector3d::UnitX())) *
                      Quaterniond(AngleAxisd(0.4, Vector3d::UnitY()));
-  clip.rotation[2] = Quaterniond(AngleAxisd(-90 * kDegree, Vector3d::UnitX())) *
+  clip.rotation[2] = Quaterniond(AngleAxisd(-90 * kRadiansADegree, Vector3d::UnitX())) *
                      Quaterniond(AngleAxisd(-2, Vector3d::UnitZ()));
   return clip;
 }
@@ -116,7 +116,7 @@ TEST(Bvh, TheFrameIsTurnedToLps) {
 // The product of three turns in the order of the channels, written out by hand as matrices in the file's
 // frame.
 Eigen::Matrix3d turn(char axis, double degrees) {
-  const double c = std::cos(degrees * kDegree), s = std::sin(degrees * kDegree);
+  const double c = std::cos(degrees * kRadiansADegree), s = std::sin(degrees * kRadiansADegree);
   Eigen::Matrix3d m;
   if (axis == 'X') m << 1, 0, 0, 0, c, -s, 0, s, c;
   if (axis == 'Y') m << c, 0, s, 0, 1, 0, -s, 0, c;

@@ -11,8 +11,8 @@
 namespace ecorche::io {
 namespace {
 
-PlacedSkeleton parse(const std::string& text) {
-  return parse_skeleton(yaml::Value::parse(text, "s.yaml"), Frame{});
+PlacedSkeleton parse_rules(const std::string& text) {
+  return parse_skeleton(yaml::Value::parse_rules(text, "s.yaml"), Frame{});
 }
 
 // A skeleton of two segments whose second joint has these keys.
@@ -35,7 +35,7 @@ TEST(Rules, EverySourceReadsBack) {
       "0]}, "
       "{axis_of: root}, [0, 1, 0]]}}";
   const std::string text = two("center: " + center + ", axes: " + axes + ", rest_deg: measured");
-  const PlacedSkeleton placed = parse(text);
+  const PlacedSkeleton placed = parse_rules(text);
   const Joint& joint = placed.skeleton.segments[1].joint;
   ASSERT_TRUE(joint.how);
   EXPECT_TRUE(joint.how->measured_rest);
@@ -44,7 +44,7 @@ TEST(Rules, EverySourceReadsBack) {
   EXPECT_EQ(axes_to_yaml(joint.how->axes), axes);
   EXPECT_EQ(joint.how->axes[0].first, 2);  // the first in the file keeps its direction
   const std::string again = skeleton_to_yaml(placed.skeleton);
-  EXPECT_EQ(skeleton_to_yaml(parse(again).skeleton), again);
+  EXPECT_EQ(skeleton_to_yaml(parse_rules(again).skeleton), again);
   EXPECT_EQ(placed.named.bones.size(), 3U);
   EXPECT_EQ(placed.named.regions.size(), 2U);
 }
@@ -57,7 +57,7 @@ TEST(Rules, WhatIsPossibleReadsBack) {
   std::string text =
       two("center: {cylinder_fit: {segment: b, facing_segment: a, along: [1, 0, 0]}}, possible: " + possible);
   text.insert(text.find("segments:"), size + "\n");
-  const PlacedSkeleton placed = parse(text);
+  const PlacedSkeleton placed = parse_rules(text);
   ASSERT_TRUE(placed.size);
   EXPECT_EQ(placed.size->whole, 300);
   EXPECT_EQ("size_mm: " + size_to_yaml(*placed.size), size);
@@ -67,29 +67,29 @@ TEST(Rules, WhatIsPossibleReadsBack) {
   EXPECT_FALSE(rule.possible.radius_mm.holds(14.9));
   EXPECT_EQ(bounds_to_yaml(rule.possible), possible);
   const std::string again = skeleton_to_yaml(placed.skeleton, placed.size);
-  EXPECT_EQ(skeleton_to_yaml(parse(again).skeleton, parse(again).size), again);
+  EXPECT_EQ(skeleton_to_yaml(parse_rules(again).skeleton, parse_rules(again).size), again);
 }
 
 TEST(Rules, WhatIsNotPossibleIsRefused) {
   const auto refused = [](const std::string& joint, const std::string& part) {
-    expect_error(ErrorKind::config, part, [&] { parse(two("center: [0, 0, 0], possible: " + joint)); });
+    expect_error(ErrorKind::config, part, [&] { parse_rules(two("center: [0, 0, 0], possible: " + joint)); });
   };
   refused("{radius_mm: [1]}", "possible.radius_mm: is a range of 1 values (write [least, most])");
   refused("{axis_to_shaft_deg: [9, 8]}", "axis_to_shaft_deg: the range ends before it begins");
   refused("{rest_deg: {bend: [0, 1]}}", "unknown angle 'bend'");
   expect_error(ErrorKind::config, "along: is for vertices that face another segment (name that segment)",
-               [] { parse(two("center: {centroid: {segment: b, along: [1, 0, 0]}}")); });
+               [] { parse_rules(two("center: {centroid: {segment: b, along: [1, 0, 0]}}")); });
   std::string text = two("center: [0, 0, 0]");
   text.insert(text.find("segments:"), "size_mm: {least: 5, most: 4}\n");
   expect_error(ErrorKind::config, "size_mm: is no range of sizes (write 0 < least <= whole <= most, in mm)",
-               [&] { parse(text); });
+               [&] { parse_rules(text); });
 }
 
 TEST(Rules, AFrameTurnsPointsAndDirections) {
   const Frame ras{(Eigen::Matrix3d() << -1, 0, 0, 0, -1, 0, 0, 0, 1).finished(), 10};
   const Skeleton s =
       parse_skeleton(
-          yaml::Value::parse(
+          yaml::Value::parse_rules(
               two("center: {between: [[1, 0, 0], [3, 0, 0]]}, axes: {x: {axis_of: root}, z: [1, 0, 1]}"),
               "s"),
           ras)
@@ -102,7 +102,7 @@ TEST(Rules, AFrameTurnsPointsAndDirections) {
 
 TEST(Rules, EveryMistakeIsNamed) {
   const auto refused = [](const std::string& joint, const std::string& part) {
-    expect_error(ErrorKind::config, part, [&] { parse(two(joint)); });
+    expect_error(ErrorKind::config, part, [&] { parse_rules(two(joint)); });
   };
   refused("center: {sphere_fit: {region: h}, centroid: {region: h}}",
           "center: names both 'sphere_fit' and 'centroid'");
@@ -241,12 +241,12 @@ TEST(Templates, EachIsASkeletonThatReadsBack) {
   const std::map<std::string, std::size_t> sizes{{"human", 22}, {"hand", 19}, {"knee", 3}, {"quadruped", 21}};
   for (const auto& [name, size] : sizes) {
     const PlacedSkeleton placed =
-        parse_skeleton(yaml::Value::parse(skeleton_template(name).value(), name + ".yaml"), Frame{});
+        parse_skeleton(yaml::Value::parse_rules(skeleton_template(name).value(), name + ".yaml"), Frame{});
     EXPECT_EQ(placed.skeleton.segments.size(), size) << name;
     EXPECT_EQ(placed.skeleton.name, name);
     EXPECT_TRUE(placed.named.bones.empty()) << name;  // whatever the bones of a segment are called
     const std::string text = skeleton_to_yaml(placed.skeleton);
-    EXPECT_EQ(skeleton_to_yaml(parse(text).skeleton), text) << name;
+    EXPECT_EQ(skeleton_to_yaml(parse_rules(text).skeleton), text) << name;
     for (const Segment& segment : placed.skeleton.segments) {
       const bool limited = std::any_of(segment.joint.sequence.begin(), segment.joint.sequence.end(),
                                        [](const AngleAxis& a) { return std::isfinite(a.min); });

@@ -17,7 +17,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using test::sequence;
 using test::turn;
-constexpr double pi = std::numbers::pi;
+constexpr double kPi = std::numbers::pi;
 
 Joint joint_of(JointKind kind, std::vector<AngleAxis> turns) {
   Joint joint;
@@ -68,7 +68,7 @@ TEST(Angles, RoundTripOfRotations) {
     for (int trial = 0; trial < 50; ++trial) {
       const Quaterniond q = test::random_turn(random);
       const Angles angles = angles_from_rotation(joint, q);
-      EXPECT_LE(std::abs(angles[1]), pi / 2 + 1e-12);
+      EXPECT_LE(std::abs(angles[1]), kPi / 2 + 1e-12);
       EXPECT_LT(apart(rotation_from_angles(joint, angles), q), 1e-9);
     }
   });
@@ -76,7 +76,7 @@ TEST(Angles, RoundTripOfRotations) {
 
 TEST(Angles, RoundTripOfAngles) {
   std::mt19937 random(8);
-  std::uniform_real_distribution<double> whole(-pi + 0.01, pi - 0.01), half(-pi / 2 + 0.01, pi / 2 - 0.01);
+  std::uniform_real_distribution<double> whole(-kPi + 0.01, kPi - 0.01), half(-kPi / 2 + 0.01, kPi / 2 - 0.01);
   for_all_sequences([&](const Joint& joint) {
     for (int trial = 0; trial < 50; ++trial) {
       const Angles asked{whole(random), half(random), whole(random)};
@@ -88,7 +88,7 @@ TEST(Angles, RoundTripOfAngles) {
 
 TEST(Angles, GimbalLockKeepsTheThirdAtRest) {
   for_all_sequences([](const Joint& joint) {
-    for (const double quarter : {-pi / 2, pi / 2}) {
+    for (const double quarter : {-kPi / 2, kPi / 2}) {
       const Quaterniond q = rotation_from_angles(joint, {0.7, quarter, 0.4});
       const Angles found = angles_from_rotation(joint, q);
       EXPECT_NEAR(found[1], quarter, 1e-6);
@@ -160,7 +160,7 @@ TEST(Clamp, HingeKeepsTheTwistAboutItsAxis) {
     EXPECT_LT(std::hypot(done.x(), done.z()), 1e-12);
     // The nearest of all turns about the axis: 1-degree steps find none that is nearer.
     for (int degree = 0; degree < 360; degree += 1) {
-      EXPECT_GE(apart(q, turn(Vector3d::UnitY(), degree * pi / 180)), apart(q, done) - 1e-9);
+      EXPECT_GE(apart(q, turn(Vector3d::UnitY(), degree * kPi / 180)), apart(q, done) - 1e-9);
     }
   }
   const Quaterniond pure = turn(Vector3d::UnitY(), 1.2);
@@ -182,11 +182,11 @@ TEST(Clamp, HingeStopsAtItsLimitsAboutItsRestAngle) {
 TEST(Clamp, HingeBeyondHalfATurnIsReadModuloWholeTurns) {
   Joint joint = joint_of(JointKind::hinge, sequence({0, 1, 2}));
   joint.sequence[0].min = 0;
-  joint.sequence[0].max = 240 * pi / 180;
-  const Quaterniond q = turn(Vector3d::UnitX(), 230 * pi / 180);
+  joint.sequence[0].max = 240 * kPi / 180;
+  const Quaterniond q = turn(Vector3d::UnitX(), 230 * kPi / 180);
   EXPECT_LT(apart(clamp(joint, q), q), 1e-12);
-  const Quaterniond past = turn(Vector3d::UnitX(), 250 * pi / 180);
-  EXPECT_LT(apart(clamp(joint, past), turn(Vector3d::UnitX(), 240 * pi / 180)), 1e-9);
+  const Quaterniond past = turn(Vector3d::UnitX(), 250 * kPi / 180);
+  EXPECT_LT(apart(clamp(joint, past), turn(Vector3d::UnitX(), 240 * kPi / 180)), 1e-9);
 }
 
 TEST(Clamp, UniversalKeepsTwoAngles) {

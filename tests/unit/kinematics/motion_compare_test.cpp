@@ -15,7 +15,7 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kRadiansADegree = std::numbers::pi / 180;
 
 TEST(MotionCompare, ConstantTurnsAreToldFromOthers) {
   const Rig rig = test::legs();
@@ -28,14 +28,14 @@ TEST(MotionCompare, ConstantTurnsAreToldFromOthers) {
   const auto other = [&](std::size_t frame) {
     Pose p = Pose::rest(7);
     p.rotation[1] = test::turn(Vector3d::UnitX(), 0.005 * static_cast<double>(frame)) *
-                    test::turn(Vector3d::UnitY(), 20 * kDegree);
+                    test::turn(Vector3d::UnitY(), 20 * kRadiansADegree);
     return p;
   };
   const MotionDifference apart = compare(rig, {50, 0.02, one}, {100, 0.01, other});
   EXPECT_EQ(apart.shift_seconds, 0) << "an even turn tells no shift from a constant one";
   EXPECT_EQ(apart.joints[1].joint, "thigh_left_joint");
-  EXPECT_NEAR(apart.joints[1].mean, 20 * kDegree, 1e-9);
-  EXPECT_NEAR(apart.joints[1].worst, 20 * kDegree, 1e-9);
+  EXPECT_NEAR(apart.joints[1].mean, 20 * kRadiansADegree, 1e-9);
+  EXPECT_NEAR(apart.joints[1].worst, 20 * kRadiansADegree, 1e-9);
   EXPECT_NEAR(apart.joints[1].varying, 0, 1e-7);
   EXPECT_EQ(apart.joints[2].mean, 0);
 }

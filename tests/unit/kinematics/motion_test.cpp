@@ -22,6 +22,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kDegree = std::numbers::pi / 180;
+using NameList = std::vector<std::string>;
 
 TEST(JointNames, ForeignSkeletonsMeanTheSame) {
   const auto has = [](const std::vector<std::string>& names, const char* name) {
@@ -36,10 +37,9 @@ TEST(JointNames, ForeignSkeletonsMeanTheSame) {
 }
 
 TEST(JointNames, ACollarMakesTheShoulderAnArm) {
-  using Names = std::vector<std::string>;
   EXPECT_EQ(plain_names({"LeftCollar", "LeftShoulder", "LeftElbow", "RightHip", "Neck", "Chest2"}),
-            (Names{"leftshoulder", "leftarm", "leftforearm", "rightupleg", "neck", "spine1"}));
-  EXPECT_EQ(plain_names({"LeftShoulder", "LeftArm"}), (Names{"leftshoulder", "leftarm"}));
+            (NameList{"leftshoulder", "leftarm", "leftforearm", "rightupleg", "neck", "spine1"}));
+  EXPECT_EQ(plain_names({"LeftShoulder", "LeftArm"}), (NameList{"leftshoulder", "leftarm"}));
 }
 
 // A clip of test::legs under foreign names.

@@ -18,15 +18,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-const Vector3d kAt(30, -20, 400), kAxis = Vector3d(0.95, 0.2, -0.24).normalized();
+const Vector3d kAt(30, -20, 400), kAxle = Vector3d(0.95, 0.2, -0.24).normalized();
 
 double degrees(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
 }
 
-// From the axis through kAt along kAxis, mm.
+// From the axis through kAt along kAxle, mm.
 double off_axis(const Vector3d& p) {
-  return (p - kAt).cross(kAxis).norm();
+  return (p - kAt).cross(kAxle).norm();
 }
 
 void add(SurfacePoints& to, const Vector3d& at, const Vector3d& normal) {
@@ -39,7 +39,7 @@ void add(SurfacePoints& to, const Vector3d& at, const Vector3d& normal) {
 
 /// Turned about the axis: 60 rows of 40 points along 50 mm, over `arc` degrees.
 SurfacePoints turned(const std::function<double(double)>& radius, double arc) {
-  const Vector3d u = kAxis.unitOrthogonal(), v = kAxis.cross(u);
+  const Vector3d u = kAxle.unitOrthogonal(), v = kAxle.cross(u);
   SurfacePoints out;
   for (int i = 0; i < 40; ++i) {
     const double along = -25 + 50.0 * i / 39;
@@ -47,7 +47,7 @@ SurfacePoints turned(const std::function<double(double)>& radius, double arc) {
     for (int k = 0; k < 30; ++k) {
       const double angle = arc * std::numbers::pi / 180 * k / 29;
       const Vector3d away = std::cos(angle) * u + std::sin(angle) * v;
-      add(out, kAt + along * kAxis + r * away, away - slope * kAxis);
+      add(out, kAt + along * kAxle + r * away, away - slope * kAxle);
     }
   }
   return out;
@@ -62,7 +62,7 @@ TEST(Axle, cylinders_cones_and_spools_turn_about_their_axis) {
     const auto fit = fit_axle(turned(radius, 150));
     ASSERT_TRUE(fit);
     // What holds the radii together leans the axis of a cone by a third of its half angle, 4.6 degrees here.
-    EXPECT_LT(degrees(fit->axis, kAxis), 1.5);
+    EXPECT_LT(degrees(fit->axis, kAxle), 1.5);
     EXPECT_LT(off_axis(fit->center), 0.5);
     EXPECT_LT((fit->center - kAt).norm(), 1.5);
     EXPECT_NEAR(fit->radius, mean, 0.3);
@@ -77,14 +77,14 @@ SurfacePoints condyles() {
   SurfacePoints kept;
   for (Eigen::Index p = 0; p < out.at.rows(); ++p) {
     const Vector3d at = out.at.row(p).transpose();
-    if (std::abs((at - kAt).dot(kAxis)) > 8) add(kept, at, out.normal.row(p).transpose());
+    if (std::abs((at - kAt).dot(kAxle)) > 8) add(kept, at, out.normal.row(p).transpose());
   }
-  const Vector3d u = kAxis.unitOrthogonal(), v = kAxis.cross(u);
+  const Vector3d u = kAxle.unitOrthogonal(), v = kAxle.cross(u);
   for (int i = 0; i < 20; ++i) {
     for (int k = 0; k < 20; ++k) {
       const Vector3d across = (i - 10.0) * 1.8 * u + (k - 10.0) * 1.8 * v;
-      for (const double side : {-25.0, -8.0, 8.0, 25.0}) add(kept, kAt + side * kAxis + across, side * kAxis);
-      add(kept, kAt - 18 * v + 2.4 * (i - 10) * kAxis - 1.5 * k * u, -v);
+      for (const double side : {-25.0, -8.0, 8.0, 25.0}) add(kept, kAt + side * kAxle + across, side * kAxle);
+      add(kept, kAt - 18 * v + 2.4 * (i - 10) * kAxle - 1.5 * k * u, -v);
     }
   }
   return kept;
@@ -93,7 +93,7 @@ SurfacePoints condyles() {
 TEST(Axle, two_condyles_of_other_radii_among_sides_notch_and_shaft) {
   const auto fit = fit_axle(condyles());
   ASSERT_TRUE(fit);
-  EXPECT_LT(degrees(fit->axis, kAxis), 1.5);
+  EXPECT_LT(degrees(fit->axis, kAxle), 1.5);
   EXPECT_LT(off_axis(fit->center), 1.5);
   EXPECT_NEAR(fit->radius, 22, 1);
 }
@@ -114,7 +114,7 @@ TEST(Axle, noise_and_badly_registered_vertices_do_not_turn_it) {
     }
     const auto fit = fit_axle(spoilt);
     ASSERT_TRUE(fit);
-    EXPECT_LT(degrees(fit->axis, kAxis), 2) << seed;
+    EXPECT_LT(degrees(fit->axis, kAxle), 2) << seed;
     EXPECT_LT(off_axis(fit->center), 2) << seed;
     EXPECT_LT(fit->confidence, 0.8) << seed;
   }
@@ -122,9 +122,9 @@ TEST(Axle, noise_and_badly_registered_vertices_do_not_turn_it) {
 
 TEST(Axle, is_sought_where_it_is_expected_only) {
   SurfacePoints across = turned([](double) { return 20.0; }, 150);
-  across.along = kAxis.unitOrthogonal();
+  across.along = kAxle.unitOrthogonal();
   const auto fit = fit_axle(across);
-  EXPECT_TRUE(!fit || degrees(fit->axis, kAxis) > 25);
+  EXPECT_TRUE(!fit || degrees(fit->axis, kAxle) > 25);
   SurfacePoints few;
   EXPECT_FALSE(fit_axle(few));
   for (int i = 0; i < 11; ++i) add(few, Vector3d(i, i * i, 0), Vector3d(0, 0, 1));

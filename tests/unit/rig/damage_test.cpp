@@ -95,7 +95,7 @@ std::vector<CaseBone> cut(const std::string& segment, Keep&& keep) {
   return bones;
 }
 
-double degrees(const Vector3d& a, const Vector3d& b) {
+double degrees_apart(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
 }
 
@@ -105,8 +105,8 @@ void expect_near(const Found& now, const std::string& joint, double mm, double m
   Vector3d off = is.center - was.center;
   if (was.kind == JointKind::hinge) off -= axis * axis.dot(off);
   EXPECT_LT(off.norm(), mm) << joint;
-  EXPECT_LT(degrees(is.axes.col(0), axis), most_degrees) << joint;
-  EXPECT_LT(degrees(is.axes.col(2), was.axes.col(2)), most_degrees) << joint;
+  EXPECT_LT(degrees_apart(is.axes.col(0), axis), most_degrees) << joint;
+  EXPECT_LT(degrees_apart(is.axes.col(2), was.axes.col(2)), most_degrees) << joint;
 }
 
 TEST(Damage, both_sides_of_a_symmetric_body_rest_alike) {
@@ -136,7 +136,7 @@ TEST(Damage, a_femur_without_its_condyles_does_not_kick_sideways) {
   const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.35, Vector3d::UnitY()).toRotationMatrix();
   for (CaseBone& bone : bones) bone.surface.V = bone.surface.V * tilt.transpose();
   const Found now = found(bones);
-  EXPECT_LT(degrees(now.joint("knee_right").axes.col(0), tilt * whole().joint("knee_right").axes.col(0)), 12);
+  EXPECT_LT(degrees_apart(now.joint("knee_right").axes.col(0), tilt * whole().joint("knee_right").axes.col(0)), 12);
   EXPECT_LT(now.confidence("knee_right"), JointSources::least_confidence);
 }
 

@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector3d;
 using Kind = DirectionSource::Kind;
 
-Segment segment(const std::string& name, int parent, JointRule rule = {}) {
+Segment segment_by(const std::string& name, int parent, JointRule rule = {}) {
   Segment s;
   s.name = name;
   s.parent = parent;
@@ -61,7 +61,7 @@ Case two_segments(JointRule rule) {
   Case patient;
   patient.name = "two";
   patient.skeleton.name = "two";
-  patient.skeleton.segments = {segment("base", -1), segment("tip", 0, std::move(rule))};
+  patient.skeleton.segments = {segment_by("base", -1), segment_by("tip", 0, std::move(rule))};
   const SurfaceMesh bone = test::joined(test::ball({0, 0, 100}, 24, 16), test::ball({10, 0, 0}, 15, 16));
   patient.bones = {{"base_bone", "base", test::ball({0, 0, 150}, 20, 16)}, {"tip_bone", "tip", bone}};
   Region high, low;

@@ -12,7 +12,7 @@
 namespace ecorche::rig {
 namespace {
 
-const Eigen::Vector3d kCenter(70, -60, 425), kAxis = Eigen::Vector3d(0.9, 0.3, -0.2).normalized();
+const Eigen::Vector3d kMiddle(70, -60, 425), kAxis = Eigen::Vector3d(0.9, 0.3, -0.2).normalized();
 constexpr double kDegree = std::numbers::pi / 180;
 
 double apart_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -28,7 +28,7 @@ Points half_cylinder(int around = 24, int along = 30) {
     for (int j = 0; j < along; ++j) {
       const double at = 60.0 * j / (along - 1) - 30;
       out.row(i * along + j) =
-          (kCenter + 22 * (std::cos(turn) * u + std::sin(turn) * v) + at * kAxis).transpose();
+          (kMiddle + 22 * (std::cos(turn) * u + std::sin(turn) * v) + at * kAxis).transpose();
     }
   }
   return out;
@@ -42,7 +42,7 @@ Points plate(bool filled) {
     if (share < 1 && !filled) break;
     for (int i = 0; i < 120; ++i) {
       const double turn = 2 * std::numbers::pi * i / 120;
-      points.push_back(kCenter + share * (20 * std::cos(turn) * u + 14 * std::sin(turn) * v));
+      points.push_back(kMiddle + share * (20 * std::cos(turn) * u + 14 * std::sin(turn) * v));
     }
   }
   Points out(static_cast<Eigen::Index>(points.size()), 3);
@@ -71,7 +71,7 @@ Points spoilt(const Points& points, double noise, std::uint32_t seed) {
 TEST(CylinderFit, exact_points_give_the_exact_cylinder) {
   const auto fit = fit_cylinder(half_cylinder());
   ASSERT_TRUE(fit);
-  EXPECT_LT((fit->center - kCenter).norm(), 1e-5);
+  EXPECT_LT((fit->center - kMiddle).norm(), 1e-5);
   EXPECT_LT(apart_deg(fit->axis, kAxis), 1e-4);
   EXPECT_NEAR(fit->radius, 22, 1e-6);
   EXPECT_LT(fit->residual, 1e-6);
@@ -83,8 +83,8 @@ TEST(CylinderFit, spoilt_points_stay_within_two_millimetres_and_two_degrees) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     const auto fit = fit_cylinder(spoilt(half_cylinder(), 1, seed));
     ASSERT_TRUE(fit);
-    EXPECT_LT((fit->center - kCenter).cross(kAxis).norm(), 1) << seed;
-    EXPECT_LT(std::abs((fit->center - kCenter).dot(kAxis)), 2) << seed;
+    EXPECT_LT((fit->center - kMiddle).cross(kAxis).norm(), 1) << seed;
+    EXPECT_LT(std::abs((fit->center - kMiddle).dot(kAxis)), 2) << seed;
     EXPECT_LT(apart_deg(fit->axis, kAxis), 2) << seed;
     EXPECT_NEAR(fit->inlier_share, 0.85, 0.08);
     EXPECT_GT(fit->confidence, 0.5);
@@ -102,13 +102,13 @@ TEST(CylinderFit, what_is_no_cylinder_has_none) {
 TEST(PlaneFit, exact_and_spoilt_points) {
   const auto exact = fit_plane(plate(true));
   ASSERT_TRUE(exact);
-  EXPECT_LT((exact->center - kCenter).norm(), 1e-9);
+  EXPECT_LT((exact->center - kMiddle).norm(), 1e-9);
   EXPECT_LT(apart_deg(exact->normal, kAxis), 1e-6);
   EXPECT_GT(exact->confidence, 0.99);
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     const auto fit = fit_plane(spoilt(plate(true), 1, seed));
     ASSERT_TRUE(fit);
-    EXPECT_LT((fit->center - kCenter).norm(), 1.5);
+    EXPECT_LT((fit->center - kMiddle).norm(), 1.5);
     EXPECT_LT(apart_deg(fit->normal, kAxis), 2);
     EXPECT_LT(fit->inlier_share, 0.95);
   }
@@ -122,7 +122,7 @@ TEST(EllipseFit, a_rim_and_a_filled_plate_give_the_exact_ellipse) {
   for (const bool filled : {false, true}) {
     const auto fit = fit_ellipse(plate(filled));
     ASSERT_TRUE(fit);
-    EXPECT_LT((fit->center - kCenter).norm(), 1e-5);
+    EXPECT_LT((fit->center - kMiddle).norm(), 1e-5);
     EXPECT_LT(apart_deg(fit->normal, kAxis), 1e-6);
     EXPECT_LT(apart_deg(fit->major, kAxis.unitOrthogonal()), 1e-4);
     EXPECT_NEAR(fit->long_mm, 20, 1e-6);
@@ -135,7 +135,7 @@ TEST(EllipseFit, spoilt_points_stay_within_two_millimetres) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     const auto fit = fit_ellipse(spoilt(plate(true), 1, seed));
     ASSERT_TRUE(fit);
-    EXPECT_LT((fit->center - kCenter).norm(), 2) << seed;
+    EXPECT_LT((fit->center - kMiddle).norm(), 2) << seed;
     EXPECT_LT(apart_deg(fit->normal, kAxis), 2) << seed;
     EXPECT_NEAR(fit->long_mm, 20, 2.5) << seed;
   }

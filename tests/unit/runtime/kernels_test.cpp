@@ -22,7 +22,7 @@ namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-constexpr Skinning kAll[] = {Skinning::lbs, Skinning::dqs, Skinning::cor};
+constexpr Skinning kEverySkinning[] = {Skinning::lbs, Skinning::dqs, Skinning::cor};
 
 struct Shape {
   std::size_t nodes, segments, most_per_node, vertices;
@@ -172,7 +172,7 @@ void expect_right(const Shape& shape, double turn) {
   const Model model = cloud(shape, 7), kept = as_kept(model);
   const BodyParts parts(model);
   const auto segments = random_segments(shape.segments, turn, 8);
-  for (const Skinning skinning : kAll) {
+  for (const Skinning skinning : kEverySkinning) {
     SCOPED_TRACE(skinning_name(skinning));
     const auto nodes = test::reference_nodes(kept, segments, skinning, 0);
     const auto vertices = test::reference_tissue(kept, kept.tissues[0], segments, nodes);
@@ -381,7 +381,7 @@ TEST(Kernels, VanishedBlendsFollowTheHeaviestSegment) {
   segments[2].t = {0, 20, 0};
   segments[2].q.coeffs() *= -1;
   const BodyParts parts(model);
-  for (const Skinning skinning : kAll) {
+  for (const Skinning skinning : kEverySkinning) {
     for_instruction_sets([&] {
       PosedBody body = frame_of(parts, model, segments);
       pose(parts, model, skinning, body);

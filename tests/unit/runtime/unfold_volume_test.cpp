@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 // The beam bent at its middle joint, its ends in bones.
-struct Bent {
+struct BentVolume {
   std::shared_ptr<const Model> model;
   BodyPoser poser;
   PosedBody body;
@@ -29,7 +29,7 @@ struct Bent {
     return model;
   }
 
-  explicit Bent(double angle, Skinning skinning)
+  explicit BentVolume(double angle, Skinning skinning)
       : model(std::make_shared<const Model>(boned())), poser(model), body(poser.make_frame()) {
     Pose pose = Pose::rest(3);
     pose.rotation[1] = Eigen::AngleAxisd(angle, Vector3d::UnitX());
@@ -41,7 +41,7 @@ struct Bent {
 TEST(UnfoldVolume, NoTissueComesOutFartherFromItsRestVolume) {
   for (const Skinning skinning : {Skinning::lbs, Skinning::dqs, Skinning::cor}) {
     for (const double angle : {1.9, 2.2, 2.5}) {
-      Bent bent(angle, skinning);
+      BentVolume bent(angle, skinning);
       const PoseQuality before = bent.quality();
       if (before.inverted_tets == 0) continue;
       unfold(*bent.model, bent.body, Context{});
@@ -56,7 +56,7 @@ TEST(UnfoldVolume, NoTissueComesOutFartherFromItsRestVolume) {
 
 // Two patches of the beam's free nodes: what the parts say of a move is what whole surfaces say.
 TEST(PatchVolumes, SayWhatWholeSurfacesSay) {
-  Bent bent(1.2, Skinning::lbs);
+  BentVolume bent(1.2, Skinning::lbs);
   const Model& model = *bent.model;
   const std::vector<float>& nodes = bent.body.nodes;
   const TissueVolumes tissues(model, nodes, 1e-3);

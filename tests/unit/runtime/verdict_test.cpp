@@ -17,12 +17,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Posed {
+struct JudgedBody {
   std::shared_ptr<const Model> model;
   BodyPoser poser{model};
   PosedBody body = poser.make_frame();
 
-  explicit Posed(Model made = test::toy_model()) : model(std::make_shared<const Model>(std::move(made))) {}
+  explicit JudgedBody(Model made = test::toy_model()) : model(std::make_shared<const Model>(std::move(made))) {}
   PoseQuality slow(const QualityThresholds& thresholds = {}) const {
     return measure(*model, body, poser.all_tissues(), thresholds);
   }
@@ -54,7 +54,7 @@ TEST(TissueLimits, OneForEveryGroupWithWhatItRestsOn) {
 
 TEST(Verdict, ATissueThatLosesVolumeIsAWarningThoughTheBodyKeepsIts) {
   for (const float times : {0.88F, 1.12F}) {
-    Posed posed;
+    JudgedBody posed;
     widen(posed.body.tissues[4], times);
     for (const PoseQuality& q : {posed.slow(), posed.quick()}) {
       EXPECT_NEAR(q.volume_change, 0, 1e-6);
@@ -71,7 +71,7 @@ TEST(Verdict, ATissueThatLosesVolumeIsAWarningThoughTheBodyKeepsIts) {
     twice.tissue_factor = 2;
     EXPECT_TRUE(posed.slow(twice).pass);
   }
-  Posed little;
+  JudgedBody little;
   widen(little.body.tissues[4], 0.93F);
   EXPECT_TRUE(little.slow().pass);
 }
@@ -82,7 +82,7 @@ TEST(Verdict, TheWorstOfSeveralTissuesComesFirst) {
   vessel.name = "aorta";
   vessel.group = Group::vessel;
   model.tissues.push_back(vessel);
-  Posed posed(std::move(model));
+  JudgedBody posed(std::move(model));
   widen(posed.body.tissues[4], 0.80F);  // twice its limit
   widen(posed.body.tissues[5], 0.75F);  // 1.67 times its own
   const PoseQuality q = posed.slow();
@@ -95,7 +95,7 @@ TEST(Verdict, TheWorstOfSeveralTissuesComesFirst) {
 
 // Half of the body swells by what the other half loses.
 TEST(Verdict, WhatSwellsHereDoesNotMakeUpForWhatIsLostThere) {
-  Posed posed;
+  JudgedBody posed;
   double most = 0;
   for (std::size_t i = 0; i < posed.body.nodes.size(); i += 3) {
     const float z = posed.body.nodes[i + 2];
@@ -113,7 +113,7 @@ TEST(Verdict, WhatSwellsHereDoesNotMakeUpForWhatIsLostThere) {
 
 TEST(Verdict, AFoldInOnePlaceIsAWarningWhateverTheBodysSize) {
   // Long enough that one fold is less than a thousandth of it.
-  Posed posed;
+  JudgedBody posed;
   QualityThresholds body;
   body.max_inverted_share = 0.5;
   posed.body.nodes[0] = 60;  // a corner, pushed through the opposite side
@@ -129,7 +129,7 @@ TEST(Verdict, AFoldInOnePlaceIsAWarningWhateverTheBodysSize) {
 
 // As worst_places says it: the cube of each tet by itself, and every other tet that lies in it.
 TEST(WorstPlaces, AgreeWithASearchOfEveryPairOfTets) {
-  Posed posed;
+  JudgedBody posed;
   Pose pose = Pose::rest(3);
   pose.rotation[1] = Eigen::AngleAxisd(2.2, Vector3d::UnitX());
   ASSERT_TRUE(posed.poser.run(pose, Skinning::lbs, posed.poser.all_tissues(), posed.body).ok());
@@ -167,7 +167,7 @@ TEST(Verdict, AJointThatWasFoundBadlyMayNotTurn) {
       Model model = test::toy_model();
       model.rig.fits[1].confidence = confidence;
       model.rig.fits[0].confidence = 0;  // the root only says where the body stands
-      Posed posed(std::move(model));
+      JudgedBody posed(std::move(model));
       Pose pose = Pose::rest(3);
       pose.rotation[0] = Eigen::AngleAxisd(1, Vector3d::UnitX());
       pose.rotation[1] = Eigen::AngleAxisd(-degrees * std::numbers::pi / 180, Vector3d::UnitX());
@@ -190,7 +190,7 @@ TEST(Verdict, AJointThatWasFoundBadlyMayNotTurn) {
 
 // Nine metres off float32 has steps of 1e-3 mm, twenty metres off of 2e-3.
 TEST(Verdict, WhereTheBodyStandsIsNotItsQuality) {
-  Posed posed;
+  JudgedBody posed;
   for (const double away : {0.0, 9000.0, 20000.0, 1e6}) {
     Pose pose = Pose::rest(3);
     pose.rotation[0] = Eigen::AngleAxisd(2, Vector3d(1, -2, 3).normalized());
@@ -218,7 +218,7 @@ TEST(Verdict, WhereTheBodyStandsIsNotItsQuality) {
 
 // Turned and moved, then taken back: the same pose as never moved.
 TEST(Verdict, ABentBodyIsMeasuredAlikeWhereverItStands) {
-  Posed here, there;
+  JudgedBody here, there;
   Pose pose = Pose::rest(3);
   pose.rotation[1] = Eigen::AngleAxisd(1.2, Vector3d::UnitX());
   pose.rotation[2] = Eigen::AngleAxisd(0.7, Vector3d(1, 1, 0).normalized());

@@ -33,12 +33,12 @@ std::vector<float> bent_nodes(const std::shared_ptr<const Model>& model, double 
   return body.nodes;
 }
 
-std::vector<float> rest_nodes(const Model& model) {
+std::vector<float> nodes_at_rest(const Model& model) {
   return {model.nodes.data(), model.nodes.data() + model.nodes.size()};
 }
 
 // Turned, anisotropic, of either hand; `finer` times as many voxels along each axis.
-ImageGrid skew_grid(bool left_handed, int finer = 1) {
+ImageGrid skewed_grid(bool left_handed, int finer = 1) {
   ImageGrid grid;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> direction =
       Eigen::Quaterniond(0.9, 0.2, -0.3, 0.1).normalized().toRotationMatrix();
@@ -120,29 +120,29 @@ class PosedInOnePass : public testing::Test {
 TEST_F(PosedInOnePass, AgreesWithTheSlowTwinOnEveryInstructionSet) {
   on_every_target([&] {
     for (const bool left_handed : {false, true}) {
-      const ImageGrid grid = skew_grid(left_handed);
+      const ImageGrid grid = skewed_grid(left_handed);
       expect_slow_twin<std::uint8_t>(smooth_volume<std::uint8_t>(grid), Sampling::nearest, grid, 0);
       expect_slow_twin<std::uint8_t>(smooth_volume<std::uint8_t>(grid), Sampling::trilinear, grid, 1);
       expect_slow_twin<std::int16_t>(smooth_volume<std::int16_t>(grid), Sampling::trilinear, grid, 1);
       expect_slow_twin<std::uint16_t>(smooth_volume<std::uint16_t>(grid), Sampling::trilinear,
-                                      skew_grid(!left_handed), 1);
+                                      skewed_grid(!left_handed), 1);
     }
   });
 }
 
 TEST_F(PosedInOnePass, AgreesForFloatsAndSeveralComponents) {
-  const ImageGrid grid = skew_grid(false);
+  const ImageGrid grid = skewed_grid(false);
   expect_slow_twin<float>(smooth_volume<float>(grid), Sampling::trilinear, grid, 1e-2);
   expect_slow_twin<std::uint8_t>(smooth_volume<std::uint8_t>(grid, 3), Sampling::trilinear, grid, 1);
   expect_slow_twin<std::int32_t>(smooth_volume<std::int32_t>(grid, 2), Sampling::nearest, grid, 0);
 }
 
 TEST_F(PosedInOnePass, FinerAndCoarserGridsAndTheirParts) {
-  const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
+  const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
   // A third, not a half: no place of the part at rest lies half way between two voxels.
-  expect_slow_twin<std::uint8_t>(volume, Sampling::nearest, skew_grid(false, 3), 0);
+  expect_slow_twin<std::uint8_t>(volume, Sampling::nearest, skewed_grid(false, 3), 0);
   const std::vector<float> nodes = bent_nodes(model, 1.2);
-  const ImageGrid whole = skew_grid(false, 2);
+  const ImageGrid whole = skewed_grid(false, 2);
   Image all, part;
   poser.pose(nodes, volume, Sampling::trilinear, whole, all, scratch);
   std::size_t differ = 0, other = 0;
@@ -172,9 +172,9 @@ TEST_F(PosedInOnePass, FinerAndCoarserGridsAndTheirParts) {
 }
 
 TEST_F(PosedInOnePass, SlicePlanes) {
-  const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
+  const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
   const std::vector<float> nodes = bent_nodes(model, 1.2);
-  ImageGrid slice = skew_grid(true, 5);
+  ImageGrid slice = skewed_grid(true, 5);
   slice.origin = slice.point(0, 0, 78.5);
   slice.size[2] = 1;
   poser.pose(nodes, volume, Sampling::nearest, slice, out, scratch);
@@ -182,12 +182,12 @@ TEST_F(PosedInOnePass, SlicePlanes) {
 }
 
 TEST_F(PosedInOnePass, RestGivesEveryVoxelBack) {
-  const ImageGrid grid = skew_grid(false);
+  const ImageGrid grid = skewed_grid(false);
   std::mt19937 random(3);
   ModelVolume volume = smooth_volume<std::uint16_t>(grid);
   for (auto& value : volume.image.scalars<std::uint16_t>()) value = static_cast<std::uint16_t>(random());
   volume.background = 0;
-  const std::vector<float> nodes = rest_nodes(*model);
+  const std::vector<float> nodes = nodes_at_rest(*model);
   InverseMap map;
   locate(*model, nodes, grid, map);
   on_every_target([&] {
@@ -214,7 +214,7 @@ TEST_F(PosedInOnePass, WhereTetsFoldTheLowestPositiveOneWins) {
       200, 0, 0, 240, 0, 0, 200, 40, 0, 200, 0, 40;
   folded.tets.resize(3, 4);
   folded.tets << 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11;
-  std::vector<float> nodes = rest_nodes(folded);
+  std::vector<float> nodes = nodes_at_rest(folded);
   for (std::size_t n = 0; n < 12; ++n) nodes[3 * n] -= 100 * static_cast<float>(n / 4);
   for (std::size_t c = 0; c < 3; ++c)
     std::swap(nodes[3 + c], nodes[6 + c]);  // tet 0 lies the wrong way round
@@ -257,7 +257,7 @@ TEST_F(PosedInOnePass, WhereManyTetsPileUpTheLowestPositiveOneWins) {
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     for (const std::size_t positive : {0U, 3U, 19U, 70U, 129U}) {
-      std::vector<float> nodes = rest_nodes(pile);
+      std::vector<float> nodes = nodes_at_rest(pile);
       for (std::size_t n = 0; n < 4 * count; ++n) nodes[3 * n] -= static_cast<float>(10 * (n / 4));
       for (std::size_t t = 0; t < positive; ++t)
         std::swap_ranges(&nodes[12 * t], &nodes[12 * t + 3], &nodes[12 * t + 3]);
@@ -275,15 +275,15 @@ TEST_F(PosedInOnePass, WhereManyTetsPileUpTheLowestPositiveOneWins) {
 
 TEST_F(PosedInOnePass, ACrumpledBodyInBoxesOfAllSizes) {
   // Every third tet or so lies the wrong way round, in more places than are told apart.
-  std::vector<float> nodes = rest_nodes(*model);
+  std::vector<float> nodes = nodes_at_rest(*model);
   std::mt19937 random(5);
   for (float& x : nodes) x += static_cast<float>(random() % 4001) * 0.01F - 20;
-  const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
+  const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
   on_every_target([&] {
     for (const bool left_handed : {false, true}) {
       for (const int finer : {1, 2, 4}) {
         SCOPED_TRACE(finer);
-        ImageGrid grid = skew_grid(left_handed, finer);
+        ImageGrid grid = skewed_grid(left_handed, finer);
         poser.pose(nodes, volume, Sampling::nearest, grid, out, scratch);
         EXPECT_LE((differing<std::uint8_t>(*model, nodes, volume, Sampling::nearest, out, 0)), 1e-3);
         if (finer < 4) continue;  // too few voxels in a slice to count
@@ -297,36 +297,36 @@ TEST_F(PosedInOnePass, ACrumpledBodyInBoxesOfAllSizes) {
 }
 
 TEST_F(PosedInOnePass, FlatTetsAndNodesThatAreNoNumbersDoNoHarm) {
-  const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
+  const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
   // A sheet a hundredth of a millimetre thick, on voxel centres.
   const ImageGrid grid{{21, 60, 100}, {-10, -90, -40}, {1, 3, 4}};
-  std::vector<float> nodes = rest_nodes(*model);
+  std::vector<float> nodes = nodes_at_rest(*model);
   for (std::size_t n = 0; n < nodes.size(); n += 3) nodes[n] *= 1e-4F;
   poser.pose(nodes, volume, Sampling::trilinear, grid, out, scratch);
   EXPECT_LE((differing<std::uint8_t>(*model, nodes, volume, Sampling::trilinear, out, 1)), 1e-3);
   nodes[30] = std::numeric_limits<float>::quiet_NaN();
   nodes[61] = std::numeric_limits<float>::infinity();
-  poser.pose(nodes, volume, Sampling::trilinear, skew_grid(false), out, scratch);
+  poser.pose(nodes, volume, Sampling::trilinear, skewed_grid(false), out, scratch);
 }
 
 TEST_F(PosedInOnePass, SameBytesForAnyNumberOfThreads) {
-  const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
+  const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
   const std::vector<float> nodes = bent_nodes(model, 2.9);
   Image one, four;
   tbb::task_arena(1).execute(
-      [&] { one = pose_volume(model, nodes, volume, Sampling::trilinear, skew_grid(false, 2)); });
+      [&] { one = pose_volume(model, nodes, volume, Sampling::trilinear, skewed_grid(false, 2)); });
   tbb::task_arena(4).execute(
-      [&] { four = pose_volume(model, nodes, volume, Sampling::trilinear, skew_grid(false, 2)); });
+      [&] { four = pose_volume(model, nodes, volume, Sampling::trilinear, skewed_grid(false, 2)); });
   EXPECT_EQ(one.bytes, four.bytes);
 }
 
 TEST_F(PosedInOnePass, RefusesAGridOfNothingOrTooMuch) {
-  const ModelVolume volume = smooth_volume<std::uint8_t>(skew_grid(false));
-  ImageGrid grid = skew_grid(false);
+  const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
+  ImageGrid grid = skewed_grid(false);
   grid.size = {2000, 2000, 2000};
-  EXPECT_THROW(poser.pose(rest_nodes(*model), volume, Sampling::nearest, grid, out, scratch), Error);
+  EXPECT_THROW(poser.pose(nodes_at_rest(*model), volume, Sampling::nearest, grid, out, scratch), Error);
   grid.size = {0, 4, 4};
-  EXPECT_THROW(poser.pose(rest_nodes(*model), volume, Sampling::nearest, grid, out, scratch), Error);
+  EXPECT_THROW(poser.pose(nodes_at_rest(*model), volume, Sampling::nearest, grid, out, scratch), Error);
 }
 
 // Places all over an image and beyond it, many of them just beside a tie.

@@ -14,8 +14,8 @@
 namespace ecorche::server {
 namespace {
 
-struct Offline {
-  explicit Offline(const Pose& pose, const Model& model = test::toy_model())
+struct OfflineEncoded {
+  explicit OfflineEncoded(const Pose& pose, const Model& model = test::toy_model())
       : poser(std::make_shared<const Model>(model)),
         body(poser.make_frame({.positions = true, .quantised = true, .normals = true})) {
     EXPECT_TRUE(poser.run(pose, runtime::Skinning::cor, poser.all_tissues(), body).ok());
@@ -33,7 +33,7 @@ std::uint32_t subscribe(TestClient& client, v1::Encoding encoding, bool normals 
 }
 
 // The bound of docs/protocol.md: half a step, and the rounding of float32.
-void expect_within_bound(const std::vector<wire::DecodedTissue>& tissues, const Offline& offline) {
+void expect_within_bound(const std::vector<wire::DecodedTissue>& tissues, const OfflineEncoded& offline) {
   ASSERT_EQ(tissues.size(), offline.body.tissues.size());
   double worst = 0;
   for (const wire::DecodedTissue& tissue : tissues) {
@@ -65,7 +65,7 @@ TEST(Encodings, QuantisedFramesAreOfflinePosingWithinHalfAStep) {
       const v1::MeshFrame& mesh = frame.envelope.mesh_frame();
       EXPECT_EQ(mesh.encoding(), encoding);
       ASSERT_TRUE(decoder.decode(mesh, frame.payload, tissues).ok());
-      const Offline offline(pose);
+      const OfflineEncoded offline(pose);
       expect_within_bound(tissues, offline);
       // And the very numbers of the kernels.
       for (const wire::DecodedTissue& tissue : tissues)
@@ -98,7 +98,7 @@ TEST(Encodings, Float32OfSeveralSelectionsInTurn) {
     for (TestClient* client : {&all, &one, &both}) {
       const Pose pose = client->bent(0.05 * static_cast<double>(++angle));
       client->send(sequence, pose);
-      const Offline offline(pose);
+      const OfflineEncoded offline(pose);
       for (int i = 0; i < (client == &both ? 2 : 1); ++i) {
         const wire::Frame frame = client->next_mesh(sequence);
         ASSERT_TRUE(decoder.decode(frame.envelope.mesh_frame(), frame.payload, tissues).ok());
@@ -142,7 +142,7 @@ TEST(Encodings, WhoJoinsGetsAKeyframeAtOnce) {
   wire::MeshDecoder decoder;
   std::vector<wire::DecodedTissue> tissues;
   ASSERT_TRUE(decoder.decode(frame.envelope.mesh_frame(), frame.payload, tissues).ok());
-  expect_within_bound(tissues, Offline(poser.bent(0.04)));
+  expect_within_bound(tissues, OfflineEncoded(poser.bent(0.04)));
 }
 
 // A free joint can carry a part of the body out of any box: then the frame is exact instead.
@@ -163,7 +163,7 @@ TEST(Encodings, WhatDoesNotFitTheBoxComesAsFloat32) {
   EXPECT_EQ(frame.envelope.mesh_frame().encoding(), v1::ENCODING_F32);
   EXPECT_FALSE(frame.envelope.mesh_frame().has_box());
   ASSERT_TRUE(decoder.decode(frame.envelope.mesh_frame(), frame.payload, tissues).ok());
-  const Offline offline(pose, loose);
+  const OfflineEncoded offline(pose, loose);
   for (const wire::DecodedTissue& tissue : tissues)
     EXPECT_EQ(tissue.positions, offline.body.tissues[tissue.tissue]);
   // And back: the keyframe still counts.
@@ -171,7 +171,7 @@ TEST(Encodings, WhatDoesNotFitTheBoxComesAsFloat32) {
   const wire::Frame back = client.next_mesh(2);
   EXPECT_EQ(back.envelope.mesh_frame().encoding(), v1::ENCODING_U16_DELTA);
   ASSERT_TRUE(decoder.decode(back.envelope.mesh_frame(), back.payload, tissues).ok());
-  expect_within_bound(tissues, Offline(client.bent(0.2), loose));
+  expect_within_bound(tissues, OfflineEncoded(client.bent(0.2), loose));
 }
 
 TEST(Encodings, NormalsAreThoseOfThePosedSurfaceWithinADegree) {
@@ -186,7 +186,7 @@ TEST(Encodings, NormalsAreThoseOfThePosedSurfaceWithinADegree) {
       if (sequence > 0) client.send(sequence, pose);
       const wire::Frame frame = client.next_mesh(sequence);
       ASSERT_TRUE(decoder.decode(frame.envelope.mesh_frame(), frame.payload, tissues).ok());
-      const Offline offline(pose);
+      const OfflineEncoded offline(pose);
       for (const wire::DecodedTissue& tissue : tissues) {
         const std::vector<std::int16_t>& expected = offline.body.normals[tissue.tissue];
         ASSERT_EQ(tissue.normals.size(), expected.size());
@@ -213,7 +213,7 @@ TEST(Encodings, SubscriptionsOfOneSessionDoNotDisturbEachOther) {
   for (std::uint64_t sequence = 0; sequence < 6; ++sequence) {
     const Pose pose = client.bent(0.1 * static_cast<double>(sequence));
     if (sequence > 0) client.send(sequence, pose);
-    const Offline offline(pose);
+    const OfflineEncoded offline(pose);
     std::set<std::uint32_t> left{exact, packed, with_normals};
     while (!left.empty()) {
       const wire::Frame frame = client.next_mesh(sequence);

@@ -20,8 +20,8 @@
 namespace ecorche::server {
 namespace {
 
-struct Offline {
-  explicit Offline(const Pose& pose)
+struct OfflineParts {
+  explicit OfflineParts(const Pose& pose)
       : poser(std::make_shared<const Model>(test::toy_model())),
         body(poser.make_frame({.positions = true, .quantised = true, .normals = true})) {
     EXPECT_TRUE(poser.run(pose, runtime::Skinning::cor, poser.all_tissues(), body).ok());
@@ -269,7 +269,7 @@ TEST(Parts, FramesOfLevelsAndRegionsAreRowsOfOfflinePosing) {
         const wire::Frame frame = client.next_mesh(sequence);
         EXPECT_EQ(frame.envelope.mesh_frame().level(), box ? 0U : 1U);
         ASSERT_TRUE(decoder.decode(frame.envelope.mesh_frame(), frame.payload, tissues).ok());
-        const Offline offline(pose);
+        const OfflineParts offline(pose);
         if (encoding != v1::ENCODING_F32) {
           EXPECT_EQ(static_cast<float>(subscribed.step()), offline.body.box.step);
         }
@@ -319,7 +319,7 @@ TEST(Parts, ControlNodesFinishedByTheClientAreOfflinePosing) {
   ASSERT_TRUE(wire::find(mesh.arrays(1).array(), frame.payload, 12, segments));
   EXPECT_EQ(segments.size(), 12 * server.model().segment_count());
   EXPECT_LE(nodes.size(), 3 * server.model().node_count());
-  const Offline offline(pose);
+  const OfflineParts offline(pose);
   int bones = 0, soft = 0;
   for (const v1::TissueBinding& binding : subscribed.bindings()) {
     const std::vector<float>& expected = offline.body.tissues[binding.tissue()];

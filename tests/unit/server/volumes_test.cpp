@@ -12,9 +12,9 @@
 namespace ecorche::server {
 namespace {
 
-struct Offline {
-  explicit Offline(const Pose& pose) : Offline(pose, test::toy_model()) {}
-  Offline(const Pose& pose, const Model& of)
+struct OfflineVolumes {
+  explicit OfflineVolumes(const Pose& pose) : OfflineVolumes(pose, test::toy_model()) {}
+  OfflineVolumes(const Pose& pose, const Model& of)
       : model(std::make_shared<const Model>(of)), poser(model), body(poser.make_frame()) {
     EXPECT_TRUE(poser.run(pose, runtime::Skinning::cor, poser.all_tissues(), body).ok());
   }
@@ -66,7 +66,7 @@ TEST(Volumes, EveryWayOfSendingThemGivesOfflinePosing) {
         bytes += frame.payload.size();
         const Status status = decoder.decode(got, frame.payload, image);
         ASSERT_TRUE(status.ok()) << status.message;
-        const Image expected = Offline(pose, model).volume(0);
+        const Image expected = OfflineVolumes(pose, model).volume(0);
         EXPECT_EQ(image.grid, expected.grid);
         EXPECT_EQ(image.bytes, expected.bytes);
       }
@@ -149,7 +149,7 @@ TEST(Volumes, SlicesArePlanesOfThePosedVolume) {
   Image image;
   ASSERT_TRUE(decoder.decode(frame.envelope.volume_frame(), frame.payload, image).ok());
   EXPECT_FALSE(frame.envelope.volume_frame().has_grid());
-  const Offline offline(pose);
+  const OfflineVolumes offline(pose);
   std::vector<std::byte> expected;
   for (const ImageGrid& plane : planes) {
     const Image posed = runtime::pose_volume(offline.model, offline.body.nodes, offline.model->volumes[0],
@@ -184,7 +184,7 @@ TEST(Volumes, ARegionIsThatPartOfThePosedVolume) {
     if (sequence > 0) client.send(sequence, pose);
     const wire::Frame frame = next_volume(client, sequence);
     ASSERT_TRUE(decoder.decode(frame.envelope.volume_frame(), frame.payload, image).ok());
-    const Offline offline(pose, model);
+    const OfflineVolumes offline(pose, model);
     const Image expected = runtime::pose_volume(offline.model, offline.body.nodes, offline.model->volumes[0],
                                                 runtime::Sampling::trilinear, grid);
     EXPECT_EQ(image.grid, grid);

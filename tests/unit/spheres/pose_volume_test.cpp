@@ -15,7 +15,7 @@ namespace {
 
 using test::BentCylinder;
 
-constexpr double kEverything = -1e9;  // thinness that keeps every voxel
+constexpr double kWholeVolume = -1e9;  // thinness that keeps every voxel
 
 Image noise_on(const ImageGrid& grid) {
   Image out(grid, ScalarType::i16);
@@ -214,7 +214,7 @@ TEST(WayBack, EveryVoxelShowsItsPlaceInThePose) {
 
 // A quarter turn of the whole body takes voxels to voxels: nothing is lost there and back.
 TEST(WayBack, QuarterTurnsComeBackWhole) {
-  const BentCylinder body(kEverything);
+  const BentCylinder body(kWholeVolume);
   const Model model = model_of(body);
   const Eigen::Vector3d c = place(body.volume.grid, 0, 5, 9);
   const LatticeBox box{{0, 0, 0}, body.volume.grid.size};

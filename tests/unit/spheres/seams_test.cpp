@@ -29,11 +29,11 @@ Segment segment(const std::string& name, int parent, const Vec3& centre) {
   return out;
 }
 
-struct Bent {
+struct BentSeams {
   BallSet rest, posed;
   Seams seams;
 
-  Bent(const BentCylinder& body, const VolumetricSkeleton& skeleton, const Skeleton& rig,
+  BentSeams(const BentCylinder& body, const VolumetricSkeleton& skeleton, const Skeleton& rig,
        const std::vector<RigidTransform>& motions)
       : rest(balls_at_rest(skeleton, body.skeleton.grid)), posed(rest) {
     seams = seams_of(rest, skeleton.segment, rig);
@@ -50,7 +50,7 @@ Skeleton two(const BentCylinder& body) {
 
 TEST(Seams, NothingIsAddedWhereNothingTurns) {
   const BentCylinder body(0.3);
-  const Bent still(body, body.skeleton, two(body), body.bent(0));
+  const BentSeams still(body, body.skeleton, two(body), body.bent(0));
   EXPECT_EQ(still.posed.balls.size(), still.rest.balls.size());
   ASSERT_EQ(still.seams.seams.size(), 1U);
   EXPECT_EQ(still.seams.seams[0].way, (std::vector<std::int32_t>{0, 1}));
@@ -59,7 +59,7 @@ TEST(Seams, NothingIsAddedWhereNothingTurns) {
 // The sheet is the cross-section at the bend: its balls fill that disc, and none leaves the body.
 TEST(Seams, TheSheetHoldsTheVoxelsOnBothSides) {
   const BentCylinder body(0.3);
-  const Bent still(body, body.skeleton, two(body), body.bent(0));
+  const BentSeams still(body, body.skeleton, two(body), body.bent(0));
   const auto owner = owners_of(still.rest, {{0, 0, 0}, body.skeleton.grid.size});
   const auto segment_of = [&](std::int32_t ball) {
     return body.skeleton.segment[static_cast<std::size_t>(ball)];
@@ -138,7 +138,7 @@ TEST(Seams, BridgesFillWhatTheCrossSectionSweepsAndNoMore) {
     const double angle = degrees * std::numbers::pi / 180;
     const Eigen::Vector3d c(hinge.data());
     const Eigen::Quaterniond q(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()));
-    const Bent bent(body, body.skeleton, rig, {{}, {q, c - q * c}});
+    const BentSeams bent(body, body.skeleton, rig, {{}, {q, c - q * c}});
     const Swept swept(bent.seams.seams[0].sheet, {middle, rim, BentCylinder::bend}, angle);
     BallSet without = bent.posed;
     without.balls.resize(bent.rest.balls.size());
@@ -187,7 +187,7 @@ TEST(Seams, ASheetFarFromTheAxisIsBridgedStraightToo) {
   const Eigen::Vector3d c(hinge.data());
   const double angle = 110 * std::numbers::pi / 180;
   const Eigen::Quaterniond q(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()));
-  const Bent bent(body, body.skeleton, rig, {{}, {q, c - q * c}});
+  const BentSeams bent(body, body.skeleton, rig, {{}, {q, c - q * c}});
   const TearDetector detector(bent.rest, body.skeleton.segment);
   EXPECT_FALSE(detector.look(bent.posed).errs());
   const Swept swept(bent.seams.seams[0].sheet, {middle, out, BentCylinder::bend}, angle);
@@ -221,7 +221,7 @@ TEST(Seams, SegmentsTwoJointsApartAreBridgedNearTheJoints) {
   rig.segments = {segment("trunk", -1, {0, 0, 0}), segment("girdle", 0, bend_of(body)),
                   segment("arm", 1, bend_of(body))};
   const std::vector<RigidTransform> motions{{}, body.bent(60)[1], body.bent(120)[1]};
-  const Bent bent(body, skeleton, rig, motions);
+  const BentSeams bent(body, skeleton, rig, motions);
   ASSERT_EQ(bent.seams.seams.size(), 1U);
   EXPECT_EQ(bent.seams.seams[0].way, (std::vector<std::int32_t>{0, 1, 2}));
   EXPECT_FALSE(TearDetector(bent.rest, skeleton.segment).look(bent.posed).errs());
@@ -229,7 +229,7 @@ TEST(Seams, SegmentsTwoJointsApartAreBridgedNearTheJoints) {
   // The same far from both joints: what touches there parts for good.
   const auto far = body.skeleton.grid.point(BentCylinder::radius + 2, BentCylinder::radius + 2, 2);
   rig.segments[1].joint.center = rig.segments[2].joint.center = {far[0], far[1], far[2]};
-  EXPECT_TRUE(Bent(body, skeleton, rig, motions).seams.seams.empty());
+  EXPECT_TRUE(BentSeams(body, skeleton, rig, motions).seams.seams.empty());
 
   // And three joints apart they are strangers.
   rig.segments.push_back(segment("hand", 2, bend_of(body)));

@@ -25,7 +25,7 @@ void expect_equal(const VolumetricSkeleton& a, const VolumetricSkeleton& b) {
   EXPECT_EQ(a.grid, b.grid);
 }
 
-Mask body() {  // a ball, a bar and a sheet that touch each other, and the image's border
+Mask lumps() {  // a ball, a bar and a sheet that touch each other, and the image's border
   return make_mask({43, 37, 70}, [](int i, int j, int k) {
     const bool ball = (i - 15) * (i - 15) + (j - 17) * (j - 17) + (k - 14) * (k - 14) < 140;
     return ball || (i > 10 && i < 19 && j > 12 && j < 24 && k > 12) || (k > 40 && k < 44);
@@ -34,7 +34,7 @@ Mask body() {  // a ball, a bar and a sheet that touch each other, and the image
 
 TEST(Thinning, DeficitIsOwnDistanceMinusTheNeighboursMean) {
   for (const DistanceMetric metric : kMetrics) {
-    const Mask mask = body();
+    const Mask mask = lumps();
     const DistanceMap map = distance_map(mask, metric, {});
     const auto& n = map.size;
     const auto length = [&](int i, int j, int k) {
@@ -87,7 +87,7 @@ TEST(Thinning, ExactWhereDistancesAreWholeNumbers) {
 }
 
 TEST(Thinning, AThinnerSkeletonOutOfAThickerOneIsAFreshOne) {
-  std::vector<Mask> masks{body(), ellipsoid({40, 30, 50}, {18, 13, 23}), random_mask({31, 29, 37}, 0.95, 4)};
+  std::vector<Mask> masks{lumps(), ellipsoid({40, 30, 50}, {18, 13, 23}), random_mask({31, 29, 37}, 0.95, 4)};
   for (const Mask& mask : masks) {
     for (const DistanceMetric metric : kMetrics) {
       const DistanceMap map = distance_map(mask, metric, {});
@@ -112,7 +112,7 @@ TEST(Thinning, AThinnerSkeletonOutOfAThickerOneIsAFreshOne) {
 }
 
 TEST(Thinning, EveryVoxelStaysAtTheLeastThinnessAndTheBallsFillTheObject) {
-  for (const Mask& mask : {body(), random_mask({20, 22, 18}, 0.9, 6)}) {
+  for (const Mask& mask : {lumps(), random_mask({20, 22, 18}, 0.9, 6)}) {
     const VolumetricSkeleton s = skeleton(mask, least_thinness);
     EXPECT_EQ(s.size(), static_cast<std::size_t>(std::count(mask.inside.begin(), mask.inside.end(), 1)));
     std::vector<std::uint8_t> filled(mask.inside.size(), 0);
@@ -136,7 +136,7 @@ TEST(Thinning, EveryVoxelStaysAtTheLeastThinnessAndTheBallsFillTheObject) {
 }
 
 TEST(Thinning, TheSameForAnyNumberOfThreadsAndWhateverElseTheImageHolds) {
-  const Mask mask = body();
+  const Mask mask = lumps();
   const VolumetricSkeleton all = skeleton(mask, 0.2);
   tbb::task_arena(1).execute([&] { expect_equal(skeleton(mask, 0.2), all); });
   // The same object in a larger image, three voxels in: the same deficits, so also across slabs.
@@ -152,7 +152,7 @@ TEST(Thinning, TheSameForAnyNumberOfThreadsAndWhateverElseTheImageHolds) {
 }
 
 TEST(Thinning, SegmentsStayWithTheirVoxels) {
-  VolumetricSkeleton s = skeleton(body(), 0.1);
+  VolumetricSkeleton s = skeleton(lumps(), 0.1);
   for (std::size_t r = 0; r < s.size(); ++r) s.segment.push_back(static_cast<std::int32_t>(r));
   s.parent.assign(s.size(), VolumetricSkeleton::none);
   const VolumetricSkeleton t = thinner(s, 0.4);
@@ -163,7 +163,7 @@ TEST(Thinning, SegmentsStayWithTheirVoxels) {
 }
 
 TEST(Thinning, RefusesWhatHasNoMeaning) {
-  Mask mask = body();
+  Mask mask = lumps();
   for (const double tp : {-2.1, 2.1, std::nan("")}) EXPECT_THROW(skeleton(mask, tp), Error);
   const VolumetricSkeleton s = skeleton(mask, 0.4);
   EXPECT_THROW(thinner(s, 0.3), Error);

@@ -13,7 +13,7 @@ namespace {
 
 using solve::SparseMatrix;
 
-Eigen::MatrixXd full(const SparseMatrix& L) {
+Eigen::MatrixXd dense(const SparseMatrix& L) {
   return Eigen::MatrixXd(L).selfadjointView<Eigen::Lower>();
 }
 
@@ -40,7 +40,7 @@ TEST(FiniteVolumes, OfOneTetAreTheSignedAreasBetweenCells) {
     const double volume = (p(1) - p(0)).cross(p(2) - p(0)).dot(p(3) - p(0)) / 6;
     if (std::abs(volume) < 0.3) continue;
     if (volume < 0) V.row(2).swap(V.row(3));
-    const Eigen::MatrixXd L = full(finite_volumes(V, T, {}, nullptr));
+    const Eigen::MatrixXd L = dense(finite_volumes(V, T, {}, nullptr));
     const Eigen::Vector3d o = circumcentre({p(0), p(1), p(2), p(3)});
     double sum = 0;
     for (Eigen::Index a = 0; a < 4; ++a)
@@ -72,7 +72,7 @@ TEST(FiniteVolumes, OfCubesAreSevenPoints) {
   double share = 1;
   const SparseMatrix L = finite_volumes(mesh.V, mesh.T, {}, &share);
   EXPECT_EQ(share, 0);
-  const Eigen::MatrixXd all = full(L);
+  const Eigen::MatrixXd all = dense(L);
   for (Eigen::Index n = 0; n < mesh.V.rows(); ++n) {
     if ((mesh.V.row(n).array() <= 0).any() || (mesh.V.row(n).array() >= 8).any()) continue;
     for (Eigen::Index m = 0; m < mesh.V.rows(); ++m) {
@@ -89,8 +89,8 @@ TEST(FiniteVolumes, ConductivityOfAnEdgeIsItsTetsMean) {
   std::uniform_real_distribution<double> draw(0.1, 9);
   std::vector<double> a(static_cast<std::size_t>(mesh.T.rows()));
   for (double& x : a) x = draw(random);
-  const Eigen::MatrixXd plain = full(finite_volumes(mesh.V, mesh.T, {}, nullptr));
-  const Eigen::MatrixXd found = full(finite_volumes(mesh.V, mesh.T, a, nullptr));
+  const Eigen::MatrixXd plain = dense(finite_volumes(mesh.V, mesh.T, {}, nullptr));
+  const Eigen::MatrixXd found = dense(finite_volumes(mesh.V, mesh.T, a, nullptr));
   for (Eigen::Index n = 0; n < mesh.V.rows(); ++n) {
     for (Eigen::Index m = 0; m < mesh.V.rows(); ++m) {
       if (m == n) continue;
@@ -109,12 +109,12 @@ TEST(FiniteVolumes, ConductivityOfAnEdgeIsItsTetsMean) {
 TEST(Stiffness, IsOfElementsUnlessOnlyFiniteVolumesAreMonotone) {
   double share = 1;
   const TetMesh even = test::box_mesh({3, 3, 3}, 10);  // both are: elements
-  EXPECT_EQ(full(stiffness(even.V, even.T, {}, &share)), full(laplacian(even.V, even.T, nullptr)));
+  EXPECT_EQ(dense(stiffness(even.V, even.T, {}, &share)), dense(laplacian(even.V, even.T, nullptr)));
   EXPECT_EQ(share, 0);
   const TetMesh shaken = test::shaken_box(4, 3);  // neither is: elements, and the share is theirs
   double of_elements = 0;
-  const Eigen::MatrixXd expected = full(laplacian(shaken.V, shaken.T, &of_elements));
-  EXPECT_EQ(full(stiffness(shaken.V, shaken.T, {}, &share)), expected);
+  const Eigen::MatrixXd expected = dense(laplacian(shaken.V, shaken.T, &of_elements));
+  EXPECT_EQ(dense(stiffness(shaken.V, shaken.T, {}, &share)), expected);
   EXPECT_EQ(share, of_elements);
   EXPECT_GT(share, 0);
   // Two pyramids on a square: its diagonal pushes by elements and bounds no area. (A
@@ -123,9 +123,9 @@ TEST(Stiffness, IsOfElementsUnlessOnlyFiniteVolumesAreMonotone) {
   V << 0, 0, 0, 2, 0, 0, 2, 2, 0, 0, 2, 0, 1, 1, 2, 1, 1, -2;
   Tets T(4, 4);
   T << 0, 1, 2, 4, 0, 2, 3, 4, 0, 2, 1, 5, 0, 3, 2, 5;
-  const Eigen::MatrixXd L = full(stiffness(V, T, {}, &share));
+  const Eigen::MatrixXd L = dense(stiffness(V, T, {}, &share));
   EXPECT_EQ(share, 0);
-  EXPECT_GT(full(laplacian(V, T, nullptr))(0, 2), 0.01);
+  EXPECT_GT(dense(laplacian(V, T, nullptr))(0, 2), 0.01);
   EXPECT_NEAR(L(0, 2), 0, 1e-12);
 }
 

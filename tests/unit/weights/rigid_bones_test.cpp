@@ -12,7 +12,7 @@ namespace ecorche::weights {
 namespace {
 
 /// The square [x, x] x [0, 60] x [0, 60]: the part of a bone's surface that matters here.
-SurfaceMesh wall(double x) {
+SurfaceMesh thin_wall(double x) {
   SurfaceMesh s;
   s.V.resize(4, 3);
   s.V << x, 0, 0, x, 60, 0, x, 60, 60, x, 0, 60;
@@ -24,7 +24,7 @@ SurfaceMesh wall(double x) {
 Case bones_at(const std::vector<double>& walls) {
   Case patient;
   for (std::size_t b = 0; b < walls.size(); ++b)
-    patient.bones.push_back({"bone_" + std::to_string(b), "s", wall(walls[b])});
+    patient.bones.push_back({"bone_" + std::to_string(b), "s", thin_wall(walls[b])});
   return patient;
 }
 
@@ -134,7 +134,7 @@ TEST(RigidBones, EveryTetIsOfItsClassAndInItsPlace) {
 }
 
 TEST(RigidBones, TwoThatMeetPartAlongTheNodesThatTheyShare) {
-  // Bone 0 fills x < 30, bone 1 the rest; the nodes between are nearer to bone 1's wall.
+  // Bone 0 fills x < 30, bone 1 the rest; the nodes between are nearer to bone 1's thin_wall.
   const TetMesh mesh =
       test::box_mesh({6, 2, 2}, 10, [](const Eigen::Vector3d& p) { return p.x() < 30 ? 1 : 2; });
   const RigidBones made = rigid_bones(mesh, bones_at({25, 31}), {0, 1}, {});

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+# Precompiled headers: reading headers is most of what compiling one of our units takes. One set of headers a kind of unit:
+#   plain    Eigen, TBB and the standard library
+#   command  also CLI11, nlohmann_json and fmt
+#   server   also Asio, Beast and Protobuf
+# and for tests, which are executables and compiled with -O1: test, test_server (with GoogleTest).
+
+# ecorche_precompiled(TARGET KIND): the target reads that kind's headers precompiled, where ECORCHE_PCH is on.
+function(ecorche_precompiled name kind)
+  if(ECORCHE_PCH AND NOT kind STREQUAL "none")
+    target_precompile_headers(${name} REUSE_FROM ecorche_pch_${kind})
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      # Says in the preprocessed text which file was read: ccache asks for it.
+      target_compile_options(${name} PRIVATE -fpch-preprocess)
+    else()
+      # Without the time of making: what reads it can then be found in the cache again.
+      target_compile_options(${name} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+    endif()
+  endif()
+endfunction()
+
+if(NOT ECORCHE_PCH)
+  return()
+endif()
+
+find_package(Boost 1.74 REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(GTest REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(Protobuf 3.21 REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(TBB REQUIRED)
+
+set(_standard <algorithm> <array> <atomic> <cmath> <cstdint> <deque> <filesystem> <functional> <limits> <map> <memory> <mutex>
+  <numeric> <optional> <random> <set> <span> <sstream> <string> <string_view> <unordered_map> <utility> <variant> <vector>)
+set(_plain ${_standard} <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <tbb/blocked_range.h> <tbb/parallel_for.h> <tbb/task_arena.h>)
+set(_command ${_standard} <chrono> <Eigen/Core> <Eigen/Geometry> <CLI/CLI.hpp> <fmt/format.h> <nlohmann/json.hpp>)
+set(_server ${_standard} <chrono> <Eigen/Core> <Eigen/Geometry> ${PROJECT_SOURCE_DIR}/runtime/server/asio.hpp <boost/asio/read.hpp>
+  <google/protobuf/message_lite.h> <google/protobuf/repeated_field.h>)
+
+# ecorche_pch(KIND EXECUTABLE|LIBRARY HEADERS... LIBS...): an object library that only carries the headers.
+function(ecorche_pch kind of)
+  cmake_parse_arguments(A "" "" "HEADERS;LIBS;OPTIONS" ${ARGN})
+  set(name ecorche_pch_${kind})
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/pch_${kind}.cpp CONTENT "")
+  add_library(${name} OBJECT ${PROJECT_BINARY_DIR}/pch_${kind}.cpp)
+  target_link_libraries(${name} PRIVATE ecorche_flags ecorche_sanitizers ${A_LIBS})
+  target_compile_options(${name} PRIVATE ${A_OPTIONS})
+  if(of STREQUAL "EXECUTABLE")
+    set_property(TARGET ${name} PROPERTY POSITION_INDEPENDENT_CODE OFF)
+  endif()
+  target_precompile_headers(${name} PRIVATE ${A_HEADERS})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(${name} PRIVATE -fpch-preprocess)
+  else()
+    target_compile_options(${name} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+  endif()
+endfunction()
+
+ecorche_pch(plain LIBRARY HEADERS ${_plain} LIBS Eigen3::Eigen TBB::tbb)
+ecorche_pch(command EXECUTABLE HEADERS ${_command} LIBS Eigen3::Eigen CLI11::CLI11 nlohmann_json::nlohmann_json spdlog::spdlog)
+ecorche_pch(server LIBRARY HEADERS ${_server} LIBS Eigen3::Eigen Boost::headers protobuf::libprotobuf-lite)
+ecorche_pch(test EXECUTABLE HEADERS ${_plain} <gtest/gtest.h> LIBS Eigen3::Eigen TBB::tbb GTest::gtest OPTIONS -O1)
+ecorche_pch(test_server EXECUTABLE HEADERS ${_server} <gtest/gtest.h>
+  LIBS Eigen3::Eigen Boost::headers protobuf::libprotobuf-lite GTest::gtest OPTIONS -O1)
