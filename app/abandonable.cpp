@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::app {
 namespace {

@@ -5,12 +5,12 @@
 #include <tuple>
 #include <vector>
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/values/error.hpp>
 #include "app/pose_frames.hpp"
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
-#include "core/model_file/model_file.hpp"
-#include "core/values/error.hpp"
-#include "io/case/case_file.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 
 namespace ecorche::app {

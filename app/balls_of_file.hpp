@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 #include "app/command.hpp"
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
-#include "core/values/volumetric_skeleton.hpp"
 #include "runtime/spheres/balls.hpp"
 #include "runtime/spheres/seams.hpp"
 

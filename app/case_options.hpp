@@ -4,8 +4,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include <ecorche/io/case_file.hpp>
 #include "app/read_budget.hpp"
-#include "io/case/case_file.hpp"
 
 namespace ecorche::app {
 

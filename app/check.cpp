@@ -7,10 +7,10 @@
 #include <map>
 #include <set>
 
+#include <ecorche/io/case_file.hpp>
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/drawn_surfaces.hpp"
-#include "io/case/case_file.hpp"
 #include "preprocess/check/inspect_case.hpp"
 #include "preprocess/check/joints.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"

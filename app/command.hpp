@@ -11,7 +11,7 @@
 #include <stop_token>
 #include <string>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 // What help calls a file or a folder.
 template <>

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {

@@ -8,14 +8,14 @@
 #include <functional>
 #include <memory>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/body_poser.hpp>
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
-#include "core/model_file/model_file.hpp"
 #include "io/image/image_file.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::app {

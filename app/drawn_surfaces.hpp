@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 namespace ecorche::app {
 

@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <memory>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "app/balls_of_file.hpp"
 #include "app/command.hpp"
 #include "app/export_rig.hpp"
 #include "app/tet_regions.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/values/error.hpp>
 #include "app/unknown_name.hpp"
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
 #include "core/kinematics/rig_clip.hpp"
-#include "core/values/error.hpp"
 #include "io/case/frame.hpp"
 #include "io/motion/bvh.hpp"
 #include "io/surface/rigged_glb.hpp"

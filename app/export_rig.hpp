@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/model.hpp>
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
-#include "core/values/model.hpp"
 
 namespace ecorche::app {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/hang_skeleton.hpp"
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/model_file/model_file.hpp>
 #include "app/point_table.hpp"
 #include "core/files/atomic_file.hpp"
-#include "core/model_file/model_file.hpp"
 #include "io/case/attachment_file.hpp"
-#include "io/case/case_file.hpp"
 #include "preprocess/thin/attach.hpp"
 #include "preprocess/thin/picks.hpp"
 

@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/runtime/rigid_copies.hpp>
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/model.hpp>
 #include "app/posed_tets.hpp"
-#include "core/values/image.hpp"
-#include "core/values/model.hpp"
-#include "runtime/volume/resample.hpp"
-#include "runtime/volume/rigid_copies.hpp"
 #include "runtime/volume/round_trip.hpp"
 
 namespace ecorche::app {

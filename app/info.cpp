@@ -3,12 +3,12 @@
 #include <cstdio>
 #include <filesystem>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "app/certificate_report.hpp"
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
 #include "app/joint_json.hpp"
 #include "core/model_file/figures.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::app {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/values/joint_rule.hpp"
+#include <ecorche/values/joint_rule.hpp>
 
 namespace ecorche::app {
 

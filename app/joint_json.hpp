@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::app {
 

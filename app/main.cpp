@@ -11,11 +11,12 @@
 #include <new>
 #include <string_view>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/version.hpp>
 #include "app/abandonable.hpp"
 #include "app/command.hpp"
 #include "app/command_line.hpp"
 #include "app/signals.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <optional>
 
+#include <ecorche/values/error.hpp>
 #include "core/kinematics/marker_fit.hpp"
-#include "core/values/error.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/motion/table_file.hpp"
 

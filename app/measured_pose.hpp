@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/values/context.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::app {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/model_report.hpp"
 
-#include "core/values/joint_rule.hpp"
+#include <ecorche/values/joint_rule.hpp>
 
 namespace ecorche::app {
 

@@ -5,11 +5,11 @@
 #include <memory>
 #include <numbers>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
 #include "core/kinematics/motion_compare.hpp"
 #include "core/kinematics/motion_report.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <numbers>
 
+#include <ecorche/values/error.hpp>
 #include "app/marker_source.hpp"
 #include "app/read_budget.hpp"
-#include "core/values/error.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/case/pose_sequence.hpp"

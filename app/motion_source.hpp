@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "app/command.hpp"
 #include "core/kinematics/retarget.hpp"
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
 #include "io/motion/clip_file.hpp"
 
 namespace ecorche::app {

@@ -8,9 +8,9 @@
 #include <map>
 #include <memory>
 
+#include <ecorche/io/case_file.hpp>
 #include "app/command.hpp"
 #include "core/files/atomic_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/motion/bvh.hpp"
 
 namespace ecorche::app {

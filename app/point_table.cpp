@@ -9,8 +9,8 @@
 #include <optional>
 #include <string_view>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {

@@ -7,6 +7,11 @@
 #include <memory>
 #include <optional>
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/measured_pose.hpp"
@@ -18,14 +23,9 @@
 #include "app/tet_regions.hpp"
 #include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
-#include "core/model_file/model_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
-#include "runtime/quality/pose_quality.hpp"
 #include "runtime/spheres/pose_volume.hpp"
-#include "runtime/volume/resample.hpp"
-#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -4,10 +4,10 @@
 #include <charconv>
 #include <cstdio>
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/io/pose_library.hpp>
+#include <ecorche/values/error.hpp>
 #include "app/solved_pose.hpp"
-#include "core/values/error.hpp"
-#include "io/case/case_file.hpp"
-#include "io/case/pose_library.hpp"
 
 namespace ecorche::app {
 namespace {

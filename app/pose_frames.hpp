@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
 #include "app/solved_pose.hpp"
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
 
 namespace ecorche::app {
 

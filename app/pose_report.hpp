@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/values/model.hpp>
 #include "app/pose_warnings.hpp"
-#include "core/values/model.hpp"
-#include "runtime/quality/pose_quality.hpp"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::app {
 

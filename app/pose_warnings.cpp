@@ -9,8 +9,8 @@
 #include <numbers>
 #include <optional>
 
-#include "core/kinematics/angles.hpp"
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/runtime/verdict.hpp>
 
 namespace ecorche::app {
 namespace {

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "core/values/model.hpp"
-#include "runtime/quality/pose_quality.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::app {
 

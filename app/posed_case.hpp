@@ -2,11 +2,11 @@
 // A posed body as a patient who was scanned so.
 #pragma once
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/model.hpp"
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::app {
 

@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
+#include <ecorche/io/case_file.hpp>
 #include "core/files/atomic_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/case/digest.hpp"
 #include "io/surface/tied_surfaces.hpp"
 

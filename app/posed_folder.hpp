@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/pose.hpp>
 #include "app/posed_manifest.hpp"
 #include "core/files/staged_folder.hpp"
-#include "core/values/model.hpp"
-#include "core/values/pose.hpp"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::app {
 

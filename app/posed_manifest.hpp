@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/transform.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche::app {
 

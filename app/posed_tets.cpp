@@ -7,7 +7,7 @@
 #include <numeric>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::app {

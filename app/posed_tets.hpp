@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/mesh.hpp"
-#include "core/values/model.hpp"
-#include "runtime/volume/rigid_copies.hpp"
+#include <ecorche/runtime/rigid_copies.hpp>
+#include <ecorche/values/mesh.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::app {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche preprocess`: a case in, a model out.
-#include "preprocess/pipeline.hpp"
+#include <ecorche/preprocess/pipeline.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <sstream>
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/model_file/model_file.hpp>
 #include "app/big_heap.hpp"
 #include "app/case_options.hpp"
 #include "app/command.hpp"
@@ -17,8 +19,6 @@
 #include "app/stage_folder.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/files/stale_parts.hpp"
-#include "core/model_file/model_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inspect_case.hpp"

@@ -6,15 +6,15 @@
 #include <filesystem>
 #include <memory>
 
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/probe.hpp>
 #include "app/command.hpp"
 #include "app/point_table.hpp"
 #include "app/pose_frames.hpp"
 #include "app/unknown_name.hpp"
 #include "core/files/atomic_file.hpp"
-#include "core/kinematics/forward.hpp"
-#include "core/model_file/model_file.hpp"
-#include "runtime/probe/probe.hpp"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <mutex>
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/values/error.hpp>
 #include "app/case_options.hpp"
 #include "app/command.hpp"
-#include "core/values/error.hpp"
-#include "io/case/case_file.hpp"
 #include "preprocess/check/surface_figures.hpp"
 #include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <ecorche/version.hpp>
 #include "core/files/atomic_file.hpp"
 #include "proto/recording.hpp"
 

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
+#include <ecorche/client/client.hpp>
 #include "app/command.hpp"
-#include "clients/cpp/client.hpp"
 
 namespace ecorche::app {
 

@@ -3,12 +3,12 @@
 #include <cstdio>
 #include <filesystem>
 
+#include <ecorche/io/case_file.hpp>
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/joint_json.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/kinematics/posed_rest.hpp"
-#include "io/case/case_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/check/joints.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"

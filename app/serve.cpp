@@ -9,14 +9,15 @@
 #include <stop_token>
 #include <vector>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/version.hpp>
+#include <ecorche/wire/address.hpp>
 #include "app/big_heap.hpp"
 #include "app/command.hpp"
 #include "app/served_clips.hpp"
 #include "app/signals.hpp"
 #include "app/token_file.hpp"
 #include "core/files/atomic_file.hpp"
-#include "core/model_file/model_file.hpp"
-#include "proto/address.hpp"
 #include "runtime/server/server.hpp"
 
 namespace ecorche::app {

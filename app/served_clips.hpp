@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <vector>
 
+#include <ecorche/values/skeleton.hpp>
 #include "app/command.hpp"
-#include "core/values/skeleton.hpp"
 #include "runtime/server/clip.hpp"
 
 namespace ecorche::app {

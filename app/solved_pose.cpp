@@ -5,8 +5,8 @@
 
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "io/case/ik_file.hpp"
 
 namespace ecorche::app {

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "app/command.hpp"
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
 
 namespace ecorche::app {
 

@@ -6,10 +6,11 @@
 #include <fstream>
 #include <vector>
 
+#include <ecorche/values/error.hpp>
+#include <ecorche/version.hpp>
 #include "core/files/atomic_file.hpp"
 #include "core/files/stale_parts.hpp"
 #include "core/model_file/digest.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::app {
 namespace {

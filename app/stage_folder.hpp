@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "preprocess/cache/stage_store.hpp"
+#include <ecorche/preprocess/stage_store.hpp>
 
 namespace ecorche::app {
 

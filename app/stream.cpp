@@ -6,15 +6,16 @@
 #include <optional>
 #include <vector>
 
+#include <ecorche/client/client.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/version.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
 #include "app/replay.hpp"
 #include "app/stream_check.hpp"
 #include "app/stream_text.hpp"
 #include "app/token_file.hpp"
-#include "clients/cpp/client.hpp"
-#include "core/model_file/model_file.hpp"
-#include "proto/convert.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -8,9 +8,9 @@
 #include <exception>
 #include <utility>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -12,10 +12,10 @@
 #include <thread>
 #include <vector>
 
-#include "proto/framing.hpp"
-#include "proto/mesh_decoder.hpp"
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
+#include <ecorche/wire/framing.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
 
 namespace ecorche::app {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/case/frame.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/mapping/carry_back.hpp"

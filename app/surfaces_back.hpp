@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/mesh.hpp>
 #include "app/posed_manifest.hpp"
 #include "app/posed_tets.hpp"
-#include "core/values/mesh.hpp"
 #include "io/surface/tied_surfaces.hpp"
 
 namespace ecorche::app {

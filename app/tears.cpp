@@ -9,12 +9,12 @@
 #include <optional>
 #include <random>
 
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "app/balls_of_file.hpp"
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
 #include "runtime/spheres/effects.hpp"
 #include "runtime/spheres/seams.hpp"
 #include "runtime/spheres/tears.hpp"

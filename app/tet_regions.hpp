@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::app {

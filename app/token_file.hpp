@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::app {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {

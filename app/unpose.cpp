@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "app/command.hpp"
 #include "app/images_back.hpp"
 #include "app/posed_tets.hpp"
@@ -13,7 +14,6 @@
 #include "app/unpose_report.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/files/staged_folder.hpp"
-#include "core/model_file/model_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/mapping/bind.hpp"

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/preprocess/pipeline.hpp>
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
 #include "app/model_report.hpp"
 #include "core/model_file/figures.hpp"
-#include "core/model_file/model_file.hpp"
 #include "preprocess/bounds.hpp"
-#include "preprocess/pipeline.hpp"
 
 namespace ecorche::app {
 namespace {

@@ -4,6 +4,7 @@ set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+include(GNUInstallDirs)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 # Any library of ours may become part of a plug-in, and shows that plug-in's users nothing.
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
@@ -25,7 +26,7 @@ set_property(GLOBAL PROPERTY JOB_POOLS cgal_pool=1)
 
 # There are a hundred executables to link, and lld links them in a tenth of the time.
 find_program(LLD ld.lld)
-if(LLD)
+if(LLD AND PROJECT_IS_TOP_LEVEL)
   add_link_options(-fuse-ld=lld)
 endif()
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "phantom/body.hpp"
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::phantom {
 

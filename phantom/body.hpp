@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "phantom/shape.hpp"
 
 namespace ecorche::phantom {

@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "core/values/transform.hpp"
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche::phantom {
 

@@ -2,8 +2,8 @@
 // Motion clips of the phantom, on joints named as in CMU's BVH files.
 #pragma once
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::phantom {
 

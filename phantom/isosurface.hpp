@@ -2,8 +2,8 @@
 // The surface of a solid as a closed triangle mesh.
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "phantom/shape.hpp"
 
 namespace ecorche::phantom {

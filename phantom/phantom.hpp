@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/pose.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/pose.hpp>
 
 namespace ecorche::phantom {
 

@@ -2,7 +2,7 @@
 // Fewer triangles for the same surface.
 #pragma once
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::phantom {
 

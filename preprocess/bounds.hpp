@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::preprocess {
 

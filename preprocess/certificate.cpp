@@ -10,12 +10,12 @@
 #include <limits>
 #include <numbers>
 
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/bounds.hpp"
 #include "preprocess/geometry/closest_point.hpp"
 #include "preprocess/geometry/dihedral.hpp"
 #include "preprocess/geometry/edges.hpp"
-#include "preprocess/pipeline.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::preprocess {

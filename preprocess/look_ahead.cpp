@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/check/touching_limbs.hpp"
-#include "preprocess/pipeline.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/tet/default_size.hpp"
 #include "preprocess/tet/mesher.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/pipeline.hpp"
+#include <ecorche/preprocess/pipeline.hpp>
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <span>
 #include <sstream>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 #include "preprocess/bounds.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/check/joints.hpp"

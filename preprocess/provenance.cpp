@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/provenance.hpp"
+#include <ecorche/version.hpp>
 
 #include <Eigen/Core>
 #include <charconv>

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/values/case.hpp"
-#include "preprocess/pipeline.hpp"
+#include <ecorche/preprocess/pipeline.hpp>
+#include <ecorche/values/case.hpp>
 
 namespace ecorche::preprocess {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/worst_tets.hpp"
+#include <ecorche/preprocess/worst_tets.hpp>
 
 #include <algorithm>
 #include <array>

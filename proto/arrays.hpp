@@ -7,8 +7,8 @@
 #include <span>
 #include <type_traits>
 
-#include "core/values/image.hpp"
-#include "proto/framing.hpp"
+#include <ecorche/values/image.hpp>
+#include <ecorche/wire/framing.hpp>
 
 namespace ecorche::wire {
 

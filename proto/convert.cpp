@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 
 #include <cmath>
 #include <limits>

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::wire {
 

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <utility>
 
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 
 namespace ecorche::wire {
 namespace {

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/values/error.hpp"
-#include "ecorche/v1/envelope.pb.h"
+#include <ecorche/v1/envelope.pb.h>
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::wire {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/volume_decoder.hpp"
+#include <ecorche/wire/volume_decoder.hpp>
 
 #include <zstd.h>
 
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
 
 namespace ecorche::wire {
 namespace {

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include <ecorche/values/joint_rule.hpp>
 #include "app/report/html.hpp"
 #include "app/report/places.hpp"
 #include "app/report/quality.hpp"
 #include "app/report/slice.hpp"
-#include "core/values/joint_rule.hpp"
 #include "preprocess/bounds.hpp"
 
 namespace ecorche::app::report {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/model.hpp"
-#include "preprocess/pipeline.hpp"
+#include <ecorche/preprocess/pipeline.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::app::report {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::app::report {
 

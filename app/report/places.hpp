@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/model.hpp>
 #include "app/report/picture.hpp"
-#include "core/values/model.hpp"
 
 namespace ecorche::app::report {
 

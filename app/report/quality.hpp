@@ -4,8 +4,8 @@
 
 #include <vector>
 
+#include <ecorche/values/model.hpp>
 #include "app/report/histogram.hpp"
-#include "core/values/model.hpp"
 
 namespace ecorche::app::report {
 

@@ -4,9 +4,9 @@
 
 #include <vector>
 
+#include <ecorche/values/model.hpp>
 #include "app/report/picture.hpp"
 #include "app/report/view.hpp"
-#include "core/values/model.hpp"
 
 namespace ecorche::app::report {
 

@@ -5,8 +5,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include <ecorche/values/mesh.hpp>
 #include "app/report/picture.hpp"
-#include "core/values/mesh.hpp"
 
 namespace ecorche::app::report {
 

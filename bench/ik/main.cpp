@@ -21,10 +21,10 @@
 #include <random>
 #include <vector>
 
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/model_file/model_file.hpp>
 #include "bench/ik/peers.hpp"
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <Eigen/SVD>
 #include <algorithm>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 
 namespace ecorche::bench {
 namespace {

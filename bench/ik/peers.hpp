@@ -2,7 +2,7 @@
 // The other two well-tried methods, with the same limits and couplings: what bench_ik holds ours against.
 #pragma once
 
-#include "core/kinematics/ik.hpp"
+#include <ecorche/kinematics/ik.hpp>
 
 namespace ecorche::bench {
 

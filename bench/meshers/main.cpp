@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/io/case_file.hpp>
 #include "bench/meshers/measures.hpp"
-#include "io/case/case_file.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/relax_slivers.hpp"

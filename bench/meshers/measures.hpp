@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::bench {
 

@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/preprocess/pipeline.hpp>
 #include "bench/preprocess/peers.hpp"
-#include "core/model_file/model_file.hpp"
-#include "io/case/case_file.hpp"
-#include "preprocess/pipeline.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::bench {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::bench {
 

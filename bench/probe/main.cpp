@@ -15,10 +15,10 @@
 #include <thread>
 #include <vector>
 
-#include "clients/cpp/client.hpp"
-#include "core/model_file/model_file.hpp"
+#include <ecorche/client/client.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
 #include "runtime/server/server.hpp"
 
 namespace {

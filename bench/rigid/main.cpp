@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/io/pose_library.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/probe.hpp>
 #include "core/kinematics/retarget.hpp"
-#include "core/model_file/model_file.hpp"
-#include "io/case/pose_library.hpp"
 #include "io/motion/bvh.hpp"
-#include "runtime/probe/probe.hpp"
 #include "runtime/quality/bone_tets.hpp"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::bench {
 namespace {

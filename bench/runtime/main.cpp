@@ -19,6 +19,10 @@
 #include <numeric>
 #include <set>
 
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/quality_meter.hpp>
 #include "bench/runtime/bandwidth.hpp"
 #include "bench/runtime/clip_poses.hpp"
 #include "bench/runtime/figure.hpp"
@@ -26,10 +30,6 @@
 #include "bench/runtime/plain_eigen.hpp"
 #include "bench/runtime/probing.hpp"
 #include "bench/runtime/volume_rows.hpp"
-#include "core/kinematics/forward.hpp"
-#include "core/model_file/model_file.hpp"
-#include "runtime/quality/pose_quality.hpp"
-#include "runtime/quality/quality_meter.hpp"
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
 

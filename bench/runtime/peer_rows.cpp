@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "runtime/volume/resample.hpp"
+#include <ecorche/runtime/resample.hpp>
 
 namespace ecorche::bench {
 namespace {

@@ -6,11 +6,11 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/transform.hpp>
 #include "bench/runtime/figure.hpp"
 #include "bench/runtime/peers.hpp"
-#include "core/values/model.hpp"
-#include "core/values/transform.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "runtime/skin/node_clusters.hpp"
 
 namespace ecorche::bench {

@@ -5,9 +5,9 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "core/values/model.hpp"
-#include "core/values/transform.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche::bench {
 

@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
+#include <ecorche/runtime/probe.hpp>
 #include "bench/runtime/figure.hpp"
-#include "runtime/probe/probe.hpp"
 
 namespace ecorche::bench {
 namespace {

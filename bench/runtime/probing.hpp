@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::bench {
 

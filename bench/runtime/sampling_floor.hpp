@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/model.hpp>
 #include "bench/runtime/figure.hpp"
-#include "core/values/model.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::bench {
 

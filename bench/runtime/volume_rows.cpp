@@ -6,11 +6,11 @@
 #include <cstdio>
 #include <string>
 
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "bench/runtime/figure.hpp"
 #include "bench/runtime/peer_rows.hpp"
 #include "bench/runtime/sampling_floor.hpp"
-#include "runtime/volume/resample.hpp"
-#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::bench {
 namespace {

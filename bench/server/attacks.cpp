@@ -16,11 +16,11 @@
 #include <utility>
 #include <vector>
 
+#include <ecorche/client/client.hpp>
+#include <ecorche/values/error.hpp>
+#include <ecorche/wire/framing.hpp>
 #include "bench/server/served.hpp"
 #include "bench/server/walking.hpp"
-#include "clients/cpp/client.hpp"
-#include "core/values/error.hpp"
-#include "proto/framing.hpp"
 
 namespace ecorche::bench {
 namespace {

@@ -17,9 +17,9 @@
 #include <numeric>
 #include <utility>
 
+#include <ecorche/values/error.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "bench/server/walking.hpp"
-#include "core/values/error.hpp"
-#include "proto/convert.hpp"
 
 namespace ecorche::bench {
 namespace {

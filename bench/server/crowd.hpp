@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "clients/cpp/client.hpp"
-#include "core/values/model.hpp"
-#include "proto/mesh_decoder.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/client/client.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
 
 namespace ecorche::bench {
 

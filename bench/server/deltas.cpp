@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/runtime/body_poser.hpp>
 #include "bench/server/walking.hpp"
 #include "proto/delta.hpp"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::bench {
 namespace {

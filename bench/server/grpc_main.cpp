@@ -21,11 +21,11 @@
 #include <thread>
 #include <vector>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/error.hpp>
 #include "bench/server/walking.hpp"
-#include "core/model_file/model_file.hpp"
-#include "core/values/error.hpp"
 #include "grpc_frame.grpc.pb.h"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::bench {
 namespace {

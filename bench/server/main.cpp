@@ -16,6 +16,8 @@
 #include <set>
 #include <sstream>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/values/error.hpp>
 #include "bench/server/attacks.hpp"
 #include "bench/server/crowd.hpp"
 #include "bench/server/deltas.hpp"
@@ -27,8 +29,6 @@
 #include "bench/server/walking.hpp"
 #include "bench/server/watcher.hpp"
 #include "bench/server/wire.hpp"
-#include "core/model_file/model_file.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::bench {
 namespace {

@@ -14,7 +14,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 
 namespace ecorche::bench {
 namespace {

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "proto/address.hpp"
+#include <ecorche/wire/address.hpp>
 
 namespace ecorche::bench {
 

@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <thread>
 
+#include <ecorche/client/client.hpp>
 #include "bench/server/served.hpp"
-#include "clients/cpp/client.hpp"
 
 namespace ecorche::bench {
 namespace {

@@ -2,8 +2,8 @@
 // A part of a posed volume at its full resolution, through the server.
 #pragma once
 
+#include <ecorche/v1/stream.pb.h>
 #include "bench/server/served.hpp"
-#include "ecorche/v1/stream.pb.h"
 
 namespace ecorche::bench {
 

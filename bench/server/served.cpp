@@ -13,7 +13,7 @@
 #include <sstream>
 #include <thread>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 extern char** environ;
 

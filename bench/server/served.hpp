@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/address.hpp"
+#include <ecorche/wire/address.hpp>
 
 namespace ecorche::bench {
 

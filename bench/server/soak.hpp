@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::bench {
 

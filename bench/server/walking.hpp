@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::bench {
 

@@ -5,9 +5,9 @@
 #include <exception>
 #include <utility>
 
-#include "clients/cpp/client.hpp"
-#include "core/values/error.hpp"
-#include "proto/convert.hpp"
+#include <ecorche/client/client.hpp>
+#include <ecorche/values/error.hpp>
+#include <ecorche/wire/convert.hpp>
 
 namespace ecorche::bench {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <thread>
 
+#include <ecorche/v1/envelope.pb.h>
 #include "bench/server/served.hpp"
-#include "ecorche/v1/envelope.pb.h"
 
 namespace ecorche::bench {
 

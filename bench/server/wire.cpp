@@ -9,11 +9,11 @@
 #include <thread>
 #include <vector>
 
+#include <ecorche/client/client.hpp>
+#include <ecorche/values/error.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "bench/server/served.hpp"
 #include "bench/server/walking.hpp"
-#include "clients/cpp/client.hpp"
-#include "core/values/error.hpp"
-#include "proto/convert.hpp"
 
 namespace ecorche::bench {
 namespace {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "io/image/image_file.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 #include "preprocess/thin/isotropic.hpp"

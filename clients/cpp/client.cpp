@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/client.hpp"
+#include <ecorche/client/client.hpp>
 
 #include <algorithm>
 #include <utility>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/socket.hpp"
+#include <ecorche/client/socket.hpp>
 
 #include <fcntl.h>
 #include <netdb.h>

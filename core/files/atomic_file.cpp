@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/flush.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::files {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string_view>
 
-#include "core/files/budget.hpp"
+#include <ecorche/files/budget.hpp>
 
 namespace ecorche::files {
 

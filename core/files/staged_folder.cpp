@@ -9,10 +9,10 @@
 #include <cstring>
 #include <system_error>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
 #include "core/files/flush.hpp"
 #include "core/files/stale_parts.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::files {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::kinematics {
 namespace {

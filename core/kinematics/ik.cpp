@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/ik.hpp"
+#include <ecorche/kinematics/ik.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "core/kinematics/damped_steps.hpp"
-#include "core/kinematics/forward.hpp"
 #include "core/kinematics/ik_chain.hpp"
 
 namespace ecorche::kinematics {

@@ -8,8 +8,8 @@
 #include <string>
 #include <tuple>
 
-#include "core/kinematics/angles.hpp"
-#include "core/values/error.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::kinematics {
 namespace {

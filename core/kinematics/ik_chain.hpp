@@ -7,8 +7,8 @@
 #include <array>
 #include <vector>
 
+#include <ecorche/kinematics/ik.hpp>
 #include "core/kinematics/damped_steps.hpp"
-#include "core/kinematics/ik.hpp"
 
 namespace ecorche::kinematics {
 

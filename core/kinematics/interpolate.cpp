@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/interpolate.hpp"
+#include <ecorche/kinematics/interpolate.hpp>
 
 #include <algorithm>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::kinematics {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
 #include "core/kinematics/rest_alignment.hpp"
 
 namespace ecorche::kinematics {

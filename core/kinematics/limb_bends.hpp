@@ -5,8 +5,8 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::kinematics {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "core/kinematics/ik.hpp"
+#include <ecorche/kinematics/ik.hpp>
 
 namespace ecorche::kinematics {
 

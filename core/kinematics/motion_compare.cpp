@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/kinematics/interpolate.hpp"
+#include <ecorche/kinematics/interpolate.hpp>
 #include "core/kinematics/mean_turn.hpp"
 
 namespace ecorche::kinematics {

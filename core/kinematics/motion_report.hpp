@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::kinematics {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/named_angles.hpp"
+#include <ecorche/kinematics/named_angles.hpp>
 
 #include <array>
 #include <map>
 
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
 
 namespace ecorche::kinematics {
 namespace {

@@ -2,8 +2,8 @@
 // A pose as the rest pose of another scan.
 #pragma once
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::kinematics {
 

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <string>
 
+#include <ecorche/values/error.hpp>
 #include "core/kinematics/mean_turn.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::kinematics {
 namespace {

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "core/kinematics/limb_bends.hpp"
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
 
 namespace ecorche::kinematics {
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include <ecorche/values/error.hpp>
 #include "core/kinematics/joint_names.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::kinematics {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "core/kinematics/rest_alignment.hpp"
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
 
 namespace ecorche::kinematics {
 

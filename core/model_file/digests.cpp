@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Three questions that two bodies can be asked: the same model, the same rig, the same surfaces? Each answer
 // is an XXH64 (seed 0) over canonical bytes: numbers little-endian, text as its length (u64) and its bytes.
+#include <ecorche/model_file/model_file.hpp>
 #include "core/model_file/digest.hpp"
 #include "core/model_file/layout.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::model_file {
 

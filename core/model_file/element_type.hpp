@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::model_file {
 

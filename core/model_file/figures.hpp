@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::model_file {
 

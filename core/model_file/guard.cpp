@@ -5,9 +5,9 @@
 #include <array>
 #include <cstring>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "core/model_file/hdf.hpp"
 #include "core/model_file/invariants.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::model_file {
 namespace {

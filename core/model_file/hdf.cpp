@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/model_file/hdf.hpp"
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 
 namespace ecorche::model_file {
 

@@ -7,8 +7,8 @@
 #include <cstring>
 #include <utility>
 
+#include <ecorche/values/error.hpp>
 #include "core/model_file/guard.hpp"
-#include "core/values/error.hpp"
 
 namespace ecorche::model_file {
 

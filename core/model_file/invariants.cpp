@@ -8,8 +8,8 @@
 #include <set>
 #include <span>
 
+#include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/model_file/in_turn.hpp"
-#include "core/values/volumetric_skeleton_check.hpp"
 
 namespace ecorche::model_file {
 namespace {

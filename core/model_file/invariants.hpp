@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/values/context.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::model_file {
 

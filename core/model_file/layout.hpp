@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/model.hpp>
 #include "core/model_file/element_type.hpp"
-#include "core/values/model.hpp"
 
 namespace ecorche::model_file {
 

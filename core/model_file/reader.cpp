@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <functional>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "core/model_file/figures.hpp"
 #include "core/model_file/guard.hpp"
 #include "core/model_file/in_turn.hpp"
 #include "core/model_file/invariants.hpp"
 #include "core/model_file/layout.hpp"
-#include "core/model_file/model_file.hpp"
 #include "core/model_file/source.hpp"
 
 namespace ecorche::model_file {

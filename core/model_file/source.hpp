@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/context.hpp>
 #include "core/model_file/guard.hpp"
 #include "core/model_file/huge_pages.hpp"
-#include "core/values/context.hpp"
 
 namespace ecorche::model_file {
 

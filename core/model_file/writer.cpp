@@ -5,12 +5,12 @@
 #include <array>
 #include <cstring>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/digest.hpp"
 #include "core/model_file/hdf.hpp"
 #include "core/model_file/invariants.hpp"
 #include "core/model_file/layout.hpp"
-#include "core/model_file/model_file.hpp"
 
 namespace ecorche::model_file {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::solve {
 

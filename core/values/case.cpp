@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 #include <array>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche {
 

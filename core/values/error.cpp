@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 #include <utility>
 

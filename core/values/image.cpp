@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 #include <algorithm>
 #include <type_traits>
 #include <unordered_set>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/values/volumetric_skeleton_check.hpp"
+#include <ecorche/values/volumetric_skeleton_check.hpp>
 
 #include <algorithm>
 #include <cmath>

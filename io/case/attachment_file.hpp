@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "core/values/attachment.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/attachment.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::io {
 

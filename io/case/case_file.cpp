@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reading `case.yaml` and everything it names.
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 
 #include <algorithm>
 #include <map>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/case/case_rules.hpp"
 #include "io/case/digest.hpp"
 #include "io/case/frame.hpp"

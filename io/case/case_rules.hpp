@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 #include "io/case/joint_rule_file.hpp"
 
 namespace ecorche::io {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writing a case as an ordinary folder of files: case.yaml last, so that a folder with one is whole.
+#include <ecorche/io/case_file.hpp>
 #include "core/files/atomic_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/case/joint_rule_file.hpp"
 #include "io/case/yaml_text.hpp"
 #include "io/image/image_file.hpp"

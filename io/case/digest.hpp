@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::io {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io {
 

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/io/pose_library.hpp>
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "io/case/pose_file.hpp"
-#include "io/case/pose_library.hpp"
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::io {

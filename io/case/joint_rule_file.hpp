@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/joint_rule.hpp"
+#include <ecorche/values/joint_rule.hpp>
 #include "io/case/frame.hpp"
 #include "io/case/yaml_reader.hpp"
 

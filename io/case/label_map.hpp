@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <functional>
 
+#include <ecorche/values/case.hpp>
 #include "core/files/read_options.hpp"
-#include "core/values/case.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/image/nifti_form.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::io {

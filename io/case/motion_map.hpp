@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/kinematics/named_angles.hpp"
+#include <ecorche/kinematics/named_angles.hpp>
 #include "core/kinematics/retarget.hpp"
 
 namespace ecorche::io {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/kinematics/angles.hpp"
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/kinematics/angles.hpp>
 #include "io/case/pose_file.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/case/yaml_text.hpp"

@@ -4,8 +4,8 @@
 
 #include <string_view>
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::io {

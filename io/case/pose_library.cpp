@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/case/pose_library.hpp"
+#include <ecorche/io/pose_library.hpp>
 
 #include <algorithm>
 
-#include "core/kinematics/named_angles.hpp"
-#include "core/values/error.hpp"
+#include <ecorche/kinematics/named_angles.hpp>
+#include <ecorche/values/error.hpp>
 #include "io/case/embedded.hpp"
 #include "io/case/yaml_reader.hpp"
 

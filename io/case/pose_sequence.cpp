@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/io/pose_library.hpp>
 #include "io/case/pose_file.hpp"
-#include "io/case/pose_library.hpp"
 
 namespace ecorche::io {
 namespace {

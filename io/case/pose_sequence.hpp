@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/kinematics/interpolate.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/kinematics/interpolate.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::io {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/joint_axes.hpp"
 #include "io/case/yaml_text.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/skeleton.hpp>
 #include "io/case/frame.hpp"
 #include "io/case/joint_rule_file.hpp"
 #include "io/case/yaml_reader.hpp"

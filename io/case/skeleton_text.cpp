@@ -2,7 +2,7 @@
 // A skeleton as YAML that reads back as the same doubles.
 #include <cmath>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_text.hpp"
 

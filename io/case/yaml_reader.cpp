@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/case/yaml_tree.hpp"
 
 namespace ecorche::io::yaml {

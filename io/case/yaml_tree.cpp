@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io::yaml {
 namespace {

@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/files/budget.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/image.hpp>
 #include "io/image/nifti_form.hpp"
 
 namespace ecorche::io {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/image/header.hpp"
 
 namespace ecorche::io::fields {

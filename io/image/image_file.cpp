@@ -4,8 +4,8 @@
 #include <cmath>
 #include <fstream>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"

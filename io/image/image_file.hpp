@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
+#include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
-#include "core/values/image.hpp"
 #include "io/image/nifti_form.hpp"
 
 namespace ecorche::io {

@@ -11,7 +11,7 @@
 #include <iostream>
 #include <sstream>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io::itk_images {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::io::itk_images {
 

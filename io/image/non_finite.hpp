@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <filesystem>
 
+#include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
-#include "core/values/image.hpp"
 
 namespace ecorche::io {
 

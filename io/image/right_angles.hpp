@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
+#include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
-#include "core/values/image.hpp"
 
 namespace ecorche::io {
 

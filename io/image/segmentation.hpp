@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
-#include "core/values/image.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/nifti_form.hpp"
 

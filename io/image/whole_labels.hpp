@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::io {
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/motion/asf_parser.hpp"
 #include "io/motion/frame_rows.hpp"
 

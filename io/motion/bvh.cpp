@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/motion/bvh_parser.hpp"
 #include "io/motion/frame_rows.hpp"
 

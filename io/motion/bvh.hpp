@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "core/values/pose.hpp"
+#include <ecorche/values/pose.hpp>
 #include "io/motion/clip_file.hpp"
 #include "io/motion/text_stream.hpp"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/motion/amc.hpp"
 #include "io/motion/bvh.hpp"
 #include "io/motion/gltf_clip.hpp"

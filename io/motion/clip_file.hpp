@@ -8,8 +8,8 @@
 #include <optional>
 #include <span>
 
-#include "core/files/budget.hpp"
-#include "core/values/pose.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/pose.hpp>
 
 namespace ecorche::io {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io {
 namespace {

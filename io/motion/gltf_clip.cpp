@@ -6,8 +6,8 @@
 #include <map>
 #include <set>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/motion/gltf_track.hpp"
 #include "io/surface/gltf_model.hpp"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/surface/gltf_accessor.hpp"
 
 namespace ecorche::io {

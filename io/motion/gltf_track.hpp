@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/files/budget.hpp"
+#include <ecorche/files/budget.hpp>
 
 namespace ecorche::io {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io {
 namespace {

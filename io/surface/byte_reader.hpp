@@ -15,7 +15,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io::bytes {
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string_view>
 
-#include "core/files/budget.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io::gltf {
 

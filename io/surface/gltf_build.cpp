@@ -6,7 +6,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io::gltf {
 namespace {

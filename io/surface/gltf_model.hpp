@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/files/budget.hpp"
+#include <ecorche/files/budget.hpp>
 
 namespace ecorche::io::gltf {
 

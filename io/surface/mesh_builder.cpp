@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/surface/byte_reader.hpp"
 #include "io/surface/vertex_merge.hpp"
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "core/files/budget.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/surface/rigged_glb.hpp"
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/surface/gltf_build.hpp"
 #include "io/surface/tissue_material.hpp"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/mesh.hpp"
-#include "core/values/pose.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/mesh.hpp>
+#include <ecorche/values/pose.hpp>
 
 namespace ecorche::io {
 

@@ -14,7 +14,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/surface/mesh_builder.hpp"
 #include "io/surface/vertex_merge.hpp"
 

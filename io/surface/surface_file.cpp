@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
 #include "io/surface/glb.hpp"
 #include "io/surface/gltf.hpp"
 #include "io/surface/obj.hpp"

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "core/files/budget.hpp"
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io {
 

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <numbers>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io::tet_formats {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::io::tet_formats {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "io/surface/byte_reader.hpp"
 
 namespace ecorche::io::bytes {

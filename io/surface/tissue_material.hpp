@@ -6,7 +6,7 @@
 
 #include <string_view>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 namespace ecorche::io::gltf {
 

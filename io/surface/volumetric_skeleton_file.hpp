@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/files/budget.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 
 namespace ecorche::io {
 

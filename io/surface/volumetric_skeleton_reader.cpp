@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/volumetric_skeleton_check.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 #include "io/surface/vtk_xml.hpp"
 

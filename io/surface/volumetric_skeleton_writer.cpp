@@ -4,9 +4,9 @@
 #include <fstream>
 #include <sstream>
 
+#include <ecorche/values/error.hpp>
+#include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/values/error.hpp"
-#include "core/values/volumetric_skeleton_check.hpp"
 #include "io/surface/byte_reader.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 

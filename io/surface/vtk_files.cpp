@@ -19,7 +19,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::io::vtk_files {
 namespace {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "io/surface/surface_file.hpp"
 #include "io/surface/tied_surfaces.hpp"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/files/budget.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/files/budget.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io::vtk_legacy {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/files/budget.hpp"
+#include <ecorche/files/budget.hpp>
 #include "io/surface/byte_reader.hpp"
 
 namespace ecorche::io::vtp {

@@ -5,10 +5,10 @@
 #include <concepts>
 #include <string>
 
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/joint_rule.hpp>
+#include <ecorche/values/model.hpp>
 #include "core/model_file/figures.hpp"
-#include "core/values/case.hpp"
-#include "core/values/joint_rule.hpp"
-#include "core/values/model.hpp"
 #include "preprocess/weights/harmonic.hpp"
 #include "preprocess/weights/rigid_bones.hpp"
 

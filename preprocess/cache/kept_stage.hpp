@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/preprocess/stage_store.hpp>
+#include <ecorche/values/context.hpp>
 #include "preprocess/cache/archive.hpp"
 #include "preprocess/cache/fields.hpp"
-#include "preprocess/cache/stage_store.hpp"
 
 namespace ecorche::preprocess::cache {
 

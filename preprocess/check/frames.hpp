@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/check/inside.hpp"
 
 namespace ecorche::check {

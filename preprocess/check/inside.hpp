@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/geometry/winding_tree.hpp"
 
 namespace ecorche::check {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
 #include "preprocess/check/surface_figures.hpp"
 
 namespace ecorche::check {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/skeleton.hpp>
 #include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::check {

@@ -9,7 +9,7 @@
 #include <memory>
 #include <numbers>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "preprocess/check/inside.hpp"
 #include "preprocess/check/joint_places.hpp"
 #include "preprocess/rig/fit_rig.hpp"

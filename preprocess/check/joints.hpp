@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
 #include "preprocess/check/inspect_case.hpp"
 
 namespace ecorche::check {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <map>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::check {
 

@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/check/surface_figures.hpp"
 
 namespace ecorche::check {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::check {
 

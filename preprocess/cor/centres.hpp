@@ -2,9 +2,9 @@
 // Optimised centres of rotation of the nodes (LeHodgins16 eq. 1; Sujar18 eqs. 6-7).
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::cor {
 

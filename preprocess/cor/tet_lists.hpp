@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/values/mesh.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/values/mesh.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::cor {
 

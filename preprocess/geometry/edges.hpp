@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::geometry {
 

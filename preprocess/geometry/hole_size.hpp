@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/geometry/surface_edges.hpp"
 
 namespace ecorche::geometry {

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "preprocess/label_surfaces/mask.hpp"
 
 namespace ecorche::label_surfaces {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::label_surfaces {
 

@@ -2,8 +2,8 @@
 // Surfaces of labels: closed meshes round the voxels of a label map.
 #pragma once
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::label_surfaces {
 

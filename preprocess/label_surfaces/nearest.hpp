@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::label_surfaces {
 

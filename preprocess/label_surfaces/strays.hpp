@@ -2,8 +2,8 @@
 // Labels of which nothing is left but stray voxels off the body.
 #pragma once
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::label_surfaces {
 

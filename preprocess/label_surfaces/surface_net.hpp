@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/label_surfaces/mask.hpp"
 
 namespace ecorche::label_surfaces {

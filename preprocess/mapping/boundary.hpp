@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::mapping {
 

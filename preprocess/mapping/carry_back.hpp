@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::mapping {
 

@@ -2,8 +2,8 @@
 // Where points of a posed body came from, when all that is known of them is their place.
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/mapping/bind.hpp"
 
 namespace ecorche::mapping {

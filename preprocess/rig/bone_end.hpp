@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::rig {
 

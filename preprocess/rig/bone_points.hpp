@@ -7,7 +7,7 @@
 #include <string>
 #include <tuple>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 #include "preprocess/rig/surface_points.hpp"
 
 namespace ecorche::rig {

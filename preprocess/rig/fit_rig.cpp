@@ -7,7 +7,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/mirrored_joints.hpp"

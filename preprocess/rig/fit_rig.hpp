@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::rig {
 

@@ -2,8 +2,8 @@
 // A skeleton for bones of which nobody said how they hang together.
 #pragma once
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::rig {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "preprocess/rig/axle_fit.hpp"
 #include "preprocess/rig/ellipse_fit.hpp"
 #include "preprocess/rig/facing.hpp"

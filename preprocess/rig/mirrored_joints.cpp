@@ -8,7 +8,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
 #include "preprocess/rig/other_side.hpp"
 
 namespace ecorche::rig {

@@ -2,7 +2,7 @@
 // What one side of a body shows badly, its other side may show well.
 #pragma once
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "preprocess/rig/joint_sources.hpp"
 
 namespace ecorche::rig {

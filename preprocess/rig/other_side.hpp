@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::rig {
 

@@ -2,9 +2,9 @@
 // The part of a skeleton that a case has bones for.
 #pragma once
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::rig {
 

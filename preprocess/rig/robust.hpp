@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::rig::robust {
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "core/values/case.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::tet {
 

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::tet {
 

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::tet {
 

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/attachment.hpp"
-#include "core/values/context.hpp"
-#include "core/values/skeleton.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/attachment.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/skeleton.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 #include "preprocess/thin/mask.hpp"
 
 namespace ecorche::thin {

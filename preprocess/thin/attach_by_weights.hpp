@@ -3,8 +3,8 @@
 // flank to the arm that lies beside it.
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::thin {
 

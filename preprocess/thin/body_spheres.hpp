@@ -2,9 +2,9 @@
 // A prepared body as balls, hung on its rig.
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/skeleton.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/skeleton.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 
 namespace ecorche::thin {
 

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "preprocess/thin/field.hpp"
 #include "preprocess/thin/mask.hpp"
 

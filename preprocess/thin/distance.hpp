@@ -8,8 +8,8 @@
 #include <utility>
 #include <variant>
 
-#include "core/values/context.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 #include "preprocess/thin/field.hpp"
 #include "preprocess/thin/mask.hpp"
 

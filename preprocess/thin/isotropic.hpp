@@ -2,8 +2,8 @@
 // Sampled volumes with voxels of one edge, as Gagvani01 asks for.
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::thin {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::thin {
 

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "preprocess/thin/tree.hpp"
 
 namespace ecorche::thin {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/values/skeleton.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/skeleton.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 #include "preprocess/thin/attach.hpp"
 #include "preprocess/thin/mask.hpp"
 

@@ -2,8 +2,8 @@
 // The skeletal voxels of an object (Gagvani01 3.2).
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 #include "preprocess/thin/distance.hpp"
 
 namespace ecorche::thin {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 
 namespace ecorche::thin {
 

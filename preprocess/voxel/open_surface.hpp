@@ -2,7 +2,7 @@
 // Inside and outside of surfaces that do not close.
 #pragma once
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/voxel/rasterize.hpp"
 
 namespace ecorche::voxel {

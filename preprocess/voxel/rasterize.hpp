@@ -2,7 +2,7 @@
 // The voxels of one surface: those it touches and those inside it, exactly.
 #pragma once
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "preprocess/voxel/voxel_mask.hpp"
 
 namespace ecorche::voxel {

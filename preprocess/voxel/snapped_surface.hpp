@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/image.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::voxel {
 

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::voxel {
 

@@ -5,8 +5,8 @@
 
 #include <vector>
 
+#include <ecorche/values/mesh.hpp>
 #include "core/solve/spd_solver.hpp"
-#include "core/values/mesh.hpp"
 
 namespace ecorche::weights {
 

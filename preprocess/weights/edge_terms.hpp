@@ -5,9 +5,9 @@
 #include <array>
 #include <cstddef>
 
+#include <ecorche/values/mesh.hpp>
 #include "core/solve/counting_sort.hpp"
 #include "core/solve/spd_solver.hpp"
-#include "core/values/mesh.hpp"
 
 namespace ecorche::weights {
 

@@ -6,11 +6,11 @@
 #include <string_view>
 #include <vector>
 
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
+#include <ecorche/values/model.hpp>
 #include "core/solve/spd_solver.hpp"
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
-#include "core/values/model.hpp"
 
 namespace ecorche::weights {
 

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "core/solve/spd_solver.hpp"
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
 
 namespace ecorche::weights {
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::weights {
 

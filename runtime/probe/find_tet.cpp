@@ -12,8 +12,8 @@
 #include <algorithm>
 #include <limits>
 
+#include <ecorche/runtime/tet_runs.hpp>
 #include "runtime/probe/tet_holds-inl.hpp"
-#include "runtime/probe/tet_runs.hpp"
 #include "runtime/skin/vectors-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();

@@ -13,7 +13,7 @@
 #include <cstring>
 #include <limits>
 
-#include "runtime/probe/tet_runs.hpp"
+#include <ecorche/runtime/tet_runs.hpp>
 #include "runtime/skin/lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/mesh.hpp"
-#include "runtime/volume/rigid_copies.hpp"
+#include <ecorche/runtime/rigid_copies.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::runtime {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/probe/probe.hpp"
+#include <ecorche/runtime/probe.hpp>
 
 #include <hwy/cache_control.h>
 #include <tbb/parallel_for.h>
@@ -8,10 +8,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
+#include <mutex>
 #include <numeric>
 #include <string>
 
+#include <ecorche/runtime/rigid_copies.hpp>
 #include "runtime/probe/space_order.hpp"
+#include "runtime/probe/tissue_cells.hpp"
+#include "runtime/probe/tissue_columns.hpp"
 #include "runtime/volume/grid_affine.hpp"
 #include "runtime/volume/sampler.hpp"
 
@@ -110,10 +114,8 @@ TetRuns runs_of(const Model& model, const RigidCopies& copies, std::span<const s
   return {DrawnTets(model.tets, copies, static_cast<std::int32_t>(own)), nodes, rows};
 }
 
-}  // namespace
-
 // From the nodes where points lie to those of the other side.
-struct Probe::Way {
+struct Way {
   FindTets here;
   const PaddedNodes &there, &rest, &posed;
   bool from_rest;
@@ -126,42 +128,65 @@ struct Probe::Way {
   }
 };
 
+}  // namespace
+
+struct Probe::Impl {
+  std::shared_ptr<const Model> model;
+  RigidCopies copies;
+  TetRuns runs;
+  PaddedNodes rest_nodes;
+  mutable BoxTree rest;  // all of it fitted
+  TissueColumns columns;
+  mutable std::once_flag cells_made;
+  mutable std::unique_ptr<const TissueCells> cells;  // made by the first who asks for tissues
+
+  Impl(std::shared_ptr<const Model> of, std::span<const std::uint32_t> given)
+      : model(std::move(of)), copies(*model, given), runs(runs_of(*model, copies, given)), columns(*model) {
+    const std::span nodes(model->nodes.data(), static_cast<std::size_t>(model->nodes.size()));
+    std::vector<float> rows(
+        given.empty() ? 0 : 3 * (std::size_t{1} + *std::max_element(given.begin(), given.end())));
+    for (std::size_t n = 0; n < given.size(); ++n)
+      std::copy_n(&nodes[3 * n], 3, &rows[3 * std::size_t{given[n]}]);
+    runtime::follow(runs, given.empty() ? nodes : std::span<const float>(rows), rest_nodes, rest,
+                    copies.rest());
+    fit_blocks({runs, rest_nodes, rest});
+  }
+  void run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const;
+};
+
 Probe::Probe(std::shared_ptr<const Model> model, std::span<const std::uint32_t> given)
-    : model_(std::move(model)),
-      copies_(*model_, given),
-      runs_(runs_of(*model_, copies_, given)),
-      columns_(*model_) {
-  const std::span nodes(model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size()));
-  std::vector<float> rows(
-      given.empty() ? 0 : 3 * (std::size_t{1} + *std::max_element(given.begin(), given.end())));
-  for (std::size_t n = 0; n < given.size(); ++n)
-    std::copy_n(&nodes[3 * n], 3, &rows[3 * std::size_t{given[n]}]);
-  runtime::follow(runs_, given.empty() ? nodes : std::span<const float>(rows), rest_nodes_, rest_,
-                  copies_.rest());
-  fit_blocks({runs_, rest_nodes_, rest_});
+    : impl_(std::make_unique<const Impl>(std::move(model), given)) {}
+
+Probe::~Probe() = default;
+
+const Model& Probe::model() const {
+  return *impl_->model;
 }
 
 void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
-  tree.copied.resize(3 * copies_.nodes());
-  copies_.place(nodes, tree.copied);
-  runtime::follow(runs_, nodes, tree.nodes, tree.boxes, tree.copied);
+  tree.copied.resize(3 * impl_->copies.nodes());
+  impl_->copies.place(nodes, tree.copied);
+  runtime::follow(impl_->runs, nodes, tree.nodes, tree.boxes, tree.copied);
 }
 
 void Probe::fit(const PosedTree& tree) const {
-  fit_blocks({runs_, tree.nodes, tree.boxes});
+  fit_blocks({impl_->runs, tree.nodes, tree.boxes});
 }
 
 void Probe::posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                           Probed& out) const {
-  run({{runs_, tree.nodes, tree.boxes}, rest_nodes_, rest_nodes_, tree.nodes, false}, points, wants, out);
+  const PaddedNodes& rest = impl_->rest_nodes;
+  impl_->run({{impl_->runs, tree.nodes, tree.boxes}, rest, rest, tree.nodes, false}, points, wants, out);
 }
 
 void Probe::rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                           Probed& out) const {
-  run({{runs_, rest_nodes_, rest_}, tree.nodes, rest_nodes_, tree.nodes, true}, points, wants, out);
+  const PaddedNodes& rest = impl_->rest_nodes;
+  impl_->run({{impl_->runs, rest, impl_->rest}, tree.nodes, rest, tree.nodes, true}, points, wants, out);
 }
 
-void Probe::run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const {
+void Probe::Impl::run(const Way& way, std::span<const float> points, const ProbeWants& wants,
+                      Probed& out) const {
   const std::size_t count = points.size() / 3;
   out.tet.resize(count);
   out.barycentric.resize(4 * count);
@@ -172,15 +197,15 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
   out.values.resize(wants.volumes.size());
   for (std::size_t v = 0; v < wants.volumes.size(); ++v) {
     const ProbeWants::Volume& wanted = wants.volumes[v];
-    if (wanted.row >= model_->volumes.size())
+    if (wanted.row >= model->volumes.size())
       throw Error(ErrorKind::usage, "probe", "the model has no volume " + std::to_string(wanted.row),
-                  "it has " + std::to_string(model_->volumes.size()));
-    out.values[v].resize(static_cast<std::size_t>(model_->volumes[wanted.row].image.components) * count);
+                  "it has " + std::to_string(model->volumes.size()));
+    out.values[v].resize(static_cast<std::size_t>(model->volumes[wanted.row].image.components) * count);
   }
   if (wants.tissue) {
     // A thread that waits here must not begin another probe: it would wait for itself.
-    std::call_once(cells_made_, [&] {
-      tbb::this_task_arena::isolate([&] { cells_ = std::make_unique<const TissueCells>(columns_); });
+    std::call_once(cells_made, [&] {
+      tbb::this_task_arena::isolate([&] { cells = std::make_unique<const TissueCells>(columns); });
     });
   }
   near_order(points, way.here.tree.above.back(), out.order);
@@ -190,17 +215,17 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
     const std::span which = std::span<const std::uint32_t>(out.order.rows)
                                 .subspan(first, std::min(kPointsPerTask, count - first));
     std::array<TetPlace, kPointsPerTask> places;
-    std::array<Eigen::Vector3d, kPointsPerTask> rest, voxel;
+    std::array<Eigen::Vector3d, kPointsPerTask> at_rest, voxel;
     kernels::find_tets(way.here, points, which, places);
-    for (std::size_t turn = 0; turn < which.size(); ++turn) way.ask_for(*model_, copies_, places[turn]);
+    for (std::size_t turn = 0; turn < which.size(); ++turn) way.ask_for(*model, copies, places[turn]);
     for (std::size_t turn = 0; turn < which.size(); ++turn) {
       const std::size_t i = which[turn];
       const std::array<float, 3> point{points[3 * i], points[3 * i + 1], points[3 * i + 2]};
       const TetPlace& place = places[turn];
       const bool held = place.tet != TetPlace::none;
       const auto drawn = static_cast<std::size_t>(place.tet);
-      out.tet[i] = held ? static_cast<std::int32_t>(copies_.own(drawn)) : TetPlace::none;
-      out.label[i] = held ? copies_.label(drawn, model_->tet_label) : TetMesh::soft;
+      out.tet[i] = held ? static_cast<std::int32_t>(copies.own(drawn)) : TetPlace::none;
+      out.label[i] = held ? copies.label(drawn, model->tet_label) : TetMesh::soft;
       Eigen::Vector3d other = Eigen::Vector3d::Constant(kNowhere);
       if (held) {
         other.setZero();
@@ -215,20 +240,20 @@ void Probe::run(const Way& way, std::span<const float> points, const ProbeWants&
         F.setConstant(kNowhere);
         if (held) F = (edges(way.posed, place) * edges(way.rest, place).inverse()).cast<float>();
       }
-      rest[turn] = way.from_rest
-                       ? Eigen::Vector3d(static_cast<double>(point[0]), static_cast<double>(point[1]),
-                                         static_cast<double>(point[2]))
-                       : other;
-      if (!held) rest[turn].setConstant(static_cast<double>(kNowhere));
+      at_rest[turn] = way.from_rest
+                          ? Eigen::Vector3d(static_cast<double>(point[0]), static_cast<double>(point[1]),
+                                            static_cast<double>(point[2]))
+                          : other;
+      if (!held) at_rest[turn].setConstant(static_cast<double>(kNowhere));
       if (wants.tissue) {
-        const Eigen::Vector3f at = rest[turn].cast<float>();
-        out.tissue[i] = held ? cells_->at({at.x(), at.y(), at.z()}) : TissueColumns::none;
+        const Eigen::Vector3f at = at_rest[turn].cast<float>();
+        out.tissue[i] = held ? cells->at({at.x(), at.y(), at.z()}) : TissueColumns::none;
       }
     }
     for (std::size_t v = 0; v < wants.volumes.size(); ++v) {
-      const ModelVolume& volume = model_->volumes[wants.volumes[v].row];
+      const ModelVolume& volume = model->volumes[wants.volumes[v].row];
       const Affine index = to_index(volume.image.grid);
-      for (std::size_t turn = 0; turn < which.size(); ++turn) voxel[turn] = index * rest[turn];
+      for (std::size_t turn = 0; turn < which.size(); ++turn) voxel[turn] = index * at_rest[turn];
       with_scalar_type(volume.image.type, [&](auto zero) {
         const bool nearest = volume.labels || wants.volumes[v].sampling == Sampling::nearest;
         const std::span<const Eigen::Vector3d> all(voxel);

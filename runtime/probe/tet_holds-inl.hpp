@@ -13,7 +13,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "runtime/probe/tet_runs.hpp"
+#include <ecorche/runtime/tet_runs.hpp>
 #include "runtime/skin/vectors-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();

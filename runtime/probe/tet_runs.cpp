@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/probe/tet_runs.hpp"
+#include <ecorche/runtime/tet_runs.hpp>
 
 #include <tbb/parallel_for.h>
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 
 namespace ecorche::runtime {
 namespace {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::runtime {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::runtime {
 

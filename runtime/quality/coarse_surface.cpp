@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/quality/coarse_surface.hpp"
+#include <ecorche/runtime/coarse_surface.hpp>
 
 #include <Eigen/Geometry>
 #include <algorithm>

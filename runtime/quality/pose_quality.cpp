@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 
 #include <tbb/parallel_for.h>
 
@@ -9,7 +9,7 @@
 #include <numeric>
 #include <vector>
 
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/runtime/verdict.hpp>
 
 namespace ecorche::runtime {
 namespace {

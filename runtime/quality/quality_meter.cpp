@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/quality/quality_meter.hpp"
+#include <ecorche/runtime/quality_meter.hpp>
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/runtime/verdict.hpp>
 
 namespace ecorche::runtime {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <string_view>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 namespace ecorche::runtime {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/runtime/verdict.hpp>
 
 #include <algorithm>
 #include <cmath>

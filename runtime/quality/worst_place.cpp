@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/quality/worst_place.hpp"
+#include <ecorche/runtime/worst_place.hpp>
 
 #include <cmath>
 #include <vector>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 
 namespace ecorche::runtime {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
 
 namespace ecorche::server {
 

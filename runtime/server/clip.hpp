@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/pose.hpp"
+#include <ecorche/values/pose.hpp>
 #include "runtime/server/asio.hpp"
 
 namespace ecorche::server {

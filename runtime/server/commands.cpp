@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/connection.hpp"
 #include "runtime/server/guarded.hpp"
 #include "runtime/server/mesh_streams.hpp"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/reserve.hpp"
 #include "runtime/server/shares.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
 

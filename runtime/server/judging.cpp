@@ -7,7 +7,7 @@
 #include <new>
 #include <utility>
 
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/runtime/verdict.hpp>
 #include "runtime/server/serially.hpp"
 #include "runtime/server/session.hpp"
 

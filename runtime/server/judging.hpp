@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/server/asio.hpp"
 #include "runtime/server/body_pool.hpp"
 #include "runtime/server/pose_job.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/kept.hpp"
 
+#include <ecorche/runtime/tet_runs.hpp>
 #include "proto/delta.hpp"
-#include "runtime/probe/tet_runs.hpp"
 #include "runtime/server/mesh_stream.hpp"
 
 namespace ecorche::server {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 #include "runtime/server/subscription.hpp"
 
 namespace ecorche::server {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::server {

@@ -7,13 +7,13 @@
 #include <span>
 #include <vector>
 
-#include "ecorche/v1/envelope.pb.h"
+#include <ecorche/v1/envelope.pb.h>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/wire/framing.hpp>
 #include "proto/delta.hpp"
-#include "proto/framing.hpp"
 #include "runtime/server/mesh_rows.hpp"
 #include "runtime/server/payload_pool.hpp"
 #include "runtime/server/subscription.hpp"
-#include "runtime/skin/body_poser.hpp"
 
 namespace ecorche::server {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/kinematics/ik.hpp"
-#include "proto/convert.hpp"
+#include <ecorche/kinematics/ik.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/connection.hpp"
 #include "runtime/server/guarded.hpp"
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 #include "runtime/server/asio.hpp"
 #include "runtime/server/flow.hpp"
 

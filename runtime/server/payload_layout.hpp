@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/wire/framing.hpp>
 #include "proto/arrays.hpp"
-#include "proto/framing.hpp"
 
 namespace ecorche::server {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 
 namespace ecorche::server {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/guarded.hpp"
 #include "runtime/server/judging.hpp"
 #include "runtime/server/mesh_stream.hpp"

@@ -9,9 +9,9 @@
 #include <stop_token>
 #include <vector>
 
-#include "proto/framing.hpp"
-#include "runtime/probe/probe.hpp"
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/probe.hpp>
+#include <ecorche/wire/framing.hpp>
 #include "runtime/server/asio.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/server/server_memory.hpp"

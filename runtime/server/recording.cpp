@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "proto/recording.hpp"
 
 namespace ecorche::server {

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "ecorche/v1/envelope.pb.h"
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/v1/envelope.pb.h>
+#include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/server/payload_pool.hpp"
 
 namespace ecorche::server {

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
 
 namespace ecorche::server {
 namespace {

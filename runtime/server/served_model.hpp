@@ -8,18 +8,18 @@
 #include <mutex>
 #include <string>
 
-#include "core/values/model.hpp"
-#include "proto/framing.hpp"
-#include "runtime/probe/probe.hpp"
-#include "runtime/quality/quality_meter.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/probe.hpp>
+#include <ecorche/runtime/quality_meter.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/wire/framing.hpp>
 #include "runtime/server/body_pool.hpp"
 #include "runtime/server/clip.hpp"
 #include "runtime/server/mesh_rows.hpp"
 #include "runtime/server/payload_pool.hpp"
 #include "runtime/server/rest_pose.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "runtime/spheres/pose_volume.hpp"
-#include "runtime/volume/volume_poser.hpp"
 
 namespace ecorche::server {
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <utility>
 
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 
 namespace ecorche::server {
 

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/server/clip.hpp"
 #include "runtime/server/judging.hpp"
 #include "runtime/server/metrics.hpp"

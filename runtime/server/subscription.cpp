@@ -6,7 +6,7 @@
 #include <numeric>
 #include <string>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/kept.hpp"
 #include "runtime/server/mesh_rows.hpp"
 

@@ -8,12 +8,12 @@
 #include <variant>
 #include <vector>
 
-#include "core/values/error.hpp"
-#include "core/values/model.hpp"
-#include "ecorche/v1/envelope.pb.h"
+#include <ecorche/v1/envelope.pb.h>
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/error.hpp>
+#include <ecorche/values/model.hpp>
 #include "runtime/server/payload_pool.hpp"
 #include "runtime/spheres/pose_volume.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::server {
 

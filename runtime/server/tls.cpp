@@ -11,7 +11,7 @@
 #include <random>
 #include <utility>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
 namespace {

@@ -8,7 +8,7 @@
 #include <new>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
 

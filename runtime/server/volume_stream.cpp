@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
+#include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
 #include "runtime/server/kept.hpp"
 #include "runtime/spheres/slice.hpp"
 

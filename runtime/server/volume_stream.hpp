@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "proto/framing.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/wire/framing.hpp>
 #include "runtime/server/payload_pool.hpp"
 #include "runtime/server/served_model.hpp"
 #include "runtime/server/server_memory.hpp"

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 
 namespace ecorche::runtime {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "core/values/context.hpp"
-#include "core/values/model.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::runtime {
 

@@ -6,8 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "core/values/model.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include "runtime/skin/move_vertices.hpp"
 #include "runtime/skin/node_clusters.hpp"
 
 namespace ecorche::runtime {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "runtime/skin/body_parts.hpp"
 
 namespace ecorche::runtime {

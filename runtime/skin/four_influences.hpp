@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/model.hpp"
-#include "core/values/transform.hpp"
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche::runtime {
 

@@ -5,16 +5,11 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/skin/segment_motion.hpp"
+#include <ecorche/runtime/quantise_box.hpp>
+#include <ecorche/runtime/segment_motion.hpp>
 #include "runtime/skin/vertex_groups.hpp"
 
 namespace ecorche::runtime {
-
-/// u16 positions: p = low + step * number on each axis; beyond the box they stay on its side.
-struct QuantiseBox {
-  Vec3f low{0, 0, 0};  ///< mm, LPS
-  float step = 1;      ///< mm
-};
 
 /// Where a tissue's vertices go, in its own order. What is null is not written.
 struct VertexSink {

@@ -8,7 +8,7 @@
 #include <string>
 #include <tuple>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::runtime {
 namespace {

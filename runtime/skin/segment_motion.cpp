@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/skin/segment_motion.hpp"
+#include <ecorche/runtime/segment_motion.hpp>
 
 #include <algorithm>
 

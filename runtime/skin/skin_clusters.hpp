@@ -6,8 +6,8 @@
 #include <span>
 #include <string_view>
 
+#include <ecorche/runtime/segment_motion.hpp>
 #include "runtime/skin/node_clusters.hpp"
-#include "runtime/skin/segment_motion.hpp"
 
 namespace ecorche::runtime {
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/values/model.hpp"
-#include "runtime/skin/aligned.hpp"
+#include <ecorche/runtime/aligned.hpp>
+#include <ecorche/values/model.hpp>
 #include "runtime/skin/node_clusters.hpp"
 
 namespace ecorche::runtime {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "runtime/volume/grid_affine.hpp"
 
 namespace ecorche::runtime {

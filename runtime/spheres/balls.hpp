@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "core/values/image.hpp"
-#include "core/values/transform.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/transform.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 
 namespace ecorche::runtime {
 

@@ -2,7 +2,7 @@
 // The union of balls on the grid: what a skeleton would refill, without refilling.
 #pragma once
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "runtime/spheres/owners.hpp"
 
 namespace ecorche::runtime {

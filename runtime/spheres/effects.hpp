@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/values/skeleton.hpp"
+#include <ecorche/values/skeleton.hpp>
 #include "runtime/spheres/balls.hpp"
 
 namespace ecorche::runtime {

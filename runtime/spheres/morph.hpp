@@ -2,9 +2,9 @@
 // Targeted volume morphing (Gagvani01 6): the balls of one object become those of another.
 #pragma once
 
-#include "core/values/context.hpp"
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/context.hpp>
 #include "runtime/spheres/owners.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::runtime {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "runtime/spheres/fixed_ball.hpp"
 
 namespace ecorche::runtime {

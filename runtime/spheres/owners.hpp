@@ -8,10 +8,10 @@
 #include <functional>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/runtime/bricks.hpp>
+#include <ecorche/values/context.hpp>
 #include "runtime/spheres/balls.hpp"
 #include "runtime/spheres/tile_owners.hpp"
-#include "runtime/volume/bricks.hpp"
 
 namespace ecorche::runtime {
 

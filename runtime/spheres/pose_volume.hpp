@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 #include "runtime/spheres/refill.hpp"
 #include "runtime/spheres/seams.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 #include "runtime/spheres/balls.hpp"
 
 namespace ecorche::runtime {

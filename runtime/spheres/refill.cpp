@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "runtime/spheres/lookup.hpp"
 #include "runtime/spheres/place_batch.hpp"
 

@@ -2,10 +2,10 @@
 // A posed volume by refilling the balls of its moved skeleton (Gagvani01 5): the second deformer.
 #pragma once
 
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
 #include "runtime/spheres/owners.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::runtime {
 

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/runtime/bricks.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/model.hpp>
 #include "runtime/spheres/refill.hpp"
-#include "runtime/volume/bricks.hpp"
 
 namespace ecorche::runtime {
 

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/skeleton.hpp"
-#include "core/values/transform.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/skeleton.hpp>
+#include <ecorche/values/transform.hpp>
 #include "runtime/spheres/balls.hpp"
 
 namespace ecorche::runtime {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "runtime/spheres/fixed_ball.hpp"
 #include "runtime/spheres/lookup.hpp"
 #include "runtime/spheres/place_batch.hpp"

@@ -2,9 +2,9 @@
 // A plane through a posed volume, without the volume: pixels ask the balls themselves.
 #pragma once
 
-#include "core/values/context.hpp"
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/context.hpp>
 #include "runtime/spheres/balls.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::runtime {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "runtime/spheres/places.hpp"
 
 namespace ecorche::runtime {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "runtime/spheres/owners.hpp"
 
 namespace ecorche::runtime {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <span>
 
-#include "core/values/mesh.hpp"
-#include "runtime/volume/bricks.hpp"
+#include <ecorche/runtime/bricks.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::runtime {
 

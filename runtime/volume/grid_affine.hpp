@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <span>
 
-#include "core/values/image.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::runtime {
 

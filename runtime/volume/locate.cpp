@@ -9,8 +9,8 @@
 #include <cmath>
 #include <limits>
 
+#include <ecorche/runtime/resample.hpp>
 #include "runtime/volume/grid_affine.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::runtime {
 namespace {

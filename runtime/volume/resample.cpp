@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/volume/resample.hpp"
+#include <ecorche/runtime/resample.hpp>
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 
+#include <ecorche/runtime/rigid_copies.hpp>
 #include "runtime/volume/grid_affine.hpp"
 #include "runtime/volume/rest_map.hpp"
-#include "runtime/volume/rigid_copies.hpp"
 #include "runtime/volume/sampler.hpp"
 
 namespace ecorche::runtime {

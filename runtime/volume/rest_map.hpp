@@ -5,8 +5,8 @@
 #include <Eigen/LU>
 #include <cstdint>
 
+#include <ecorche/runtime/resample.hpp>
 #include "runtime/volume/grid_affine.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::runtime {
 

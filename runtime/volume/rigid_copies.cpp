@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/volume/rigid_copies.hpp"
+#include <ecorche/runtime/rigid_copies.hpp>
 
 #include <Eigen/SVD>
 #include <algorithm>

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "runtime/volume/resample.hpp"
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::runtime {
 

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "core/values/image.hpp"
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/values/image.hpp>
 #include "runtime/volume/draw_tets.hpp"
-#include "runtime/volume/resample.hpp"
 
 namespace ecorche::runtime {
 

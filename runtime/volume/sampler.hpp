@@ -9,7 +9,7 @@
 #include <span>
 #include <type_traits>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::runtime {
 

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/values/image.hpp"
-#include "runtime/volume/rigid_copies.hpp"
+#include <ecorche/runtime/rigid_copies.hpp>
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::runtime {
 

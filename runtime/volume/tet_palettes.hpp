@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/skin/aligned.hpp"
-#include "runtime/volume/rigid_copies.hpp"
+#include <ecorche/runtime/aligned.hpp>
+#include <ecorche/runtime/rigid_copies.hpp>
 
 namespace ecorche::runtime {
 

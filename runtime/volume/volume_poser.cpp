@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/volume_poser.hpp>
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <mutex>
 
+#include <ecorche/runtime/rigid_copies.hpp>
+#include "runtime/volume/draw_tets.hpp"
 #include "runtime/volume/fixed_points.hpp"
 #include "runtime/volume/grid_affine.hpp"
 #include "runtime/volume/sample_batch.hpp"
 #include "runtime/volume/sampler.hpp"
+#include "runtime/volume/tet_blocks.hpp"
+#include "runtime/volume/tet_palettes.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -120,9 +126,8 @@ void fit_image(const ImageGrid& grid, const ModelVolume& volume, Image& out) {
     out = Image(grid, volume.image.type, volume.image.components);
 }
 
-}  // namespace
-
-struct VolumePoser::Job {
+// How one volume is asked for.
+struct Job {
   std::span<const float> nodes;
   const ModelVolume& volume;
   Sampling sampling;
@@ -131,54 +136,75 @@ struct VolumePoser::Job {
   const Context& context;
 };
 
-std::size_t VolumePoser::base() const {
-  return (model_->node_count() + TetBlocks::size - 1) / TetBlocks::size * TetBlocks::size;
-}
+}  // namespace
+
+struct VolumePoser::Impl {
+  std::shared_ptr<const Model> model;
+  RigidCopies copies{*model};
+  DrawnTets drawn{model->tets, copies, static_cast<std::int32_t>(base())};
+  TetBlocks blocks{drawn, copies.nodes() == 0 ? model->node_count() : base() + copies.nodes(),
+                   copies.nodes()};
+  std::array<float, 6> rest_box{};
+  mutable std::once_flag palettes_made;  // with the first volume: many a poser never poses one
+  mutable std::unique_ptr<const TetPalettes> made_palettes;
+
+  explicit Impl(std::shared_ptr<const Model> of) : model(std::move(of)) {
+    if (model->node_count() == 0) return;
+    for (int c = 0; c < 3; ++c) {
+      rest_box[static_cast<std::size_t>(c)] = model->nodes.col(c).minCoeff();
+      rest_box[static_cast<std::size_t>(c) + 3] = model->nodes.col(c).maxCoeff();
+    }
+  }
+
+  // Of the copied nodes, a multiple of TetBlocks::size.
+  std::size_t base() const {
+    return (model->node_count() + TetBlocks::size - 1) / TetBlocks::size * TetBlocks::size;
+  }
+  const TetPalettes& palettes() const;
+  DrawTets prepare(const Job& job, Scratch& scratch) const;
+  void find_moved(const Job& job, const DrawTets& tets, PosedVolume& kept, Scratch& scratch) const;
+};
 
 VolumePoser::VolumePoser(std::shared_ptr<const Model> model)
-    : model_(std::move(model)),
-      copies_(*model_),
-      drawn_(model_->tets, copies_, static_cast<std::int32_t>(base())),
-      blocks_(drawn_, copies_.nodes() == 0 ? model_->node_count() : base() + copies_.nodes(),
-              copies_.nodes()) {
-  if (model_->node_count() == 0) return;
-  for (int c = 0; c < 3; ++c) {
-    rest_box_[static_cast<std::size_t>(c)] = model_->nodes.col(c).minCoeff();
-    rest_box_[static_cast<std::size_t>(c) + 3] = model_->nodes.col(c).maxCoeff();
-  }
+    : impl_(std::make_unique<const Impl>(std::move(model))) {}
+
+VolumePoser::~VolumePoser() = default;
+
+const Model& VolumePoser::model() const {
+  return *impl_->model;
 }
 
-const TetPalettes& VolumePoser::palettes() const {
-  std::call_once(palettes_made_, [&] {
+const TetPalettes& VolumePoser::Impl::palettes() const {
+  std::call_once(palettes_made, [&] {
     // A thread that waits here must not begin another volume of this poser: it would wait for itself.
     tbb::this_task_arena::isolate([&] {
-      palettes_ = std::make_unique<const TetPalettes>(drawn_, std::span<const std::uint32_t>(), 3);
+      made_palettes = std::make_unique<const TetPalettes>(drawn, std::span<const std::uint32_t>(), 3);
     });
   });
-  return *palettes_;
+  return *made_palettes;
 }
 
 // Which blocks reach into the grid, and their nodes in fixed points.
-DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
+DrawTets VolumePoser::Impl::prepare(const Job& job, Scratch& scratch) const {
   const ImageGrid& rest_grid = job.volume.image.grid;
-  scratch.bounds.resize(6 * blocks_.groups());
-  scratch.copied.resize(3 * copies_.nodes());
-  copies_.place(job.nodes, scratch.copied);
-  blocks_.bound_groups(job.nodes, scratch.copied, scratch.bounds);
+  scratch.bounds.resize(6 * blocks.groups());
+  scratch.copied.resize(3 * copies.nodes());
+  copies.place(job.nodes, scratch.copied);
+  blocks.bound_groups(job.nodes, scratch.copied, scratch.bounds);
   const int bits = fraction_bits(
-      std::max(index_reach(job.grid, box_of(scratch.bounds)), index_reach(rest_grid, rest_box_)));
+      std::max(index_reach(job.grid, box_of(scratch.bounds)), index_reach(rest_grid, rest_box)));
 
   const GridBox grid_box(job.grid);
-  scratch.sides.resize(blocks_.groups());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.groups(), 512), [&](const auto& range) {
+  scratch.sides.resize(blocks.groups());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.groups(), 512), [&](const auto& range) {
     for (std::size_t g = range.begin(); g < range.end(); ++g)
       scratch.sides[g] = grid_box.sides(std::span<const float, 6>(&scratch.bounds[6 * g], 6));
   });
-  scratch.block_meets.resize(blocks_.blocks());
-  scratch.groups.assign(blocks_.groups(), job.all_nodes ? 1 : 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.blocks(), 1024), [&](const auto& range) {
+  scratch.block_meets.resize(blocks.blocks());
+  scratch.groups.assign(blocks.groups(), job.all_nodes ? 1 : 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.blocks(), 1024), [&](const auto& range) {
     for (std::size_t b = range.begin(); b < range.end(); ++b) {
-      const std::span<const std::uint32_t> groups = blocks_.groups_of(b);
+      const std::span<const std::uint32_t> groups = blocks.groups_of(b);
       std::uint8_t sides = 0;
       for (const std::uint32_t g : groups) sides |= scratch.sides[g];
       const bool meets = sides == GridBox::reaches;
@@ -191,21 +217,20 @@ DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
     }
   });
   // Copied nodes come last, from a group of their own on.
-  const std::size_t numbers = copies_.nodes() == 0 ? job.nodes.size() : 3 * (base() + copies_.nodes());
+  const std::size_t numbers = copies.nodes() == 0 ? job.nodes.size() : 3 * (base() + copies.nodes());
   scratch.posed.resize(numbers + 1);
   to_fixed(job.grid, bits, job.nodes, scratch.groups, scratch.posed);
   to_fixed(job.grid, bits, scratch.copied, std::span(scratch.posed).subspan(numbers - scratch.copied.size()));
-  if (scratch.of_rest.model != model_.get() || scratch.of_rest.bits != bits ||
+  if (scratch.of_rest.model != model.get() || scratch.of_rest.bits != bits ||
       !(scratch.of_rest.grid == rest_grid)) {
     scratch.rest.resize(numbers + 1);
-    to_fixed(rest_grid, bits, {model_->nodes.data(), static_cast<std::size_t>(model_->nodes.size())},
+    to_fixed(rest_grid, bits, {model->nodes.data(), static_cast<std::size_t>(model->nodes.size())},
              scratch.rest);
-    to_fixed(rest_grid, bits, copies_.rest(),
-             std::span(scratch.rest).subspan(numbers - copies_.rest().size()));
-    scratch.of_rest = {model_.get(), rest_grid, bits};
+    to_fixed(rest_grid, bits, copies.rest(), std::span(scratch.rest).subspan(numbers - copies.rest().size()));
+    scratch.of_rest = {model.get(), rest_grid, bits};
   }
   job.context.check_stop();
-  return {drawn_,
+  return {drawn,
           palettes(),
           scratch.posed,
           scratch.rest,
@@ -216,48 +241,10 @@ DrawTets VolumePoser::prepare(const Job& job, Scratch& scratch) const {
           {}};
 }
 
-void VolumePoser::pose(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
-                       const ImageGrid& grid, Image& out, Scratch& scratch, const Context& context) const {
-  check_grid(grid);
-  fit_image(grid, volume, out);
-  const Job job{nodes, volume, sampling, grid, false, context};
-  draw(job, prepare(job, scratch), out, scratch);
-}
-
-void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
-                         const ImageGrid& grid, PosedVolume& kept, Scratch& scratch,
-                         const Context& context) const {
-  check_grid(grid);
-  const bool same = kept.drawn.volume == &volume && kept.drawn.sampling == sampling &&
-                    kept.image.grid == grid && kept.drawn.nodes == nodes.size();
-  kept.drawn.volume = nullptr;
-  fit_image(grid, volume, kept.image);
-  const Job job{nodes, volume, sampling, grid, true, context};
-  DrawTets tets = prepare(job, scratch);
-  kept.bricks = Bricks(grid);
-  kept.moved.assign(kept.bricks.all(), same && kept.drawn.bits == tets.bits ? 0 : 1);
-  if (same && kept.drawn.bits == tets.bits) {
-    find_moved(job, tets, kept, scratch);
-    tets.only = {kept.bricks, kept.moved.data()};
-  }
-  kept.rewritten.clear();
-  kept.rewritten.reserve(kept.bricks.all());
-  for (std::size_t b = 0; b < kept.moved.size(); ++b) {
-    if (kept.moved[b] != 0) kept.rewritten.push_back(static_cast<std::uint32_t>(b));
-  }
-  if (!kept.rewritten.empty()) draw(job, tets, kept.image, scratch);
-  kept.drawn.posed.resize(scratch.posed.size());
-  std::swap(kept.drawn.posed, scratch.posed);
-  kept.drawn.nodes = nodes.size();
-  kept.drawn.bits = tets.bits;
-  kept.drawn.sampling = sampling;
-  kept.drawn.volume = &volume;
-}
-
-void VolumePoser::find_moved(const Job& job, const DrawTets& tets, PosedVolume& kept,
-                             Scratch& scratch) const {
+void VolumePoser::Impl::find_moved(const Job& job, const DrawTets& tets, PosedVolume& kept,
+                                   Scratch& scratch) const {
   const std::span<const std::int32_t> before = kept.drawn.posed;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.groups(), 256), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.groups(), 256), [&](const auto& range) {
     for (std::size_t g = range.begin(); g < range.end(); ++g) {
       const std::size_t first = 3 * TetBlocks::size * g;
       const std::size_t end = std::min(before.size(), first + 3 * TetBlocks::size);
@@ -269,13 +256,13 @@ void VolumePoser::find_moved(const Job& job, const DrawTets& tets, PosedVolume& 
     }
   });
   const VoxelRange range = whole(job.grid);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks_.blocks(), 64), [&](const auto& blocks) {
-    for (std::size_t b = blocks.begin(); b < blocks.end(); ++b) {
-      const std::span<const std::uint32_t> groups = blocks_.groups_of(b);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.blocks(), 64), [&](const auto& some) {
+    for (std::size_t b = some.begin(); b < some.end(); ++b) {
+      const std::span<const std::uint32_t> groups = blocks.groups_of(b);
       if (std::none_of(groups.begin(), groups.end(), [&](std::uint32_t g) { return scratch.groups[g] != 0; }))
         continue;
       kernels::mark_moved(tets, before, range, kept.bricks, b * TetBlocks::size,
-                          std::min(static_cast<std::size_t>(drawn_.rows()), (b + 1) * TetBlocks::size),
+                          std::min(static_cast<std::size_t>(drawn.rows()), (b + 1) * TetBlocks::size),
                           kept.moved.data());
     }
   });
@@ -334,9 +321,7 @@ class Band {
   VoxelBatch batch_;
 };
 
-}  // namespace
-
-void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratch& scratch) const {
+void draw(const Job& job, const DrawTets& drawn, Image& out, VolumePoser::Scratch& scratch) {
   const ImageGrid& grid = job.grid;
   const Context& context = job.context;
   const Bands bands(grid);
@@ -371,6 +356,46 @@ void VolumePoser::draw(const Job& job, const DrawTets& drawn, Image& out, Scratc
     Band(drawn, samples, sink, scratch).draw(bands.of(number, grid));
   });
   context.check_stop();
+}
+
+}  // namespace
+
+void VolumePoser::pose(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
+                       const ImageGrid& grid, Image& out, Scratch& scratch, const Context& context) const {
+  check_grid(grid);
+  fit_image(grid, volume, out);
+  const Job job{nodes, volume, sampling, grid, false, context};
+  draw(job, impl_->prepare(job, scratch), out, scratch);
+}
+
+void VolumePoser::follow(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
+                         const ImageGrid& grid, PosedVolume& kept, Scratch& scratch,
+                         const Context& context) const {
+  check_grid(grid);
+  const bool same = kept.drawn.volume == &volume && kept.drawn.sampling == sampling &&
+                    kept.image.grid == grid && kept.drawn.nodes == nodes.size();
+  kept.drawn.volume = nullptr;
+  fit_image(grid, volume, kept.image);
+  const Job job{nodes, volume, sampling, grid, true, context};
+  DrawTets tets = impl_->prepare(job, scratch);
+  kept.bricks = Bricks(grid);
+  kept.moved.assign(kept.bricks.all(), same && kept.drawn.bits == tets.bits ? 0 : 1);
+  if (same && kept.drawn.bits == tets.bits) {
+    impl_->find_moved(job, tets, kept, scratch);
+    tets.only = {kept.bricks, kept.moved.data()};
+  }
+  kept.rewritten.clear();
+  kept.rewritten.reserve(kept.bricks.all());
+  for (std::size_t b = 0; b < kept.moved.size(); ++b) {
+    if (kept.moved[b] != 0) kept.rewritten.push_back(static_cast<std::uint32_t>(b));
+  }
+  if (!kept.rewritten.empty()) draw(job, tets, kept.image, scratch);
+  kept.drawn.posed.resize(scratch.posed.size());
+  std::swap(kept.drawn.posed, scratch.posed);
+  kept.drawn.nodes = nodes.size();
+  kept.drawn.bits = tets.bits;
+  kept.drawn.sampling = sampling;
+  kept.drawn.volume = &volume;
 }
 
 Image pose_volume(std::shared_ptr<const Model> model, std::span<const float> nodes, const ModelVolume& volume,

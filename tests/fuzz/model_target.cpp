@@ -4,8 +4,8 @@
 #include <fstream>
 #include <string>
 
-#include "core/model_file/model_file.hpp"
-#include "core/values/error.hpp"
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/values/error.hpp>
 #include "tests/fuzz/place.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/toy_model.hpp"

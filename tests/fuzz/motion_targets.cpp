@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/motion/amc.hpp"
 #include "io/motion/bvh.hpp"
 #include "io/motion/gltf_clip.hpp"

@@ -7,9 +7,9 @@
 #include <initializer_list>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/values/error.hpp>
 #include "io/case/attachment_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/case/ik_file.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/image/image_file.hpp"

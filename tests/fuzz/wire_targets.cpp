@@ -4,12 +4,12 @@
 #include <cstdlib>
 #include <cstring>
 
+#include <ecorche/wire/convert.hpp>
+#include <ecorche/wire/framing.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
+#include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
-#include "proto/framing.hpp"
-#include "proto/mesh_decoder.hpp"
 #include "proto/recording.hpp"
-#include "proto/volume_decoder.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace ecorche::fuzz {

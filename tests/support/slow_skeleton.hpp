@@ -5,8 +5,8 @@
 
 #include <functional>
 
-#include "core/values/image.hpp"
-#include "core/values/volumetric_skeleton.hpp"
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/volumetric_skeleton.hpp>
 
 namespace ecorche::test {
 

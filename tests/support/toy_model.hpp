@@ -2,7 +2,7 @@
 // A body of a few hundred tets that no stage made: for tests that need a Model and nothing before it.
 #pragma once
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::test {
 

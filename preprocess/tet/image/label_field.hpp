@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::tet {
 

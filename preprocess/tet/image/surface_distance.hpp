@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::tet {
 

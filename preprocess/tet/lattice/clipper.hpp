@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/tet/lattice/bcc_lattice.hpp"
 
 namespace ecorche::tet {

@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
-#include "core/values/context.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/mesh.hpp>
 #include "preprocess/tet/lattice/bcc_lattice.hpp"
 #include "preprocess/tet/lattice/edge_cuts.hpp"
 #include "preprocess/tet/lattice/node_materials.hpp"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "preprocess/tet/lattice/node_materials.hpp"
 
 namespace ecorche::tet {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 #include "preprocess/tet/lattice/bcc_lattice.hpp"
 
 namespace ecorche::tet {

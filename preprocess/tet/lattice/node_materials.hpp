@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/image.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/image.hpp>
 #include "preprocess/geometry/face_tree.hpp"
 #include "preprocess/tet/lattice/bcc_lattice.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::tet {
 

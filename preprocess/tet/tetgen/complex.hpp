@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/case.hpp"
-#include "core/values/mesh.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::tet {
 

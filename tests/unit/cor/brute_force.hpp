@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/mesh.hpp"
-#include "core/values/model.hpp"
+#include <ecorche/values/mesh.hpp>
+#include <ecorche/values/model.hpp>
 
 namespace ecorche::test {
 

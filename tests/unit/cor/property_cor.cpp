@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 #include "preprocess/cor/centres.hpp"
 #include "tests/unit/cor/brute_force.hpp"
 

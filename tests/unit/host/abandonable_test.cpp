@@ -11,7 +11,7 @@
 #include <stop_token>
 #include <thread>
 
-#include "core/values/context.hpp"
+#include <ecorche/values/context.hpp>
 
 namespace ecorche::app {
 namespace {

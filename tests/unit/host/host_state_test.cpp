@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/weights/harmonic.hpp"

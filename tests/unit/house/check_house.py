@@ -29,7 +29,11 @@ ARROWS = {
     "app": ["core", "io", "phantom", "preprocess", "runtime", "proto", "clients"],
 }
 # core/values knows the standard library and Eigen only; three of its headers not even Eigen (ITK brings its own).
-PLAIN_HEADERS = {"core/values/image.hpp", "core/values/error.hpp", "core/values/context.hpp"}
+PLAIN_HEADERS = {f"core/include/ecorche/values/{name}.hpp" for name in ("image", "error", "context")}
+# Where public headers belong: <ecorche/wire/framing.hpp> is of proto.
+PUBLIC = {"values": "core/values", "files": "core/files", "kinematics": "core/kinematics", "model_file": "core/model_file",
+          "io": "io/case", "preprocess": "preprocess", "runtime": "runtime", "wire": "proto", "v1": "proto", "client": "clients/cpp",
+          "version.hpp": "core/values"}
 FOREIGN_IN_VALUES = re.compile(r"#include <(hdf5|H5|yaml|tbb|spdlog|fmt|fstream|filesystem|thread|mutex)")
 # Units that link GPL or AGPL libraries carry that licence themselves; nothing else may include those libraries.
 GPL_UNITS = ("preprocess/tet/cgal/", "preprocess/tet/tetgen/", "preprocess/weights/cholmod/",
@@ -48,6 +52,9 @@ def tracked(root):
 
 
 def folder_of(path):
+    public = re.match(r"(?:.*/include/)?ecorche/([^/]+)", path)
+    if public:
+        return PUBLIC.get(public.group(1))
     matches = [folder for folder in ARROWS if path.startswith(folder + "/")]
     return max(matches, key=len) if matches else None
 
@@ -57,13 +64,18 @@ def check_arrows(path, text):
     if folder is None:
         return
     for number, line in enumerate(text.splitlines(), 1):
-        match = re.match(r'\s*#include "([^"]+)"', line)
+        match = re.match(r'\s*#include (?:"([^"]+)"|<(ecorche/[^>]+)>)', line)
         if not match:
             continue
-        target = match.group(1)
-        if target.endswith(".pb.h"):
-            target = "proto/" + target
+        target = match.group(1) or match.group(2)
+        if match.group(1) and "/include/ecorche/" in path:
+            yield f"{path}:{number}: a public header includes public headers only, as <ecorche/...>, not {target}"
         own = folder_of(target)
+        if match.group(2):
+            if own is None:
+                yield f"{path}:{number}: {target} belongs to no folder that PUBLIC names"
+                continue
+            target = own + "/"
         allowed = own == folder or any(target.startswith(to + "/") for to in ARROWS[folder])
         # `runtime` -> `runtime/server` would turn the arrow round, although the path starts alike.
         if allowed and own and own != folder and own.startswith(folder + "/"):
@@ -90,7 +102,7 @@ def check_file(root, path):
             yield f"{path}: includes a GPL or AGPL library outside of {', '.join(GPL_UNITS)}"
         if gpl_unit and GPL_INCLUDE.search(text) and spdx and spdx.group(1) != "AGPL-3.0-or-later":
             yield f"{path}:1: uses a GPL or AGPL library: AGPL-3.0-or-later"
-        if path.startswith("core/values/") and FOREIGN_IN_VALUES.search(text):
+        if folder_of(path) == "core/values" and FOREIGN_IN_VALUES.search(text):
             yield f"{path}: core/values is plain data: no files, threads, HDF5, YAML or logs"
         if path in PLAIN_HEADERS and "<Eigen" in text:
             yield f"{path}: is seen by ITK, which brings its own Eigen: std::array and std::span only"

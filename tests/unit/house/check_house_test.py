@@ -31,17 +31,27 @@ class House(unittest.TestCase):
 
     def test_a_good_tree_passes(self):
         self.assertEqual([line for line in problems({
-            "runtime/skin/a.cpp": SPDX + '#include "core/values/mesh.hpp"\n#include "runtime/skin/a.hpp"\n#include <vector>\n',
-            "runtime/server/b.cpp": SPDX + '#include "runtime/skin/a.hpp"\n#include "core/model_file/model_file.hpp"\n',
+            "runtime/skin/a.cpp": SPDX + '#include <ecorche/values/mesh.hpp>\n#include "runtime/skin/a.hpp"\n#include <vector>\n',
+            "runtime/server/b.cpp": SPDX + '#include "runtime/skin/a.hpp"\n#include <ecorche/model_file/model_file.hpp>\n',
+            "runtime/include/ecorche/runtime/c.hpp": SPDX + '#include <ecorche/values/mesh.hpp>\n',
             "README.md": "no licence line needed\n"}) if line], [])
 
     def test_forbidden_arrows(self):
-        for path, include in [("runtime/skin/a.cpp", "preprocess/pipeline.hpp"), ("runtime/skin/a.cpp", "io/case/case_file.hpp"),
+        for path, include in [("runtime/skin/a.cpp", "preprocess/rig/fit_rig.hpp"), ("runtime/skin/a.cpp", "io/case/case_file.hpp"),
                               ("runtime/skin/a.cpp", "runtime/server/server.hpp"), ("core/values/a.hpp", "core/files/atomic_file.hpp"),
                               ("core/kinematics/a.cpp", "core/solve/spd_solver.hpp"), ("io/image/a.cpp", "preprocess/pipeline.hpp"),
                               ("preprocess/cor/a.cpp", "runtime/skin/body_poser.hpp"), ("phantom/a.cpp", "io/case/case_file.hpp"),
                               ("io/case/a.cpp", "app/command.hpp")]:
             self.assert_refused(path, SPDX + f'#include "{include}"\n', "may not include")
+
+        for path, include in [("runtime/skin/a.cpp", "preprocess/pipeline.hpp"), ("core/values/a.cpp", "runtime/body_poser.hpp"),
+                              ("runtime/include/ecorche/runtime/a.hpp", "wire/framing.hpp")]:
+            self.assert_refused(path, SPDX + f"#include <ecorche/{include}>\n", "may not include")
+
+    def test_public_headers(self):
+        header = "runtime/include/ecorche/runtime/a.hpp"
+        self.assert_refused(header, SPDX + '#include "runtime/skin/aligned.hpp"\n', "public headers only")
+        self.assert_refused("app/a.cpp", SPDX + "#include <ecorche/nowhere/a.hpp>\n", "belongs to no folder")
 
     def test_licences(self):
         self.assert_refused("core/values/a.cpp", "int a;\n", "SPDX")
@@ -50,7 +60,7 @@ class House(unittest.TestCase):
 
     def test_plain_values(self):
         self.assert_refused("core/values/a.cpp", SPDX + "#include <fstream>\n", "plain data")
-        self.assert_refused("core/values/image.hpp", SPDX + "#include <Eigen/Core>\n", "brings its own Eigen")
+        self.assert_refused("core/include/ecorche/values/image.hpp", SPDX + "#include <Eigen/Core>\n", "brings its own Eigen")
 
     def test_large_rooms(self):
         self.assert_refused("app/a.cpp", SPDX + "int a;\n" * 501, "one idea a file")

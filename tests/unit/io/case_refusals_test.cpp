@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/yaml_reader.hpp"
 #include "io/image/image_file.hpp"
 #include "tests/unit/io/scratch.hpp"

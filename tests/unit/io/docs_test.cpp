@@ -2,8 +2,8 @@
 // The examples of docs/case.md and docs/volumetric.md are read by the readers that they describe.
 #include <gtest/gtest.h>
 
+#include <ecorche/io/case_file.hpp>
 #include "io/case/attachment_file.hpp"
-#include "io/case/case_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "tests/unit/io/scratch.hpp"

@@ -5,7 +5,7 @@
 
 #include <cstdlib>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/yaml_reader.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "tests/unit/phantom/mesh_checks.hpp"

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::foreign {
 

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/frame.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/check/surface_figures.hpp"

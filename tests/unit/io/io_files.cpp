@@ -4,7 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/image/image_file.hpp"
 #include "io/image/nifti_form.hpp"
 #include "io/surface/surface_file.hpp"

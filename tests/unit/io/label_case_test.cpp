@@ -2,7 +2,7 @@
 // Cases whose surfaces come from labels: what is read, and every refusal with its place.
 #include <gtest/gtest.h>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/digest.hpp"
 #include "io/image/image_file.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/image/image_file.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/segmentation.hpp"

@@ -20,7 +20,8 @@ using Eigen::Vector3d;
 constexpr double kRadiansADegree = std::numbers::pi / 180;
 
 double degrees_between(const Quaterniond& a, const Quaterniond& b) {
-  return 2 * std::atan2((a.conjugate() * b).vec().norm(), std::abs((a.conjugate() * b).w())) / kRadiansADegree;
+  return 2 * std::atan2((a.conjugate() * b).vec().norm(), std::abs((a.conjugate() * b).w())) /
+         kRadiansADegree;
 }
 
 Quaterniond random_turn(std::mt19937& random) {

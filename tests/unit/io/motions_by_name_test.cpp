@@ -4,12 +4,12 @@
 
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/io/pose_library.hpp>
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "io/case/ik_file.hpp"
 #include "io/case/motion_map.hpp"
-#include "io/case/pose_library.hpp"
 #include "io/case/pose_sequence.hpp"
 #include "tests/unit/io/scratch.hpp"
 

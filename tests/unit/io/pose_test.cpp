@@ -5,8 +5,8 @@
 #include <numbers>
 #include <random>
 
-#include "core/kinematics/angles.hpp"
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
+#include <ecorche/kinematics/angles.hpp>
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/io/small_case.hpp"
 

@@ -2,7 +2,7 @@
 // Rules of joints, regions and skeleton templates as files: they read back, and every mistake is named.
 #include <gtest/gtest.h>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/case_rules.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "tests/unit/io/scratch.hpp"
@@ -12,7 +12,7 @@ namespace ecorche::io {
 namespace {
 
 PlacedSkeleton parse_rules(const std::string& text) {
-  return parse_skeleton(yaml::Value::parse_rules(text, "s.yaml"), Frame{});
+  return parse_skeleton(yaml::Value::parse(text, "s.yaml"), Frame{});
 }
 
 // A skeleton of two segments whose second joint has these keys.
@@ -89,7 +89,7 @@ TEST(Rules, AFrameTurnsPointsAndDirections) {
   const Frame ras{(Eigen::Matrix3d() << -1, 0, 0, 0, -1, 0, 0, 0, 1).finished(), 10};
   const Skeleton s =
       parse_skeleton(
-          yaml::Value::parse_rules(
+          yaml::Value::parse(
               two("center: {between: [[1, 0, 0], [3, 0, 0]]}, axes: {x: {axis_of: root}, z: [1, 0, 1]}"),
               "s"),
           ras)
@@ -241,7 +241,7 @@ TEST(Templates, EachIsASkeletonThatReadsBack) {
   const std::map<std::string, std::size_t> sizes{{"human", 22}, {"hand", 19}, {"knee", 3}, {"quadruped", 21}};
   for (const auto& [name, size] : sizes) {
     const PlacedSkeleton placed =
-        parse_skeleton(yaml::Value::parse_rules(skeleton_template(name).value(), name + ".yaml"), Frame{});
+        parse_skeleton(yaml::Value::parse(skeleton_template(name).value(), name + ".yaml"), Frame{});
     EXPECT_EQ(placed.skeleton.segments.size(), size) << name;
     EXPECT_EQ(placed.skeleton.name, name);
     EXPECT_TRUE(placed.named.bones.empty()) << name;  // whatever the bones of a segment are called

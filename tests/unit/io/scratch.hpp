@@ -11,7 +11,7 @@
 #include <optional>
 #include <string>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche {
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "io/case/case_file.hpp"
+#include <ecorche/io/case_file.hpp>
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_text.hpp"
 #include "tests/unit/io/scratch.hpp"

@@ -2,7 +2,7 @@
 // The smallest case with one of everything.
 #pragma once
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 namespace ecorche {
 

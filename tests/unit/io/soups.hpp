@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche {
 

@@ -2,7 +2,7 @@
 // Two tets that share a face.
 #pragma once
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io {
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "core/values/volumetric_skeleton_check.hpp"
+#include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "tests/unit/io/scratch.hpp"
 
 namespace ecorche::io {

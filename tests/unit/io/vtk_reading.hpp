@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::foreign {
 

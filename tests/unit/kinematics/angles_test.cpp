@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <numbers>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {
@@ -76,7 +76,8 @@ TEST(Angles, RoundTripOfRotations) {
 
 TEST(Angles, RoundTripOfAngles) {
   std::mt19937 random(8);
-  std::uniform_real_distribution<double> whole(-kPi + 0.01, kPi - 0.01), half(-kPi / 2 + 0.01, kPi / 2 - 0.01);
+  std::uniform_real_distribution<double> whole(-kPi + 0.01, kPi - 0.01),
+      half(-kPi / 2 + 0.01, kPi / 2 - 0.01);
   for_all_sequences([&](const Joint& joint) {
     for (int trial = 0; trial < 50; ++trial) {
       const Angles asked{whole(random), half(random), whole(random)};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "core/kinematics/angles.hpp"
-#include "core/values/error.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/values/error.hpp>
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "core/kinematics/ik_chain.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 

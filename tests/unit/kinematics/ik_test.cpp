@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/kinematics/ik.hpp"
+#include <ecorche/kinematics/ik.hpp>
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/values/error.hpp>
 #include "core/kinematics/marker_fit.hpp"
-#include "core/values/error.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {

@@ -4,14 +4,14 @@
 
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
-#include "core/kinematics/interpolate.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/kinematics/interpolate.hpp>
+#include <ecorche/kinematics/named_angles.hpp>
+#include <ecorche/values/error.hpp>
 #include "core/kinematics/joint_names.hpp"
 #include "core/kinematics/motion_report.hpp"
-#include "core/kinematics/named_angles.hpp"
 #include "core/kinematics/retarget.hpp"
-#include "core/values/error.hpp"
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 

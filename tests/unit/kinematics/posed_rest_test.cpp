@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {

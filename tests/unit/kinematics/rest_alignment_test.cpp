@@ -8,11 +8,11 @@
 #include <span>
 #include <string>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/values/error.hpp>
 #include "core/kinematics/retarget.hpp"
 #include "core/kinematics/rig_clip.hpp"
-#include "core/values/error.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 
 namespace ecorche::kinematics {

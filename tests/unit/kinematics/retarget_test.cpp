@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/kinematics/forward.hpp"
-#include "core/values/error.hpp"
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/values/error.hpp>
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 

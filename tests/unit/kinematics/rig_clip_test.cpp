@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 #include "core/kinematics/retarget.hpp"
 #include "tests/unit/kinematics/rigs.hpp"
 

@@ -5,9 +5,9 @@
 #include <random>
 #include <string>
 
-#include "core/values/pose.hpp"
-#include "core/values/skeleton.hpp"
-#include "core/values/transform.hpp"
+#include <ecorche/values/pose.hpp>
+#include <ecorche/values/skeleton.hpp>
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche::test {
 

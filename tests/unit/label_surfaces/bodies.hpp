@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 #include "tests/unit/phantom/mesh_checks.hpp"
 
 namespace ecorche::label_surfaces {

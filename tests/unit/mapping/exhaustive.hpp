@@ -11,7 +11,7 @@
 #include <map>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::test {
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <random>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::test {
 

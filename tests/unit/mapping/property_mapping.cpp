@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 #include "tests/support/triangle_distance.hpp"
 #include "tests/unit/mapping/exhaustive.hpp"
 

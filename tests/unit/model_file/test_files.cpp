@@ -8,8 +8,8 @@
 #include <fstream>
 #include <iterator>
 
+#include <ecorche/model_file/model_file.hpp>
 #include "core/model_file/figures.hpp"
-#include "core/model_file/model_file.hpp"
 #include "tests/support/toy_model.hpp"
 
 // HDF5 1.10 itself loses a block whenever H5Gopen or H5Dopen refuses a damaged header; a C program of those

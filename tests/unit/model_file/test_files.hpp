@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 
 namespace ecorche::test {
 

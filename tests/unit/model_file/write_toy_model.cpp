@@ -2,7 +2,7 @@
 // write_toy_model FILE.hdf
 #include <cstdio>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
 #include "tests/support/toy_model.hpp"
 
 int main(int argc, char** argv) {

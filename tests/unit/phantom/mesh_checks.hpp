@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::phantom {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "core/kinematics/angles.hpp"
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/kinematics/forward.hpp>
 #include "core/kinematics/retarget.hpp"
 #include "tests/unit/phantom/mesh_checks.hpp"
 #include "tests/unit/phantom/small_phantom.hpp"

@@ -3,8 +3,8 @@
 
 #include <functional>
 
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/bounds.hpp"
-#include "preprocess/pipeline.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::preprocess {

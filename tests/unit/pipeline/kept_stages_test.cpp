@@ -5,9 +5,9 @@
 #include <map>
 #include <memory>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/cache/kept_stage.hpp"
-#include "preprocess/pipeline.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"
 
 namespace ecorche::preprocess {

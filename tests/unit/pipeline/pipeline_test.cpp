@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/pipeline.hpp"
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/bounds.hpp"
 
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "core/model_file/model_file.hpp"
-#include "core/values/volumetric_skeleton_check.hpp"
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "preprocess/tet/mesher.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"
 

@@ -2,10 +2,10 @@
 // Bodies of any size in any place, and limbs that touch.
 #include <gtest/gtest.h>
 
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/bounds.hpp"
 #include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/look_ahead.hpp"
-#include "preprocess/pipeline.hpp"
 #include "preprocess/tet/default_size.hpp"
 #include "preprocess/voxel/voxelize.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 namespace ecorche::test {
 

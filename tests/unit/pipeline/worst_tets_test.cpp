@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/worst_tets.hpp"
+#include <ecorche/preprocess/worst_tets.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/geometry/dihedral.hpp"
-#include "preprocess/pipeline.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"
 
 namespace ecorche::preprocess {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/address.hpp"
+#include <ecorche/wire/address.hpp>
 
 #include <gtest/gtest.h>
 

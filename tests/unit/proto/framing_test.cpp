@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/mesh_decoder.hpp"
+#include <ecorche/wire/mesh_decoder.hpp>
 
 #include <gtest/gtest.h>
 

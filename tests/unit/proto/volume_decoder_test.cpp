@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a compressed volume may say of its size. Whole streams of volumes: tests/unit/server/volumes_test.cpp.
-#include "proto/volume_decoder.hpp"
+#include <ecorche/wire/volume_decoder.hpp>
 
 #include <gtest/gtest.h>
 #include <zstd.h>

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::test {
 

@@ -136,7 +136,8 @@ TEST(Damage, a_femur_without_its_condyles_does_not_kick_sideways) {
   const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.35, Vector3d::UnitY()).toRotationMatrix();
   for (CaseBone& bone : bones) bone.surface.V = bone.surface.V * tilt.transpose();
   const Found now = found(bones);
-  EXPECT_LT(degrees_apart(now.joint("knee_right").axes.col(0), tilt * whole().joint("knee_right").axes.col(0)), 12);
+  EXPECT_LT(
+      degrees_apart(now.joint("knee_right").axes.col(0), tilt * whole().joint("knee_right").axes.col(0)), 12);
   EXPECT_LT(now.confidence("knee_right"), JointSources::least_confidence);
 }
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "io/case/case_rules.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "preprocess/rig/fit_rig.hpp"

@@ -5,8 +5,8 @@
 
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
-#include "core/values/joint_rule.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/values/joint_rule.hpp>
 #include "preprocess/rig/fit_rig.hpp"
 #include "tests/unit/rig/balls.hpp"
 

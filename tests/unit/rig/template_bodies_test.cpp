@@ -6,8 +6,8 @@
 #include <numbers>
 #include <set>
 
-#include "core/kinematics/angles.hpp"
-#include "core/values/pose.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/values/pose.hpp>
 #include "io/case/case_rules.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "phantom/body.hpp"

@@ -8,9 +8,9 @@
 #include <memory>
 #include <new>
 
-#include "runtime/probe/probe.hpp"
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/probe.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/runtime/reference_skinning.hpp"
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/model.hpp"
+#include <ecorche/values/model.hpp>
 #include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::test {

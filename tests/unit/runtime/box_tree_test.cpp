@@ -14,7 +14,7 @@
 #include <random>
 #include <thread>
 
-#include "runtime/probe/probe.hpp"
+#include <ecorche/runtime/probe.hpp>
 
 namespace ecorche::runtime {
 namespace {

@@ -9,8 +9,8 @@
 #include <random>
 #include <stop_token>
 
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

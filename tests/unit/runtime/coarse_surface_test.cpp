@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes by few vertices against those of the whole surface.
-#include "runtime/quality/coarse_surface.hpp"
+#include <ecorche/runtime/coarse_surface.hpp>
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <map>
 #include <numbers>
 
-#include "runtime/quality/quality_meter.hpp"
+#include <ecorche/runtime/quality_meter.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

@@ -12,7 +12,7 @@
 #include <random>
 #include <set>
 
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
 #include "tests/unit/runtime/reference_skinning.hpp"

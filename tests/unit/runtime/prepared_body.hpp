@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/body_poser.hpp>
 #include "core/kinematics/retarget.hpp"
-#include "core/model_file/model_file.hpp"
 #include "io/motion/bvh.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "tests/unit/runtime/reference_skinning.hpp"
 
 namespace ecorche::test {

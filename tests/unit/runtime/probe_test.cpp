@@ -16,10 +16,10 @@
 #include <memory>
 #include <random>
 
-#include "runtime/probe/probe.hpp"
-#include "runtime/quality/pose_quality.hpp"
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/probe.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

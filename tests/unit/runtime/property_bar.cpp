@@ -16,10 +16,10 @@
 #include <map>
 #include <numbers>
 
-#include "core/kinematics/angles.hpp"
+#include <ecorche/kinematics/angles.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/resample.hpp>
 #include "io/surface/surface_file.hpp"
-#include "runtime/quality/pose_quality.hpp"
-#include "runtime/volume/resample.hpp"
 #include "tests/unit/runtime/prepared_body.hpp"
 
 namespace ecorche::runtime {

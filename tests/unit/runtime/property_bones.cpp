@@ -5,9 +5,9 @@
 #include <atomic>
 #include <cstdio>
 
-#include "io/case/pose_library.hpp"
+#include <ecorche/io/pose_library.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/quality/bone_tets.hpp"
-#include "runtime/quality/pose_quality.hpp"
 #include "tests/unit/runtime/bone_depth.hpp"
 #include "tests/unit/runtime/prepared_body.hpp"
 

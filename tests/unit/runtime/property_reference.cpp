@@ -3,7 +3,7 @@
 // stored.
 #include <cstdio>
 
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 #include "tests/unit/runtime/prepared_body.hpp"
 
 namespace ecorche::runtime {

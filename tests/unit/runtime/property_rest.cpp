@@ -2,7 +2,7 @@
 // Rest pose in, rest pose out, through the whole machinery: meshes within 1e-3 mm, voxels identical.
 #include <cstdio>
 
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/runtime/volume_poser.hpp>
 #include "tests/unit/runtime/prepared_body.hpp"
 
 namespace ecorche::runtime {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/kinematics/forward.hpp"
+#include <ecorche/kinematics/forward.hpp>
 #include "tests/unit/runtime/prepared_body.hpp"
 
 namespace ecorche::runtime {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The quick quality against the slow one: the same where it looks at everything, within its stated error
 // where it does not.
-#include "runtime/quality/quality_meter.hpp"
+#include <ecorche/runtime/quality_meter.hpp>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/runtime/verdict.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

@@ -8,8 +8,8 @@
 #include <memory>
 #include <random>
 
-#include "runtime/quality/pose_quality.hpp"
-#include "runtime/quality/quality_meter.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/quality_meter.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

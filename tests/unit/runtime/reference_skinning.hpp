@@ -8,9 +8,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/values/model.hpp"
-#include "core/values/transform.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche::test {
 

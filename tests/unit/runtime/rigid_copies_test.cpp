@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contested tets drawn rigidly: copies against the segments' own motions, posed volumes against a rigidly
 // moved scan, and volumes and probes against their slow twins.
-#include "runtime/volume/rigid_copies.hpp"
+#include <ecorche/runtime/rigid_copies.hpp>
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,11 @@
 #include <numeric>
 #include <random>
 
-#include "core/kinematics/forward.hpp"
-#include "runtime/probe/probe.hpp"
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/resample.hpp"
-#include "runtime/volume/volume_poser.hpp"
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/probe.hpp>
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "tests/unit/runtime/contested_toy.hpp"
 
 namespace ecorche::runtime {

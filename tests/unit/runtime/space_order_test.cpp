@@ -10,12 +10,12 @@
 #include <random>
 #include <set>
 
+#include <ecorche/runtime/pose_quality.hpp>
+#include <ecorche/runtime/tet_runs.hpp>
 #include "runtime/probe/halving_order.hpp"
 #include "runtime/probe/space_order.hpp"
-#include "runtime/probe/tet_runs.hpp"
 #include "runtime/probe/tissue_cells.hpp"
 #include "runtime/probe/tissue_columns.hpp"
-#include "runtime/quality/pose_quality.hpp"
 #include "runtime/volume/tet_palettes.hpp"
 #include "tests/support/toy_model.hpp"
 

@@ -7,7 +7,7 @@
 
 #include <random>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/settle/fold_energy.hpp"
 #include "runtime/settle/lbfgs.hpp"
 #include "tests/support/toy_model.hpp"

@@ -2,7 +2,7 @@
 // Unfolding keeps what tissues enclose: none comes out farther from its rest volume than skinning had put it.
 #include <gtest/gtest.h>
 
-#include "runtime/quality/pose_quality.hpp"
+#include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/settle/patch_volumes.hpp"
 #include "runtime/settle/unfold.hpp"
 #include "tests/support/toy_model.hpp"

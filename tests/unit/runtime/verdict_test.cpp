@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a verdict looks at: each tissue, folds, the worst place, joints that were found badly; and that where
 // a body stands is none of it.
-#include "runtime/quality/verdict.hpp"
+#include <ecorche/runtime/verdict.hpp>
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <set>
 
-#include "runtime/quality/quality_meter.hpp"
+#include <ecorche/runtime/quality_meter.hpp>
 #include "runtime/quality/tissue_limits.hpp"
 #include "tests/support/toy_model.hpp"
 
@@ -22,7 +22,8 @@ struct JudgedBody {
   BodyPoser poser{model};
   PosedBody body = poser.make_frame();
 
-  explicit JudgedBody(Model made = test::toy_model()) : model(std::make_shared<const Model>(std::move(made))) {}
+  explicit JudgedBody(Model made = test::toy_model())
+      : model(std::make_shared<const Model>(std::move(made))) {}
   PoseQuality slow(const QualityThresholds& thresholds = {}) const {
     return measure(*model, body, poser.all_tissues(), thresholds);
   }

@@ -11,11 +11,11 @@
 #include <memory>
 #include <random>
 
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
 #include "runtime/volume/fixed_points.hpp"
 #include "runtime/volume/sample_batch.hpp"
 #include "runtime/volume/sampler.hpp"
-#include "runtime/volume/volume_poser.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

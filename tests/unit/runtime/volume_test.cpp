@@ -10,8 +10,8 @@
 #include <numbers>
 #include <random>
 
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/resample.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/resample.hpp>
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/io/scratch.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Control, coming back, inverse kinematics, clips and thresholds.
-#include "core/kinematics/ik.hpp"
-#include "proto/convert.hpp"
+#include <ecorche/kinematics/ik.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {

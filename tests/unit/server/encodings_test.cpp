@@ -5,9 +5,9 @@
 #include <memory>
 #include <set>
 
-#include "proto/mesh_decoder.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
 #include "runtime/server/mesh_stream.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every connection that the server ends is told why, over a WebSocket by its close code, too.
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "tests/unit/server/test_server.hpp"
 #include "tests/unit/server/web_client.hpp"
 

@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
-#include "proto/mesh_decoder.hpp"
-#include "proto/volume_decoder.hpp"
+#include <ecorche/wire/mesh_decoder.hpp>
+#include <ecorche/wire/volume_decoder.hpp>
 #include "runtime/server/judging.hpp"
 #include "runtime/server/mesh_streams.hpp"
 #include "runtime/server/pose_job.hpp"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/mesh_decoder.hpp"
+#include <ecorche/wire/mesh_decoder.hpp>
 
 namespace ecorche::server {
 namespace {

@@ -8,12 +8,12 @@
 #include <semaphore>
 #include <thread>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "proto/mesh_decoder.hpp"
 #include "runtime/server/house.hpp"
 #include "runtime/server/mesh_rows.hpp"
 #include "runtime/server/served_model.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/probe.hpp>
 #include "proto/arrays.hpp"
-#include "runtime/probe/probe.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "tests/unit/server/session_stage.hpp"
 #include "tests/unit/server/test_server.hpp"
 

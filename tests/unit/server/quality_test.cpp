@@ -2,9 +2,9 @@
 // Quality in every reply, of the pose itself or of one before it.
 #include <set>
 
-#include "runtime/quality/quality_meter.hpp"
-#include "runtime/quality/verdict.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/quality_meter.hpp>
+#include <ecorche/runtime/verdict.hpp>
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {

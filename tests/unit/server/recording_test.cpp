@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/recording.hpp"
 #include "runtime/server/tls.hpp"
 #include "tests/support/toy_model.hpp"

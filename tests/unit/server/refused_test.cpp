@@ -2,7 +2,7 @@
 // Values that a field cannot have are refused, and named.
 #include <limits>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/framing.hpp"
+#include <ecorche/wire/framing.hpp>
 #include "runtime/server/session.hpp"
 #include "tests/support/toy_model.hpp"
 

@@ -6,8 +6,8 @@
 #include <map>
 #include <numeric>
 
-#include "proto/mesh_decoder.hpp"
-#include "runtime/skin/body_poser.hpp"
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/slow_relay.hpp"
 #include "tests/unit/server/test_server.hpp"

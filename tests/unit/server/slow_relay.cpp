@@ -13,7 +13,7 @@
 #include <deque>
 #include <random>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
 namespace {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "proto/address.hpp"
+#include <ecorche/wire/address.hpp>
 
 namespace ecorche::server {
 

@@ -6,11 +6,11 @@
 #include <cstring>
 #include <set>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/wire/convert.hpp>
+#include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
-#include "proto/volume_decoder.hpp"
 #include "runtime/server/subscription.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/spheres/slice.hpp"
 #include "tests/support/toy_model.hpp"

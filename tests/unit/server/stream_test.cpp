@@ -3,13 +3,13 @@
 #include <cstring>
 #include <set>
 
-#include "core/model_file/model_file.hpp"
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/quality_meter.hpp>
+#include <ecorche/runtime/resample.hpp>
+#include <ecorche/runtime/volume_poser.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
-#include "proto/convert.hpp"
-#include "runtime/quality/quality_meter.hpp"
-#include "runtime/skin/body_poser.hpp"
-#include "runtime/volume/resample.hpp"
-#include "runtime/volume/volume_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 

@@ -4,7 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 
-#include "proto/convert.hpp"
+#include <ecorche/wire/convert.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::server {

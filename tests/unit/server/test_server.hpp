@@ -12,9 +12,9 @@
 #include <string>
 #include <thread>
 
-#include "clients/cpp/client.hpp"
-#include "core/values/model.hpp"
-#include "core/values/pose.hpp"
+#include <ecorche/client/client.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/pose.hpp>
 #include "runtime/server/server.hpp"
 
 namespace ecorche::server {

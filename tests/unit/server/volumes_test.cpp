@@ -2,10 +2,10 @@
 // Slices, changed bricks and compressed voxels against offline posing.
 #include <memory>
 
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "proto/volume_decoder.hpp"
 #include "runtime/server/volume_stream.hpp"
-#include "runtime/skin/body_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "clients/cpp/socket.hpp"
-#include "proto/framing.hpp"
+#include <ecorche/client/socket.hpp>
+#include <ecorche/wire/framing.hpp>
 
 namespace ecorche::server {
 

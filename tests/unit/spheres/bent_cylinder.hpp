@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/values/transform.hpp"
+#include <ecorche/values/transform.hpp>
 #include "tests/support/slow_skeleton.hpp"
 
 namespace ecorche::test {

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 #include "runtime/spheres/refilled_volume.hpp"
 #include "runtime/spheres/slice.hpp"
 #include "tests/unit/spheres/exhaustive.hpp"

@@ -34,7 +34,7 @@ struct BentSeams {
   Seams seams;
 
   BentSeams(const BentCylinder& body, const VolumetricSkeleton& skeleton, const Skeleton& rig,
-       const std::vector<RigidTransform>& motions)
+            const std::vector<RigidTransform>& motions)
       : rest(balls_at_rest(skeleton, body.skeleton.grid)), posed(rest) {
     seams = seams_of(rest, skeleton.segment, rig);
     move_balls(skeleton, motions, posed);

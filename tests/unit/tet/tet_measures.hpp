@@ -11,7 +11,7 @@
 #include <numeric>
 #include <vector>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::measures {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/values/image.hpp"
+#include <ecorche/values/image.hpp>
 
 namespace ecorche::foreign {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/values/error.hpp"
+#include <ecorche/values/error.hpp>
 
 namespace ecorche::thin {
 namespace {

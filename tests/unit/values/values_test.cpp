@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "core/values/case.hpp"
-#include "core/values/context.hpp"
-#include "core/values/error.hpp"
-#include "core/values/image.hpp"
-#include "core/values/transform.hpp"
+#include <ecorche/values/case.hpp>
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/error.hpp>
+#include <ecorche/values/image.hpp>
+#include <ecorche/values/transform.hpp>
 
 namespace ecorche {
 namespace {

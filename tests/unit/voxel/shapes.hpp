@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/values/case.hpp"
+#include <ecorche/values/case.hpp>
 
 namespace ecorche::shapes {
 

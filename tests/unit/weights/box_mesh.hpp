@@ -8,7 +8,7 @@
 #include <functional>
 #include <random>
 
-#include "core/values/mesh.hpp"
+#include <ecorche/values/mesh.hpp>
 
 namespace ecorche::test {
 

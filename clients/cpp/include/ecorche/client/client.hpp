@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// A small blocking client of the framed protocol (docs/protocol.md).
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <ecorche/client/socket.hpp>
+#include <ecorche/wire/framing.hpp>
+
+namespace ecorche::client {
+
+/// How a server is entered.
+struct Access {
+  std::string authorities;   ///< PEM file whose certificates are trusted; empty: no TLS
+  std::string token;         ///< of the right to connect
+  std::string resume_token;  ///< ServerHello.resume_token of an earlier connection
+};
+
+/// One connection; for one thread. Frames are acknowledged and pings answered as they are read, so call
+/// receive() often.
+///
+///   Client client(wire::parse_address("127.0.0.1:7070"), "my program");
+///   v1::Envelope open;
+///   open.mutable_open_model();
+///   const wire::Frame opened = client.call(open);           // ModelOpened and its triangles
+///   ...
+///   client.send(pose);
+///   while (auto message = client.receive(until)) { ... }    // PoseAck, MeshFrame, VolumeFrame
+///
+/// Errors: temporary (nobody there, hung up, the server stops or has no room), refused (PERMISSION_DENIED),
+/// protocol (anything else that the server says or does).
+class Client {
+ public:
+  /// How long the server may take for an answer.
+  static constexpr std::chrono::seconds patience{30};
+
+  /// Connects and exchanges the hellos.
+  Client(const wire::Address& address, const std::string& name, const Access& access = {});
+
+  const v1::ServerHello& server() const { return hello_; }
+
+  /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
+  /// answer is a Status that is not OK.
+  wire::Frame call(v1::Envelope request, std::shared_ptr<const wire::Payload> payload = nullptr);
+
+  /// Sends what has no direct answer: poses.
+  void send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload = nullptr);
+
+  /// The next message; nothing when none came whole until `until`. Throws when the server ends the
+  /// connection.
+  std::optional<wire::Frame> receive(Clock::time_point until);
+
+  /// A frame that was read to its end: its memory serves a later payload.
+  void reuse(wire::Frame spent) { reader_.reuse(std::move(spent.payload)); }
+
+  /// All read so far, framing included.
+  std::uint64_t bytes_received() const { return bytes_received_; }
+
+ private:
+  std::optional<wire::Frame> read_frame(Clock::time_point until);
+  void attend(const v1::Envelope& envelope);
+
+  Socket socket_;
+  wire::FrameReader reader_;
+  std::deque<wire::Frame> waiting_;
+  v1::ServerHello hello_;
+  std::uint64_t last_request_ = 0;
+  std::uint64_t bytes_received_ = 0;
+};
+
+/// The error that a status is to whoever asked. `where` names the request.
+Error to_error(const std::string& where, const v1::Status& status);
+
+}  // namespace ecorche::client

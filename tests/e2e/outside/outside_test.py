@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Projects outside of this tree use ecorche: installed, by find_package; and as a part of their own, by add_subdirectory.
+
+usage: outside_test.py SOURCE BUILD; the environment is that of the fixtures
+"""
+import ctypes
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE, BUILD = (pathlib.Path(word) for word in sys.argv[1:3])
+HERE = pathlib.Path(__file__).resolve().parent
+
+
+def run(*words, **options):
+    result = subprocess.run([str(word) for word in words], capture_output=True, text=True, **options)
+    assert result.returncode == 0, f"{words}: {result.returncode}\n{result.stdout[-4000:]}\n{result.stderr[-4000:]}"
+    return result.stdout
+
+
+class Outside(unittest.TestCase):
+    def setUp(self):
+        self.scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(self.scratch.cleanup)
+        self.folder = pathlib.Path(self.scratch.name)
+
+    def nobody_answers(self, connect):
+        result = subprocess.run([connect, "127.0.0.1:1"], capture_output=True, text=True)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, r"^error: 127\.0\.0\.1:1: ")
+
+    def test_installed(self):
+        first, prefix, build = self.folder / "first", self.folder / "moved", self.folder / "build"
+        run("cmake", "--install", BUILD, "--prefix", first)
+        first.rename(prefix)  # nothing in it knows where it was installed
+        for file in prefix.rglob("*.cmake"):
+            self.assertNotRegex(file.read_text(), re.escape(str(SOURCE)), file)
+        for header in (prefix / "include").rglob("*.hpp"):
+            self.assertEqual(header.relative_to(prefix).parts[1], "ecorche", header)
+        run("cmake", "-S", HERE / "installed", "-B", build, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}", "-Wno-dev")
+        run("cmake", "--build", build)
+        self.assertRegex(run(prefix / "bin" / "ecorche", "--version"), r"^\d+\.\d+\.\d+$")
+
+        model = self.folder / "body.hdf"
+        self.assertRegex(run(build / "prepare", os.environ["ECORCHE_CASE"], model), r"^\d{4,6} tets$")
+        said = run(build / "pose", model, "knee_right", "flexion", "60")
+        self.assertRegex(said, r"^ecorche \d+\.\d+\.\d+: [2-9]\d\d\.\d mm, (pass|warn)$")
+        self.nobody_answers(build / "connect")
+
+        plugin = build / "libplugin.so"
+        self.assertGreater(ctypes.CDLL(str(plugin)).plugin_nodes(str(model).encode()), 1000)
+        shown = run("nm", "-D", "--defined-only", "-C", plugin)
+        self.assertIn("plugin_nodes", shown)
+        self.assertNotIn("ecorche::", shown)
+
+    def test_part_of_another_project(self):
+        build = self.folder / "build"
+        run("cmake", "-S", HERE / "subproject", "-B", build, "-G", "Ninja", f"-DECORCHE_SOURCE={SOURCE}", "-Wno-dev")
+        run("cmake", "--build", build)
+        self.nobody_answers(build / "connect")
+        self.assertFalse((build / "bin").exists(), "the outer project's folders are its own")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
