@@ -7,7 +7,7 @@
 
 #include "app/command.hpp"
 #include "core/values/skeleton.hpp"
-#include "runtime/server/clip.hpp"
+#include "runtime/server/session/clip.hpp"
 
 namespace ecorche::app {
 

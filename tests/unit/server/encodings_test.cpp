@@ -6,7 +6,7 @@
 #include <set>
 
 #include "proto/mesh_decoder.hpp"
-#include "runtime/server/mesh_stream.hpp"
+#include "runtime/server/session/mesh_stream.hpp"
 #include "runtime/skin/body_poser.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
