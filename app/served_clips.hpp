@@ -7,7 +7,7 @@
 
 #include <ecorche/values/skeleton.hpp>
 #include "app/command.hpp"
-#include "runtime/server/clip.hpp"
+#include "runtime/server/session/clip.hpp"
 
 namespace ecorche::app {
 

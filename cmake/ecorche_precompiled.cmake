@@ -36,7 +36,7 @@ set(_standard <algorithm> <array> <atomic> <cmath> <cstdint> <deque> <filesystem
   <numeric> <optional> <random> <set> <span> <sstream> <string> <string_view> <unordered_map> <utility> <variant> <vector>)
 set(_plain ${_standard} <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <tbb/blocked_range.h> <tbb/parallel_for.h> <tbb/task_arena.h>)
 set(_command ${_standard} <chrono> <Eigen/Core> <Eigen/Geometry> <CLI/CLI.hpp> <fmt/format.h> <nlohmann/json.hpp>)
-set(_server ${_standard} <chrono> <Eigen/Core> <Eigen/Geometry> ${PROJECT_SOURCE_DIR}/runtime/server/asio.hpp <boost/asio/read.hpp>
+set(_server ${_standard} <chrono> <Eigen/Core> <Eigen/Geometry> ${PROJECT_SOURCE_DIR}/runtime/server/net/asio.hpp <boost/asio/read.hpp>
   <google/protobuf/message_lite.h> <google/protobuf/repeated_field.h>)
 
 # ecorche_pch(KIND EXECUTABLE|LIBRARY HEADERS... LIBS...): an object library that only carries the headers.

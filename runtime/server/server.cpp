@@ -9,13 +9,14 @@
 #include <thread>
 #include <utility>
 
-#include "runtime/server/connection.hpp"
-#include "runtime/server/post_back.hpp"
-#include "runtime/server/rates.hpp"
-#include "runtime/server/reserve.hpp"
-#include "runtime/server/shares.hpp"
-#include "runtime/server/tls.hpp"
-#include "runtime/server/web.hpp"
+#include "runtime/server/handlers/connection.hpp"
+#include "runtime/server/net/tls.hpp"
+#include "runtime/server/net/web.hpp"
+#include "runtime/server/registry/test_hooks.hpp"
+#include "runtime/server/resources/rates.hpp"
+#include "runtime/server/resources/reserve.hpp"
+#include "runtime/server/resources/shares.hpp"
+#include "runtime/server/schedule/post_back.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -87,8 +88,8 @@ void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
 }  // namespace
 
 struct Server::Impl {
-  Impl(Options options, std::vector<NamedModel> models, Workers& workers_, Seams seams)
-      : workers(workers_), wrap(seams.transport) {
+  Impl(Options options, std::vector<NamedModel> models, Workers& workers_, TestHooks hooks)
+      : workers(workers_), wrap(hooks.transport) {
     check_options(options);
     bind(acceptor, endpoint_of(options.listen, options));
     port = acceptor.local_endpoint().port();
@@ -103,11 +104,12 @@ struct Server::Impl {
             .messages_per_second = options.limits.messages_per_second,
             .ready = [this] { return !stopping; },
             .metrics = [this] { return metrics(); },
-            .denied = [this] { house->metrics().denied(); },
+            .denied = [this] { registry->metrics().denied(); },
             .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
             .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
                               bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
-    house = std::make_unique<House>(io, workers, std::move(options), std::move(models), std::move(seams));
+    registry = std::make_unique<SessionRegistry>(io, workers, std::move(options), std::move(models),
+                                                 std::move(hooks));
   }
 
   net::awaitable<void> accept(tcp::acceptor& at, bool web);
@@ -133,7 +135,7 @@ struct Server::Impl {
   std::uint16_t port = 0, http_port = 0;
   std::unique_ptr<Carrier> carrier;
   WebRoom room;
-  std::unique_ptr<House> house;
+  std::unique_ptr<SessionRegistry> registry;
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
   Reserve* reserve = nullptr;  ///< while it runs
@@ -141,8 +143,11 @@ struct Server::Impl {
   std::map<WebKind, Rates> admitted;  ///< requests
 };
 
-Server::Server(Options options, std::vector<NamedModel> models, Workers& workers, Seams seams)
-    : impl_(std::make_unique<Impl>(std::move(options), std::move(models), workers, std::move(seams))) {}
+Server::Server(Options options, std::vector<NamedModel> models, Workers& workers)
+    : Server(std::move(options), std::move(models), workers, TestHooks{}) {}
+
+Server::Server(Options options, std::vector<NamedModel> models, Workers& workers, TestHooks hooks)
+    : impl_(std::make_unique<Impl>(std::move(options), std::move(models), workers, std::move(hooks))) {}
 
 Server::~Server() = default;
 
@@ -181,7 +186,7 @@ void Server::stop() {
 void Server::reload() {
   post_back(impl_->io, [this] {
     spdlog::info("asked to read the models again");
-    impl_->house->reload_all();
+    impl_->registry->reload_all();
   });
 }
 
@@ -196,9 +201,9 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
       if (!ec) receive(std::move(socket), web);
       failed = static_cast<bool>(ec);
       // Out of file descriptors, or the client is gone already: neither ends the server.
-      if (ec) house->journal().line(spdlog::level::warn, "accept: " + ec.message());
+      if (ec) registry->journal().line(spdlog::level::warn, "accept: " + ec.message());
     } catch (const std::exception& error) {
-      house->journal().line(spdlog::level::warn, std::string("accept: ") + error.what());
+      registry->journal().line(spdlog::level::warn, std::string("accept: ") + error.what());
       failed = true;
     }
     try {
@@ -219,7 +224,7 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
     if (wrap) transport = wrap(std::move(transport));
   }
   if (!web) return welcome(std::move(transport), std::move(peer), false, in_kernel);
-  if (!room_for_request(Clock::now())) return house->metrics().hit("connections");
+  if (!room_for_request(Clock::now())) return registry->metrics().hit("connections");
   {
     const MayFail may_fail;
     requests.push_back(web_request(std::move(transport), std::move(peer), room));
@@ -230,9 +235,9 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
 // Of requests, too, the oldest makes way.
 bool Server::Impl::room_for_request(Clock::time_point now) {
   std::erase_if(requests, [](const auto& request) { return request->over(); });
-  if (requests.size() < house->limits().connections) return true;
+  if (requests.size() < registry->limits().connections) return true;
   if (now - requests.front()->born() < kTimeToGreet) return false;
-  house->metrics().hit("hello");
+  registry->metrics().hit("hello");
   requests.front()->close();
   requests.erase(requests.begin());
   return true;
@@ -240,18 +245,18 @@ bool Server::Impl::room_for_request(Clock::time_point now) {
 
 // At most a second's worth in one go. All together are as many as the port lets in (kBetween).
 bool Server::Impl::admit(WebKind kind, const std::string& peer) {
-  const double rate = house->limits().requests_per_second;
+  const double rate = registry->limits().requests_per_second;
   Rates& of_kind = admitted.try_emplace(kind, rate, rate).first->second;
   if (of_kind.take(address_of(peer), Clock::now())) return true;
-  house->metrics().hit("requests");
+  registry->metrics().hit("requests");
   return false;
 }
 
 void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven,
                            Clock::duration waited) {
   if (stopping) return;
-  const auto limit = house->limits().connections;
-  const auto share = portion(limit, house->limits().peer_share);
+  const auto limit = registry->limits().connections;
+  const auto share = portion(limit, registry->limits().peer_share);
   const std::string address = address_of(peer);
   std::size_t alive = 0, own = 0;
   for (const auto& c : connections) {
@@ -263,12 +268,12 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
   bool let_in = alive < limit && !beyond;
   if (!let_in) let_in = make_way(Clock::now(), beyond ? address : std::string());
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
-  if (!let_in) house->metrics().hit("connections");
+  if (!let_in) registry->metrics().hit("connections");
   if (connections.size() >= limit + kMostRefusals) return;
   {
     const MayFail may_fail;  // as in receive()
     connections.push_back(
-        std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *house));
+        std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *registry));
   }
   if (let_in) return connections.back()->start();
   connections.back()->start_refused(
@@ -280,7 +285,7 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
 // Of those who read nothing, whoever holds most: the longest queue is pushed out (Wei, Coyle, Hsiao 1991), if
 // it is longer than half of what each would have of the memory. One at a time: its bytes are given back soon.
 void Server::Impl::make_room(Clock::time_point now, Clock::duration patience) {
-  std::uint64_t most = house->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
+  std::uint64_t most = registry->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
   Connection* longest = nullptr;
   for (const auto& connection : connections) {
     const std::uint64_t bytes = connection->clogged(now, patience);
@@ -298,7 +303,7 @@ bool Server::Impl::make_way(Clock::time_point now, const std::string& address) {
   });
   if (silent == connections.end()) return false;
   // Whoever is told why stays for a moment.
-  (*silent)->make_way(connections.size() + 1 < house->limits().connections + kMostRefusals);
+  (*silent)->make_way(connections.size() + 1 < registry->limits().connections + kMostRefusals);
   return true;
 }
 
@@ -318,7 +323,7 @@ net::awaitable<void> Server::Impl::watch() {
       without_memory();
     }
   }
-  house->end_recordings();
+  registry->end_recordings();
   // Until the last client had its goodbye, the HTTP port tells that the server stops.
   http_acceptor.close(ec);
   for (const auto& request : requests) request->close();
@@ -330,40 +335,40 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
   for (const auto& connection : connections) next = std::min(next, connection->check(now));
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   for (const auto& request : requests) {
-    const Clock::duration left = duration(house->limits().hello_seconds) - (now - request->born());
+    const Clock::duration left = duration(registry->limits().hello_seconds) - (now - request->born());
     if (left > Clock::duration::zero()) {
       next = std::min(next, left);
       continue;
     }
-    if (!request->over()) house->metrics().hit("hello");
+    if (!request->over()) registry->metrics().hit("hello");
     request->close();
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });
-  if (const auto patience = house->patience(now)) {
+  if (const auto patience = registry->patience(now)) {
     make_room(now, *patience);
     next = std::min(next, kRoomTick);
   }
-  house->sweep(now);
+  registry->sweep(now);
   if (const std::size_t used = reserve->refill())
-    house->journal().line(spdlog::level::warn,
-                          "out of memory: " + std::to_string(used * Reserve::piece_bytes / 1024) +
-                              " KiB of what is put by for that were used");
+    registry->journal().line(spdlog::level::warn,
+                             "out of memory: " + std::to_string(used * Reserve::piece_bytes / 1024) +
+                                 " KiB of what is put by for that were used");
   return std::max(next, kShortTick);
 }
 
 std::string Server::Impl::metrics() {
-  Metrics& figures = house->metrics();
+  Metrics& figures = registry->metrics();
   figures.set_clients(static_cast<std::size_t>(
       std::count_if(connections.begin(), connections.end(), [](const auto& c) { return !c->closed(); })));
-  figures.set_sessions(house->sessions());
-  figures.set_memory(house->memory().bytes(), house->memory().kept());
+  figures.set_sessions(registry->sessions());
+  figures.set_memory(registry->memory().bytes(), registry->memory().kept());
   return figures.text();
 }
 
 void Server::Impl::begin_shutdown() {
   if (std::exchange(stopping, true)) return;
   spdlog::info("stopping: {} connections", connections.size());
-  house->stop();
+  registry->stop();
   boost::system::error_code ec;
   acceptor.close(ec);
   tick.cancel();
@@ -388,7 +393,7 @@ net::awaitable<void> Server::Impl::pause(net::steady_timer& timer, Clock::durati
   boost::system::error_code ec;
   try {
     timer.expires_after(stopping ? kShortTick : time);
-    co_await house->wait(timer, ec);
+    co_await registry->wait(timer, ec);
   } catch (const std::exception& error) {
     spdlog::error("server: {}", error.what());
   }

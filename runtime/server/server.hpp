@@ -7,12 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "runtime/server/named_model.hpp"
-#include "runtime/server/options.hpp"
-#include "runtime/server/seams.hpp"
-#include "runtime/server/workers.hpp"
+#include "runtime/server/registry/named_model.hpp"
+#include "runtime/server/resources/options.hpp"
+#include "runtime/server/schedule/workers.hpp"
 
 namespace ecorche::server {
+
+struct TestHooks;
 
 /// One I/O thread holds every connection and session; workers pose.
 ///
@@ -28,7 +29,7 @@ class Server {
   /// Binds and listens. Throws Error{temporary} when the address is in use, Error{usage} for one that cannot
   /// be or half of TLS, Error{refused} beyond loopback without TLS and a token (unless Options::insecure),
   /// Error{config} for too many models or two of one name, and for files that are no certificate.
-  Server(Options options, std::vector<NamedModel> models, Workers& workers, Seams seams = {});
+  Server(Options options, std::vector<NamedModel> models, Workers& workers);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -46,6 +47,10 @@ class Server {
   void stop();
   /// Reads all models again, aside, as ReloadModel does; the log tells how each went. As stop().
   void reload();
+
+ protected:
+  /// For tests: what never fails is made to fail (registry/test_hooks.hpp).
+  Server(Options options, std::vector<NamedModel> models, Workers& workers, TestHooks hooks);
 
  private:
   struct Impl;

@@ -21,7 +21,7 @@
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/weights/harmonic.hpp"
-#include "runtime/server/journal.hpp"
+#include "runtime/server/resources/journal.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace {

@@ -43,7 +43,7 @@ EXCEPTIONS = {
     "preprocess/tet/lattice/clipper.cpp": {"it shares its only tet": "no body is known that does it"},
     "preprocess/voxel/voxelize.cpp": {"more bones than 16-bit labels": SIZE},
     "preprocess/weights/cholmod/cholmod_solver.cpp": {"status ": CALLER, "solve before factor": CALLER},
-    "runtime/server/recording_file.cpp": {"flushed": "takes a disk that fails between two calls", "renamed": "takes a disk that fails between two calls"},
+    "runtime/server/session/recording_file.cpp": {"flushed": "takes a disk that fails between two calls", "renamed": "takes a disk that fails between two calls"},
     "proto/framing.cpp": {"do not make a frame": CALLER},
 }
 

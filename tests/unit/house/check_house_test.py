@@ -34,6 +34,7 @@ class House(unittest.TestCase):
             "runtime/skin/a.cpp": SPDX + '#include <ecorche/values/mesh.hpp>\n#include "runtime/skin/a.hpp"\n#include <vector>\n',
             "runtime/server/b.cpp": SPDX + '#include "runtime/skin/a.hpp"\n#include <ecorche/model_file/model_file.hpp>\n',
             "runtime/include/ecorche/runtime/c.hpp": SPDX + '#include <ecorche/values/mesh.hpp>\n',
+            "runtime/server/handlers/c.cpp": SPDX + '#include "runtime/server/net/asio.hpp"\n#include "runtime/skin/a.hpp"\n',
             "README.md": "no licence line needed\n"}) if line], [])
 
     def test_forbidden_arrows(self):
@@ -41,7 +42,13 @@ class House(unittest.TestCase):
                               ("runtime/skin/a.cpp", "runtime/server/server.hpp"), ("core/values/a.hpp", "core/files/atomic_file.hpp"),
                               ("core/kinematics/a.cpp", "core/solve/spd_solver.hpp"), ("io/image/a.cpp", "preprocess/pipeline.hpp"),
                               ("preprocess/cor/a.cpp", "runtime/skin/body_poser.hpp"), ("phantom/a.cpp", "io/case/case_file.hpp"),
-                              ("io/case/a.cpp", "app/command.hpp")]:
+                              ("io/case/a.cpp", "app/command.hpp"),
+                              ("runtime/server/net/a.cpp", "runtime/server/schedule/workers.hpp"),
+                              ("runtime/server/net/a.cpp", "runtime/skin/body_poser.hpp"),
+                              ("runtime/server/schedule/a.cpp", "runtime/server/session/session.hpp"),
+                              ("runtime/server/session/a.cpp", "runtime/server/registry/recordings.hpp"),
+                              ("runtime/server/registry/a.cpp", "runtime/server/handlers/connection.hpp"),
+                              ("runtime/server/handlers/a.cpp", "runtime/server/server.hpp")]:
             self.assert_refused(path, SPDX + f'#include "{include}"\n', "may not include")
 
         for path, include in [("runtime/skin/a.cpp", "preprocess/pipeline.hpp"), ("core/values/a.cpp", "runtime/body_poser.hpp"),

@@ -2,7 +2,7 @@
 // TLS and tokens: who may connect, and who sees what is said.
 #include <filesystem>
 
-#include "runtime/server/tls.hpp"
+#include "runtime/server/net/tls.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/certificate.hpp"
 #include "tests/unit/server/test_server.hpp"

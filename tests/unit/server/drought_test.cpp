@@ -10,7 +10,7 @@
 #include <new>
 #include <string>
 
-#include "runtime/server/guarded.hpp"
+#include "runtime/server/resources/guarded.hpp"
 #include "tests/unit/server/conversation.hpp"
 #include "tests/unit/server/failing_new.hpp"
 #include "tests/unit/server/web_client.hpp"

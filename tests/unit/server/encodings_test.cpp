@@ -7,7 +7,7 @@
 
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/wire/mesh_decoder.hpp>
-#include "runtime/server/mesh_stream.hpp"
+#include "runtime/server/session/mesh_stream.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 

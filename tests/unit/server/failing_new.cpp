@@ -63,7 +63,7 @@ void* allocate(std::size_t size) {
   }
 }
 
-void let_go(void* memory) {
+void give_back(void* memory) {
   if (dry && !spared && memory) left += static_cast<std::int64_t>(malloc_usable_size(memory));
   std::free(memory);
 }
@@ -77,14 +77,14 @@ void* operator new[](std::size_t size) {
   return allocate(size);
 }
 void operator delete(void* memory) noexcept {
-  let_go(memory);
+  give_back(memory);
 }
 void operator delete[](void* memory) noexcept {
-  let_go(memory);
+  give_back(memory);
 }
 void operator delete(void* memory, std::size_t) noexcept {
-  let_go(memory);
+  give_back(memory);
 }
 void operator delete[](void* memory, std::size_t) noexcept {
-  let_go(memory);
+  give_back(memory);
 }

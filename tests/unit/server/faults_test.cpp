@@ -11,7 +11,7 @@ namespace {
 struct Faults {
   Countdown reads, writes, timers;
 
-  Seams seams() {
+  TestHooks hooks() {
     return {.transport =
                 [this](std::unique_ptr<Transport> inner) {
                   return std::make_unique<FaultyTransport>(std::move(inner), reads, writes);
@@ -39,19 +39,19 @@ int for_every_failure(const TestServer& server, Countdown& countdown, Talk&& tal
 
 TEST(FaultsTest, TheNthRead) {
   Faults faults;
-  const TestServer server(Options{}, faults.seams());
+  const TestServer server(Options{}, faults.hooks());
   EXPECT_GT(for_every_failure(server, faults.reads, [&] { converse(server, 0.5); }), 8);
 }
 
 TEST(FaultsTest, TheNthWrite) {
   Faults faults;
-  const TestServer server(Options{}, faults.seams());
+  const TestServer server(Options{}, faults.hooks());
   EXPECT_GT(for_every_failure(server, faults.writes, [&] { converse(server, 0.5); }), 5);
 }
 
 TEST(FaultsTest, TheNthTimer) {
   Faults faults;
-  const TestServer server(Options{}, faults.seams());
+  const TestServer server(Options{}, faults.hooks());
   // A wait that ends early is no reason to lose anything.
   for (int n = 0; n < 20; ++n) {
     faults.timers.set(n);
@@ -63,7 +63,7 @@ TEST(FaultsTest, TheNthReadAndWriteBelowAWebSocket) {
   Faults faults;
   Options options;
   options.http = Endpoint{};
-  const TestServer server(options, faults.seams());
+  const TestServer server(options, faults.hooks());
   const auto talk = [&] {
     try {
       WebClient client(server.http());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/server/flow.hpp"
+#include "runtime/server/net/flow.hpp"
 
 #include <gtest/gtest.h>
 

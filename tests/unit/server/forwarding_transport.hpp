@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/server/transport.hpp"
+#include "runtime/server/net/transport.hpp"
 
 namespace ecorche::server {
 
@@ -30,7 +30,7 @@ class ForwardingTransport : public Transport {
   bool hung_up() override { return inner_->hung_up(); }
   std::optional<bool> message_ended() const override { return inner_->message_ended(); }
   bool wrong_kind() const override { return inner_->wrong_kind(); }
-  void ends_by(Farewell why) override { inner_->ends_by(why); }
+  void ends_by(CloseReason why) override { inner_->ends_by(why); }
 
  private:
   std::unique_ptr<Transport> inner_;

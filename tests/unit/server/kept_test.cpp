@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "runtime/server/kept.hpp"
+#include "runtime/server/session/retained_bytes.hpp"
 #include "tests/unit/server/session_stage.hpp"
 #include "tests/unit/server/test_server.hpp"
 #include "tests/unit/server/web_client.hpp"
@@ -20,8 +20,8 @@ Stage stage_with(std::uint64_t kept) {
 }
 
 std::uint64_t kept_by_scan(const Model& model) {
-  const VolumeWant want;
-  return kept_by(model, want, rest_voxels(model, want));
+  const VolumeSpec spec;
+  return kept_by(model, spec, rest_voxels(model, spec));
 }
 
 TEST(Kept, AVolumeCountsWhileSomebodyWatchesIt) {
@@ -52,16 +52,16 @@ TEST(Kept, AVolumeCountsWhileSomebodyWatchesIt) {
 TEST(Kept, ARegionCountsAsLargeAsItIs) {
   const Model model = test::toy_model();
   const ImageGrid& grid = model.volumes[0].image.grid;
-  VolumeWant want;
-  want.region = runtime::Region{grid.point(1, 2, 3), grid.point(2, 4, 6)};
+  VolumeSpec spec;
+  spec.region = runtime::Region{grid.point(1, 2, 3), grid.point(2, 4, 6)};
   for (std::size_t a = 0; a < 3; ++a) {
-    if (want.region->low[a] > want.region->high[a]) std::swap(want.region->low[a], want.region->high[a]);
+    if (spec.region->low[a] > spec.region->high[a]) std::swap(spec.region->low[a], spec.region->high[a]);
   }
-  EXPECT_EQ(rest_voxels(model, want), 2U * 3 * 4);
+  EXPECT_EQ(rest_voxels(model, spec), 2U * 3 * 4);
   // A region that is larger than any volume may be: each of its frames says so, and nothing is made.
   Stage stage = stage_with(kPlenty);
-  want.region = runtime::Region{{-1e5, -1e5, -1e5}, {1e5, 1e5, 1e5}};
-  EXPECT_TRUE(stage.session->subscribe(stage.watcher, {.id = 0, .want = want, .request = {}}));
+  spec.region = runtime::Region{{-1e5, -1e5, -1e5}, {1e5, 1e5, 1e5}};
+  EXPECT_TRUE(stage.session->subscribe(stage.watcher, {.id = 0, .spec = spec, .request = {}}));
   EXPECT_EQ(stage.memory.kept(), 0U);
 }
 
@@ -70,23 +70,23 @@ TEST(Kept, MeshesCountByTheirEncodingAndParts) {
   Stage stage = stage_with(kPlenty);
   const std::uint64_t vertices = static_cast<std::uint64_t>(stage.model->model().tissues[0].V.rows());
   const auto more_for = [&](const auto& change) {
-    MeshWant want;
-    want.tissues = {0};
-    change(want);
+    MeshSpec spec;
+    spec.tissues = {0};
+    change(spec);
     const std::uint64_t before = stage.memory.kept();
-    EXPECT_TRUE(stage.session->subscribe(stage.watcher, {.id = 0, .want = want, .request = {}}));
+    EXPECT_TRUE(stage.session->subscribe(stage.watcher, {.id = 0, .spec = spec, .request = {}}));
     return stage.memory.kept() - before;
   };
-  EXPECT_EQ(more_for([](MeshWant& w) { w.normals = true; }), 0U);
-  EXPECT_EQ(more_for([](MeshWant& w) { w.encoding = v1::ENCODING_U16; }), 0U);
-  const std::uint64_t deltas = more_for([](MeshWant& w) { w.encoding = v1::ENCODING_U16_DELTA; });
+  EXPECT_EQ(more_for([](MeshSpec& w) { w.normals = true; }), 0U);
+  EXPECT_EQ(more_for([](MeshSpec& w) { w.encoding = v1::ENCODING_U16; }), 0U);
+  const std::uint64_t deltas = more_for([](MeshSpec& w) { w.encoding = v1::ENCODING_U16_DELTA; });
   EXPECT_GE(deltas, 12 * vertices);
-  EXPECT_EQ(more_for([](MeshWant& w) { w.encoding = v1::ENCODING_U16_DELTA, w.max_rate = 30; }), deltas);
-  const std::uint64_t part = more_for([](MeshWant& w) { w.level = 1; });
+  EXPECT_EQ(more_for([](MeshSpec& w) { w.encoding = v1::ENCODING_U16_DELTA, w.max_rate = 30; }), deltas);
+  const std::uint64_t part = more_for([](MeshSpec& w) { w.level = 1; });
   EXPECT_GT(part, 0U);
-  EXPECT_GT(more_for([](MeshWant& w) { w.level = 1, w.encoding = v1::ENCODING_U16; }), part);
-  EXPECT_GT(more_for([](MeshWant& w) { w.adaptive = true; }), part);
-  EXPECT_GT(more_for([](MeshWant& w) { w.control_nodes = true; }), 0U);
+  EXPECT_GT(more_for([](MeshSpec& w) { w.level = 1, w.encoding = v1::ENCODING_U16; }), part);
+  EXPECT_GT(more_for([](MeshSpec& w) { w.adaptive = true; }), part);
+  EXPECT_GT(more_for([](MeshSpec& w) { w.control_nodes = true; }), 0U);
 }
 
 v1::Envelope for_scan(const TestServer& server, double rate) {

@@ -12,10 +12,10 @@
 
 #include <ecorche/wire/mesh_decoder.hpp>
 #include <ecorche/wire/volume_decoder.hpp>
-#include "runtime/server/judging.hpp"
-#include "runtime/server/mesh_streams.hpp"
-#include "runtime/server/pose_job.hpp"
-#include "runtime/server/volume_stream.hpp"
+#include "runtime/server/session/mesh_streams.hpp"
+#include "runtime/server/session/pose_job.hpp"
+#include "runtime/server/session/quality_job.hpp"
+#include "runtime/server/session/volume_stream.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/conversation.hpp"
 #include "tests/unit/server/failing_new.hpp"
@@ -138,16 +138,16 @@ struct Reader {
 
 class Posing {
  public:
-  explicit Posing(const std::vector<Want>& wants) {
-    for (const Want& want : wants) {
+  explicit Posing(const std::vector<StreamSpec>& wants) {
+    for (const StreamSpec& spec : wants) {
       Reader& reader = readers_.emplace_back();
       reader.subscription.id = static_cast<std::uint32_t>(readers_.size());
-      reader.subscription.want = want;
+      reader.subscription.spec = spec;
       reader.subscription.keyframes = ~0U;
-      if (const auto* mesh = std::get_if<MeshWant>(&want))
+      if (const auto* mesh = std::get_if<MeshSpec>(&spec))
         reader.subscription.streams = open_streams(model(), *mesh);
       else
-        reader.subscription.volume = std::make_shared<VolumeStream>(std::get<VolumeWant>(want), 0);
+        reader.subscription.volume = std::make_shared<VolumeStream>(std::get<VolumeSpec>(spec), 0);
     }
   }
 
@@ -241,41 +241,41 @@ class Posing {
       const float bound = tissue.numbers.empty() ? 0 : model().step;
       for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(tissue.positions[i], expected[i], bound);
     }
-    const auto* want = std::get_if<VolumeWant>(&reader.subscription.want);
-    if (!want) return;
+    const auto* spec = std::get_if<VolumeSpec>(&reader.subscription.spec);
+    if (!spec) return;
     static std::map<std::pair<bool, double>, Image> made;
-    Image& expected = made[{want->by_spheres, pose.rotation[2].x()}];
+    Image& expected = made[{spec->by_spheres, pose.rotation[2].x()}];
     if (expected.bytes.empty()) {
-      const ModelVolume& volume = model().model().volumes[want->volume];
+      const ModelVolume& volume = model().model().volumes[spec->volume];
       expected =
-          want->by_spheres
-              ? runtime::pose_volume(model().model(), body.segments, volume, std::nullopt, want->sampling)
-              : runtime::pose_volume(poser.shared_model(), body.nodes, volume, want->sampling,
+          spec->by_spheres
+              ? runtime::pose_volume(model().model(), body.segments, volume, std::nullopt, spec->sampling)
+              : runtime::pose_volume(poser.shared_model(), body.nodes, volume, spec->sampling,
                                      runtime::grow_to(volume.image.grid, body.nodes));
     }
     ASSERT_EQ(reader.image.bytes, expected.bytes);
   }
 
-  ServerMemory memory_{std::uint64_t{1} << 30, std::uint64_t{1} << 30};
+  MemoryBudget memory_{std::uint64_t{1} << 30, std::uint64_t{1} << 30};
   std::vector<Reader> readers_;
   std::vector<PosedFrame> frames_;
   std::uint64_t number_ = 0;
   bool struck_ = false;
 };
 
-MeshWant mesh_want(v1::Encoding encoding, std::vector<std::uint32_t> tissues, bool normals = false) {
-  MeshWant want;
-  want.tissues = std::move(tissues);
-  want.encoding = encoding;
-  want.normals = normals;
-  return want;
+MeshSpec mesh_want(v1::Encoding encoding, std::vector<std::uint32_t> tissues, bool normals = false) {
+  MeshSpec spec;
+  spec.tissues = std::move(tissues);
+  spec.encoding = encoding;
+  spec.normals = normals;
+  return spec;
 }
 
-VolumeWant volume_want(bool by_spheres) {
-  VolumeWant want;
-  want.by_spheres = by_spheres;
-  want.changed_bricks = want.compressed = true;
-  return want;
+VolumeSpec volume_want(bool by_spheres) {
+  VolumeSpec spec;
+  spec.by_spheres = by_spheres;
+  spec.changed_bricks = spec.compressed = true;
+  return spec;
 }
 
 // Whichever it is, no frame is wrong, and those of the next pose but one are there.
@@ -283,7 +283,7 @@ TEST(MemoryTest, TheNthAllocationOfAPose) {
   Posing::model().meter();
   Posing::model().volumes();
   Posing::model().balls(0);
-  const std::vector<std::vector<Want>> cases{
+  const std::vector<std::vector<StreamSpec>> cases{
       {mesh_want(v1::ENCODING_F32, {0, 1})},  // sent as it lies
       {mesh_want(v1::ENCODING_F32, {0}), mesh_want(v1::ENCODING_U16, {0, 1}, true)},
       {mesh_want(v1::ENCODING_U16_DELTA, {0, 1}), mesh_want(v1::ENCODING_U16_DELTA, {1}, true)},
@@ -325,7 +325,7 @@ TEST(MemoryTest, TheNthAllocationOfAJudgement) {
   bool struck = true, judged = false;
   int n = 0;
   for (; struck; ++n) {
-    JudgeJob job;
+    QualityJob job;
     job.model = model;
     job.request.sequence = 7;
     job.request.pose = Pose::rest(model->model().segment_count());
@@ -337,7 +337,7 @@ TEST(MemoryTest, TheNthAllocationOfAJudgement) {
     struck = allocations.spent();
     allocations.off();
     judged = job.rows[0].quality && job.rows[1].quality;
-    for (const JudgeJob::Row& row : job.rows) {
+    for (const QualityJob::Row& row : job.rows) {
       if (row.quality) {
         EXPECT_EQ(row.quality->tissues_size(), static_cast<int>(row.tissues.size()));
       }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/server/mesh_stream.hpp"
+#include "runtime/server/session/mesh_stream.hpp"
 
 #include <gtest/gtest.h>
 
@@ -23,11 +23,11 @@ runtime::PosedBody body_at(std::uint16_t moved) {
   return body;
 }
 
-MeshWant want_of(v1::Encoding encoding) {
-  MeshWant want;
-  want.tissues = {0};
-  want.encoding = encoding;
-  return want;
+MeshSpec want_of(v1::Encoding encoding) {
+  MeshSpec spec;
+  spec.tissues = {0};
+  spec.encoding = encoding;
+  return spec;
 }
 
 struct Streamed {
@@ -116,9 +116,9 @@ TEST(MeshStream, FindsTheVertexBeyondTheBox) {
 TEST(MeshStream, ShowsPositionsAsTheyLie) {
   runtime::PosedBody body = body_at(0);
   body.tissues = {{1, 2, 3}, {4, 5, 6, 7, 8, 9}, {10, 11, 12}};
-  MeshWant want = want_of(v1::ENCODING_F32);
-  want.tissues = {0, 2};
-  MeshStream stream(want, 0, nullptr);
+  MeshSpec spec = want_of(v1::ENCODING_F32);
+  spec.tissues = {0, 2};
+  MeshStream stream(spec, 0, nullptr);
   EXPECT_TRUE(stream.plain());
   v1::MeshFrame copied, shown;
   wire::Payload payload, joined;
@@ -129,13 +129,13 @@ TEST(MeshStream, ShowsPositionsAsTheyLie) {
   for (const auto& part : pieces.parts) joined.insert(joined.end(), part.begin(), part.end());
   EXPECT_EQ(joined, payload);
   EXPECT_EQ(shown.SerializeAsString(), copied.SerializeAsString());
-  want.normals = true;
-  EXPECT_FALSE(MeshStream(want, 0, nullptr).plain());
-  want.normals = false;
-  EXPECT_FALSE(MeshStream(want, 0, std::make_shared<MeshParts>(2)).plain());
+  spec.normals = true;
+  EXPECT_FALSE(MeshStream(spec, 0, nullptr).plain());
+  spec.normals = false;
+  EXPECT_FALSE(MeshStream(spec, 0, std::make_shared<MeshParts>(2)).plain());
   EXPECT_FALSE(MeshStream(want_of(v1::ENCODING_U16), 0, nullptr).plain());
-  want.control_nodes = true;
-  EXPECT_FALSE(MeshStream(want, 0, nullptr).plain());
+  spec.control_nodes = true;
+  EXPECT_FALSE(MeshStream(spec, 0, nullptr).plain());
 }
 
 }  // namespace

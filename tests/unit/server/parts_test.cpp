@@ -11,9 +11,9 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/wire/mesh_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "runtime/server/house.hpp"
-#include "runtime/server/mesh_rows.hpp"
-#include "runtime/server/served_model.hpp"
+#include "runtime/server/registry/session_registry.hpp"
+#include "runtime/server/session/mesh_rows.hpp"
+#include "runtime/server/session/served_model.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
@@ -98,13 +98,14 @@ TEST(Parts, LevelsAreMadeBeforeAnybodyAsks) {
   changed->tissues[0].V.array() += 1e-3;
   net::io_context io;
   Workers workers(1, [](const Job& job) { job(); });
-  House house(io, workers, {}, {{"toy", model, {}, [changed] { return ModelParts{changed}; }}}, {});
-  const auto first = house.models()[0];
+  SessionRegistry registry(io, workers, {}, {{"toy", model, {}, [changed] { return ModelParts{changed}; }}},
+                           {});
+  const auto first = registry.models()[0];
   EXPECT_TRUE(soon([&] { return first->has_levels(all); }));
-  house.reload("toy", [](const Status& status) { EXPECT_TRUE(status.ok()) << status.message; });
+  registry.reload("toy", [](const Status& status) { EXPECT_TRUE(status.ok()) << status.message; });
   io.run();
-  ASSERT_NE(house.models()[0], first);
-  EXPECT_TRUE(soon([&] { return house.models()[0]->has_levels(all); }));
+  ASSERT_NE(registry.models()[0], first);
+  EXPECT_TRUE(soon([&] { return registry.models()[0]->has_levels(all); }));
 }
 
 TEST(Parts, LevelsThatNobodyWaitsForDoNotHoldUpTheEnd) {
@@ -115,22 +116,22 @@ TEST(Parts, LevelsThatNobodyWaitsForDoNotHoldUpTheEnd) {
   {
     net::io_context io;
     Workers workers(1, [](const Job& job) { job(); });
-    Seams seams;
-    seams.may_coarsen = [&] {
+    TestHooks hooks;
+    hooks.may_coarsen = [&] {
       if (++asked == 1) stopped.acquire();
       return true;
     };
-    House house(io, workers, {}, {{"toy", model, {}, {}}}, seams);
-    house.stop();
+    SessionRegistry registry(io, workers, {}, {{"toy", model, {}, {}}}, hooks);
+    registry.stop();
     stopped.release();
   }
   EXPECT_LE(asked, 1);
 }
 
-Seams on_demand() {
-  Seams seams;
-  seams.may_coarsen = [] { return false; };
-  return seams;
+TestHooks on_demand() {
+  TestHooks hooks;
+  hooks.may_coarsen = [] { return false; };
+  return hooks;
 }
 
 // A thread of its own makes them: whoever asks first may be gone by then.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/server/payload_layout.hpp"
+#include "runtime/server/session/payload_layout.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <numeric>
 
-#include "runtime/server/payload_pool.hpp"
+#include "runtime/server/resources/payload_pool.hpp"
 
 namespace ecorche::server {
 namespace {

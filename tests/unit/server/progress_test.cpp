@@ -14,10 +14,10 @@
 #include <thread>
 #include <vector>
 
-#include "runtime/server/outbox.hpp"
-#include "runtime/server/patience.hpp"
-#include "runtime/server/tls.hpp"
-#include "runtime/server/web.hpp"
+#include "runtime/server/net/outbox.hpp"
+#include "runtime/server/net/patience.hpp"
+#include "runtime/server/net/tls.hpp"
+#include "runtime/server/net/web.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/certificate.hpp"
 #include "tests/unit/server/test_server.hpp"
@@ -56,7 +56,7 @@ SharedFrame small_frame() {
 TEST(Patience, AnAcknowledgementIsAwaitedFromTheWritesEnd) {
   Outbox outbox(2);
   const auto start = Clock::now();
-  for (const std::uint32_t subscription : {1U, 2U}) outbox.offer(subscription, 0, 1, 0, small_frame());
+  for (const std::uint32_t subscription : {1U, 2U}) outbox.enqueue(subscription, 0, 1, 0, small_frame());
   outbox.next(start);
   EXPECT_EQ(outbox.oldest_in_flight(), start);
   EXPECT_FALSE(outbox.oldest_written());
@@ -68,7 +68,7 @@ TEST(Patience, AnAcknowledgementIsAwaitedFromTheWritesEnd) {
   outbox.written(start + milliseconds(40));
   EXPECT_EQ(outbox.oldest_written(), start + milliseconds(40));
   // A later one of the same subscription, and an answer, change nothing about it.
-  outbox.offer(2, 0, 2, 0, small_frame());
+  outbox.enqueue(2, 0, 2, 0, small_frame());
   outbox.next(start + milliseconds(50));
   outbox.written(start + milliseconds(60));
   outbox.answer(small_frame());

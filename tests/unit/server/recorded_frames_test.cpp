@@ -6,8 +6,8 @@
 #include <span>
 
 #include "proto/recording.hpp"
-#include "runtime/server/recording.hpp"
-#include "runtime/server/tls.hpp"
+#include "runtime/server/net/tls.hpp"
+#include "runtime/server/session/recording.hpp"
 #include "tests/unit/server/session_stage.hpp"
 
 namespace ecorche::server {

@@ -6,8 +6,8 @@
 #include <fstream>
 
 #include <ecorche/wire/convert.hpp>
-#include "runtime/server/recording.hpp"
-#include "runtime/server/tls.hpp"
+#include "runtime/server/net/tls.hpp"
+#include "runtime/server/session/recording.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Who may record, how it reaches the disk, and what is left of those who go.
-#include "runtime/server/recordings.hpp"
+#include "runtime/server/registry/recordings.hpp"
 
 #include <filesystem>
 #include <fstream>
 
 #include "proto/recording.hpp"
-#include "runtime/server/tls.hpp"
+#include "runtime/server/net/tls.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {

@@ -9,13 +9,13 @@ namespace {
 
 TEST(Room, IsLeftToThoseWhoNeedLittle) {
   constexpr std::uint64_t kMiB = 1 << 20;
-  const ServerMemory memory(512 * kMiB, 0);
+  const MemoryBudget memory(512 * kMiB, 0);
   EXPECT_FALSE(memory.must_wait(1000 * kMiB, 0)) << "there is nothing else";
-  const ServerMemory::Room much(memory, 300 * kMiB);
+  const MemoryBudget::Reservation much(memory, 300 * kMiB);
   EXPECT_FALSE(memory.must_wait(84 * kMiB, 0));
   EXPECT_TRUE(memory.must_wait(85 * kMiB, 0)) << "a quarter is not for large ones";
   EXPECT_TRUE(memory.must_wait(84 * kMiB, 1));
-  const ServerMemory::Room more(memory, 140 * kMiB);
+  const MemoryBudget::Reservation more(memory, 140 * kMiB);
   EXPECT_FALSE(memory.must_wait(8 * kMiB, 0));
   EXPECT_TRUE(memory.must_wait(9 * kMiB, 0)) << "an eighth is for small ones";
   EXPECT_FALSE(memory.must_wait(kMiB / 4, 70 * kMiB));

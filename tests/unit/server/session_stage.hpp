@@ -16,7 +16,8 @@
 #include <vector>
 
 #include <ecorche/wire/framing.hpp>
-#include "runtime/server/session.hpp"
+#include "runtime/server/session/quality_job.hpp"
+#include "runtime/server/session/session.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::server {
@@ -43,7 +44,7 @@ class Watcher final : public Member {
   }
   // Holds on to every frame, not just to the last, until it is told to let go.
   void hold() { holds_ = true; }
-  void let_go() {
+  void release_frames() {
     held_.clear();
     bytes_.reset();
   }
@@ -141,32 +142,32 @@ struct Stage {
                       }),
         session(open("a", true)) {
     session->join(watcher);
-    want.tissues = {0};
-    want.encoding = encoding;
+    spec.tissues = {0};
+    spec.encoding = encoding;
     subscribe(watcher);
   }
   // To what the watcher sees, or, with another rate, to the same once more.
   std::uint32_t subscribe(Watcher& who, double rate = 0) {
-    MeshWant wanted = want;
+    MeshSpec wanted = spec;
     wanted.max_rate = rate;
-    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}})->id;
+    return session->subscribe(who, {.id = 0, .spec = wanted, .request = {}})->id;
   }
   // To the CT as it is posed, or to a plane of it.
   std::uint32_t subscribe_volume(Watcher& who, bool plane = false, double rate = 0) {
-    VolumeWant wanted;
+    VolumeSpec wanted;
     wanted.max_rate = rate;
     if (plane) {
       ImageGrid& slice = wanted.slices.emplace_back();
       slice.size = {16, 16, 1};
     }
-    return session->subscribe(who, {.id = 0, .want = wanted, .request = {}})->id;
+    return session->subscribe(who, {.id = 0, .spec = wanted, .request = {}})->id;
   }
   ~Stage() {
     gate.open();
     volume_gate.open();
     plane_gate.open();
     session->leave(watcher, false);
-    judging.stop();
+    quality_turns.stop();
     run_until([] { return false; }, milliseconds(50));
     session.reset();
   }
@@ -177,8 +178,9 @@ struct Stage {
                             volume_workers,
                             plane_workers,
                             memory,
-                            judging,
-                            openings,
+                            quality_turns,
+                            first_frames,
+                            activity,
                             metrics,
                             [this](std::shared_ptr<const void> what) { gone.push_back(std::move(what)); }};
     return std::make_shared<Session>(services, model, name, named, limits);
@@ -213,15 +215,16 @@ struct Stage {
 
   net::io_context io;
   Limits limits;
-  ServerMemory memory;
-  Judging judging{io};
-  Openings openings;
+  MemoryBudget memory;
+  TurnQueue quality_turns{io, TurnQueue::Order::first_come, kQualityPause, last_of_all};
+  TurnQueue first_frames{io, TurnQueue::Order::least_used, 0, giving_way};
+  StreamActivity activity;
   Metrics metrics;
   std::vector<std::shared_ptr<const void>> gone;  // let go of, as a server would elsewhere
   Gate gate, volume_gate, plane_gate;
   std::shared_ptr<const ServedModel> model;
   Workers workers, volume_workers, plane_workers;
-  MeshWant want;
+  MeshSpec spec;
   Watcher watcher;
   std::size_t seen = 0;  // of its frames
   std::shared_ptr<Session> session;
@@ -237,11 +240,11 @@ struct Guest {
   }
   ~Guest() { session->leave(watcher, false); }
   void ask(v1::Encoding encoding, bool quality = false) {
-    MeshWant want;
-    want.tissues = {0};
-    want.encoding = encoding;
-    want.quality = quality;
-    session->subscribe(watcher, {.id = 0, .want = want, .request = {}});
+    MeshSpec spec;
+    spec.tissues = {0};
+    spec.encoding = encoding;
+    spec.quality = quality;
+    session->subscribe(watcher, {.id = 0, .spec = spec, .request = {}});
   }
   std::size_t frames() const { return watcher.judged().size(); }
   bool sees(std::size_t count, Clock::duration most) {

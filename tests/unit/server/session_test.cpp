@@ -144,7 +144,7 @@ TEST(Session, NothingIsDueWhenNobodyIsThere) {
     stage.run_until([&] { return stage.watcher.frame().pose_sequence() == pose; });
   }
   stage.session->leave(stage.watcher, true);
-  stage.judging.stop();
+  stage.quality_turns.stop();
   stage.io.restart();
   stage.io.run_for(std::chrono::seconds(10));
   EXPECT_TRUE(stage.io.stopped());
@@ -162,7 +162,7 @@ TEST(Session, FirstFramesAreMadeAsFarAsTheMemoryGoes) {
   stage.run_until([&] { return stage.watcher.numbers().size() >= 2; });
   stage.wait(milliseconds(50));
   EXPECT_EQ(stage.watcher.numbers().size(), 2U);
-  stage.watcher.let_go();
+  stage.watcher.release_frames();
   stage.session->catch_up();
   stage.run_until([&] { return stage.watcher.numbers().size() >= 3; });
   stage.wait(milliseconds(50));
@@ -173,13 +173,13 @@ TEST(Session, FirstFramesAreMadeAsFarAsTheMemoryGoes) {
 TEST(Session, PlanesAreCountedByTheirPixels) {
   Stage stage;
   stage.run_until([&] { return !stage.watcher.numbers().empty(); });
-  stage.watcher.let_go();
-  VolumeWant planes;
+  stage.watcher.release_frames();
+  VolumeSpec planes;
   ImageGrid plane;
   plane.size = {300, 200, 1};
   planes.slices = {plane, plane};
   stage.plane_gate.close();
-  stage.session->subscribe(stage.watcher, {.id = 0, .want = planes, .request = {}});
+  stage.session->subscribe(stage.watcher, {.id = 0, .spec = planes, .request = {}});
   stage.wait(milliseconds(50));
   EXPECT_EQ(stage.memory.bytes(), 2U * 300 * 200 * sizeof(std::int16_t));
 }
@@ -188,12 +188,12 @@ TEST(Session, PlanesAreCountedByTheirPixels) {
 TEST(Session, JudgingRestsAfterATurn) {
   Stage stage;
   ASSERT_EQ(stage.next_is_judged(), true);
-  stage.judging.done(milliseconds(60));
-  stage.judging.ask(stage.session);
+  stage.quality_turns.done(milliseconds(60));
+  stage.quality_turns.ask(stage.session->quality_turn());
   stage.wait(kShort);
-  EXPECT_TRUE(stage.session->await_judgement()) << "its turn came too soon";
+  EXPECT_TRUE(stage.session->quality_turn()->awaited()) << "its turn came too soon";
   bool waits = true;
-  stage.run_until([&] { return !(waits = waits && stage.session->await_judgement()); });
+  stage.run_until([&] { return !(waits = waits && stage.session->quality_turn()->awaited()); });
   EXPECT_FALSE(waits) << "its turn never came";
 }
 
@@ -201,17 +201,17 @@ TEST(Session, JudgingTakesOneAfterTheOther) {
   Stage stage;
   ASSERT_EQ(stage.next_is_judged(), true);
   const auto other = stage.open("b", true);
-  stage.judging.ask(stage.session);
-  stage.judging.ask(other);
-  EXPECT_TRUE(other->await_judgement()) << "its turn came beside another's";
+  stage.quality_turns.ask(stage.session->quality_turn());
+  stage.quality_turns.ask(other->quality_turn());
+  EXPECT_TRUE(other->quality_turn()->awaited()) << "its turn came beside another's";
 }
 
 // A long rest does not hold up the server's end.
 TEST(Session, NobodyRestsWhereNothingIsJudgedAnyMore) {
   net::io_context io;
-  Judging judging(io);
-  judging.stop();
-  judging.done(std::chrono::hours(1));
+  TurnQueue turns(io, TurnQueue::Order::first_come, kQualityPause, last_of_all);
+  turns.stop();
+  turns.done(std::chrono::hours(1));
   io.run_for(milliseconds(20));
   EXPECT_TRUE(io.stopped());
 }
@@ -220,7 +220,7 @@ TEST(Session, NobodyRestsWhereNothingIsJudgedAnyMore) {
 TEST(Session, AQualityByFormerThresholdsIsNotKept) {
   Stage stage;
   ASSERT_EQ(stage.next_is_judged(), true);
-  stage.judging.done(std::chrono::seconds(3));  // nothing is judged beside the frames
+  stage.quality_turns.done(std::chrono::seconds(3));  // nothing is judged beside the frames
   stage.wait(kLong);
   stage.gate.close();
   stage.pose(1);

@@ -13,7 +13,7 @@ TEST(Sessions, TheCreatorPosesAndAnObserverWatches) {
   EXPECT_EQ(observer.opened().role(), v1::ROLE_OBSERVER);
   const std::uint32_t a = creator.subscribe_mesh();
   const std::uint32_t b = observer.subscribe_mesh();
-  EXPECT_EQ(a, b);  // the same want: encoded once
+  EXPECT_EQ(a, b);  // the same spec: encoded once
 
   creator.send(1, creator.bent(0.4));
   const wire::Frame mine = creator.next_mesh(1);

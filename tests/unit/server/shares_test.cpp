@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What one client may have of what all share: by address, and by connection.
-#include "runtime/server/shares.hpp"
+#include "runtime/server/resources/shares.hpp"
 
 #include <boost/asio/read.hpp>
 
-#include "runtime/server/journal.hpp"
-#include "runtime/server/kept.hpp"
+#include "runtime/server/resources/journal.hpp"
+#include "runtime/server/session/retained_bytes.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 #include "tests/unit/server/web_client.hpp"
@@ -39,9 +39,9 @@ class Elsewhere {
     wire::FrameReader reader({.envelope_bytes = 1 << 20, .payload_bytes = 1 << 20});
     boost::system::error_code ec;
     while (!reader.complete()) {
-      const auto want = reader.want();
-      net::read(socket_, net::buffer(want.data(), want.size()), ec);
-      if (ec || !reader.advance(want.size()).ok()) return false;
+      const auto spec = reader.want();
+      net::read(socket_, net::buffer(spec.data(), spec.size()), ec);
+      if (ec || !reader.advance(spec.size()).ok()) return false;
     }
     return reader.take().envelope.has_server_hello();
   }
@@ -172,8 +172,8 @@ TEST(Shares, OneAddressHasNotAllSessions) {
 
 TEST(Shares, OneConnectionKeepsNotAll) {
   const Model toy = test::toy_model();
-  const VolumeWant want;
-  const std::uint64_t one = kept_by(toy, want, rest_voxels(toy, want));
+  const VolumeSpec spec;
+  const std::uint64_t one = kept_by(toy, spec, rest_voxels(toy, spec));
   Limits limits;
   limits.kept_bytes = 10 * one;
   limits.connection_share = 0.2;

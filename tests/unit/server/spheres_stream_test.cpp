@@ -10,7 +10,7 @@
 #include <ecorche/wire/convert.hpp>
 #include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "runtime/server/subscription.hpp"
+#include "runtime/server/session/subscription.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 #include "runtime/spheres/slice.hpp"
 #include "tests/support/toy_model.hpp"
@@ -154,19 +154,19 @@ TEST(SpheresStream, TetsStayWhatIsMeantWithoutAWord) {
   const Model model = test::toy_model();
   v1::Subscribe request;
   request.mutable_volume()->set_volume("ct");
-  Want want;
-  ASSERT_TRUE(read_want(request, model, want).ok());
-  EXPECT_FALSE(std::get<VolumeWant>(want).by_spheres);
+  StreamSpec spec;
+  ASSERT_TRUE(read_want(request, model, spec).ok());
+  EXPECT_FALSE(std::get<VolumeSpec>(spec).by_spheres);
   request.mutable_volume()->set_deformer(v1::DEFORMER_TETS);
-  ASSERT_TRUE(read_want(request, model, want).ok());
-  EXPECT_FALSE(std::get<VolumeWant>(want).by_spheres);
+  ASSERT_TRUE(read_want(request, model, spec).ok());
+  EXPECT_FALSE(std::get<VolumeSpec>(spec).by_spheres);
 }
 
 TEST(SpheresStream, WhatCannotBeRefilledIsRefused) {
   const TestServer server;
-  Want want;
+  StreamSpec spec;
   const auto code = [&](const v1::Envelope& request, const Model& model) {
-    return read_want(request.subscribe(), model, want).code;
+    return read_want(request.subscribe(), model, spec).code;
   };
   v1::Envelope request = request_for("ct");
   EXPECT_EQ(code(request, server.model()), StatusCode::ok);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/server/subscription.hpp"
+#include "runtime/server/session/subscription.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,17 +14,17 @@ TEST(Subscription, NoNamesAreAllTissuesAndOrderDoesNotMatter) {
   const Model model = test::toy_model();
   v1::Subscribe request;
   request.mutable_mesh();
-  Want all;
+  StreamSpec all;
   ASSERT_TRUE(read_want(request, model, all).ok());
-  EXPECT_EQ(std::get<MeshWant>(all).tissues.size(), model.tissues.size());
+  EXPECT_EQ(std::get<MeshSpec>(all).tissues.size(), model.tissues.size());
   for (auto tissue = model.tissues.rbegin(); tissue != model.tissues.rend(); ++tissue)
     request.mutable_mesh()->add_tissues(tissue->name);
   request.mutable_mesh()->add_tissues(model.tissues[0].name);
-  Want named;
+  StreamSpec named;
   ASSERT_TRUE(read_want(request, model, named).ok());
   EXPECT_EQ(all, named);
   request.mutable_mesh()->set_quality(true);
-  ASSERT_TRUE(read_want(request, model, named = Want()).ok());
+  ASSERT_TRUE(read_want(request, model, named = StreamSpec()).ok());
   EXPECT_NE(all, named);
 }
 
@@ -33,10 +33,10 @@ TEST(Subscription, LabelsAreAlwaysNearest) {
   for (const ModelVolume& volume : model.volumes) {
     v1::Subscribe request;
     request.mutable_volume()->set_volume(volume.name);
-    Want want;
-    ASSERT_TRUE(read_want(request, model, want).ok());
+    StreamSpec spec;
+    ASSERT_TRUE(read_want(request, model, spec).ok());
     const auto expected = volume.labels ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
-    EXPECT_EQ(std::get<VolumeWant>(want).sampling, expected) << volume.name;
+    EXPECT_EQ(std::get<VolumeSpec>(spec).sampling, expected) << volume.name;
   }
 }
 
@@ -108,8 +108,8 @@ TEST(Subscription, WhatCannotBeDoneSaysSo) {
   for (const Case& c : cases) {
     v1::Subscribe request;
     c.ask(request);
-    Want want;
-    const Status status = read_want(request, model, want);
+    StreamSpec spec;
+    const Status status = read_want(request, model, spec);
     EXPECT_EQ(status.code, c.code) << c.what;
     EXPECT_NE(status.message.find("subscribe: "), std::string::npos) << status.message;
   }
@@ -127,8 +127,8 @@ TEST(Subscription, PlanesLieWhereNumbersReach) {
     slice.mutable_v()->set_y(v);
     slice.set_size_u(5);
     slice.set_size_v(5);
-    Want want;
-    return read_want(request, model, want);
+    StreamSpec spec;
+    return read_want(request, model, spec);
   };
   for (const double at : {0.0, -1e9, 1e9}) EXPECT_TRUE(read(at, 1, -2).ok()) << at;
   for (const double step : {2e-9, -5e8}) EXPECT_TRUE(read(0, step, 1).ok() && read(0, 1, step).ok()) << step;

@@ -46,9 +46,18 @@ Model TestServer::toy() {
   return test::toy_model();
 }
 
+namespace {
+
+struct HookedServer : Server {
+  HookedServer(Options options, std::vector<NamedModel> models, Workers& workers, TestHooks hooks)
+      : Server(std::move(options), std::move(models), workers, std::move(hooks)) {}
+};
+
+}  // namespace
+
 TestServer::TestServer(const Limits& limits, const Model& model) : TestServer(with(limits), {}, model) {}
 
-TestServer::TestServer(Options options, Seams seams, const Model& model)
+TestServer::TestServer(Options options, TestHooks hooks, const Model& model)
     : model_(std::make_shared<const Model>(model)), workers_(2, [](const Job& job) {
         if (on_its_threads) on_its_threads();
         job();
@@ -61,10 +70,10 @@ TestServer::TestServer(Options options, Seams seams, const Model& model)
     const std::lock_guard lock(mutex_);
     return read_();
   };
-  server_ = std::make_unique<Server>(
+  server_ = std::make_shared<HookedServer>(
       std::move(options),
       std::vector<NamedModel>{{"toy", model_, {turning_clip(*model_)}, read}, {"twin", model_}}, workers_,
-      std::move(seams));
+      std::move(hooks));
   thread_ = std::thread([this] {
     if (on_its_threads) on_its_threads();
     server_->run();

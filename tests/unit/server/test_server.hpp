@@ -15,6 +15,7 @@
 #include <ecorche/client/client.hpp>
 #include <ecorche/values/model.hpp>
 #include <ecorche/values/pose.hpp>
+#include "runtime/server/registry/test_hooks.hpp"
 #include "runtime/server/server.hpp"
 
 namespace ecorche::server {
@@ -27,7 +28,7 @@ class TestServer {
  public:
   explicit TestServer(const Limits& limits = {}, const Model& model = toy());
   /// Listens on free ports, whatever the options say of them.
-  explicit TestServer(Options options, Seams seams = {}, const Model& model = toy());
+  explicit TestServer(Options options, TestHooks hooks = {}, const Model& model = toy());
   ~TestServer();
 
   wire::Address address() const { return {"127.0.0.1", server_->port()}; }
@@ -50,7 +51,7 @@ class TestServer {
   std::mutex mutex_;
   std::function<ModelParts()> read_;
   Workers workers_;
-  std::unique_ptr<Server> server_;
+  std::shared_ptr<Server> server_;
   std::thread thread_;
 };
 

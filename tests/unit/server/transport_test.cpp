@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Frames through a TCP socket: every byte in order, in turns with others, to the end or to an error.
-#include "runtime/server/transport.hpp"
+#include "runtime/server/net/transport.hpp"
 
 #include <gtest/gtest.h>
 #include <linux/sockios.h>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes beside the meshes of newer poses.
-#include "runtime/server/kept.hpp"
-#include "runtime/server/pose_job.hpp"
-#include "runtime/server/recording.hpp"
-#include "runtime/server/volume_stream.hpp"
+#include "runtime/server/session/pose_job.hpp"
+#include "runtime/server/session/recording.hpp"
+#include "runtime/server/session/retained_bytes.hpp"
+#include "runtime/server/session/volume_stream.hpp"
 #include "tests/unit/server/session_stage.hpp"
 
 namespace ecorche::server {
@@ -109,8 +109,8 @@ TEST(VolumeJobs, KeepTheirSession) {
   stage.volume_gate.close();
   {
     Guest guest(stage);
-    VolumeWant want;
-    guest.session->subscribe(guest.watcher, {.id = 0, .want = want, .request = {}});
+    VolumeSpec spec;
+    guest.session->subscribe(guest.watcher, {.id = 0, .spec = spec, .request = {}});
     ASSERT_TRUE(guest.sees(1, std::chrono::seconds(20)));
     guest.session->leave(guest.watcher, false);
     EXPECT_FALSE(guest.session->over(Clock::now()));
@@ -165,14 +165,14 @@ TEST(VolumeJobs, EndWhereNobodyWatches) {
 TEST(VolumeJobs, EndInTheirMidst) {
   const Model toy = test::toy_model();
   const auto model = std::make_shared<const ServedModel>("toy", std::make_shared<const Model>(toy));
-  const ServerMemory memory(1 << 30, 1 << 30);
+  const MemoryBudget memory(1 << 30, 1 << 30);
   for (const bool by_spheres : {false, true}) {
     for (const bool plane : {false, true}) {
       SCOPED_TRACE(std::string(by_spheres ? "spheres" : "tets") + (plane ? ", a plane" : ""));
-      VolumeWant want;
-      want.by_spheres = by_spheres;
-      want.changed_bricks = !plane;
-      if (plane) want.slices.emplace_back().size = {16, 16, 1};
+      VolumeSpec spec;
+      spec.by_spheres = by_spheres;
+      spec.changed_bricks = !plane;
+      if (plane) spec.slices.emplace_back().size = {16, 16, 1};
       PoseJob job;
       job.model = model;
       job.request.pose = Pose::rest(toy.segment_count());
@@ -180,8 +180,8 @@ TEST(VolumeJobs, EndInTheirMidst) {
       job.memory = &memory;
       Subscription& shown = job.subscriptions.emplace_back();
       shown.id = 1;
-      shown.want = want;
-      shown.volume = std::make_shared<VolumeStream>(want, rest_voxels(toy, want));
+      shown.spec = spec;
+      shown.volume = std::make_shared<VolumeStream>(spec, rest_voxels(toy, spec));
       std::vector<PosedFrame> frames;
       job.on_frame = [&](PosedFrame frame) { frames.push_back(std::move(frame)); };
       std::stop_source stop;
@@ -209,7 +209,7 @@ TEST(VolumeJobs, FirstOnesWaitForMemory) {
   VolumeStage stage;
   const std::uint32_t volume = stage.subscribe_volume(stage.watcher);
   ASSERT_TRUE(stage.shows(volume, 0));
-  auto all = std::make_unique<ServerMemory::Room>(stage.memory, std::uint64_t{2} << 30);
+  auto all = std::make_unique<MemoryBudget::Reservation>(stage.memory, std::uint64_t{2} << 30);
   const std::uint32_t plane = stage.subscribe_volume(stage.watcher, true);
   stage.pose(1);
   ASSERT_TRUE(stage.shows(volume, 1));

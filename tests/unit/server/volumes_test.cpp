@@ -5,7 +5,7 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "runtime/server/volume_stream.hpp"
+#include "runtime/server/session/volume_stream.hpp"
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
@@ -83,7 +83,7 @@ TEST(Volumes, ALatticeGrowsOnlyAsFarAsTheMemoryGoes) {
   const auto model = std::make_shared<const Model>(test::toy_model());
   const ServedModel served("toy", model);
   const std::uint64_t scan = model->volumes[0].image.bytes.size();
-  const ServerMemory memory(0, 9 * scan);  // three copies are kept
+  const MemoryBudget memory(0, 9 * scan);  // three copies are kept
   const runtime::BodyPoser poser(model);
   const auto body_at = [&](double mm) {
     Pose pose = Pose::rest(model->segment_count());
@@ -92,10 +92,10 @@ TEST(Volumes, ALatticeGrowsOnlyAsFarAsTheMemoryGoes) {
     EXPECT_TRUE(poser.run(pose, runtime::Skinning::cor, {}, body).ok());
     return body;
   };
-  VolumeWant want;
-  want.changed_bricks = true;
+  VolumeSpec spec;
+  spec.changed_bricks = true;
   const std::uint64_t voxels = model->volumes[0].image.grid.voxels();
-  VolumeStream first(want, voxels, memory.kept_pool()), second(want, voxels, memory.kept_pool());
+  VolumeStream first(spec, voxels, memory.kept_pool()), second(spec, voxels, memory.kept_pool());
   std::uint64_t number = 0;
   const auto write = [&](VolumeStream& stream, double mm, v1::VolumeFrame& frame) {
     frame.Clear();

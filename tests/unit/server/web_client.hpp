@@ -75,7 +75,7 @@ class WebClient {
   std::optional<std::string> message(double seconds = 10) {
     std::string data;
     while (true) {
-      if (!want(2, seconds)) return std::nullopt;
+      if (!spec(2, seconds)) return std::nullopt;
       const auto at = [&](std::size_t i) { return static_cast<std::uint8_t>(bytes_[i]); };
       const int opcode = at(0) & 15;
       const bool last = (at(0) & 0x80) != 0;
@@ -83,12 +83,12 @@ class WebClient {
       std::size_t head = 2;
       if (size >= 126) {
         const std::size_t more = size == 126 ? 2 : 8;
-        if (!want(2 + more, seconds)) return std::nullopt;
+        if (!spec(2 + more, seconds)) return std::nullopt;
         size = 0;
         for (std::size_t i = 0; i < more; ++i) size = size << 8 | at(2 + i);
         head += more;
       }
-      if (!want(head + size, seconds)) return std::nullopt;
+      if (!spec(head + size, seconds)) return std::nullopt;
       if (opcode < 8) data += bytes_.substr(head, size);
       if (opcode == 8 && size >= 2) close_code_ = at(head) << 8 | at(head + 1);
       bytes_.erase(0, head + size);
@@ -128,7 +128,7 @@ class WebClient {
     bytes_.append(reinterpret_cast<const char*>(buffer.data()), n);
     return n > 0;
   }
-  bool want(std::size_t size, double seconds) {
+  bool spec(std::size_t size, double seconds) {
     try {
       while (bytes_.size() < size) {
         if (!read(seconds)) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/server/workers.hpp"
+#include "runtime/server/schedule/workers.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/server/session/served_model.hpp"
+
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <utility>
+
+#include <ecorche/model_file/model_file.hpp>
+#include <ecorche/wire/convert.hpp>
+#include "proto/arrays.hpp"
+
+namespace ecorche::server {
+namespace {
+
+v1::ModelSummary summarize(std::string name, const Model& model) {
+  v1::ModelSummary summary;
+  summary.set_name(std::move(name));
+  summary.set_identity(model_file::identity(model));
+  summary.set_segments(static_cast<std::uint32_t>(model.segment_count()));
+  summary.set_tissues(static_cast<std::uint32_t>(model.tissues.size()));
+  std::uint64_t vertices = 0;
+  for (const Tissue& tissue : model.tissues) vertices += static_cast<std::uint64_t>(tissue.V.rows());
+  summary.set_tissue_vertices(vertices);
+  summary.set_nodes(model.node_count());
+  summary.set_tets(model.tet_count());
+  for (const ModelVolume& volume : model.volumes) summary.add_volumes(volume.name);
+  return summary;
+}
+
+void describe(const Tissue& tissue, v1::Tissue& out) {
+  out.set_name(tissue.name);
+  out.set_group(std::string(group_name(tissue.group)));
+  out.set_segment(tissue.segment);
+  out.set_vertices(static_cast<std::uint64_t>(tissue.V.rows()));
+}
+
+void describe(const ModelVolume& volume, v1::Volume& out) {
+  out.set_name(volume.name);
+  wire::to_proto(volume.image.grid, *out.mutable_grid());
+  out.set_type(wire::to_proto(volume.image.type));
+  out.set_components(static_cast<std::uint32_t>(volume.image.components));
+  out.set_background(volume.background);
+  out.set_labels(volume.labels);
+  for (const auto& [id, name] : volume.table) (*out.mutable_table())[id] = name;
+}
+
+// While it waits for its own loops, the thread must not take up another job: that one could want the same.
+template <class Make>
+void once(std::once_flag& flag, Make&& make) {
+  std::call_once(flag, [&] { tbb::this_task_arena::isolate(make); });
+}
+
+}  // namespace
+
+// What every client needs, made at once by several threads.
+struct ServedModel::Made {
+  std::unique_ptr<const runtime::BodyPoser> poser;
+  v1::ModelSummary summary;
+  v1::ModelOpened opened;
+  std::vector<v1::Array> triangles;
+  std::shared_ptr<const wire::Payload> topology;
+  std::vector<Clip> clips;
+
+  Made(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves)
+      : clips(std::move(moves)) {
+    tbb::parallel_invoke([&] { poser = std::make_unique<const runtime::BodyPoser>(model); },
+                         [&] { describe_model(std::move(name), *model); }, [&] { lay_out(*model); });
+  }
+
+ private:
+  void describe_model(std::string name, const Model& model) {
+    summary = summarize(std::move(name), model);
+    opened.set_model(summary.name());
+    opened.set_identity(summary.identity());
+    opened.set_rig_digest(model_file::rig_digest(model.rig));
+    opened.set_topology_digest(model_file::topology_digest(model));
+    wire::to_proto(model.rig, *opened.mutable_skeleton());
+    for (const Tissue& tissue : model.tissues) describe(tissue, *opened.add_tissues());
+    for (const ModelVolume& volume : model.volumes) describe(volume, *opened.add_volumes());
+  }
+  void lay_out(const Model& model) {
+    auto payload = std::make_shared<wire::Payload>();
+    std::size_t bytes = 0;
+    for (const Tissue& tissue : model.tissues)
+      bytes += wire::aligned(static_cast<std::size_t>(tissue.F.size()) * sizeof(std::uint32_t));
+    payload->reserve(bytes);
+    for (const Tissue& tissue : model.tissues) {
+      const std::span corners(tissue.F.data(), static_cast<std::size_t>(tissue.F.size()));
+      v1::Array array = wire::append(*payload, corners, 3);
+      array.set_type(v1::SCALAR_TYPE_U32);  // rows are never negative
+      triangles.push_back(std::move(array));
+    }
+    topology = std::move(payload);
+  }
+};
+
+ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves)
+    : ServedModel(Made(std::move(name), model, std::move(moves))) {}
+
+ServedModel::ServedModel(Made made)
+    : summary(std::move(made.summary)),
+      opened(std::move(made.opened)),
+      triangles(std::move(made.triangles)),
+      topology(std::move(made.topology)),
+      poser_(std::move(made.poser)),
+      bodies(*poser_),
+      bodies_aside(*poser_),
+      levels_(model().tissues.size()),
+      balls_(model().volumes.size()) {
+  for (Clip& clip : made.clips) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
+  runtime::PosedBody body = poser_->make_frame({.positions = false});
+  const Pose rest = Pose::rest(model().segment_count());
+  if (poser_->run(rest, runtime::Skinning::lbs, {}, body, runtime::NodesOf::tissues).ok())
+    step = body.box.step;
+}
+
+const runtime::QualityMeter& ServedModel::meter() const {
+  once(meter_made_,
+       [this] { meter_ = std::make_unique<const runtime::QualityMeter>(poser_->shared_model()); });
+  return *meter_;
+}
+
+const runtime::VolumeBalls& ServedModel::balls(std::size_t volume) const {
+  Balls& row = balls_[volume];
+  once(row.made,
+       [&] { row.balls = std::make_unique<const runtime::VolumeBalls>(model(), model().volumes[volume]); });
+  return *row.balls;
+}
+
+const runtime::VolumePoser& ServedModel::volumes() const {
+  once(volumes_made_,
+       [this] { volumes_ = std::make_unique<const runtime::VolumePoser>(poser_->shared_model()); });
+  return *volumes_;
+}
+
+bool ServedModel::has_levels(const std::vector<std::uint32_t>& tissues) const {
+  return std::all_of(tissues.begin(), tissues.end(),
+                     [this](std::uint32_t t) { return levels_[t].made.load(); });
+}
+
+void ServedModel::make_levels(const std::vector<std::uint32_t>& tissues) const {
+  for (const std::uint32_t t : tissues) {
+    Levels& row = levels_[t];
+    std::call_once(row.once, [&] {
+      row.levels = server::make_levels(model().tissues[t]);
+      row.made = true;
+    });
+  }
+}
+
+const runtime::Probe& ServedModel::probe() const {
+  once(probe_made_,
+       [this] { probe_ = std::make_unique<const runtime::Probe>(poser_->shared_model(), poser_->lanes()); });
+  return *probe_;
+}
+
+}  // namespace ecorche::server
