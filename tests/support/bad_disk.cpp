@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <vector>
 
+// Seen by all libraries of the process, though ours show nothing.
+#pragma GCC visibility push(default)
 extern "C" ssize_t pwrite(int file, const void* bytes, std::size_t size, off_t place) {
   using Write = ssize_t (*)(int, const void*, std::size_t, off_t);
   static const auto real = reinterpret_cast<Write>(dlsym(RTLD_NEXT, "pwrite"));
@@ -20,3 +22,4 @@ extern "C" ssize_t pwrite(int file, const void* bytes, std::size_t size, off_t p
 extern "C" ssize_t pwrite64(int file, const void* bytes, std::size_t size, off_t place) {
   return pwrite(file, bytes, size, place);
 }
+#pragma GCC visibility pop

@@ -19,6 +19,8 @@ namespace {
 std::optional<unsigned char> every_byte;  // of what the kernel's dice show
 }
 
+// Seen by all libraries of the process, though ours show nothing.
+#pragma GCC visibility push(default)
 extern "C" ssize_t getrandom(void* to, std::size_t size, unsigned flags) {
   using Real = ssize_t (*)(void*, std::size_t, unsigned);
   static const auto real = reinterpret_cast<Real>(dlsym(RTLD_NEXT, "getrandom"));
@@ -26,6 +28,7 @@ extern "C" ssize_t getrandom(void* to, std::size_t size, unsigned flags) {
   std::memset(to, *every_byte, size);
   return static_cast<ssize_t>(size);
 }
+#pragma GCC visibility pop
 
 namespace ecorche::files {
 namespace {

@@ -31,6 +31,8 @@ std::atomic<int> threads_started{0}, functions_at_exit{0};
 }  // namespace
 
 // Before those of the C library: what anything here starts or registers is counted.
+// Seen by all libraries of the process, though ours show nothing.
+#pragma GCC visibility push(default)
 extern "C" {
 int openblas_get_num_threads() __attribute__((weak));
 void openblas_set_num_threads(int threads) __attribute__((weak));
@@ -46,6 +48,7 @@ int on_exit(void (*call)(int, void*), void* with) noexcept {
   return next(call, with);
 }
 }
+#pragma GCC visibility pop
 
 namespace ecorche {
 namespace {

@@ -11,6 +11,7 @@
 
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
+#include "runtime/volume/draw_tets.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {

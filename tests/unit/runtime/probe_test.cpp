@@ -20,6 +20,7 @@
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/runtime/probe.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
+#include "runtime/probe/tissue_columns.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
