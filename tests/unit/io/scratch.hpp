@@ -36,7 +36,7 @@ class Scratch {
 
   /// Writes `bytes` under `name`, making folders.
   std::filesystem::path put(const std::string& name, const std::string& bytes) const {
-    const std::filesystem::path file = path_ / name;
+    std::filesystem::path file = path_ / name;
     std::filesystem::create_directories(file.parent_path());
     std::ofstream(file, std::ios::binary) << bytes;
     return file;
