@@ -288,22 +288,23 @@ void Server::Impl::make_room(Clock::time_point now, Clock::duration patience) {
   std::uint64_t most = registry->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
   Connection* longest = nullptr;
   for (const auto& connection : connections) {
-    const std::uint64_t bytes = connection->clogged(now, patience);
+    const std::uint64_t bytes = connection->unread(now, patience);
     if (bytes <= most) continue;
     most = bytes;
     longest = connection.get();
   }
-  if (longest) longest->make_room();
+  if (longest) longest->drop_unread();
 }
 
 // The oldest connection that had time for a hello, and sent none; with an address, the oldest of its.
 bool Server::Impl::make_way(Clock::time_point now, const std::string& address) {
   const auto silent = std::find_if(connections.begin(), connections.end(), [&](const auto& c) {
-    return c->silent() && now - c->born() >= kTimeToGreet && (address.empty() || c->address() == address);
+    return c->awaits_hello() && now - c->accepted_at() >= kTimeToGreet &&
+           (address.empty() || c->address() == address);
   });
   if (silent == connections.end()) return false;
   // Whoever is told why stays for a moment.
-  (*silent)->make_way(connections.size() + 1 < registry->limits().connections + kMostRefusals);
+  (*silent)->evict(connections.size() + 1 < registry->limits().connections + kMostRefusals);
   return true;
 }
 

@@ -53,10 +53,6 @@ Status Recordings::begin(Session& session, const std::string& name, const std::s
 }
 
 Status Recordings::room(const std::string& name, const std::string& address, std::filesystem::path& path) {
-  if (options_.record_folder.empty()) {
-    return {StatusCode::failed_precondition,
-            "record: this server keeps no recordings (serve with --record-dir)"};
-  }
   if (!identifier(name))
     return {StatusCode::invalid_argument, "record: a name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   path = options_.record_folder / (name + ".ecrec");

@@ -32,9 +32,10 @@ class Recordings {
 
   Recordings(net::io_context& io, const Options& options);
 
-  /// Begins one in the session, which has none, for a client of this address. failed_precondition where
-  /// nothing is recorded, invalid_argument for an odd name, already_exists for one that is taken,
-  /// resource_exhausted for one too many.
+  /// This server keeps recordings; else none may begin.
+  bool enabled() const { return !options_.record_folder.empty(); }
+  /// Begins one in the session, which has none, for a client of this address. invalid_argument for an odd
+  /// name, already_exists for one that is taken, resource_exhausted for one too many.
   Status begin(Session& session, const std::string& name, const std::string& address);
   /// Ends the session's recording, which it has, with its last pose; then `done`, with how it reached the
   /// disk. failed_precondition where no pose came.

@@ -1,36 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points both ways through the body.
 #include <algorithm>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "proto/arrays.hpp"
-#include "runtime/server/handlers/connection.hpp"
+#include "runtime/server/handlers/handlers.hpp"
 #include "runtime/server/resources/guarded.hpp"
 
 namespace ecorche::server {
+namespace {
 
-/// What a request asks, and what was found.
-struct ProbeAsked {
+constexpr std::size_t kMaxPoints = 10000;
+constexpr int kMaxPending = 4;  // of one client
+// So few are asked on the spot: quicker than a worker wakes. Those by tissue cost many times more.
+constexpr std::size_t kFewPoints = 16;
+
+// What is asked, and what was found.
+struct ProbeRequest {
+  std::uint64_t id = 0;
   bool to_rest = true;
   std::vector<float> points;
   runtime::ProbeWants wants;
   runtime::Probed found;
   Status status;
+
+  bool few() const { return points.size() <= 3 * kFewPoints; }
 };
-
-namespace {
-
-constexpr std::size_t kMostPoints = 10000;
-constexpr int kMostWaiting = 4;
-// So few are asked on the spot: quicker than a worker wakes. Those by tissue cost many times more.
-constexpr std::size_t kFewPoints = 16;
 
 Status read_points(const v1::ProbePoints& request, const wire::Payload& payload, std::vector<float>& out) {
   std::span<const double> points;
   if (!wire::find(request.points(), payload, 3, points) || points.empty())
     return {StatusCode::invalid_argument,
             "probe: the points are no f64 array of 3 in the payload (describe it)"};
-  if (points.size() > 3 * kMostPoints) {
+  if (points.size() > 3 * kMaxPoints) {
     return {StatusCode::invalid_argument,
             "probe: " + std::to_string(points.size() / 3) + " points (send at most 10000 a message)"};
   }
@@ -40,7 +44,7 @@ Status read_points(const v1::ProbePoints& request, const wire::Payload& payload,
 }
 
 Status read_request(const v1::ProbePoints& request, const wire::Payload& payload, const Model& model,
-                    ProbeAsked& out) {
+                    ProbeRequest& out) {
   if (request.direction() != v1::ProbePoints::DIRECTION_POSED_TO_REST &&
       request.direction() != v1::ProbePoints::DIRECTION_REST_TO_POSED) {
     return {StatusCode::invalid_argument, "probe: no direction (set one of two)"};
@@ -61,12 +65,12 @@ Status read_request(const v1::ProbePoints& request, const wire::Payload& payload
   return read_points(request, payload, out.points);
 }
 
-void ask(const ServedModel& model, const ProbeFrame& body, ProbeAsked& asked) {
-  asked.status = guarded("probe", [&] {
-    if (asked.to_rest)
-      model.probe().posed_to_rest(body.tree, asked.points, asked.wants, asked.found);
+void find_points(const ServedModel& model, const ProbeFrame& body, ProbeRequest& probe) {
+  probe.status = guarded("probe", [&] {
+    if (probe.to_rest)
+      model.probe().posed_to_rest(body.tree, probe.points, probe.wants, probe.found);
     else
-      model.probe().rest_to_posed(body.tree, asked.points, asked.wants, asked.found);
+      model.probe().rest_to_posed(body.tree, probe.points, probe.wants, probe.found);
     return Status{};
   });
 }
@@ -93,62 +97,61 @@ v1::Array append_doubles(wire::Payload& payload, const std::vector<float>& numbe
   return wire::append(payload, std::span<const double>(wide), components);
 }
 
-}  // namespace
-
-void Connection::handle_probe(const wire::Frame& frame) {
-  const std::uint64_t id = frame.envelope.request_id();
-  const auto asked = std::make_shared<ProbeAsked>();
-  Status status = may("probe", false);
-  if (status.ok())
-    status = read_request(frame.envelope.probe_points(), frame.payload, session_->model()->model(), *asked);
-  if (status.ok() && probing_ >= kMostWaiting)
-    status = {StatusCode::resource_exhausted, "probe: four wait already (read their answers first)"};
-  if (!status.ok()) return answer_status(id, status);
-  ++probing_;
-  const bool few = asked->points.size() <= 3 * kFewPoints;
-  const auto ready = [weak = weak_from_this(), asked, id, few, model = session_->model()](
-                         const std::shared_ptr<const ProbeFrame>& body, const Status& why) {
-    const auto self = weak.lock();
-    if (!self) return;
-    self->take_back([&] {
-      if (!body) {
-        asked->status = why;
-        return self->answer_probe(id, asked, std::make_shared<const ProbeFrame>());
-      }
-      if (few && !asked->wants.tissue) {
-        ask(*model, *body, *asked);
-        return self->answer_probe(id, asked, body);
-      }
-      self->registry_.run_on_worker([model, body, asked] { ask(*model, *body, *asked); },
-                                    [weak, id, asked, body] {
-                                      const auto still = weak.lock();
-                                      if (still)
-                                        still->take_back([&] { still->answer_probe(id, asked, body); });
-                                    },
-                                    self->account_);
-    });
-  };
-  session_->probe(ready, !few);
-}
-
-void Connection::answer_probe(std::uint64_t id, const std::shared_ptr<ProbeAsked>& asked,
-                              const std::shared_ptr<const ProbeFrame>& body) {
-  --probing_;
-  if (closed_ || ending_) return;
-  if (!asked->status.ok()) return answer_status(id, asked->status);
-  const runtime::Probed& found = asked->found;
+// `sequence`: of the pose in which the points were found.
+void answer_probe(Client& client, const ProbeRequest& probe, std::uint64_t sequence) {
+  --client.pending().probes;
+  if (client.over()) return;
+  if (!probe.status.ok()) return client.answer_status(probe.id, probe.status);
   v1::Envelope envelope;
   v1::Probed& probed = *envelope.mutable_probed();
-  probed.set_pose_sequence(body->sequence);
+  probed.set_pose_sequence(sequence);
   auto payload = std::make_shared<wire::Payload>();
-  *probed.mutable_points() = append_doubles(*payload, found.points, 3);
-  if (asked->wants.tissue)
-    *probed.mutable_tissue() = wire::append(*payload, std::span<const std::int32_t>(found.tissue), 1);
-  if (!asked->wants.volumes.empty())
-    *probed.mutable_values() = append_rows(*payload, asked->points.size() / 3, found.values);
-  if (asked->wants.gradient)
-    *probed.mutable_deformation_gradient() = append_doubles(*payload, found.gradient, 9);
-  answer(id, std::move(envelope), std::move(payload));
+  *probed.mutable_points() = append_doubles(*payload, probe.found.points, 3);
+  if (probe.wants.tissue)
+    *probed.mutable_tissue() = wire::append(*payload, std::span<const std::int32_t>(probe.found.tissue), 1);
+  if (!probe.wants.volumes.empty())
+    *probed.mutable_values() = append_rows(*payload, probe.points.size() / 3, probe.found.values);
+  if (probe.wants.gradient)
+    *probed.mutable_deformation_gradient() = append_doubles(*payload, probe.found.gradient, 9);
+  client.answer(probe.id, std::move(envelope), std::move(payload));
+}
+
+using SharedProbe = std::shared_ptr<ProbeRequest>;
+using SharedBody = std::shared_ptr<const ProbeFrame>;
+
+void on_body(Client& client, const SharedProbe& probe, const std::shared_ptr<const ServedModel>& model,
+             const SharedBody& body, const Status& why) {
+  if (!body) {
+    probe->status = why;
+    return answer_probe(client, *probe, 0);
+  }
+  if (probe->few() && !probe->wants.tissue) {
+    find_points(*model, *body, *probe);
+    return answer_probe(client, *probe, body->sequence);
+  }
+  client.registry().run_on_worker(
+      [model, body, probe] { find_points(*model, *body, *probe); },
+      client.callback([probe, body](Client& asking) { answer_probe(asking, *probe, body->sequence); }),
+      client.account());
+}
+
+}  // namespace
+
+Status handle_probe_points(Client& client, const v1::ProbePoints& points, const Request& request) {
+  const std::shared_ptr<const ServedModel> model = client.session()->model();
+  const auto probe = std::make_shared<ProbeRequest>();
+  probe->id = request.id();
+  if (Status status = read_request(points, request.payload, model->model(), *probe); !status.ok())
+    return status;
+  if (client.pending().probes >= kMaxPending)
+    return {StatusCode::resource_exhausted, "probe: four wait already (read their answers first)"};
+  ++client.pending().probes;
+  client.session()->probe(
+      client.callback([probe, model](Client& asking, const SharedBody& body, const Status& why) {
+        on_body(asking, probe, model, body, why);
+      }),
+      !probe->few());
+  return {};
 }
 
 }  // namespace ecorche::server
