@@ -255,7 +255,8 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   ++preparing_;
   const auto made = std::make_shared<Prepared>();
   made->asked = {.id = 0, .spec = spec, .request = request.subscribe()};
-  registry_.run_in_background(
+  registry_.executor().run(
+      Service::background,
       [made, model = session_->model()] {
         made->status = guarded("subscribe", [&]() -> Status {
           made->asked.streams = open_streams(*model, std::get<MeshSpec>(made->asked.spec));

@@ -56,7 +56,8 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
       lacking.push_back(&asked);
   }
   if (!lacking.empty()) {
-    registry_.run_in_background(
+    registry_.executor().run(
+        Service::background,
         [back, lacking, weak = weak_from_this(), model = session->model(), &hooks = registry_.hooks()] {
           if (weak.expired()) return;
           const HandlingScope handling(hooks);

@@ -84,7 +84,7 @@ void Connection::handle_solve(const v1::Envelope& request) {
       return Status{};
     });
   };
-  registry_.run_on_worker(
+  registry_.executor().run_request(
       work,
       [weak = weak_from_this(), outcome, id, solve] {
         if (const auto self = weak.lock()) self->take_back([&] { self->solved(id, solve, *outcome); });

@@ -26,6 +26,7 @@ void Skipped::add(std::uint64_t sequence) {
 Session::Session(const Services& services, std::shared_ptr<const ServedModel> model, std::string name,
                  bool named, const Limits& limits)
     : io_(services.io),
+      executor_(services.executor),
       metrics_(services.metrics),
       memory_(services.memory),
       quality_turns_(services.quality_turns),
@@ -40,9 +41,9 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
       kept_(memory_.kept_pool()),
       quality_turn_([this] { return measure_quality(); }, account_),
       first_frame_turn_([this] { return show_newcomers(); }, account_),
-      poses_(io_, services.workers),
-      whole_(io_, services.volume_workers),
-      planes_(io_, services.plane_workers),
+      poses_(io_, Service::frames),
+      whole_(io_, Service::volumes),
+      planes_(io_, Service::planes),
       clock_(io_) {
   present_.pose = Pose::rest(model_->model().segment_count());
   player_ = std::make_shared<ClipPlayer>(io_, [this](const Pose& pose) {

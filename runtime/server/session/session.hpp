@@ -18,9 +18,10 @@
 #include "runtime/server/resources/memory_budget.hpp"
 #include "runtime/server/resources/metrics.hpp"
 #include "runtime/server/resources/options.hpp"
+#include "runtime/server/schedule/executor.hpp"
 #include "runtime/server/schedule/stream_activity.hpp"
 #include "runtime/server/schedule/turn_queue.hpp"
-#include "runtime/server/schedule/workers.hpp"
+
 #include "runtime/server/session/clip.hpp"
 #include "runtime/server/session/pose_job.hpp"
 #include "runtime/server/session/recording.hpp"
@@ -76,9 +77,7 @@ struct SubscriptionRequest {
 /// What all sessions of a server share.
 struct Services {
   net::io_context& io;
-  Workers& workers;
-  Workers& volume_workers;  ///< give way to those
-  Workers& plane_workers;   ///< as well; planes do not wait behind other sessions' volumes
+  Executor& executor;
   const MemoryBudget& memory;
   TurnQueue& quality_turns;  ///< whose present pose is measured next
   TurnQueue& first_frames;   ///< whose newcomers are shown the present pose next, beside streams
@@ -218,8 +217,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// Jobs of one kind: one at a time, and no more in a second than poses may come.
   struct Lane {
-    Lane(net::io_context& io, Workers& by) : workers(by), pace(io) {}
-    Workers& workers;
+    Lane(net::io_context& io, Service by) : service(by), pace(io) {}
+    Service service;
     bool busy = false;
     Clock::time_point next = Clock::now();  ///< no job begins before
     net::steady_timer pace;
@@ -285,7 +284,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void want_again(const Lane& lane);
   void stop_unwatched();
   void start_volumes(Lane& lane);
-  void submit_volumes(Lane& lane, Workers& workers, std::shared_ptr<PoseJob> job);
+  void submit_volumes(Lane& lane, Service service, std::shared_ptr<PoseJob> job);
   void volumes_done(Lane& lane, bool posed, const Status& status);
   bool held_back(Row& row, Clock::time_point now) const;
   void ask_levels(Row& row, bool still, Clock::time_point now) const;
@@ -296,6 +295,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void publish(const PosedFrame& frame);
 
   net::io_context& io_;
+  Executor& executor_;
   Metrics& metrics_;
   const MemoryBudget& memory_;
   TurnQueue& quality_turns_;

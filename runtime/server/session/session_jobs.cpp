@@ -242,10 +242,10 @@ void Session::submit(std::shared_ptr<PoseJob> job, bool refresh) {
     post_back(io, [self = std::move(self), job = std::move(job), teller = std::move(teller),
                    guard = std::move(guard), status = std::move(status)] { self->posed(*job, status); });
   };
-  if (aside)
-    first_frames_.submit(std::move(work), account_);
-  else
-    (volumes ? whole_ : poses_).workers.submit(std::move(work), account_);
+  executor_.submit(aside     ? Service::first_frames
+                   : volumes ? Service::volumes
+                             : Service::frames,
+                   std::move(work), account_);
 }
 
 // The job is over.

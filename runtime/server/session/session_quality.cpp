@@ -37,14 +37,12 @@ bool Session::measure_quality() {
     if (mesh && !mesh->quality) job->rows.push_back({row.subscription.id, mesh->tissues, nullptr});
   }
   if (job->rows.empty()) return false;
-  quality_turns_.submit([self = shared_from_this(), job, guard = net::make_work_guard(io_)]() mutable {
-    run(*job);
-    net::io_context& io = self->io_;
-    post_back(io, [self = std::move(self), job = std::move(job), guard = std::move(guard)] {
-      self->quality_turns_.done(job->cost);
-      self->judged(*job);
-    });
-  });
+  executor_.run(
+      Service::quality, [job] { run(*job); },
+      [self = shared_from_this(), job] {
+        self->quality_turns_.done(job->cost);
+        self->judged(*job);
+      });
   return true;
 }
 

@@ -79,7 +79,7 @@ void Session::start_volumes(Lane& lane) {
     job->room = MemoryBudget::Reservation(memory_, taking.bytes);
     keep_time();
     // Large planes are made where volumes are, so that small ones do not wait for them.
-    submit_volumes(lane, memory_.large(taking.bytes) ? whole_.workers : lane.workers, std::move(job));
+    submit_volumes(lane, memory_.large(taking.bytes) ? whole_.service : lane.service, std::move(job));
   } catch (...) {  // out of memory: catch_up() tries again
     lane.busy = false;
     want_again(lane);
@@ -87,7 +87,7 @@ void Session::start_volumes(Lane& lane) {
   }
 }
 
-void Session::submit_volumes(Lane& lane, Workers& workers, std::shared_ptr<PoseJob> job) {
+void Session::submit_volumes(Lane& lane, Service service, std::shared_ptr<PoseJob> job) {
   std::shared_ptr<Session> self = shared_from_this();
   const auto posed = std::make_shared<bool>(false);
   job->on_outcome = [posed](const PoseOutcome& outcome) { *posed = outcome.status.ok(); };
@@ -102,7 +102,7 @@ void Session::submit_volumes(Lane& lane, Workers& workers, std::shared_ptr<PoseJ
     post_back(io, [self = std::move(self), job = std::move(job), guard = std::move(guard), posed, &lane,
                    status = std::move(status)] { self->volumes_done(lane, *posed, status); });
   };
-  workers.submit(std::move(work), account_);
+  executor_.submit(service, std::move(work), account_);
 }
 
 void Session::volumes_done(Lane& lane, bool posed, const Status& status) {

@@ -195,7 +195,7 @@ TEST(SessionRegistry, WhatIsAskedBesideLeavesAWorkerToPoses) {
     int done = 0;
     constexpr int kAsked = 7;
     for (int i = 0; i < kAsked; ++i) {
-      open.registry.run_on_worker(
+      open.registry.executor().run_request(
           [&] {
             ++begun;
             while (!go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));

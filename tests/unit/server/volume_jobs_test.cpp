@@ -136,8 +136,8 @@ TEST(VolumeJobs, EndWithTheServer) {
   stage.session->stop_volumes();
   stage.volume_gate.open();
   stage.plane_gate.open();
-  stage.volume_workers.drain();
-  stage.plane_workers.drain();
+  stage.executor.drain(Service::volumes);
+  stage.executor.drain(Service::planes);
   stage.pose(2);
   ASSERT_TRUE(stage.shows(stage.mesh, 2));
   stage.wait(milliseconds(150));
@@ -156,7 +156,7 @@ TEST(VolumeJobs, EndWhereNobodyWatches) {
   const std::string figures = stage.metrics.text();
   stage.session->unsubscribe(stage.watcher, volume);
   stage.volume_gate.open();
-  stage.volume_workers.drain();
+  stage.executor.drain(Service::volumes);
   stage.wait(milliseconds(20));
   EXPECT_EQ(stage.metrics.text(), figures) << "a frame was made";
 }
