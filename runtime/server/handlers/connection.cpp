@@ -152,8 +152,9 @@ void Connection::leave_place() {
   std::optional<SavedPlace> place;
   if (session && !departed_ && !session->retired()) {
     try {
-      place = SavedPlace{
-          .session = session, .asked = session->requests_of(*this), .controlled = session->controls(*this)};
+      place = SavedPlace{.session = session,
+                         .asked = session->subscriptions().requests_of(*this),
+                         .controlled = session->control().controls(*this)};
     } catch (const std::bad_alloc&) {  // then nobody comes back to it
     }
   }

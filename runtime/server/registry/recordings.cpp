@@ -44,7 +44,7 @@ Status Recordings::begin(Session& session, const std::string& name, const std::s
   recording->put({.file = std::make_shared<RecordingFile>(path), .owner = address});
   running_.push_back(recording);
   files_[address].push_back(path);
-  session.record(std::move(recording));
+  session.recorder().start(std::move(recording));
   return {};
 }
 
@@ -159,13 +159,13 @@ void Recordings::tick(Clock::time_point now) {
 }
 
 void Recordings::finish(Session& session, std::function<void(const Status&)> done) {
-  session.end_recording([this, recording = session.recording(), model = session.model(),
-                         done = std::move(done)] { write(recording, *model, done); });
+  session.recorder().stop([this, recording = session.recorder().recording(), model = session.model(),
+                           done = std::move(done)] { write(recording, *model, done); });
 }
 
 void Recordings::keep(Session& session) {
-  if (!session.recording()) return;
-  finish(session, [name = session.recording()->name()](const Status& status) {
+  if (!session.recorder().running()) return;
+  finish(session, [name = session.recorder().recording()->name()](const Status& status) {
     if (!status.ok() && status.code != StatusCode::failed_precondition)
       spdlog::warn("recording {}: {}", name, status.message);
   });

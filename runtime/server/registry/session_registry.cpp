@@ -142,11 +142,14 @@ Status SessionRegistry::open(const v1::OpenModel& request, const std::string& ad
       .metrics = metrics_,
       .destroy_later = [this](std::shared_ptr<const void> what) { executor_.destroy_later(std::move(what)); },
       .journal = &journal_};
-  out = std::make_shared<Session>(services, *model, name, named, options_.limits);
-  const auto before = [&](const auto& session) { return session->name() == name && session->controlled(); };
-  if (std::any_of(retired_.begin(), retired_.end(), before)) out->await_heir();
   const std::shared_ptr<const ClientShare> of = share_of(address);
-  out->belong(address, of->kept, of->account);
+  out = std::make_shared<Session>(services, *model, name, named, options_.limits,
+                                  SessionOwner{.address = address, .kept = of->kept, .account = of->account});
+  const auto now = Clock::now();
+  const auto before = [&](const auto& session) {
+    return session->name() == name && session->control().taken(now);
+  };
+  if (std::any_of(retired_.begin(), retired_.end(), before)) out->control().await_heir(now);
   sessions_.emplace(name, out);
   return {};
 }
@@ -190,7 +193,7 @@ void SessionRegistry::sweep(Clock::time_point now) {
   old.reserve(retired_.size());
   const auto ends = [&](const std::shared_ptr<Session>& session) {
     session->forget_probes(now);
-    session->free_control(now);
+    session->control().expire(now);
     const bool over = session->over(now);
     const auto since = session->abandoned();
     if (over || (since && now - *since >= Recordings::abandoned_after)) recordings_.keep(*session);

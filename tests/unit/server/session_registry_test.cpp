@@ -171,7 +171,7 @@ TEST(SessionRegistry, ARecordingsNameIsTakenUntilItIsWritten) {
     PoseRequest pose;
     pose.sequence = 1;
     pose.pose = Pose::rest(session->model()->model().segment_count());
-    session->recording()->add(pose);
+    session->recorder().recording()->add(pose);
     bool written = false;
     recordings.finish(*session, [&](const Status& status) { written = status.ok(); });
     EXPECT_EQ(recordings.begin(*other, "bow", {}).code, StatusCode::already_exists);

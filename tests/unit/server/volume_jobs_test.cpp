@@ -70,7 +70,7 @@ TEST(VolumeJobs, AloneShowTheNewestPoseToo) {
   ASSERT_TRUE(stage.shows(volume, 0));
   for (std::uint64_t pose = 1; pose <= 3; ++pose) stage.pose(pose);
   ASSERT_TRUE(stage.shows(volume, 3));
-  EXPECT_EQ(stage.session->present().sequence, 3U);
+  EXPECT_EQ(stage.session->poses().present().sequence, 3U);
 }
 
 TEST(VolumeJobs, KeepTheirRate) {
@@ -228,7 +228,8 @@ TEST(VolumeJobs, RecordedPosesKeepTheirVolumes) {
   stage.volume_gate.close();
   stage.pose(1);
   ASSERT_TRUE(stage.shows(stage.mesh, 1));
-  stage.session->record(std::make_shared<Recording>("bow", *stage.model, "test", std::size_t{1} << 20));
+  stage.session->recorder().start(
+      std::make_shared<Recording>("bow", *stage.model, "test", std::size_t{1} << 20));
   stage.pose(2);
   stage.wait(milliseconds(50));
   EXPECT_EQ(stage.watcher.poses(stage.mesh).back(), 1U) << "it waits for the volume that is being made";
@@ -240,7 +241,7 @@ TEST(VolumeJobs, RecordedPosesKeepTheirVolumes) {
   }
   ASSERT_TRUE(stage.shows(volume, 5));
   EXPECT_EQ(stage.watcher.poses(volume), Poses({0, 1, 2, 3, 4, 5}));
-  stage.session->record(nullptr);
+  stage.session->recorder().start(nullptr);
   stage.pose(6);
   EXPECT_TRUE(stage.shows(volume, 6));
 }
