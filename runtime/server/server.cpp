@@ -121,7 +121,7 @@ struct Server::Impl {
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
   bool admit_request(Clock::time_point now);
-  void drop_clogged(Clock::time_point now, Clock::duration patience);
+  void drop_unread(Clock::time_point now, Clock::duration patience);
   void begin_shutdown();
   void without_memory();
   std::string metrics();
@@ -284,7 +284,7 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
 
 // Of those who read nothing, whoever holds most: the longest queue is pushed out (Wei, Coyle, Hsiao 1991), if
 // it is longer than half of what each would have of the memory. One at a time: its bytes are given back soon.
-void Server::Impl::drop_clogged(Clock::time_point now, Clock::duration patience) {
+void Server::Impl::drop_unread(Clock::time_point now, Clock::duration patience) {
   std::uint64_t most = registry->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
   Connection* longest = nullptr;
   for (const auto& connection : connections) {
@@ -345,7 +345,7 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });
   if (const auto patience = registry->patience(now)) {
-    drop_clogged(now, *patience);
+    drop_unread(now, *patience);
     next = std::min(next, kRoomTick);
   }
   registry->sweep(now);

@@ -39,8 +39,8 @@ class Executor {
 
   /// From any thread. `work` must not throw. `by`: for whom; who had least comes first.
   void submit(Service service, Job work, std::shared_ptr<Account> by = nullptr);
-  /// `work` there, then `then` on the I/O thread, where all ends that both hold, and which does not end
-  /// before. Neither may throw, but `then` may as any handler.
+  /// `work` there, which must not throw, then `then` on the I/O thread. There everything ends that both hold,
+  /// so that no worker destroys what is not its own; io_context::run() does not return before.
   void run(Service service, std::function<void()> work, std::function<void()> then,
            std::shared_ptr<Account> by = nullptr);
   /// As run(), on the threads of `frames`, of which one is left for poses (where there are two): what else
