@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames on the wire (docs/reference/protocol.md): u32 envelope_bytes, u32 payload_bytes, little-endian; the envelope;
-// zeros up to a multiple of 16 counted from the frame's start; the payload, itself a multiple of 16 long.
+// Frames on the wire (docs/reference/protocol.md): u32 envelope_bytes, u32 payload_bytes, little-endian; the
+// envelope; zeros up to a multiple of 16 counted from the frame's start; the payload, itself a multiple of 16
+// long.
 #pragma once
 
 #include <array>
