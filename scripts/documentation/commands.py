@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pages of the subcommands, made from their help: {path under docs/reference: text}."""
+import re
+
+from documentation import program
+
+NOTICE = "<!-- SPDX-License-Identifier: Apache-2.0 -->\n<!-- Made by scripts/reference from `ecorche {} --help`. Edit app/{}.cpp, then run it again. -->\n"
+# Where a page of its own says more than an option's line can.
+MORE = {
+    "check": [("Findings", "check.md#findings"), ("the case", "case.md")], "repair": [("Repairing", "check.md#repairing")],
+    "rig": [("Joints found from the bones", "skeleton.md#joints-found-from-the-bones")],
+    "preprocess": [("Meshers", "meshers.md"), ("the model", "model.md"), ("the case", "case.md")],
+    "info": [("the certificate", "model.md#ecorchequality-the-certificate")], "verify": [("the model", "model.md")],
+    "pose": [("the posed folder", "posed_folder.md"), ("Quality", "quality.md"), ("the pose", "pose.md"), ("Motion", "motion.md")],
+    "unpose": [("what unpose reads", "posed_folder.md#what-unpose-reads"), ("the round trip", "posed_folder.md#the-round-trip")],
+    "motion": [("Motion", "motion.md")], "probe": [("Points", "points.md")], "export": [("what export writes", "motion.md#what-export-writes")],
+    "thin": [("Thinning", "volumetric.md#thinning")], "refill": [("Refilling", "volumetric.md#refilling")],
+    "tears": [("Tears", "volumetric.md#tears")], "path": [("Paths and contacts", "volumetric.md#paths-and-contacts")],
+    "contact": [("Paths and contacts", "volumetric.md#paths-and-contacts")],
+    "deformers": [("By tets or by spheres", "volumetric.md#by-tets-or-by-spheres")],
+    "serve": [("Protocol", "protocol.md"), ("Limits", "limits.md"), ("HTTP", "http.md")], "stream": [("Protocol", "protocol.md")],
+}
+
+
+def pages():
+    out = {f"commands/{name}.md": page_of(name) for name in program.subcommands()}
+    out["commands/index.md"] = index()
+    return out
+
+
+def cell(text):
+    return text.replace("|", "\\|").replace("<", "&lt;").strip()
+
+
+def spaced(number):
+    """1048576 as 1 048 576; all else as it is."""
+    return f"{int(number):,}".replace(",", " ") if re.fullmatch(r"\d{5,}", number) else number
+
+
+def table(options, positional=False):
+    out = ["| argument | value | meaning |\n|---|---|---|" if positional else "| option | value | default | meaning |\n|---|---|---|---|"]
+    for option in options:
+        value = f"`{option.type}`".replace("|", "\\|") if option.type else ""
+        if option.range:
+            low, high = map(spaced, option.range)
+            value += f" {low} to {high}"
+        names = ", ".join(f"`{name}`" for name in option.names)
+        words = cell(option.text) + (" **Required.**" if option.required else "")
+        default = f"`{option.default}`" if option.default and not option.required else ""
+        out.append(f"| {names} | {value} | {words} |" if positional else f"| {names} | {value} | {default} | {words} |")
+    return "\n".join(out) + "\n"
+
+
+def page_of(name):
+    page = program.page(name)
+    out = [NOTICE.format(name, name), f"# ecorche {name}\n", f"{page.about[0].upper()}{page.about[1:]}.\n", f"```text\n{page.usage}\n```\n"]
+    if page.positionals:
+        out += ["## Arguments\n", table(page.positionals, positional=True)]
+    for group in page.groups:
+        options = [option for option in group.options if "--help" not in option.names]
+        if options:
+            out += [f"## {group.title}\n", table(options)]
+    out.append("Options of every command (`--json`, `--threads`, `--fail-on-warn`): [Commands](index.md#options-of-every-command).\n")
+    if page.notes:
+        out += ["## Notes\n", *(cell(note) + "\n" for note in page.notes)]
+    out += ["## Example\n", f"```text\n{page.example}\n```\n", "## Exit codes\n",
+            "0: done. 1: with `--fail-on-warn`, something was warned of. All others: [Exit codes](../errors.md#exit-codes).\n"]
+    if name in MORE:
+        out += ["## More\n", *(f"- [{title}](../{target})" for title, target in MORE[name]), ""]
+    return "\n".join(out)
+
+
+def index():
+    page = program.page(None)
+    out = [NOTICE.format("", "main").replace(" --help`", "--help`"), "# Commands\n", "```text\n" + page.usage + "\n```\n",
+           "| command | does |\n|---|---|"]
+    out += [f"| [`{name}`]({name}.md) | {cell(words)} |" for name, words in program.subcommands().items()]
+    out += ["\n## Options of every command\n"]
+    out += [table([option for option in group.options]) for group in page.groups]
+    out += ["Results go to stdout, everything else to stderr. Exit codes: [Exit codes and errors](../errors.md).\n"]
+    return "\n".join(out)
