@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The examples of docs/reference/case.md and docs/reference/volumetric.md are read by the readers that they
-// describe.
+// The examples of docs/reference are read by the readers that they describe.
 #include <gtest/gtest.h>
 
 #include <ecorche/io/case_file.hpp>
