@@ -65,6 +65,11 @@ class Outside(unittest.TestCase):
         self.nobody_answers(build / "connect")
         self.assertFalse((build / "bin").exists(), "the outer project's folders are its own")
 
+    def test_the_page_shows_these_programs(self):
+        page = (SOURCE / "docs" / "embedding.md").read_text()
+        for name in ("pose", "prepare", "connect"):
+            self.assertIn((HERE / "installed" / f"{name}.cpp").read_text(), page, name)
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])
