@@ -222,7 +222,7 @@ class CaseReader {
       if (!axes && !frame_given_) frame.axes = *tagged;
       if (frame.axes != *tagged) {
         context_.warn(file.where() + ": its header says SPACE=" + *surface.space +
-                      ", which the given frame overrides");
+                      ", which the given frame overrides (leave out frame where the header is right)");
       }
     }
     frame.apply(surface.mesh);
