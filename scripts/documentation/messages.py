@@ -97,21 +97,21 @@ def page_of(file, home):
         if not message.field:
             out.append("No fields.\n")
             continue
-        out.append("| number | field | type | meaning |\n|---|---|---|---|")
+        out.append("| field | type | meaning |\n|---|---|---|")
         for i, field in enumerate(message.field):
             meaning = file.comment([*path, FIELD, i])
             if field.HasField("oneof_index") and not field.proto3_optional:
                 among = message.oneof_decl[field.oneof_index].name
                 meaning = f"One of `{among}`. {meaning}".strip()
-            out.append(f"| {field.number} | `{field.name}` | {type_of(field, home, file.name)} | {meaning} |")
+            out.append(f"| `{field.name}` = {field.number} | {type_of(field, home, file.name)} | {meaning} |")
         out.append("")
     for path, name, enum in file.enums():
         out.append(f"## {name}\n")
         if file.comment(path):
             out.append(file.comment(path, paragraphs=True) + "\n")
-        out.append("| number | value | meaning |\n|---|---|---|")
+        out.append("| value | meaning |\n|---|---|")
         for i, value in enumerate(enum.value):
-            out.append(f"| {value.number} | `{value.name}` | {file.comment([*path, VALUE, i])} |")
+            out.append(f"| `{value.name}` = {value.number} | {file.comment([*path, VALUE, i])} |")
         out.append("")
     return "\n".join(out)
 
@@ -124,19 +124,19 @@ def index_of(files, home):
            "One message travels on the wire, `ecorche.v1.Envelope` (`proto/ecorche/v1/envelope.proto`), with exactly one of the members "
            "below. How it is framed, and what may follow what, is in [Protocol](../protocol.md).\n",
            "Space is the patient's LPS, lengths are millimetres, angles radians, quaternions (w, x, y, z).\n",
-           "| number | field | meaning |\n|---|---|---|",
-           f"| {message.field[0].number} | `{message.field[0].name}` (uint64) | {file.comment([MESSAGE, 0, FIELD, 0])} |\n",
+           "| field | type | meaning |\n|---|---|---|",
+           f"| `{message.field[0].name}` = {message.field[0].number} | uint64 | {file.comment([MESSAGE, 0, FIELD, 0])} |\n",
            "A receiver that finds no member it knows MUST answer `UNIMPLEMENTED` and go on: newer peers say more.\n"]
     ways = [("To the server", 10, 39), ("Either way", 40, 59), ("To the client", 60, 79), ("In recordings only", 80, 99)]
     for title, low, high in ways:
-        out.append(f"## {title}\n\n| number | message | what it is |\n|---|---|---|")
+        out.append(f"## {title}\n\n| message | what it is |\n|---|---|")
         for field in message.field:
             if low <= field.number <= high:
                 name = field.type_name.rsplit(".", 1)[1]
                 of = files[home["ecorche.v1." + name]]
                 path = next(path for path, full, _ in of.messages() if full == name)
                 first = re.split(r"(?<=[.:]) ", of.comment(path), maxsplit=1)[0].rstrip(":")
-                out.append(f"| {field.number} | {link(field.type_name, home, 'index')} | {first} |")
+                out.append(f"| {link(field.type_name, home, 'index')} = {field.number} | {first} |")
         out.append("")
     out.append("## By file\n")
     out += [f"- [{TITLES[name]}]({name}.md)" for name in ORDER]
