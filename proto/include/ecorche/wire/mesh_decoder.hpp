@@ -11,6 +11,7 @@
 
 namespace ecorche::wire {
 
+/// One tissue of a frame.
 struct DecodedTissue {
   std::uint32_t tissue = 0;            ///< row of ModelOpened.tissues
   std::vector<std::uint16_t> numbers;  ///< 3 per vertex; empty under ENCODING_F32

@@ -26,6 +26,7 @@ struct QualityThresholds {
   double max_doubtful_turn = 5 * std::numbers::pi / 180;  ///< this, radians
 };
 
+/// How a pose changes a tissue's volume.
 struct TissueChange {
   std::string name;
   Group group = Group::other;
@@ -43,6 +44,7 @@ struct DoubtfulJoint {
   double confidence = 0;
 };
 
+/// What was measured of a pose.
 struct PoseQuality {
   std::uint64_t inverted_tets = 0;  ///< of posed volume zero or less
   double inverted_rest_mm3 = 0;

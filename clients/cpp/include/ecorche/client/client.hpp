@@ -40,6 +40,7 @@ class Client {
   /// Connects and exchanges the hellos.
   Client(const wire::Address& address, const std::string& name, const Access& access = {});
 
+  /// What the server said of itself.
   const v1::ServerHello& server() const { return hello_; }
 
   /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
