@@ -32,18 +32,17 @@ def cell(text):
     return text.replace("|", "\\|").replace("<", "&lt;").strip()
 
 
-def spaced(number):
-    """1048576 as 1 048 576; all else as it is."""
-    return f"{int(number):,}".replace(",", " ") if re.fullmatch(r"\d{5,}", number) else number
+def spaced(text):
+    """Long numbers in groups: 1048576 as 1 048 576."""
+    return re.sub(r"(?<![\d.])\d{5,}(?![\d.])", lambda number: f"{int(number[0]):,}".replace(",", " "), text)
 
 
 def table(options, positional=False):
     out = ["| argument | value | meaning |\n|---|---|---|" if positional else "| option | value | default | meaning |\n|---|---|---|---|"]
     for option in options:
-        value = f"`{option.type}`".replace("|", "\\|") if option.type else ""
+        value = ", ".join(f"`{choice}`" for choice in option.type.split("|")) if option.type else ""
         if option.range:
-            low, high = map(spaced, option.range)
-            value += f" {low} to {high}"
+            value += f" {spaced(option.range)}"
         names = ", ".join(f"`{name}`" for name in option.names)
         words = cell(option.text) + (" **Required.**" if option.required else "")
         default = f"`{option.default}`" if option.default and not option.required else ""

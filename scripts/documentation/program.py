@@ -30,7 +30,7 @@ class Option:
     names: list          # ["-o", "--output"]; of a positional its name
     text: str
     type: str = ""       # TEXT, PATH, a|b|c, ...; empty for a flag
-    range: tuple = ()    # ("64", "1048576")
+    range: str = ""      # "64 to 1048576"
     default: str = ""
     required: bool = False
 
@@ -57,10 +57,10 @@ def option_of(head, text):
     required = value.endswith("(required)")
     value = value.removesuffix("(required)").strip()
     kind, _, default = value.partition("=")
-    bounds = re.search(r":?\w+ in \[(.+?) - (.+?)\]", kind)
-    if bounds:
-        kind = kind.replace(bounds[0], "")
-    return Option(names.split(","), text, kind.strip(), bounds.groups() if bounds else (), default, required)
+    # TYPE:TYPE in [LOW - HIGH], or TYPE:what a check says of itself.
+    kind, _, checked = kind.partition(":")
+    bounds = re.search(r"\w+ in \[(.+?) - (.+?)\]", checked)
+    return Option(names.split(","), text, kind.strip(), " to ".join(bounds.groups()) if bounds else checked, default, required)
 
 
 @functools.cache
