@@ -38,15 +38,18 @@ def spaced(text):
 
 
 def table(options, positional=False):
-    out = ["| argument | value | meaning |\n|---|---|---|" if positional else "| option | value | default | meaning |\n|---|---|---|---|"]
+    out = [f"| {'argument' if positional else 'option'} | value | meaning |\n|---|---|---|"]
     for option in options:
         value = ", ".join(f"`{choice}`" for choice in option.type.split("|")) if option.type else ""
+        words = cell(option.text)
         if option.range:
-            value += f" {spaced(option.range)}"
+            words += f"; {spaced(option.range)}"
+        if option.required:
+            words += ". **Required**"
+        elif option.default:
+            words += f". Default: `{option.default}`"
         names = ", ".join(f"`{name}`" for name in option.names)
-        words = cell(option.text) + (" **Required.**" if option.required else "")
-        default = f"`{option.default}`" if option.default and not option.required else ""
-        out.append(f"| {names} | {value} | {words} |" if positional else f"| {names} | {value} | {default} | {words} |")
+        out.append(f"| {names} | {value} | {words} |")
     return "\n".join(out) + "\n"
 
 
