@@ -77,7 +77,8 @@ class ClipSource final : public MotionSource {
     if (!choice.map.empty()) names = io::read_motion_map(choice.map, rig).joints;
     match_ = kinematics::match(rig, clip_->head(), names);
     if (!match_.unused_joints.empty())
-      program.note("warning: " + path_ + ": " + some(match_.unused_joints) + " moves nothing of this model");
+      program.note("warning: " + path_ + ": " + some(match_.unused_joints) +
+                   " moves nothing of this model (assign it by --map FILE)");
     find_bends();
     align(choice);
     note_alignment(program);
@@ -265,7 +266,8 @@ class AngleSource final : public MotionSource {
                   "none of its columns (" + some(file_.columns()) + ") is an angle of this model",
                   "say by --map FILE what they mean");
     if (!unused.empty())
-      program.note("warning: " + choice.file.string() + ": " + some(unused) + " moves nothing of this model");
+      program.note("warning: " + choice.file.string() + ": " + some(unused) +
+                   " moves nothing of this model (assign it by --map FILE)");
     // The pelvis of OpenSim stands in the ground's frame: its way is told from the first frame.
     const auto first = file_.read(0);
     for (std::size_t c = 0; c < root_.size(); ++c) {
@@ -315,7 +317,8 @@ class SequenceSource final : public MotionSource {
   SequenceSource(const Program& program, const MotionChoice& choice, const Rig& rig)
       : sequence_(io::read_pose_sequence(choice.file, rig)) {
     reference = "the scan";
-    if (!sequence_.left_out.empty()) program.note("warning: the model has no " + some(sequence_.left_out));
+    if (!sequence_.left_out.empty())
+      program.note("warning: the model has no " + some(sequence_.left_out) + " (these stay as scanned)");
   }
   std::size_t frames() const override { return sequence_.frames(); }
   double frame_seconds() const override { return sequence_.frame_seconds; }

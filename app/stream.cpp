@@ -368,7 +368,7 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::Range(0.0, 1e5))
       ->capture_default_str();
   command->add_flag("--normals", settings->normals, "unit normals beside the positions");
-  command->add_flag("--quality", settings->quality, "let the server judge every pose");
+  command->add_flag("--quality", settings->quality, "let the server measure the quality of every pose");
   command->add_option(
       "--model", settings->model,
       "check every frame against offline posing of this model file: float32 and volumes byte for "

@@ -302,12 +302,15 @@ void inspect_joints(const Case& patient, const Context& context, Report& report)
   Context inner = context;
   inner.log = [&](LogLevel level, std::string_view line) {
     if (level != LogLevel::warning || line.starts_with("segment ")) return;  // `inspect` names those itself
+    const std::string advice = " (" + std::string(rig::joint_advice) + ")";
+    if (line.ends_with(advice)) line.remove_suffix(advice.size());
     const std::size_t colon = line.find(": ");
-    report.findings.push_back({Severity::warning,
-                               std::string(line.substr(0, colon)),
-                               std::string(colon == std::string_view::npos ? line : line.substr(colon + 2)),
-                               {},
-                               "ecorche rig says how well each joint was found"});
+    report.findings.push_back(
+        {Severity::warning,
+         std::string(line.substr(0, colon)),
+         std::string(colon == std::string_view::npos ? line : line.substr(colon + 2)),
+         {},
+         std::string(rig::joint_advice) + "; ecorche rig says how well each was found"});
   };
   try {
     const Rig rig = rig::fit(patient, inner);

@@ -146,9 +146,23 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
   rig.fits.back().confidence = std::min(found.fit.confidence, of_axes);
 }
 
+// `outer`, whose warnings of joints end with what to do.
+Context advising(const Context& outer) {
+  Context context = outer;
+  context.log = [&outer](LogLevel level, std::string_view line) {
+    if (!outer.log) return;
+    std::string said(line);
+    if (level == LogLevel::warning && line.starts_with("joint "))
+      said.append(" (").append(joint_advice) += ')';
+    outer.log(level, said);
+  };
+  return context;
+}
+
 }  // namespace
 
-Rig fit(const Case& patient, const Context& context, std::vector<JointEvidence>* evidence) {
+Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* evidence) {
+  const Context context = advising(outer);
   Rig rig;
   const Skeleton asked = patient.generic ? generic_tree(patient, context) : present_part(patient, context);
   rig.skeleton = asked;
