@@ -56,6 +56,15 @@ def paper_model():
     return model
 
 
+def example_model(body, data, tets=300_000):
+    """The model of examples/BODY, whose files lie in the folder `data`."""
+    model = MADE / "examples" / f"{body}_{tets}.hdf"
+    if not model.exists():
+        model.parent.mkdir(parents=True, exist_ok=True)
+        ecorche("preprocess", ROOT / "examples" / body, "-o", model, "--data", data, "--max-tets", tets)
+    return model
+
+
 def given_model(path):
     """`path`, or where there is none the paper phantom's model."""
     if path is None:
