@@ -57,7 +57,7 @@ void add_frame_options(CLI::App& command, FrameChoice& choice) {
   command.add_option(
       "--pose", choice.pose,
       "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
-  command.add_option("--ik", choice.ik, "goals of points of the body, a file (docs/motion.md)");
+  command.add_option("--ik", choice.ik, "goals of points of the body, a file (docs/reference/motion.md)");
   command
       .add_option("--ik-tolerance", choice.ik_tolerance_mm,
                   "millimetres beyond which a goal of --ik counts as missed: a warning, and ok: false")

@@ -352,7 +352,7 @@ Case read_case(const fs::path& path, const CaseOptions& options, const Context& 
   if (ending != ".yaml" && ending != ".yml" && fs::is_regular_file(file, ignored)) {
     throw Error(
         ErrorKind::usage, path.string(), "is no case",
-        "give a case.yaml, or the folder that holds one; surfaces and images are named in it (docs/case.md)");
+        "give a case.yaml, or the folder that holds one; surfaces and images are named in it (docs/reference/case.md)");
   }
   return CaseReader(file, options, context).read();
 }

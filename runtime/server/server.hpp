@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server: framed Protobuf over TCP, TLS and WebSockets (docs/protocol.md).
+// The server: framed Protobuf over TCP, TLS and WebSockets (docs/reference/protocol.md).
 #pragma once
 
 #include <cstdint>

@@ -235,7 +235,7 @@ class Motion(unittest.TestCase):
                 "skins": [{"joints": [0, 1]}], "animations": [{"channels": [], "samplers": []}]}
         self.refused(65, "circle.gltf", *self.motion(self.put("circle.gltf", json.dumps(gltf))))
 
-    # The table of docs/motion.md, on the phantom's own clip; its figure as other means read it moves as the body does.
+    # The table of docs/reference/motion.md, on the phantom's own clip; its figure as other means read it moves as the body does.
     def test_table_of_clips(self):
         bench = pathlib.Path(__file__).resolve().parents[3] / "bench" / "clips" / "run"
         loader = importlib.machinery.SourceFileLoader("clips", str(bench))

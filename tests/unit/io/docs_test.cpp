@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The examples of docs/case.md and docs/volumetric.md are read by the readers that they describe.
+// The examples of docs/reference/case.md and docs/reference/volumetric.md are read by the readers that they describe.
 #include <gtest/gtest.h>
 
 #include <ecorche/io/case_file.hpp>
@@ -14,7 +14,7 @@ namespace {
 
 // The first block of YAML after the heading that begins with `first`.
 std::string example(const std::string& heading, const char* of = "case.md", const std::string& first = "") {
-  std::ifstream file(std::string(ECORCHE_SOURCE "/docs/") + of, std::ios::binary);
+  std::ifstream file(std::string(ECORCHE_SOURCE "/docs/reference/") + of, std::ios::binary);
   const std::string page(std::istreambuf_iterator<char>(file), {});
   const std::size_t at = page.find("## " + heading), begin = page.find("```yaml\n" + first, at) + 8;
   EXPECT_NE(at, page.npos) << heading;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames on the wire (docs/protocol.md): u32 envelope_bytes, u32 payload_bytes, little-endian; the envelope;
+// Frames on the wire (docs/reference/protocol.md): u32 envelope_bytes, u32 payload_bytes, little-endian; the envelope;
 // zeros up to a multiple of 16 counted from the frame's start; the payload, itself a multiple of 16 long.
 #pragma once
 

@@ -14,7 +14,7 @@
 
 namespace ecorche::runtime {
 
-/// Thresholds of the verdict; printed with it. What each rests on: docs/quality.md.
+/// Thresholds of the verdict; printed with it. What each rests on: docs/reference/quality.md.
 struct QualityThresholds {
   double max_inverted_share = 1e-3;  ///< rest volume of inverted tets over that of the body
   double max_volume_change = 0.10;   ///< of the whole body, unsigned

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small blocking client of the framed protocol (docs/protocol.md).
+// A small blocking client of the framed protocol (docs/reference/protocol.md).
 #pragma once
 
 #include <deque>
