@@ -45,7 +45,8 @@ void replace_non_finite(Image& image, const std::filesystem::path& path, const f
     std::snprintf(value, sizeof value, "%.6g", static_cast<double>(least));
     options.say(path.string() + ": " + std::to_string(count) + " of " + std::to_string(all) +
                 " values are NaN or infinite: taken as " + value +
-                (image.components == 1 ? ", the least of the others" : ""));
+                (image.components == 1 ? ", the least of the others" : "") +
+                " (write other values there if that is not meant)");
   });
 }
 

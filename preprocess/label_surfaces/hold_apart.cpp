@@ -278,7 +278,8 @@ void tell(const Case& patient, const std::vector<TakenOut>& taken, std::int64_t 
   char share[32];
   std::snprintf(share, sizeof share, "%.3g", 100 * static_cast<double>(all) / static_cast<double>(labelled));
   context.warn(patient.labels->apart->where + ": " + in_ml(all, grid) + " (" + share +
-               " % of what is labelled) taken out, so that limbs are apart" + pairs);
+               " % of what is labelled) taken out, so that limbs are apart" + pairs +
+               " (a smaller gap_mm takes less)");
 }
 
 }  // namespace

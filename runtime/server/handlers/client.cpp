@@ -80,7 +80,7 @@ void Client::on_closed() {
   output_.wake().cancel();
   leave_place();
   try {
-    registry_.destroy_later(output_.clear());
+    registry_.executor().destroy_later(output_.clear());
   } catch (const std::bad_alloc&) {  // then it goes with the client
   }
 }
@@ -91,8 +91,9 @@ void Client::leave_place() {
   std::optional<SavedPlace> place;
   if (session && !said_goodbye_ && !session->retired()) {
     try {
-      place = SavedPlace{
-          .session = session, .asked = session->requests_of(*this), .controlled = session->controls(*this)};
+      place = SavedPlace{.session = session,
+                         .asked = session->subscriptions().requests_of(*this),
+                         .controlled = session->control().controls(*this)};
     } catch (const std::bad_alloc&) {  // then nobody comes back to it
     }
   }
@@ -104,7 +105,7 @@ void Client::leave_place() {
 void Client::evict() {
   const MustNotFail half_way;
   try {
-    registry_.destroy_later(output_.clear());
+    registry_.executor().destroy_later(output_.clear());
     end({StatusCode::aborted,
          "resume: another connection showed this one's token, and has its place (go on there)"});
   } catch (const std::bad_alloc&) {
@@ -115,7 +116,7 @@ void Client::evict() {
 
 void Client::join(std::shared_ptr<Session> session) {
   if (session_) {
-    if (session_->controls(*this)) inherited_ = session_->name();
+    if (session_->control().controls(*this)) inherited_ = session_->name();
     session_->leave(*this, false);
     for (const std::uint32_t subscription : subscriptions_) output_.forget(subscription);
     subscriptions_.clear();
@@ -128,13 +129,13 @@ void Client::join(std::shared_ptr<Session> session) {
 void Client::rejoin(std::shared_ptr<Session> session, bool controlled) {
   session_ = std::move(session);
   role_ = session_->rejoin(*this, controlled);
-  last_sequence_ = session_->last_sequence();
+  last_sequence_ = session_->poses().last_sequence();
 }
 
 bool Client::claim_control() {
-  if (!session_->claim(*this)) return false;
+  if (!session_->control().claim(*this, Clock::now())) return false;
   role_ = v1::ROLE_CONTROLLER;
-  last_sequence_ = session_->last_sequence();
+  last_sequence_ = session_->poses().last_sequence();
   return true;
 }
 

@@ -152,7 +152,7 @@ void Connection::on_stalled() {
     registry_.metrics().hit("stall");
     return close("stalled");
   }
-  registry_.destroy_later(client_->output().clear());
+  registry_.executor().destroy_later(client_->output().clear());
   client_->end_at("stall",
                   {StatusCode::deadline_exceeded,
                    "frame: none was acknowledged in time (send FrameAck for each as soon as it is read)"});
@@ -264,7 +264,7 @@ net::awaitable<void> Connection::write_output() {
     }
     co_await transport_->write(write->buffers, ec);
     if (ec) {
-      registry_.destroy_later(output.failed());
+      registry_.executor().destroy_later(output.failed());
       close("client left");
       co_return;
     }

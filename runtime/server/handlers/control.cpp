@@ -19,7 +19,7 @@ Status handle_claim_control(Client& client, const v1::ClaimControl&, const Reque
 
 Status handle_release_control(Client& client, const v1::ReleaseControl&, const Request& request) {
   client.answer_status(request.id(), {});
-  client.session()->release(client);
+  client.session()->control().release(client, Clock::now());
   return {};
 }
 

@@ -83,7 +83,7 @@ void on_solved(Client& client, const v1::Envelope& request, const IkOutcome& out
   PoseRequest next;
   next.sequence = apply_as;
   next.pose = outcome.result.pose;
-  next.skinning = client.session()->present().skinning;
+  next.skinning = client.session()->poses().present().skinning;
   client.session()->pose(std::move(next));
 }
 
@@ -98,13 +98,14 @@ Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& 
     if (Status status = check_sequence(solve.apply_as(), client.last_sequence()); !status.ok()) return status;
   }
   Pose start;
-  if (Status status = read_start(solve, segments, session.present().pose, start); !status.ok()) return status;
+  if (Status status = read_start(solve, segments, session.poses().present().pose, start); !status.ok())
+    return status;
   if (client.pending().ik >= kMaxPending) {
     return {StatusCode::resource_exhausted, "ik: two are being solved for this connection (wait for them)"};
   }
   ++client.pending().ik;
   const auto outcome = std::make_shared<IkOutcome>();
-  client.registry().run_on_worker(
+  client.registry().executor().run_request(
       [outcome, problem = std::move(problem), start = std::move(start), model = session.model()] {
         outcome->status = guarded("ik", [&] {
           outcome->result = kinematics::solve_ik(model->model().rig, start, problem);

@@ -129,7 +129,7 @@ void on_body(Client& client, const SharedProbe& probe, const std::shared_ptr<con
     find_points(*model, *body, *probe);
     return answer_probe(client, *probe, body->sequence);
   }
-  client.registry().run_on_worker(
+  client.registry().executor().run_request(
       [model, body, probe] { find_points(*model, *body, *probe); },
       client.callback([probe, body](Client& asking) { answer_probe(asking, *probe, body->sequence); }),
       client.account());

@@ -32,7 +32,8 @@ void remake_aside(Client& client, ResumeRequest request, const Session& session)
   const auto remake = std::make_shared<Remake>();
   remake->request = std::move(request);
   remake->lacking = lacking_streams(remake->request.subscriptions, session);
-  client.registry().run_in_background(
+  client.registry().executor().run(
+      Service::background,
       [remake, weak = client.weak_from_this(), model = session.model(), &hooks = client.registry().hooks()] {
         if (weak.expired()) return;
         const HandlingScope handling(hooks);

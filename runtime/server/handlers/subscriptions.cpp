@@ -62,7 +62,8 @@ void prepare_aside(Client& client, std::uint64_t id, SubscriptionRequest asked) 
   const auto made = std::make_shared<Prepared>();
   made->asked = std::move(asked);
   const std::shared_ptr<Session> session = client.session();
-  client.registry().run_in_background(
+  client.registry().executor().run(
+      Service::background,
       [made, model = session->model()] {
         made->status = guarded("subscribe", [&]() -> Status {
           made->asked.streams = open_streams(*model, std::get<MeshSpec>(made->asked.spec));
@@ -91,7 +92,7 @@ void prepare_aside(Client& client, std::uint64_t id, SubscriptionRequest asked) 
 Status handle_subscribe(Client& client, const v1::Subscribe& wanted, const Request& request) {
   const Session& session = *client.session();
   StreamSpec spec;
-  if (Status status = read_want(wanted, session.model()->model(), spec); !status.ok()) return status;
+  if (Status status = read_spec(wanted, session.model()->model(), spec); !status.ok()) return status;
   const std::size_t subscriptions = client.subscriptions().size() + client.pending().subscriptions;
   if (Status status = check_limits(client, subscriptions, session.frame_bytes(spec)); !status.ok())
     return status;
