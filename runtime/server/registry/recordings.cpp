@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
 #include "runtime/server/resources/shares.hpp"
 #include "runtime/server/schedule/post_back.hpp"
 
@@ -57,7 +58,7 @@ Status Recordings::room(const std::string& name, const std::string& address, std
     return {StatusCode::failed_precondition,
             "record: this server keeps no recordings (serve with --record-dir)"};
   }
-  if (!identifier(name))
+  if (!is_identifier(name))
     return {StatusCode::invalid_argument, "record: a name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   path = options_.record_folder / (name + ".ecrec");
   std::erase_if(running_, [](const auto& one) { return one.expired(); });

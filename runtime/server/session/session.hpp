@@ -90,9 +90,6 @@ struct Services {
   Journal* journal = nullptr;  ///< for what goes wrong; may be null
 };
 
-/// [a-z0-9_]{1,64}
-bool identifier(const std::string& name);
-
 /// Lives on the I/O thread. Poses wait in one slot, where the newest wins; one job at a time runs on the
 /// workers until its end is posted back. Volumes, which take longer than all else of a pose, have a job of
 /// their own beside it, and planes of them another: each shows the newest pose that is posed when it begins,
