@@ -14,10 +14,10 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr Eigen::Index kAsked = 3000;   // vertices, whose distance from the other bone is asked
-constexpr std::size_t kFewest = 16;     // of the nearest ones
-constexpr double kNearestShare = 0.02;  // likewise, as in facing.cpp
-constexpr double kLong = 4;             // a shaft's variance, in variances across it
+constexpr Eigen::Index kSampled = 3000;  // vertices, whose distance from the other bone is asked
+constexpr std::size_t kFewest = 16;      // of the nearest ones
+constexpr double kNearestShare = 0.02;   // likewise, as in facing.cpp
+constexpr double kLong = 4;              // a shaft's variance, in variances across it
 constexpr double kTip = 0.005, kSide = 0.02;
 constexpr int kRounds = 6;  // of finding the width of the last width's half
 
@@ -30,7 +30,7 @@ double percentile(std::vector<double> of, double share) {
 // The middle, coordinate by coordinate, of the vertices nearest to `other`.
 Eigen::Vector3d nearest_part(const SurfaceMesh& bone, const SurfaceMesh& other) {
   const geometry::FaceTree tree(other);
-  const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kAsked);
+  const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kSampled);
   std::vector<std::pair<double, Eigen::Index>> away;
   std::int32_t hint = -1;
   for (Eigen::Index v = 0; v < bone.V.rows(); v += step) {
