@@ -48,7 +48,10 @@ Played play(const Program& program, const Model& model, const RigChoice& choice,
     whole = kinematics::add_frame(model.rig, pose, out.clip) && whole;
     if (f % step == 0) out.some.push_back(std::move(pose));
   }
-  if (!whole) program.note("warning: translations of joints other than the root are left out");
+  if (!whole)
+    program.note(
+        "warning: translations of joints other than the root are left out (pose writes them into the bodies "
+        "themselves)");
   return out;
 }
 

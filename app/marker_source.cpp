@@ -46,7 +46,7 @@ class MarkerSource final : public MotionSource {
                   "say where three or more are by --map FILE");
     if (unknown > 0)
       program.note("warning: " + choice.file.string() + ": " + std::to_string(unknown) +
-                   " markers have no place on the body");
+                   " markers have no place on the body (say it by --map FILE)");
     check_size(choice);
   }
 

@@ -12,7 +12,8 @@
 
 namespace ecorche::app {
 
-/// `quality.json`, every key of which docs/quality.md explains. `det_f`: of every tet, measured as `quality`.
+/// `quality.json`, every key of which docs/reference/quality.md explains. `det_f`: of every tet, measured as
+/// `quality`.
 nlohmann::json quality_json(const Model& model, const runtime::PosedBody& body,
                             const runtime::PoseQuality& quality, std::span<const float> det_f,
                             const HowPosed& how);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `posed.json`: what a posed folder is of, and what each of its files is (docs/unpose.md).
+// `posed.json`: what a posed folder is of, and what each of its files is (docs/reference/posed_folder.md).
 #pragma once
 
 #include <cstdint>

@@ -17,7 +17,7 @@ TYPES = {"unsigned char": "u1", "uint8": "u1", "signed char": "i1", "int8": "i1"
 
 
 def identifier(name):
-    """A label's name as a tissue's: what docs/case.md says of names out of files."""
+    """A label's name as a tissue's: what docs/reference/case.md says of names out of files."""
     return re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")[:48].strip("_") or "label"
 
 

@@ -35,7 +35,8 @@ struct Bound {
   Unit unit = Unit::plain;
 };
 
-/// All of them, in the order of the certificate's members. docs/model.md holds the same table, by a test.
+/// All of them, in the order of the certificate's members. docs/reference/model.md holds the same table, by a
+/// test.
 std::span<const Bound> bounds();
 
 /// `>= 0.5`, `<= 1`, `<= 4 grains of float32`, or `0` where only that will do.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ENCODING_U16_DELTA: the u16 positions of a tissue against those of a keyframe (docs/protocol.md, "Deltas").
+// ENCODING_U16_DELTA: the u16 positions of a tissue against those of a keyframe (docs/reference/protocol.md,
+// "Deltas").
 //
 // Vertices go in blocks of 512. A block's deformation since the keyframe is nearly affine, so the block tells
 // an affine map in fixed point, and what is left of each coordinate after it, less the least of its axis, is
@@ -17,7 +18,7 @@
 
 namespace ecorche::wire {
 
-/// The layout of a block; see docs/protocol.md.
+/// The layout of a block; see docs/reference/protocol.md.
 namespace delta {
 inline constexpr std::size_t block_vertices = 512;
 /// A row: vertex 32 r + l of the block is lane l of row r.

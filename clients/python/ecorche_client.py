@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small client of an ecorche server: framed Protobuf over TCP (docs/protocol.md), plain sockets, no threads.
+"""A small client of an ecorche server: framed Protobuf over TCP (docs/reference/protocol.md), plain sockets, no threads.
 
     from ecorche_client import Client
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The encodings of frames (docs/protocol.md, "Encodings"), as numpy arrays. Needs no server."""
+"""The encodings of frames (docs/reference/protocol.md, "Encodings"), as numpy arrays. Needs no server."""
 import ctypes
 import ctypes.util
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which datasets a model is made of: the one list that the writer stores and `identity` hashes
-// (docs/model.md).
+// (docs/reference/model.md).
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What hangs on which segment, said by hand (docs/volumetric.md).
+// What hangs on which segment, said by hand (docs/reference/volumetric.md).
 #pragma once
 
 #include <filesystem>

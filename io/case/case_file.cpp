@@ -222,7 +222,7 @@ class CaseReader {
       if (!axes && !frame_given_) frame.axes = *tagged;
       if (frame.axes != *tagged) {
         context_.warn(file.where() + ": its header says SPACE=" + *surface.space +
-                      ", which the given frame overrides");
+                      ", which the given frame overrides (leave out frame where the header is right)");
       }
     }
     frame.apply(surface.mesh);
@@ -350,9 +350,9 @@ Case read_case(const fs::path& path, const CaseOptions& options, const Context& 
   const fs::path file = fs::is_directory(path, ignored) ? path / "case.yaml" : path;
   const std::string ending = file.extension().string();
   if (ending != ".yaml" && ending != ".yml" && fs::is_regular_file(file, ignored)) {
-    throw Error(
-        ErrorKind::usage, path.string(), "is no case",
-        "give a case.yaml, or the folder that holds one; surfaces and images are named in it (docs/case.md)");
+    throw Error(ErrorKind::usage, path.string(), "is no case",
+                "give a case.yaml, or the folder that holds one; surfaces and images are named in it "
+                "(docs/reference/case.md)");
   }
   return CaseReader(file, options, context).read();
 }

@@ -18,8 +18,8 @@ struct IkRequest {
   std::vector<std::string> left_out;  ///< of a library pose that the rig has not
 };
 
-/// `ecorche_ik: 1` (docs/motion.md): where to start, what is pinned, targets and looks. Throws Error{config}
-/// naming file, line and key, and what read_pose and library_pose throw.
+/// `ecorche_ik: 1` (docs/reference/motion.md): where to start, what is pinned, targets and looks. Throws
+/// Error{config} naming file, line and key, and what read_pose and library_pose throw.
 IkRequest read_ik(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace ecorche::io

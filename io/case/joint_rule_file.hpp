@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sources of joint centres and axes in a skeleton file, and named regions (docs/case.md).
+// The sources of joint centres and axes in a skeleton file, and named regions (docs/reference/case.md).
 #pragma once
 
 #include <string>
@@ -46,7 +46,7 @@ class RuleReader {
 std::string point_to_yaml(const PointSource& source);
 std::string axes_to_yaml(const std::vector<std::pair<int, DirectionSource>>& axes);
 
-/// What is possible at a joint with these angles (docs/case.md), and the size of a body.
+/// What is possible at a joint with these angles (docs/reference/case.md), and the size of a body.
 JointBounds read_bounds(const yaml::Value& value, const std::vector<AngleAxis>& sequence);
 BodySize read_size(const yaml::Value& value);
 

@@ -31,8 +31,8 @@ struct MotionMap {
   std::map<std::string, MarkerPlace> markers;
 };
 
-/// `ecorche_motion_map: 1` with `joints`, `angles` and `markers` (docs/motion.md), each of which may be left
-/// out. Throws Error{config} for whatever is wrong in it and for what `rig` has not.
+/// `ecorche_motion_map: 1` with `joints`, `angles` and `markers` (docs/reference/motion.md), each of which
+/// may be left out. Throws Error{config} for whatever is wrong in it and for what `rig` has not.
 MotionMap read_motion_map(const std::filesystem::path& path, const Rig& rig);
 
 /// OpenSim's coordinates as far as `rig` has them: io/case/data/opensim.yaml.

@@ -13,7 +13,7 @@ namespace ecorche::io {
 /// Refuses another version under `kind` (`ecorche_pose`), and a pose of another skeleton.
 void check_head(const yaml::Value& file, std::string_view kind, const Skeleton& skeleton);
 
-/// The pose that the keys `root` and `joints` of a map say (docs/case.md); without both, the scan.
+/// The pose that the keys `root` and `joints` of a map say (docs/reference/case.md); without both, the scan.
 Pose parse_pose(const yaml::Value& map, const Rig& rig);
 
 }  // namespace ecorche::io

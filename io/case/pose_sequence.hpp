@@ -21,9 +21,9 @@ struct PoseSequence {
   Pose at(std::size_t frame) const;
 };
 
-/// A pose sequence (docs/motion.md): keys in ascending `time_s`, each a pose file beside it, a pose of the
-/// library or joints of its own. Throws Error{config} for whatever is wrong in it, naming file, line and key,
-/// and what read_pose throws.
+/// A pose sequence (docs/reference/motion.md): keys in ascending `time_s`, each a pose file beside it, a pose
+/// of the library or joints of its own. Throws Error{config} for whatever is wrong in it, naming file, line
+/// and key, and what read_pose throws.
 PoseSequence read_pose_sequence(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace ecorche::io

@@ -14,7 +14,7 @@
 
 namespace ecorche::io {
 
-// What the reader accepts; docs/skeleton.schema.json lists the same (a test compares them).
+// What the reader accepts; docs/reference/skeleton.schema.json lists the same (a test compares them).
 namespace skeleton_keys {
 inline constexpr std::array<std::string_view, 5> file{"ecorche_skeleton", "name", "size_mm", "segments",
                                                       "regions"};

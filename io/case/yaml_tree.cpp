@@ -120,7 +120,7 @@ Node parse_tree(const std::string& text, const std::string& file) {
     std::istringstream stream(text);
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(builder))
-      throw Error(ErrorKind::config, file, "is empty", "see docs/case.md");
+      throw Error(ErrorKind::config, file, "is empty", "see docs/reference/case.md");
     TreeBuilder second(file);
     if (parser.HandleNextDocument(second)) {
       throw Error(ErrorKind::config, file, "holds more than one document", "keep one, without '---'");

@@ -44,7 +44,8 @@ void replace_non_finite(Image& image, const std::filesystem::path& path, const f
     for (T& x : scalars) x = std::isfinite(x) ? x : least;
     options.say(path.string() + ": " + std::to_string(count) + " of " + std::to_string(all) +
                 " values are NaN or infinite: taken as " + text::number(static_cast<double>(least), 6) +
-                (image.components == 1 ? ", the least of the others" : ""));
+                (image.components == 1 ? ", the least of the others" : "") +
+                " (write other values there if that is not meant)");
   });
 }
 

@@ -76,7 +76,7 @@ void make_right_angled(ImageGrid& grid, const std::filesystem::path& path,
   for (int c = 0; c < 8; ++c) moved = std::max(moved, (corner(grid, c) - corner(before, c)).norm());
   options.say(path.string() + ": its axes are " + text::number(degrees) +
               " degrees off right angles: taken as right-angled, which moves its farthest voxel by " +
-              text::number(moved) + " mm");
+              text::number(moved) + " mm (resample it onto right-angled voxels if that is too far)");
 }
 
 }  // namespace ecorche::io

@@ -20,8 +20,9 @@ struct VolumetricSkeletonFile {
 
 /// Writes XML PolyData, atomically, raw appended: points LPS mm (float32), point arrays `ijk`, `distance`,
 /// `deficit` and, where attached, `segment`; a line from child to parent for every edge of the tree; the rest
-/// as field data (docs/volumetric.md). `path` must end in `.vtp`. The same value gives the same bytes. Throws
-/// Error{usage, cannot_create, io}, Error{internal} for a skeleton with a defect or more segments than names.
+/// as field data (docs/reference/volumetric.md). `path` must end in `.vtp`. The same value gives the same
+/// bytes. Throws Error{usage, cannot_create, io}, Error{internal} for a skeleton with a defect or more
+/// segments than names.
 void write_volumetric_skeleton(const std::filesystem::path& path, const VolumetricSkeletonFile& file);
 
 /// Reads what the above wrote, also as ParaView saves it again, trusting nothing: `first_defect` finds none,

@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <numbers>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/degrees.hpp"
 #include "core/values/text.hpp"
 #include "preprocess/check/inside.hpp"
 #include "preprocess/check/joint_places.hpp"
@@ -20,7 +20,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kOutside = 0.02;  // of the longer bone: surfaces of skin and bones are no truer
 // Hinges of limbs stand across the shafts of both bones: condyles 80 to 96 degrees to the femur (Paley 2002),
 // an elbow's axis 75 to 100 to the humerus (London 1981) and, by the carrying angle of up to 28 (Zampagni et
@@ -220,7 +219,8 @@ class Joints {
       // end.
       const Vector3d from = bones_[of].middle() - joint(row).center;
       if (std::abs(bones_[of].shaft->dot(from)) < 0.9 * from.norm()) continue;
-      const double angle = std::acos(std::min(1.0, std::abs(axis.dot(*bones_[of].shaft)))) * kDegrees;
+      const double angle =
+          std::acos(std::min(1.0, std::abs(axis.dot(*bones_[of].shaft)))) * degrees_per_radian;
       if (angle >= 90 - kAcross) continue;
       add_finding(row,
                   "its axis stands " + text::number(angle) + " degrees to the shaft of '" + segment(of) +
@@ -297,12 +297,15 @@ void inspect_joints(const Case& patient, const Context& context, Report& report)
   Context inner = context;
   inner.log = [&](LogLevel level, std::string_view line) {
     if (level != LogLevel::warning || line.starts_with("segment ")) return;  // `inspect` names those itself
+    const std::string advice = " (" + std::string(rig::joint_advice) + ")";
+    if (line.ends_with(advice)) line.remove_suffix(advice.size());
     const std::size_t colon = line.find(": ");
-    report.findings.push_back({Severity::warning,
-                               std::string(line.substr(0, colon)),
-                               std::string(colon == std::string_view::npos ? line : line.substr(colon + 2)),
-                               {},
-                               "ecorche rig says how well each joint was found"});
+    report.findings.push_back(
+        {Severity::warning,
+         std::string(line.substr(0, colon)),
+         std::string(colon == std::string_view::npos ? line : line.substr(colon + 2)),
+         {},
+         std::string(rig::joint_advice) + "; ecorche rig says how well each was found"});
   };
   try {
     const Rig rig = rig::fit(patient, inner);

@@ -276,7 +276,8 @@ void warn_of_removed(const Case& patient, const std::vector<RemovedVoxels>& take
   }
   const std::string share = text::number(100 * static_cast<double>(all) / static_cast<double>(labelled));
   context.warn(patient.labels->apart->where + ": " + in_ml(all, grid) + " (" + share +
-               " % of what is labelled) taken out, so that limbs are apart" + pairs);
+               " % of what is labelled) taken out, so that limbs are apart" + pairs +
+               " (a smaller gap_mm takes less)");
 }
 
 }  // namespace

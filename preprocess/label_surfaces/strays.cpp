@@ -74,7 +74,8 @@ void drop_strays(Case& patient, const Context& context) {
     const Strays strays = voxels_of(*patient.labels, *tissue.source);
     const bool limited = tissue.source->side != Side::both || tissue.source->within;
     if (strays.voxels == 0 || strays.voxels > kStray || limited) refuse(*tissue.source, tissue.name, strays);
-    context.warn(tissue.source->where + ": '" + tissue.name + "': " + describe(strays) + "; it is left out");
+    context.warn(tissue.source->where + ": '" + tissue.name + "': " + describe(strays) +
+                 "; it is left out (take the label out of the image, or say except: in the entry)");
     return true;
   });
 }

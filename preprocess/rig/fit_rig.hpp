@@ -2,6 +2,7 @@
 // Joint centres from the bones (Sujar18 3.1).
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include <ecorche/values/case.hpp>
@@ -9,6 +10,10 @@
 #include <ecorche/values/skeleton.hpp>
 
 namespace ecorche::rig {
+
+/// What every warning of a joint ends with, in brackets: what to do about it.
+inline constexpr std::string_view joint_advice =
+    "give its center and axes in the skeleton, or mend the bones that it was found on";
 
 /// What a joint's centre was found on, for pictures.
 struct JointEvidence {
@@ -30,6 +35,6 @@ struct JointEvidence {
 /// two bones names an absent one, when rules go in a circle, or when no segment owns a bone, and Error{data}
 /// when such a sphere fit finds none, or axes come out collinear. `evidence`, if not null, gets one per
 /// joint.
-Rig fit(const Case& patient, const Context& context, std::vector<JointEvidence>* evidence = nullptr);
+Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* evidence = nullptr);
 
 }  // namespace ecorche::rig

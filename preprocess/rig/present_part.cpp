@@ -41,7 +41,8 @@ Skeleton present_part(const Case& patient, const Context& context) {
     } else {
       home[s] = up;
       context.warn("segment " + whole.segments[s].name + " has no bone in this case: it is dropped into " +
-                   part.segments[static_cast<std::size_t>(up)].name);
+                   part.segments[static_cast<std::size_t>(up)].name +
+                   " (give it a bone if that is not meant)");
     }
   }
   for (Segment& segment : part.segments) {

@@ -12,7 +12,7 @@ VolumetricSkeleton body_spheres(const Image& labels, const Skeleton& rig, double
                                 const Context& context) {
   const Mask mask = segment(labels, {}, context);
   for (const std::string& joint : joints_outside(mask, rig))
-    context.warn("joint " + joint + " lies outside the body");
+    context.warn("joint " + joint + " lies outside the body (give its center in the skeleton)");
   VolumetricSkeleton body;
   {
     const DistanceMap map = distance_map(mask, DistanceMetric::euclidean, context);

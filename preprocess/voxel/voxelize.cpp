@@ -162,7 +162,7 @@ bool flat(const SurfaceMesh& surface) {
 
 Solid solid(const SurfaceMesh& surface, const std::string& name, bool is_skin, const ImageGrid& grid,
             const Context& context) {
-  if (surface.F.rows() == 0) return {{}, name + ": the bone has no triangle"};
+  if (surface.F.rows() == 0) return {{}, name + ": the bone has no triangle (export it again)"};
   const SnappedSurface snapped = snap(surface, grid);
   Solid out{rasterize(snapped, snapped.closed, snapped.closed ? 0 : 1, context), {}};
   if (!snapped.closed) {
@@ -184,9 +184,10 @@ Solid solid(const SurfaceMesh& surface, const std::string& name, bool is_skin, c
     } else {
       out.warning =
           name + ": the surface has open edges; " +
-          (inside.voxels > 0
-               ? "what it encloses was found by flooding"
-               : "it encloses nothing at this voxel size, so that only the voxels it touches count");
+          (inside.voxels > 0 ? "what it encloses was found by flooding (ecorche repair closes holes)"
+                             : "it encloses nothing at this voxel size, so that only the voxels it touches "
+                               "count (a smaller "
+                               "--voxel, or ecorche repair)");
     }
     if (is_skin && inside.voxels == 0)
       throw Error(ErrorKind::data, name, "encloses no volume", "give a closed surface of the body");

@@ -71,11 +71,12 @@ std::vector<std::int32_t> attachments(const Points& V, const Parts& parts,
       source[static_cast<std::size_t>(n)] = there.find(V.row(n), d2);
     });
     const std::int32_t first = nodes[part].front();
-    std::array<char, 200> line{};
-    std::snprintf(
-        line.data(), line.size(),
-        "a part of %zu nodes about (%.1f, %.1f, %.1f) touches no bone: it follows the part %.2f mm from it",
-        nodes[part].size(), V(first, 0), V(first, 1), V(first, 2), std::sqrt(best.first));
+    std::array<char, 280> line{};
+    std::snprintf(line.data(), line.size(),
+                  "a part of %zu nodes about (%.1f, %.1f, %.1f) touches no bone: it follows the part %.2f mm "
+                  "from it (join "
+                  "it to the body in the scan, or give it a bone, if that is not meant)",
+                  nodes[part].size(), V(first, 0), V(first, 1), V(first, 2), std::sqrt(best.first));
     context.warn(line.data());
   }
   return source;

@@ -42,16 +42,18 @@ void warn_of_untouched_bones(const TetMesh& mesh, const Case& patient, const Con
   for (const std::uint16_t label : mesh.label) seen[label] = 1;
   for (std::size_t b = 0; b < patient.bones.size(); ++b) {
     if (!seen[b + 1])
-      context.warn("bone '" + patient.bones[b].name + "' has no tet: nothing follows it through the mesh");
+      context.warn("bone '" + patient.bones[b].name +
+                   "' has no tet: nothing follows it through the mesh "
+                   "(more tets by --max-tets, or a smaller --voxel)");
   }
 }
 
 void warn_of_mended_nodes(const MonotoneResult& solved, const Context& context) {
   if (solved.mended_nodes == 0) return;
-  std::array<char, 200> line{};
+  std::array<char, 280> line{};
   std::snprintf(line.data(), line.size(),
                 "weights left [0, 1] by up to %.2g beside bad tets: solved again with the ties of %lld nodes "
-                "mended, by which a weight moved by up to %.2g",
+                "mended, by which a weight moved by up to %.2g (--mesher lattice makes no bad tets)",
                 solved.first_violation, static_cast<long long>(solved.mended_nodes), solved.largest_change);
   context.warn(line.data());
 }

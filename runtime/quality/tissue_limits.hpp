@@ -17,7 +17,7 @@ struct TissueLimit {
 
 inline constexpr std::size_t group_count = 10;
 
-/// A row for every group, in the order of Group. docs/quality.md holds the same table.
+/// A row for every group, in the order of Group. docs/reference/quality.md holds the same table.
 const std::array<TissueLimit, group_count>& tissue_limits();
 
 /// The limit of one group.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server: framed Protobuf over TCP, TLS and WebSockets (docs/protocol.md).
+// The server: framed Protobuf over TCP, TLS and WebSockets (docs/reference/protocol.md).
 #pragma once
 
 #include <cstdint>
@@ -45,7 +45,7 @@ class Server {
 
   /// From any thread, any number of times, also before run().
   void stop();
-  /// Reads all models again, aside, as ReloadModel does; the log tells how each went. As stop().
+  /// Reads all models again, in the background, as ReloadModel does; the log tells how each went. As stop().
   void reload();
 
  protected:

@@ -7,8 +7,6 @@
 
 namespace ecorche::runtime {
 
-using Eigen::Vector3d;
-
 FoldPatches::FoldPatches(const Model& model, const std::vector<std::uint8_t>& held,
                          const std::vector<std::uint8_t>& excluded, const std::vector<std::size_t>& seeds,
                          int rings, std::span<const float> nodes)
@@ -96,7 +94,7 @@ void FoldPatches::fill(std::size_t g, const std::vector<std::size_t>& tets, std:
 
 FoldPatch::Tet FoldPatches::tet_of(std::size_t t) const {
   FoldPatch::Tet tet;
-  std::array<Vector3d, 4> p;
+  std::array<Eigen::Vector3d, 4> p;
   for (int c = 0; c < 4; ++c) {
     tet.node[static_cast<std::size_t>(c)] = row_[at(t, c)];
     p[static_cast<std::size_t>(c)] =
@@ -105,9 +103,9 @@ FoldPatch::Tet FoldPatches::tet_of(std::size_t t) const {
   Eigen::Matrix3d edges;
   edges << p[1] - p[0], p[2] - p[0], p[3] - p[0];
   const Eigen::Matrix3d gradients = edges.inverse();
-  Eigen::Map<Vector3d>(tet.gradient[0].data()) = -gradients.colwise().sum().transpose();
+  Eigen::Map<Eigen::Vector3d>(tet.gradient[0].data()) = -gradients.colwise().sum().transpose();
   for (std::size_t c = 0; c < 3; ++c)
-    Eigen::Map<Vector3d>(tet.gradient[c + 1].data()) =
+    Eigen::Map<Eigen::Vector3d>(tet.gradient[c + 1].data()) =
         gradients.row(static_cast<Eigen::Index>(c)).transpose();
   tet.weight = edges.determinant();
   return tet;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What acknowledgements say of the way to one client (docs/protocol.md, "Slow networks").
+// What acknowledgements say of the way to one client (docs/reference/protocol.md, "Slow networks").
 #pragma once
 
 #include <cstddef>

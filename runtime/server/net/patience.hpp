@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a client may take for what it is sent (docs/protocol.md, "Limits").
+// How long a client may take for what it is sent (docs/reference/protocol.md, "Limits").
 #pragma once
 
 #include <algorithm>

@@ -42,7 +42,7 @@ class Pool {
 /// it. A subscription's first frame waits where it has no room: a large one leaves a quarter of the memory to
 /// others, and of the rest an eighth is for small ones, of which every connection may have one. From half of
 /// the limit on, who keeps frames without acknowledging them has a quarter of the usual time to do so
-/// (docs/protocol.md, "Limits").
+/// (docs/reference/protocol.md, "Limits").
 ///
 /// What streams and probes keep from frame to frame is counted for itself: it never makes way, so that beyond
 /// its limit there are no new ones. From any thread.

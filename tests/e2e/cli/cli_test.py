@@ -168,7 +168,7 @@ class Cli(unittest.TestCase):
         self.assertEqual({row["figure"]: row["value"] for row in rows}, json.loads(run("--json", "info", MODEL).stdout)["certificate"])
         self.assertTrue(all(row["kept"] for row in rows))
         judged = [(row["figure"], row["bound"], row["reason"]) for row in rows if row["bound"]]
-        docs = (pathlib.Path(__file__).parents[3] / "docs" / "model.md").read_text()
+        docs = (pathlib.Path(__file__).parents[3] / "docs" / "reference" / "model.md").read_text()
         table = docs.split("| figure | bound | because |\n|---|---|---|\n")[1].split("\n\n")[0]
         said = [tuple(cell.strip().strip("`") for cell in line.strip("|").split("|")) for line in table.splitlines()]
         self.assertEqual(said, judged)

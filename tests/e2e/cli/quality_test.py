@@ -12,7 +12,7 @@ import numpy as np
 
 from posed_files import CASE, MODEL, run
 
-DOCS = (pathlib.Path(__file__).parents[3] / "docs" / "quality.md").read_text()
+DOCS = (pathlib.Path(__file__).parents[3] / "docs" / "reference" / "quality.md").read_text()
 LUMBAR, THORAX = (re.search(rf"name: ({start}\w+)", (CASE / "skeleton.yaml").read_text())[1] for start in ("lumb", "thora"))
 TRUNK = f"{LUMBAR}: {{flexion_deg: 15}}, {THORAX}: {{flexion_deg: 10}}"
 ARM = "shoulder_left: {flexion_deg: 60}, elbow_left: {flexion_deg: 90}"
@@ -118,12 +118,12 @@ class Quality(unittest.TestCase):
         keys = keys_of(quality) - {f"thresholds.max_tissue_change.{group}" for group in limits}
         self.assertGreater(len(keys), 50)
         parents = {"worst_places", "worst_places.inverted", "worst_places.changed"}
-        self.assertEqual(keys - said - parents, set(), "docs/quality.md does not explain these keys")
+        self.assertEqual(keys - said - parents, set(), "docs/reference/quality.md does not explain these keys")
         table = dict(re.findall(r"(?m)^\| (\w+) \| ([\d.]+) \|", DOCS))
         self.assertEqual({group: float(limit) for group, limit in table.items()}, limits)
         for key, value in quality["thresholds"].items():
             if not isinstance(value, dict):
-                self.assertRegex(DOCS, rf"`{key}` {value:g}\b", f"docs/quality.md has another {key}")
+                self.assertRegex(DOCS, rf"`{key}` {value:g}\b", f"docs/reference/quality.md has another {key}")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 SOURCE, BUILD = (pathlib.Path(word) for word in sys.argv[1:3])
@@ -34,6 +35,23 @@ class Outside(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertRegex(result.stderr, r"^error: 127\.0\.0\.1:1: ")
 
+    def first_client(self, program):
+        port, obj = self.folder / "port", self.folder / "bent.obj"
+        with subprocess.Popen([os.environ["ECORCHE_BIN"], "serve", os.environ["ECORCHE_MODEL"], "--listen", "127.0.0.1:0", "--port-file", port],
+                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
+            try:
+                for _ in range(600):
+                    if port.exists() or server.poll() is not None:
+                        break
+                    time.sleep(0.1)
+                said = run(program, f"127.0.0.1:{port.read_text().strip()}", obj)
+            finally:
+                server.terminate()
+        vertices = int(re.fullmatch(r"pose 1: (\d+) vertices\n", said)[1])
+        lines = obj.read_text().splitlines()
+        self.assertEqual(sum(line.startswith("v ") for line in lines), vertices)
+        self.assertGreater(sum(line.startswith("f ") for line in lines), vertices)
+
     def test_installed(self):
         first, prefix, build = self.folder / "first", self.folder / "moved", self.folder / "build"
         run("cmake", "--install", BUILD, "--prefix", first)
@@ -52,6 +70,8 @@ class Outside(unittest.TestCase):
         self.assertRegex(said, r"^ecorche \d+\.\d+\.\d+: [2-9]\d\d\.\d mm, (pass|warn)$")
         self.nobody_answers(build / "connect")
 
+        self.first_client(build / "first_client")
+
         plugin = build / "libplugin.so"
         self.assertGreater(ctypes.CDLL(str(plugin)).plugin_nodes(str(model).encode()), 1000)
         shown = run("nm", "-D", "--defined-only", "-C", plugin)
@@ -64,6 +84,13 @@ class Outside(unittest.TestCase):
         run("cmake", "--build", build)
         self.nobody_answers(build / "connect")
         self.assertFalse((build / "bin").exists(), "the outer project's folders are its own")
+
+    def test_pages_show_these_programs(self):
+        shown = {"embedding.md": ("pose", "prepare", "connect"), "tutorial/first_client.md": ("first_client",)}
+        for page, names in shown.items():
+            text = (SOURCE / "docs" / page).read_text()
+            for name in names:
+                self.assertIn((HERE / "installed" / f"{name}.cpp").read_text(), text, f"{page} shows another {name}.cpp")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Posing in plain double precision, straight from the papers and the model file: the oracle of streamed frames.
 
-Shares no code with the server: h5py reads the file (docs/model.md), numpy does the sums.
+Shares no code with the server: h5py reads the file (docs/reference/model.md), numpy does the sums.
 """
 import h5py
 import numpy as np

@@ -67,7 +67,7 @@ function array(message, payload, Type, width) {
   return new Type(payload.buffer.slice(payload.byteOffset + offset, payload.byteOffset + offset + size * width));
 }
 
-// ---- docs/protocol.md, "Deltas".
+// ---- docs/reference/protocol.md, "Deltas".
 const wrap = (x) => (x << 16) >> 16;
 function decodeDelta(data, key) {
   const out = new Uint16Array(key.length), count = key.length / 3;

@@ -53,7 +53,7 @@ TEST_F(CaseRefusals, TheUnchangedCaseIsRead) {
 }
 
 TEST_F(CaseRefusals, KeysAndTypes) {
-  expect_error(ErrorKind::config, "case.yaml: is empty (see docs/case.md)", [&] { read(""); });
+  expect_error(ErrorKind::config, "case.yaml: is empty (see docs/reference/case.md)", [&] { read(""); });
   refused("unit: mm", "units: mm", "3:units: unknown key 'units' (did you mean 'unit'?)");
   refused(
       "unit: mm", "atlas: r.yaml",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The examples of docs/case.md and docs/volumetric.md are read by the readers that they describe.
+// The examples of docs/reference are read by the readers that they describe.
 #include <gtest/gtest.h>
 
 #include <ecorche/io/case_file.hpp>
@@ -14,7 +14,7 @@ namespace {
 
 // The first block of YAML after the heading that begins with `first`.
 std::string example(const std::string& heading, const char* of = "case.md", const std::string& first = "") {
-  std::ifstream file(std::string(ECORCHE_SOURCE "/docs/") + of, std::ios::binary);
+  std::ifstream file(std::string(ECORCHE_SOURCE "/docs/reference/") + of, std::ios::binary);
   const std::string page(std::istreambuf_iterator<char>(file), {});
   const std::size_t at = page.find("## " + heading), begin = page.find("```yaml\n" + first, at) + 8;
   EXPECT_NE(at, page.npos) << heading;
@@ -24,8 +24,8 @@ std::string example(const std::string& heading, const char* of = "case.md", cons
 TEST(Docs, TheExamplesAreRead) {
   const Scratch scratch;
   scratch.put("case.yaml", example("case.yaml"));
-  scratch.put("skeleton.yaml", example("skeleton.yaml"));
-  scratch.put("regions.yaml", example("Joints found from the bones", "case.md", "ecorche_regions"));
+  scratch.put("skeleton.yaml", example("skeleton.yaml", "skeleton.md"));
+  scratch.put("regions.yaml", example("Regions", "skeleton.md", "ecorche_regions"));
   for (const char* folder : {"bones", "muscles"}) std::filesystem::create_directory(scratch / folder);
   const Case small = small_case();
   for (const char* file : {"skin.stl", "bones/hip.stl", "bones/femur.stl", "muscles/rf.stl"})
@@ -40,7 +40,7 @@ TEST(Docs, TheExamplesAreRead) {
   EXPECT_EQ(patient.regions[0].points.row(3), patient.bones[1].surface.V.row(7));
   Rig rig;
   rig.skeleton = patient.skeleton;
-  const Pose pose = read_pose(scratch.put("pose.yaml", example("pose.yaml")), rig);
+  const Pose pose = read_pose(scratch.put("pose.yaml", example("pose.yaml", "pose.md")), rig);
   const Reassignment by_hand =
       read_attachment(scratch.put("by_hand.yaml", example("Joints", "volumetric.md")), patient.skeleton);
   EXPECT_EQ(by_hand.splits.at(0).within_mm, 120);

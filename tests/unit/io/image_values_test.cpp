@@ -163,16 +163,18 @@ TEST(ImageValues, ThatAreNotFiniteAreCountedAndReplaced) {
   EXPECT_EQ(values<float>(read_image(path, said.options)),
             (std::vector<float>{-1000, 40, -1000, -1000, 7, -1000, 0, 1}));
   ASSERT_EQ(said.lines.size(), 1U);
-  EXPECT_EQ(said.lines[0],
-            path.string() + ": 3 of 8 values are NaN or infinite: taken as -1000, the least of the others");
+  EXPECT_EQ(said.lines[0], path.string() +
+                               ": 3 of 8 values are NaN or infinite: taken as -1000, the least of the others "
+                               "(write other values there if that is not meant)");
   // Displacements have no least.
   Image field(read_image(path).grid, ScalarType::f64, 3);
   field.scalars<double>()[5] = std::nan("");
   field.scalars<double>()[6] = -3;
   write_image(scratch / "d.mha", field);
   EXPECT_EQ(read_image(scratch / "d.mha", said.options).scalars<double>()[5], 0);
-  EXPECT_EQ(said.lines.back(),
-            (scratch / "d.mha").string() + ": 1 of 24 values are NaN or infinite: taken as 0");
+  EXPECT_EQ(said.lines.back(), (scratch / "d.mha").string() +
+                                   ": 1 of 24 values are NaN or infinite: taken as 0 "
+                                   "(write other values there if that is not meant)");
   expect_error(ErrorKind::data, "n.nrrd: none of its 8 values is finite",
                [&] { read_image(scratch.put("n.nrrd", nrrd("float", packed(std::vector<float>(8, nan))))); });
 }
@@ -188,7 +190,7 @@ TEST(ImageAxes, ALittleOffAreMadeRightAngledAndSaid) {
   EXPECT_EQ(said.lines[0],
             path.string() +
                 ": its axes are 0.06 degrees off right angles: taken as right-angled, which moves its "
-                "farthest voxel by 0.00037 mm");
+                "farthest voxel by 0.00037 mm (resample it onto right-angled voxels if that is too far)");
   // The middle stays, and each axis gives half.
   const auto middle = grid.point(0.5, 0.5, 0.5);
   EXPECT_NEAR(middle[0], -0.5, 1e-5);

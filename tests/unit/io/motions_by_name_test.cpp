@@ -177,7 +177,7 @@ markers: {RKNE: knee_right, SACR: {segment: pelvis, point: [0, 40, 900]}}
 
 TEST(Docs, TheExamplesOfMotionAreRead) {
   const Scratch scratch;
-  std::ifstream page(ECORCHE_SOURCE "/docs/motion.md", std::ios::binary);
+  std::ifstream page(ECORCHE_SOURCE "/docs/reference/motion.md", std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(page), {});
   const auto block = [&](const std::string& first) {
     const std::size_t begin = text.find("```yaml\n" + first) + 8;

@@ -236,7 +236,7 @@ TEST(Skeleton, EveryPrefixIsRefusedOrWhole) {
 
 // The schema and the reader list the same keys.
 TEST(Skeleton, TheSchemaListsTheReadersKeys) {
-  std::ifstream file(ECORCHE_SOURCE "/docs/skeleton.schema.json");
+  std::ifstream file(ECORCHE_SOURCE "/docs/reference/skeleton.schema.json");
   const nlohmann::json schema = nlohmann::json::parse(file);
   const auto same = [](const nlohmann::json& object, std::span<const std::string_view> keys) {
     std::vector<std::string> listed, known(keys.begin(), keys.end());

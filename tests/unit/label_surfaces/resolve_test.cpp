@@ -141,7 +141,10 @@ TEST(Resolve, AStrayVoxelIsNamedAndLeftOutMoreAreRefused) {
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_TRUE(warnings[0].starts_with("case.yaml:9:tissues[2]: 'gall_bladder': its only voxel, at ["))
       << warnings[0];
-  EXPECT_TRUE(warnings[0].ends_with("], lies off the body; it is left out")) << warnings[0];
+  EXPECT_TRUE(
+      warnings[0].ends_with("], lies off the body; it is left out (take the label out of the image, or say "
+                            "except: in the entry)"))
+      << warnings[0];
   Case many = with_strays(65);
   const Case before = many;
   try {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Holds docs/model.md against a file: every dataset is described with its type, and nothing else is.
+"""Holds docs/reference/model.md against a file: every dataset is described with its type, and nothing else is.
 
 usage: check_page.py MODEL.hdf PAGE.md
 """

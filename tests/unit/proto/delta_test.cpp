@@ -22,7 +22,8 @@ std::int16_t i16(const std::byte* p) {
   return x;
 }
 
-// The layout of docs/protocol.md, read a bit at a time: the slow twin of decode_delta for good bytes.
+// The layout of docs/reference/protocol.md, read a bit at a time: the slow twin of decode_delta for good
+// bytes.
 Numbers slow_decode(const std::vector<std::byte>& bytes, const Numbers& key) {
   Numbers out(key.size());
   std::size_t at = 0;

@@ -32,7 +32,7 @@ std::uint32_t subscribe(TestClient& client, v1::Encoding encoding, bool normals 
   return client.client().call(request).envelope.subscribed().subscription();
 }
 
-// The bound of docs/protocol.md: half a step, and the rounding of float32.
+// The bound of docs/reference/protocol.md: half a step, and the rounding of float32.
 void expect_within_bound(const std::vector<wire::DecodedTissue>& tissues, const OfflineEncoded& offline) {
   ASSERT_EQ(tissues.size(), offline.body.tissues.size());
   double worst = 0;

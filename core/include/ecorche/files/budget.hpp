@@ -35,7 +35,9 @@ class Budget {
     return {limits.image_base, limits.per_byte, file_bytes, std::move(where)};
   }
 
+  /// The file that is read.
   const std::string& where() const { return where_; }
+  /// Bytes that may still be taken.
   std::uint64_t left() const { return left_; }
 
   /// Takes `count` times `bytes`. Throws Error{data} where that is more than is left.
@@ -51,6 +53,7 @@ class Budget {
   /// Another file of `bytes` belongs to it.
   void add_file(std::uint64_t bytes) { left_ += std::min(bytes, most_ / per_byte_) * per_byte_; }
 
+  /// Throws Error{data}: the file says more than it may take.
   [[noreturn]] void refuse() const {
     throw Error(ErrorKind::data, where_,
                 "takes more memory than its " + std::to_string(file_bytes_) + " bytes stand for: over " +

@@ -28,6 +28,7 @@ struct IkLook {
   double weight = 1;
 };
 
+/// What is asked of a pose.
 struct IkProblem {
   std::vector<IkTarget> targets;
   std::vector<IkLook> looks;
@@ -36,6 +37,7 @@ struct IkProblem {
   int most_steps = 40;        ///< from each of the four starts
 };
 
+/// The pose that was found, and what it misses.
 struct IkResult {
   Pose pose;                    ///< within limits and couplings
   std::vector<double> away_mm;  ///< of each target

@@ -25,6 +25,7 @@ struct NamedAngle {
 std::optional<NamedAngle> find_named_angle(const Skeleton& skeleton, std::string_view joint,
                                            std::string_view angle);
 
+/// An anatomical angle, and what it should be.
 struct AngleValue {
   NamedAngle angle;
   double radians = 0;  ///< in the name's sense; several for one angle are added

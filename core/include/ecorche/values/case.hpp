@@ -38,6 +38,7 @@ struct LabelSource {
 
 // An entry has a surface, or a source that `label_surfaces::resolve` turns into one.
 
+/// A bone, and the segment that moves it.
 struct CaseBone {
   std::string name;
   std::string segment;  ///< owner
@@ -45,6 +46,7 @@ struct CaseBone {
   std::optional<LabelSource> source = {};
 };
 
+/// Anything that follows the body and is no bone.
 struct CaseTissue {
   std::string name;
   Group group = Group::other;
@@ -52,6 +54,7 @@ struct CaseTissue {
   std::optional<LabelSource> source = {};
 };
 
+/// An image that follows the body.
 struct CaseVolume {
   std::string name;
   Image image;
@@ -61,6 +64,7 @@ struct CaseVolume {
 /// Limbs that touch in the scan what they do not hang on, and are to move apart from it
 /// (preprocess/label_surfaces/hold_apart.hpp).
 struct HeldApart {
+  /// Limbs of the same labels.
   struct Limbs {
     std::vector<std::int64_t> ids;      ///< labels that these limbs are made of
     std::vector<std::string> segments;  ///< the uppermost of each limb
@@ -79,6 +83,7 @@ struct CaseLabels {
   std::optional<HeldApart> apart = {};        ///< `label_surfaces::resolve` takes that out of the images
 };
 
+/// One patient as scanned, read whole: LPS, mm.
 struct Case {
   std::string name;
   Skeleton skeleton;

@@ -27,12 +27,15 @@ struct Context {
   /// such work owns all that it touches (shared pointers captured by value), never the caller's references.
   std::function<void(std::function<void()> work)> run_apart = {};
 
+  /// How far the stage has come, 0 to 1.
   void report(double fraction) const {
     if (progress) progress(fraction);
   }
+  /// Tells the log.
   void info(std::string_view line) const {
     if (log) log(LogLevel::info, line);
   }
+  /// Tells the log, as a warning.
   void warn(std::string_view line) const {
     if (log) log(LogLevel::warning, line);
   }

@@ -30,8 +30,10 @@ int exit_code(ErrorKind kind) noexcept;
 /// The only exception that ecorche throws. Printed as `error: WHERE: WHAT (HOW TO MEND)`.
 class Error : public std::exception {
  public:
+  /// Line breaks of the texts become blanks.
   Error(ErrorKind kind, std::string where, std::string what, std::string mend);
 
+  /// Decides the exit code.
   ErrorKind kind() const noexcept { return kind_; }
   const std::string& where() const noexcept { return where_; }      ///< file:line:key, option or address
   const std::string& problem() const noexcept { return problem_; }  ///< what is wrong, with the value met
@@ -69,6 +71,7 @@ enum class StatusCode : std::uint8_t {
 struct Status {
   StatusCode code = StatusCode::ok;
   std::string message;
+  /// Whether it worked.
   bool ok() const noexcept { return code == StatusCode::ok; }
 };
 

@@ -21,10 +21,12 @@ struct ImageGrid {
   std::array<double, 9> direction{1, 0, 0, 0, 1,
                                   0, 0, 0, 1};  ///< row-major, orthonormal; columns are the axes
 
+  /// How many.
   std::size_t voxels() const {
     return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
            static_cast<std::size_t>(size[2]);
   }
+  /// Of voxel (i, j, k) in memory order.
   std::size_t offset(int i, int j, int k) const {
     return static_cast<std::size_t>(i) +
            static_cast<std::size_t>(size[0]) *
@@ -36,6 +38,7 @@ struct ImageGrid {
   /// The continuous index of a point, LPS mm (direction is orthonormal, so its inverse is its transpose).
   std::array<double, 3> index(const std::array<double, 3>& point) const;
 
+  /// Equal in every member.
   bool operator==(const ImageGrid&) const = default;
 };
 
@@ -84,6 +87,7 @@ struct Image {
     check_type(scalar_type_of<T>);
     return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
   }
+  /// All numbers, components side by side. Throws Error where they are of another type.
   template <class T>
   std::span<const T> scalars() const {
     check_type(scalar_type_of<T>);

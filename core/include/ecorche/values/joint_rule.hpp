@@ -57,6 +57,7 @@ struct PointSource {
 
 /// A direction of the body.
 struct DirectionSource {
+  /// Where it comes from.
   enum class Kind : std::uint8_t {
     given,       ///< `direction`
     fit,         ///< the axis of a cylinder, the normal of a plane or of an ellipse: `from.rule` on `from.on`
@@ -73,10 +74,13 @@ struct DirectionSource {
 
 /// What anatomy allows at a joint; no bound by default.
 struct JointBounds {
+  /// Both ends included.
   struct Range {
     double least = -std::numeric_limits<double>::infinity();
     double most = std::numeric_limits<double>::infinity();
+    /// Whether `x` lies within.
     bool holds(double x) const { return x >= least && x <= most; }
+    /// Whether it bounds nothing.
     bool any() const {
       return !(least > -std::numeric_limits<double>::infinity()) &&
              !(most < std::numeric_limits<double>::infinity());
@@ -87,6 +91,7 @@ struct JointBounds {
   std::vector<std::pair<std::string, Range>> rest;  ///< radians, by angle: as a body can be scanned
   std::string source;
 
+  /// Whether it bounds nothing.
   bool none() const { return radius_mm.any() && axis_to_shaft.any() && rest.empty() && source.empty(); }
 };
 
@@ -97,6 +102,7 @@ struct BodySize {
   std::string source;
 };
 
+/// How a joint's center and axes are found.
 struct JointRule {
   PointSource center;
   /// Axis (0 x, 1 y, 2 z) and where it comes from: the first keeps its direction, the second is made

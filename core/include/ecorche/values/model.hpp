@@ -93,6 +93,7 @@ struct Certificate {
   double bone_rigidity_mm = 0;
 };
 
+/// A prepared body: what `ecorche preprocess` makes, and what is posed.
 struct Model {
   std::string name;
   Rig rig;
@@ -115,8 +116,11 @@ struct Model {
   Certificate certificate;
   std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
 
+  /// Nodes of the tets.
   std::size_t node_count() const { return static_cast<std::size_t>(nodes.rows()); }
+  /// Tets.
   std::size_t tet_count() const { return static_cast<std::size_t>(tets.rows()); }
+  /// Segments, and joints.
   std::size_t segment_count() const { return rig.skeleton.segments.size(); }
 };
 

@@ -17,6 +17,7 @@ struct Pose {
   /// Per joint, mm, in the joint's frame; zero but for `free` joints and couplings. Row 0 is unused.
   std::vector<Eigen::Vector3d> translation;
 
+  /// The scanned pose of so many joints.
   static Pose rest(std::size_t joints) {
     return {Eigen::Vector3d::Zero(), std::vector<Eigen::Quaterniond>(joints, Eigen::Quaterniond::Identity()),
             std::vector<Eigen::Vector3d>(joints, Eigen::Vector3d::Zero())};
@@ -29,6 +30,7 @@ struct ClampedJoint {
   double removed = 0;  ///< radians: the turn between what was asked and what was done
 };
 
+/// A joint of a motion file.
 struct ClipJoint {
   std::string name;
   int parent = -1;
@@ -42,6 +44,7 @@ struct Clip {
   std::vector<ClipJoint> joints;               ///< parents first
   std::vector<Eigen::Vector3d> root_position;  ///< per frame, LPS mm
   std::vector<Eigen::Quaterniond> rotation;    ///< frame * #joints + joint; local, axes parallel to LPS
+  /// How many.
   std::size_t frames() const { return root_position.size(); }
 };
 

@@ -65,6 +65,7 @@ struct Coupling {
   }
 };
 
+/// Where a segment turns about its parent.
 struct Joint {
   std::string name;
   JointKind kind = JointKind::ball;
@@ -80,6 +81,7 @@ struct Joint {
   std::vector<Coupling> coupled;
 };
 
+/// A rigid part of the skeleton, with the one joint about which it turns.
 struct Segment {
   std::string name;
   int parent = -1;  ///< row of the parent, always smaller than this row; -1 for the root

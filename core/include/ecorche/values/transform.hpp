@@ -11,8 +11,11 @@ struct RigidTransform {
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   Eigen::Vector3d t = Eigen::Vector3d::Zero();
 
+  /// The point moved.
   Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return q * x + t; }
+  /// First `local`, then this one.
   RigidTransform operator*(const RigidTransform& local) const { return {q * local.q, q * local.t + t}; }
+  /// The way back.
   RigidTransform inverse() const { return {q.conjugate(), -(q.conjugate() * t)}; }
 };
 

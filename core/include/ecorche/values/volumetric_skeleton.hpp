@@ -41,6 +41,7 @@ struct VolumetricSkeleton {
   /// Row of the rig's segment that moves the voxel, or `none`. Empty where nothing was attached.
   std::vector<std::int32_t> segment;
 
+  /// Skeletal voxels.
   std::size_t size() const { return voxel.size(); }
 };
 

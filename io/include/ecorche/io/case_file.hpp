@@ -14,6 +14,7 @@
 
 namespace ecorche::io {
 
+/// How a case is read.
 struct CaseOptions {
   std::filesystem::path data;     ///< what `root: data` paths resolve against
   std::string frame;              ///< overrides the case's `frame` where not empty

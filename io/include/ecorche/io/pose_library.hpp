@@ -16,6 +16,7 @@ inline constexpr std::string_view library_prefix = "lib:";
 /// anatomical, arms_up, lateral, lithotomy, prone, sitting, supine: io/case/data/poses.yaml.
 std::vector<std::string> library_poses();
 
+/// A pose by name, on a rig.
 struct LibraryPose {
   Pose pose;
   std::vector<std::string> left_out;  ///< `joint.angle` that the rig has not

@@ -16,6 +16,7 @@
 
 namespace ecorche::preprocess {
 
+/// How a body is prepared.
 struct Options {
   /// An inclusive range of an option; the command line and `run` refuse what lies beyond.
   template <class T>
@@ -43,6 +44,7 @@ struct Options {
   std::string spheres_by = "weights";
 };
 
+/// How long a stage took.
 struct StageTime {
   std::string name;
   double seconds = 0;
@@ -50,6 +52,7 @@ struct StageTime {
   bool kept = false;        ///< taken from the store, made by an earlier run
 };
 
+/// What a preparation made.
 struct Result {
   Model model;
   std::vector<StageTime> stages;

@@ -17,6 +17,7 @@ class StageStore {
 
   /// XXH64 of the program that makes the stages: another build keeps its own.
   virtual std::uint64_t program() const = 0;
+  /// What was kept under that name, if anything.
   virtual std::optional<std::string> find(std::string_view name) = 0;
   /// Throws Error where that fails; the run then goes on without.
   virtual void keep(std::string_view name, std::string_view bytes) = 0;

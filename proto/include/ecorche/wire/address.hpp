@@ -10,6 +10,7 @@
 
 namespace ecorche::wire {
 
+/// Where a server listens.
 struct Address {
   std::string host;
   std::uint16_t port = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames on the wire (docs/protocol.md): u32 envelope_bytes, u32 payload_bytes, little-endian; the envelope;
-// zeros up to a multiple of 16 counted from the frame's start; the payload, itself a multiple of 16 long.
+// Frames on the wire (docs/reference/protocol.md): u32 envelope_bytes, u32 payload_bytes, little-endian; the
+// envelope; zeros up to a multiple of 16 counted from the frame's start; the payload, itself a multiple of 16
+// long.
 #pragma once
 
 #include <array>
@@ -28,6 +29,7 @@ constexpr std::size_t aligned(std::size_t bytes) {
 /// Raw arrays (arrays.hpp).
 using Payload = std::vector<std::byte>;
 
+/// An envelope, and the arrays that it describes.
 struct Frame {
   v1::Envelope envelope;
   Payload payload;
@@ -48,6 +50,7 @@ struct FrameLimits {
 /// After a status that is not ok the stream is lost: a frame's end cannot be found any more.
 class FrameReader {
  public:
+  /// Refuses what is larger than `limits`.
   explicit FrameReader(FrameLimits limits) : limits_(limits) {}
 
   /// For the frames after the present one.
@@ -61,6 +64,7 @@ class FrameReader {
   /// padding that is not zero, no Protobuf.
   Status advance(std::size_t n);
 
+  /// Whether a frame is there to take.
   bool complete() const { return part_ == Part::done; }
   /// No byte of a frame has come yet.
   bool between_frames() const { return part_ == Part::header && filled_ == 0; }
@@ -90,6 +94,7 @@ struct Pieces {
   std::vector<std::span<const std::byte>> parts;
   std::shared_ptr<const void> owner;  ///< keeps what they show
 
+  /// Of all parts.
   std::size_t bytes() const;
 };
 
@@ -99,7 +104,9 @@ struct EncodedFrame {
   std::shared_ptr<const Payload> payload;  ///< may be null
   Pieces pieces = {};                      ///< or the payload is these
 
+  /// Bytes behind the head.
   std::size_t payload_bytes() const { return payload ? payload->size() : pieces.bytes(); }
+  /// Bytes of the whole frame.
   std::size_t bytes() const { return head.size() + payload_bytes(); }
 };
 

@@ -11,6 +11,7 @@
 
 namespace ecorche::wire {
 
+/// One tissue of a frame.
 struct DecodedTissue {
   std::uint32_t tissue = 0;            ///< row of ModelOpened.tissues
   std::vector<std::uint16_t> numbers;  ///< 3 per vertex; empty under ENCODING_F32
@@ -18,7 +19,7 @@ struct DecodedTissue {
   std::vector<float> normals;          ///< 3 per vertex, unit or zero; empty where they were not asked for
 };
 
-/// Keeps the keyframes of every level, as docs/protocol.md asks of clients.
+/// Keeps the keyframes of every level, as docs/reference/protocol.md asks of clients.
 class MeshDecoder {
  public:
   /// Replaces `out`, keeping its memory. invalid_argument for arrays that are not what the frame says they

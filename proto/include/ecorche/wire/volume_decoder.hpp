@@ -10,7 +10,7 @@
 
 namespace ecorche::wire {
 
-/// Keeps the last keyframe, as docs/protocol.md asks of clients.
+/// Keeps the last keyframe, as docs/reference/protocol.md asks of clients.
 class VolumeDecoder {
  public:
   /// Replaces `out`. Of slices, which have no grid, `out` holds all pixels in one row. invalid_argument for

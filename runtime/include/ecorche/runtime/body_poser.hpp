@@ -88,8 +88,11 @@ class BodyPoser {
   BodyPoser(const BodyPoser&) = delete;
   BodyPoser& operator=(const BodyPoser&) = delete;
 
+  /// What is posed.
   const Model& model() const;
+  /// The same, to be kept.
   const std::shared_ptr<const Model>& shared_model() const;
+  /// Room for a posed body, to be used again from pose to pose.
   PosedBody make_frame(const FrameParts& parts = {}) const;
 
   /// Constrains `pose` (limits, coupling), runs forward kinematics, skins the nodes, then moves the tissues

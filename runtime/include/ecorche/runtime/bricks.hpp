@@ -21,6 +21,7 @@ struct VoxelRange {
     constexpr std::int32_t most = std::numeric_limits<std::int32_t>::max();
     return {{most, most, most}, {-1, -1, -1}};
   }
+  /// Whether it holds no voxel.
   bool empty() const { return first[0] > last[0] || first[1] > last[1] || first[2] > last[2]; }
   /// The least that holds both.
   VoxelRange around(const VoxelRange& other) const {
@@ -31,6 +32,7 @@ struct VoxelRange {
     }
     return out;
   }
+  /// Whether they share a voxel.
   bool meets(const VoxelRange& other) const {
     bool out = true;
     for (std::size_t a = 0; a < 3; ++a) out &= first[a] <= other.last[a] && last[a] >= other.first[a];
@@ -44,9 +46,11 @@ struct Bricks {
   std::array<std::int32_t, 3> count{0, 0, 0};
 
   Bricks() = default;
+  /// Those that hold the whole grid.
   explicit Bricks(const ImageGrid& grid) {
     for (std::size_t a = 0; a < 3; ++a) count[a] = (grid.size[a] + edge - 1) / edge;
   }
+  /// How many.
   std::size_t all() const {
     return static_cast<std::size_t>(count[0]) * static_cast<std::size_t>(count[1]) *
            static_cast<std::size_t>(count[2]);
@@ -75,7 +79,9 @@ struct BrickMask {
   Bricks bricks;
   const std::uint8_t* moved = nullptr;
 
+  /// Whether there is a mask.
   explicit operator bool() const { return moved != nullptr; }
+  /// Whether the brick of voxel (x, y, z) is marked.
   bool has(std::int32_t x, std::int32_t y, std::int32_t z) const {
     return moved[bricks.row_of(y, z) + static_cast<std::size_t>(x / Bricks::edge)] != 0;
   }

@@ -14,7 +14,7 @@
 
 namespace ecorche::runtime {
 
-/// Thresholds of the verdict; printed with it. What each rests on: docs/quality.md.
+/// Thresholds of the verdict; printed with it. What each rests on: docs/reference/quality.md.
 struct QualityThresholds {
   double max_inverted_share = 1e-3;  ///< rest volume of inverted tets over that of the body
   double max_volume_change = 0.10;   ///< of the whole body, unsigned
@@ -26,6 +26,7 @@ struct QualityThresholds {
   double max_doubtful_turn = 5 * std::numbers::pi / 180;  ///< this, radians
 };
 
+/// How a pose changes a tissue's volume.
 struct TissueChange {
   std::string name;
   Group group = Group::other;
@@ -43,6 +44,7 @@ struct DoubtfulJoint {
   double confidence = 0;
 };
 
+/// What was measured of a pose.
 struct PoseQuality {
   std::uint64_t inverted_tets = 0;  ///< of posed volume zero or less
   double inverted_rest_mm3 = 0;

@@ -16,6 +16,7 @@ namespace ecorche::runtime {
 
 /// What to say of every point besides the tet that holds it and where it is on the other side.
 struct ProbeWants {
+  /// A volume to sample.
   struct Volume {
     std::uint32_t row = 0;                    ///< of Model::volumes
     Sampling sampling = Sampling::trilinear;  ///< labels are always sampled nearest
@@ -74,9 +75,11 @@ class Probe {
   /// tree. Throws Error{usage} for a volume that the model has not.
   void posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                      Probed& out) const;
+  /// Points of the scan into the posed body.
   void rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
                      Probed& out) const;
 
+  /// What is probed.
   const Model& model() const;
 
  private:

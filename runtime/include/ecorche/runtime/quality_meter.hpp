@@ -34,6 +34,7 @@ class QualityMeter {
   PoseQuality measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                       const QualityThresholds& thresholds = {}) const;
 
+  /// How many are measured.
   std::size_t tets() const { return rest_.size(); }
 
  private:

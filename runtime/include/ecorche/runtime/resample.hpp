@@ -36,6 +36,7 @@ struct Deformation {
   const Tets& tets;
   std::span<const float> rest, posed;
 
+  /// From the pose to the scan.
   Deformation back() const { return {tets, posed, rest}; }
 };
 /// That of `model` posed as `nodes`.

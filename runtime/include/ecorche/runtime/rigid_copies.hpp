@@ -29,7 +29,9 @@ class RigidCopies {
               std::span<const std::uint16_t> contested, std::span<const std::int32_t> segment,
               std::span<const std::uint32_t> given = {});
 
+  /// How many are copied.
   std::size_t tets() const { return static_cast<std::size_t>(corners_.rows()); }
+  /// Nodes of the copies.
   std::size_t nodes() const { return rest_.size() / 3; }
   /// tets() by 4, rows of the copied nodes.
   const Tets& corners() const { return corners_; }
@@ -42,9 +44,11 @@ class RigidCopies {
 
   /// Of a drawn tet: whether it is a copy, the mesh's own index, and what it is labelled.
   bool is_copy(std::size_t drawn) const { return drawn >= first_ && drawn < first_ + tets(); }
+  /// Index in the mesh.
   std::size_t own(std::size_t drawn) const {
     return is_copy(drawn) ? copied_[drawn - first_] : drawn < first_ ? drawn : drawn - tets();
   }
+  /// Of a copy its bone's, else the mesh's own.
   std::uint16_t label(std::size_t drawn, std::span<const std::uint16_t> of_tets) const {
     return is_copy(drawn) ? label_[drawn - first_] : of_tets[own(drawn)];
   }
@@ -73,7 +77,9 @@ class RigidCopies {
 /// on. Refers to both.
 class DrawnTets {
  public:
+  /// The mesh alone.
   DrawnTets(const Tets& tets) : tets_(tets) {}  // NOLINT(google-explicit-constructor): a mesh without copies
+  /// With copies, whose nodes begin at `base`.
   DrawnTets(const Tets& tets, const RigidCopies& copies, std::int32_t base)
       : tets_(tets),
         copies_(&copies),
@@ -81,7 +87,9 @@ class DrawnTets {
         end_(first_ + copies.corners().rows()),
         base_(base) {}
 
+  /// Drawn tets.
   Eigen::Index rows() const { return tets_.rows() + end_ - first_; }
+  /// The node at a corner of a drawn tet.
   std::int32_t operator()(Eigen::Index tet, Eigen::Index corner) const {
     if (tet < first_) return tets_(tet, corner);
     if (tet >= end_) return tets_(tet - (end_ - first_), corner);

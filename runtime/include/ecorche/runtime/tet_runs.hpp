@@ -37,10 +37,13 @@ class TetRuns {
   /// `given`: #nodes, the row at which follow() is given a node; empty: its own.
   TetRuns(const DrawnTets& tets, const PointsF& nodes, std::span<const std::uint32_t> given = {});
 
+  /// Runs of 16 tets.
   std::size_t runs() const { return corners_.size(); }
   /// At least two; the last is one node.
   std::size_t levels() const { return levels_; }
+  /// Of the tree, on a level.
   std::size_t nodes(std::size_t level) const { return nodes_[level]; }
+  /// Nodes of level 1: sixteen runs each.
   std::size_t blocks() const { return nodes_[1]; }
   /// Of the levels above 0, where `level` begins.
   std::size_t first(std::size_t level) const { return first_[level]; }
@@ -107,6 +110,7 @@ using PaddedNodes = Aligned<float>;
 /// The tree about one place of the nodes. What lies in a block is fitted when a search first comes there: of
 /// a pose's tets few points see few.
 struct BoxTree {
+  /// Of a block's boxes.
   enum class State : std::uint8_t { stale, being_fitted, fitted };
 
   Aligned<BoxNode> above;     ///< of levels 1 and more; those of level 1 are of their blocks

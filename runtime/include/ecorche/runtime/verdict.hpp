@@ -21,6 +21,7 @@ enum class Figure : std::uint8_t {
   bone_rigidity,   ///< mm
 };
 
+/// A figure beyond its threshold.
 struct Breach {
   Figure figure = Figure::inverted_share;
   std::size_t row = 0;

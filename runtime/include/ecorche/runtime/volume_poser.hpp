@@ -42,6 +42,7 @@ class VolumePoser {
     std::vector<std::int32_t> posed, rest;
     std::vector<VoxelRange> runs, stretches;  // boxes of runs of tets, and of some that follow each other
     std::vector<std::uint8_t> sides, block_meets, groups;
+    /// What the scratch holds of the scan.
     struct Rest {  // what `rest` holds
       const Model* model = nullptr;
       ImageGrid grid;
@@ -49,6 +50,7 @@ class VolumePoser {
     } of_rest;
   };
 
+  /// Keeps the model.
   explicit VolumePoser(std::shared_ptr<const Model> model);
   ~VolumePoser();
 
@@ -70,6 +72,7 @@ class VolumePoser {
   void follow(std::span<const float> nodes, const ModelVolume& volume, Sampling sampling,
               const ImageGrid& grid, PosedVolume& kept, Scratch& scratch, const Context& context = {}) const;
 
+  /// What is posed.
   const Model& model() const;
 
  private:

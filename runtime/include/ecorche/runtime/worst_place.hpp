@@ -15,6 +15,7 @@ struct Place {
   double share = 0;                              ///< of the volume of its tets, at rest
 };
 
+/// Where a pose does most harm.
 struct WorstPlaces {
   double edge_mm = 0;  ///< of every cube; 0: nowhere was looked
   Place inverted;      ///< where most is turned inside out

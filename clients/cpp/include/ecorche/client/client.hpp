@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small blocking client of the framed protocol (docs/protocol.md).
+// A small blocking client of the framed protocol (docs/reference/protocol.md).
 #pragma once
 
 #include <deque>
@@ -40,6 +40,7 @@ class Client {
   /// Connects and exchanges the hellos.
   Client(const wire::Address& address, const std::string& name, const Access& access = {});
 
+  /// What the server said of itself.
   const v1::ServerHello& server() const { return hello_; }
 
   /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the

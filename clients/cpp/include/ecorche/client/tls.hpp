@@ -14,7 +14,9 @@ namespace ecorche::client {
 /// when none came in time; `send` writes all.
 class Tls {
  public:
+  /// Reads bytes of the connection below; 0 when none came in time.
   using Receive = std::function<std::size_t(std::span<std::byte>)>;
+  /// Writes bytes to the connection below.
   using Send = std::function<void(std::span<const std::byte>)>;
 
   /// Trusts the certificates in `authorities` (PEM) only, for this host (a name or a numeric address). Throws
@@ -27,6 +29,7 @@ class Tls {
   void handshake(const Receive& receive, const Send& send);
   /// At least a byte; 0 when none came in time. Throws Error{temporary} at the end.
   std::size_t read(std::span<std::byte> out, const Receive& receive, const Send& send);
+  /// Encrypts and sends all of it.
   void write(std::span<const std::byte> bytes, const Send& send);
 
  private:
