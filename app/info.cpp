@@ -10,6 +10,7 @@
 #include "app/joint_json.hpp"
 #include "app/text_line.hpp"
 #include "core/model_file/figures.hpp"
+#include "core/values/text.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -49,10 +50,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"spheres", Json::array()},
            {"contacts", contacts_json(model)},
            {"provenance", model.provenance}};
-  char identity[17];
-  std::snprintf(identity, sizeof identity, "%016llx",
-                static_cast<unsigned long long>(model_file::identity(model)));
-  out["identity"] = identity;
+  out["identity"] = text::hex(model_file::identity(model));
   for (std::size_t row = 0; row < model.segment_count(); ++row)
     out["rig"].push_back(joint_json(model.rig, row));
   for (const Tissue& tissue : model.tissues) {

@@ -11,6 +11,7 @@
 #include "app/read_budget.hpp"
 #include "app/usage_error.hpp"
 #include "core/values/degrees.hpp"
+#include "core/values/text.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/case/pose_sequence.hpp"
@@ -194,7 +195,7 @@ class ClipSource final : public MotionSource {
       match_.scale = 1 / figure;
       return;
     }
-    const std::string size = number(figure) + " times as long as the patient's";
+    const std::string size = text::number(figure) + " times as long as the patient's";
     if (figure > kWrongSize || figure < 1 / kWrongSize) {
       throw Error(ErrorKind::data, path_, "the limbs of its figure are " + size + ": its unit is another",
                   "say it by --motion-unit, or fit it to the patient by --motion-unit body");
@@ -202,12 +203,6 @@ class ClipSource final : public MotionSource {
     if (figure > kStrangeSize || figure < 1 / kStrangeSize)
       program.note("warning: " + path_ + ": the limbs of its figure are " + size + read_in(choice) +
                    other_unit(choice, figure) + ": --motion-unit body would fit them to the patient");
-  }
-
-  static std::string number(double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", x);
-    return text;
   }
 
   // Millimetres of the unit that it was read in, where that is not the file's own.
@@ -225,7 +220,7 @@ class ClipSource final : public MotionSource {
     for (const char* name : {"mm", "cm", "in", "m"}) {
       const double made = used > 0 ? figure * *io::unit_from_name(name) / used : 0;
       if (made < kFits && made > 1 / kFits)
-        return ": --motion-unit " + std::string(name) + " would make that " + number(made);
+        return ": --motion-unit " + std::string(name) + " would make that " + text::number(made);
     }
     return "";
   }

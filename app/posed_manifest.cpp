@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/case/digest.hpp"
 
 namespace ecorche::app {
@@ -18,12 +19,6 @@ using nlohmann::json;
 
 constexpr std::array<std::string_view, 9> kFileKinds{"surface", "image",   "labels", "tets", "scan",
                                                      "pose",    "quality", "field",  "other"};
-
-std::string hex(std::uint64_t number) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(number));
-  return text;
-}
 
 template <class T>
 T number_from(const std::string& text, int base) {
@@ -107,12 +102,12 @@ std::string to_json(const PosedManifest& manifest) {
     files.push_back({{"file", file.file},
                      {"is", kind_name(file.kind)},
                      {"bytes", file.bytes},
-                     {"xxh64", hex(file.digest)}});
+                     {"xxh64", text::hex(file.digest)}});
     if (!file.of.empty()) files.back()["of"] = file.of;
     for (const auto& [value, name] : file.labels) files.back()["labels"][std::to_string(value)] = name;
   }
   const json out{{"ecorche_posed", 1},
-                 {"model", {{"name", manifest.model}, {"identity", hex(manifest.identity)}}},
+                 {"model", {{"name", manifest.model}, {"identity", text::hex(manifest.identity)}}},
                  {"pose", kPoseFile},
                  {"skinning", manifest.skinning},
                  {"deformer", manifest.deformer},

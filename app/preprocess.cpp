@@ -10,7 +10,6 @@
 
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/model_file/model_file.hpp>
-#include "app/big_heap.hpp"
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/drawn_surfaces.hpp"
@@ -19,6 +18,8 @@
 #include "app/stage_folder.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/files/stale_parts.hpp"
+#include "core/platform/heap.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inspect_case.hpp"
@@ -150,7 +151,7 @@ std::string write_refused(const fs::path& output, const preprocess::WorstTets& w
 
 int run(const Program& program, const PreprocessSettings& settings) {
   check_outputs(settings);
-  use_big_heap();
+  platform::use_big_heap();
   std::optional<StageFolder> kept;
   if (!settings.cache.empty()) kept.emplace(settings.cache, settings.cache_gib);
   std::vector<StageTime> stages;
@@ -212,12 +213,6 @@ int run(const Program& program, const PreprocessSettings& settings) {
 }
 
 // `cgal, lattice or ...` for help texts.
-std::string listed(const std::vector<std::string_view>& names) {
-  std::string out;
-  for (const std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
-  return out;
-}
-
 // 0, or a value in range: told as one thing.
 template <class T>
 CLI::Validator or_zero(const preprocess::Options::Range<T>& range, const std::string& unit) {
@@ -249,7 +244,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   Options& o = settings->options;
   const auto meshers = tet::mesher_names();
   o.mesher = meshers.front();
-  command->add_option("--mesher", o.mesher, "who makes the tets: " + listed(meshers))
+  command->add_option("--mesher", o.mesher, "who makes the tets: " + text::joined(meshers))
       ->check(CLI::IsMember(strings(meshers)))
       ->capture_default_str();
   command
@@ -274,7 +269,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   command
       ->add_option("--solver", o.solver,
                    "who solves for the weights: auto (" + solvers[1] + ", and amg for large meshes), " +
-                       listed(weights::solver_names()))
+                       text::joined(weights::solver_names()))
       ->check(CLI::IsMember(solvers))
       ->capture_default_str();
   command

@@ -12,12 +12,12 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
-#include "app/big_heap.hpp"
 #include "app/command.hpp"
 #include "app/served_clips.hpp"
 #include "app/signals.hpp"
 #include "app/token_file.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/platform/heap.hpp"
 #include "runtime/server/server.hpp"
 
 namespace ecorche::app {
@@ -72,7 +72,7 @@ std::string written(const std::string& host, std::uint16_t port) {
 }
 
 int run_serve(const ServeSettings& settings, const Program& program) {
-  use_tidy_heap();
+  platform::use_tidy_heap();
   // stdout is for the result.
   spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");

@@ -7,6 +7,7 @@
 
 #include "app/report/html.hpp"
 #include "app/report/view.hpp"
+#include "core/values/identifier.hpp"
 
 namespace ecorche::app::report {
 namespace {
@@ -52,7 +53,6 @@ Box box_of(const Model& model) {
 }
 
 std::vector<WarningGroup> grouped(const Model& model, const std::vector<std::string>& warnings) {
-  const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
   const auto once = [](std::vector<std::string>& names, const std::string& name) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
@@ -63,7 +63,7 @@ std::vector<WarningGroup> grouped(const Model& model, const std::vector<std::str
     std::string pattern;
     for (std::size_t i = 0; i < warning.size();) {
       std::size_t end = i;
-      while (end < warning.size() && in_name(warning[end])) ++end;
+      while (end < warning.size() && in_identifier(warning[end])) ++end;
       const std::string word = warning.substr(i, std::max<std::size_t>(1, end - i));
       i += word.size();
       if (model.rig.skeleton.find_joint(word) >= 0) {

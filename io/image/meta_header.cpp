@@ -2,6 +2,7 @@
 // https://itk.org/Wiki/ITK/MetaIO/Documentation
 #include <map>
 
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -38,7 +39,7 @@ MetaFields read_meta_fields(std::string_view head, const Path& path, std::uint64
     const std::string_view text = head.substr(at, end - at);
     at = end + 1;
     const std::size_t equals = text.find('=');
-    const std::string key(fields::trim(text.substr(0, std::min(equals, text.size()))));
+    const std::string key(text::trim(text.substr(0, std::min(equals, text.size()))));
     const bool named =
         equals != text.npos && !key.empty() &&
         key.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == key.npos;
@@ -48,7 +49,7 @@ MetaFields read_meta_fields(std::string_view head, const Path& path, std::uint64
                  std::string(text.substr(0, 60)) + "'",
              "it must be a MetaImage");
     }
-    if (!fields.emplace(key, fields::trim(text.substr(equals + 1))).second) {
+    if (!fields.emplace(key, text::trim(text.substr(equals + 1))).second) {
       refuse(path, "its header gives '" + key + "' twice");
     }
     if (key == "ElementDataFile") {
@@ -86,7 +87,7 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   if (needed(fields, "NDims", path) != "3")
     refuse(path, "has " + fields.at("NDims") + " axes", "save a 3-D image");
   const std::string sizes = needed(fields, "DimSize", path);
-  const auto counts = fields::words(sizes);
+  const auto counts = text::words(sizes);
   if (counts.size() != 3) refuse(path, "its DimSize is '" + sizes + "'");
   for (std::size_t i = 0; i < 3; ++i) {
     header.size[i] = static_cast<std::int32_t>(

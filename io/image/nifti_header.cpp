@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -133,9 +134,7 @@ ImageGrid placed(const NiftiFields& f, const std::array<std::int32_t, 3>& size, 
   if (form != NiftiForm::either || f.qform <= 0 || f.sform <= 0) return one;
   const double mm = apart(one, grid_of(f, size, false));
   if (mm <= 0.5 * *std::min_element(one.spacing.begin(), one.spacing.end())) return one;
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", mm);
-  refuse(path, std::string("its qform and its sform lie ") + text.data() + " mm apart",
+  refuse(path, "its qform and its sform lie " + text::number(mm) + " mm apart",
          "write the image with one of them, or say in the case which counts: form: qform, or form: sform");
 }
 

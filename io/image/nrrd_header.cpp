@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -86,7 +87,7 @@ NrrdFields read_nrrd_fields(std::string_view head, const Path& path, std::uint64
     }
     if (text.front() == '#') continue;
     if (const std::size_t free = text.find(":="); free != text.npos) {
-      if (free_keys != nullptr) free_keys->emplace(text.substr(0, free), fields::trim(text.substr(free + 2)));
+      if (free_keys != nullptr) free_keys->emplace(text.substr(0, free), text::trim(text.substr(free + 2)));
       continue;
     }
     const std::size_t colon = text.find(": ");
@@ -94,9 +95,9 @@ NrrdFields read_nrrd_fields(std::string_view head, const Path& path, std::uint64
       refuse(path, "line " + std::to_string(line) + " of its header is no field: '" +
                        std::string(text.substr(0, 60)) + "'");
     }
-    std::string key = fields::lower(text.substr(0, colon));
+    std::string key = text::lower(text.substr(0, colon));
     std::erase(key, ' ');
-    if (!fields.emplace(key, fields::trim(text.substr(colon + 2))).second) {
+    if (!fields.emplace(key, text::trim(text.substr(colon + 2))).second) {
       refuse(path, "its header gives '" + key + "' twice");
     }
   }
@@ -117,7 +118,7 @@ void check_axes(const NrrdFields& fields, std::int64_t dimension, const Path& pa
   if (dimension == 3) return;
   const auto found = fields.find("spacedirections");
   const std::vector<std::string_view> axes =
-      found == fields.end() ? std::vector<std::string_view>() : fields::words(found->second);
+      found == fields.end() ? std::vector<std::string_view>() : text::words(found->second);
   const auto is_none = [](std::string_view axis) { return axis == "none"; };
   if (axes.empty() || !is_none(axes.front()) || std::count_if(axes.begin(), axes.end(), is_none) != 1) {
     refuse(path, "has 4 axes, and the first is not the only one with space direction 'none'",
@@ -128,7 +129,7 @@ void check_axes(const NrrdFields& fields, std::int64_t dimension, const Path& pa
 void check_unit(const NrrdFields& fields, const Path& path) {
   const auto found = fields.find("spaceunits");
   if (found == fields.end()) return;
-  for (const std::string_view unit : fields::words(found->second)) {
+  for (const std::string_view unit : text::words(found->second)) {
     if (unit != "\"mm\"" && unit != "\"\"" && unit != "mm") {
       refuse(path, "its space units are " + found->second, "write it in mm");
     }
@@ -159,7 +160,7 @@ std::vector<std::array<double, 3>> vectors(const NrrdFields& fields, const char*
     const std::size_t close = std::min(rest.find(')', open), rest.size());
     std::string inside(rest.substr(open + 1, close - open - 1));
     std::replace(inside.begin(), inside.end(), ',', ' ');
-    const auto numbers = fields::words(inside);
+    const auto numbers = text::words(inside);
     std::array<double, 3> v{};
     v.fill(std::nan(""));
     for (std::size_t i = 0; i < 3 && numbers.size() == 3; ++i) {
@@ -181,7 +182,7 @@ std::optional<ImageGrid> grid_of(const NrrdFields& fields, const ImageHeader& he
       {"left-anterior-superior", {1, -1, 1}},   {"las", {1, -1, 1}}};
   const auto said = fields.find("space");
   if (said == fields.end()) return std::nullopt;
-  std::string name = fields::lower(said->second);
+  std::string name = text::lower(said->second);
   std::replace(name.begin(), name.end(), ' ', '-');
   const auto space = spaces.find(name);
   if (space == spaces.end()) {
@@ -222,7 +223,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   check_axes(fields, dimension, path);
   check_unit(fields, path);
   const std::string sizes = needed(fields, "sizes", path);
-  const auto counts = fields::words(sizes);
+  const auto counts = text::words(sizes);
   if (counts.size() != static_cast<std::size_t>(dimension)) refuse(path, "its sizes are '" + sizes + "'");
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::int64_t count =
@@ -233,9 +234,9 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
       header.size[i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
     }
   }
-  set_nrrd_type(header, fields::lower(needed(fields, "type", path)), path);
+  set_nrrd_type(header, text::lower(needed(fields, "type", path)), path);
   fields::check_size(header, path);
-  const std::string encoding = fields::lower(needed(fields, "encoding", path));
+  const std::string encoding = text::lower(needed(fields, "encoding", path));
   header.gzip = encoding == "gzip" || encoding == "gz";
   if (!header.gzip && encoding != "raw") {
     refuse(path, "its encoding is '" + encoding + "'", "save it as raw or gzip");
@@ -248,7 +249,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   read_skips(fields, header, path);
   const auto endian = fields.find("endian");
   header.swapped =
-      header.stored_bytes() > 1 && endian != fields.end() && fields::lower(endian->second) == "big";
+      header.stored_bytes() > 1 && endian != fields.end() && text::lower(endian->second) == "big";
   header.grid = grid_of(fields, header, path);
   return header;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "core/values/text.hpp"
 #include "io/surface/mesh_builder.hpp"
 #include "io/surface/text_lines.hpp"
 
@@ -19,14 +20,14 @@ class OffWords {
   // The next line that says something, without its comment.
   std::string_view next_line() {
     while (const auto line = lines_.next()) {
-      rest_ = bytes::trim(line->substr(0, line->find('#')));
+      rest_ = text::trim(line->substr(0, line->find('#')));
       if (!rest_.empty()) return rest_;
     }
     bytes::refuse(where_, "ends before all that it declares");
   }
   std::string_view next() {
-    if (bytes::trim(rest_).empty()) next_line();
-    return bytes::cut_word(rest_);
+    if (text::trim(rest_).empty()) next_line();
+    return text::cut_word(rest_);
   }
   double real() { return lines_.real(next()); }
   std::int64_t whole() { return lines_.whole(next()); }
@@ -46,7 +47,7 @@ class OffWords {
   }
   void check_end() {
     while (const auto rest = lines_.next()) {
-      if (!bytes::trim(rest->substr(0, rest->find('#'))).empty()) fail("has more lines than it declares");
+      if (!text::trim(rest->substr(0, rest->find('#'))).empty()) fail("has more lines than it declares");
     }
   }
 

@@ -4,6 +4,7 @@
 
 #include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 #include "io/surface/vtk_xml.hpp"
 
@@ -24,7 +25,7 @@ class SkeletonReader {
 
   VolumetricSkeletonFile read() {
     if (const auto version = field("ecorche_volumetric_skeleton", 1); version[0] != 1)
-      refuse("is of version " + bytes::number(version[0]), "this program reads version 1");
+      refuse("is of version " + text::shortest(version[0]), "this program reads version 1");
     if (document_.pieces.size() != 1) refuse("has " + std::to_string(document_.pieces.size()) + " pieces");
     read_fields();
     read_voxels();
@@ -82,7 +83,8 @@ class SkeletonReader {
     s.name = word("name");
     for (std::size_t a = 0; a < 3; ++a) {
       const double n = numbers<3>("size")[a];
-      if (!(n >= 1 && n <= 65535) || n != std::floor(n)) refuse("its field 'size' holds " + bytes::number(n));
+      if (!(n >= 1 && n <= 65535) || n != std::floor(n))
+        refuse("its field 'size' holds " + text::shortest(n));
       s.grid.size[a] = static_cast<std::int32_t>(n);
     }
     s.grid.origin = numbers<3>("origin");
@@ -133,7 +135,7 @@ class SkeletonReader {
     const auto values = vtp::reals(*deficit, document_.storage, rows_, where_);
     check_length("deficit", values.size(), 1);
     for (const double x : values) {
-      if (!(std::abs(x) < 1e6)) refuse("its array 'deficit' holds " + bytes::number(x));
+      if (!(std::abs(x) < 1e6)) refuse("its array 'deficit' holds " + text::shortest(x));
       s.deficit.push_back(static_cast<float>(x));
     }
     if (piece().find("PointData", "segment") == nullptr) return;

@@ -14,7 +14,7 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr Eigen::Index kAsked = 3000;      // vertices, whose distance from the other bone is asked
+constexpr Eigen::Index kSampled = 3000;    // vertices, whose distance from the other bone is asked
 constexpr std::size_t kEndFewest = 16;     // of the nearest ones
 constexpr double kEndNearestShare = 0.02;  // likewise, as in facing.cpp
 constexpr double kEndLong = 4;             // a shaft's variance, in variances across it
@@ -30,7 +30,7 @@ double percentile(std::vector<double> of, double share) {
 // The middle, coordinate by coordinate, of the vertices nearest to `other`.
 Eigen::Vector3d nearest_part(const SurfaceMesh& bone, const SurfaceMesh& other) {
   const geometry::FaceTree tree(other);
-  const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kAsked);
+  const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kSampled);
   std::vector<std::pair<double, Eigen::Index>> away;
   std::int32_t hint = -1;
   for (Eigen::Index v = 0; v < bone.V.rows(); v += step) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "runtime/server/handlers/connection.hpp"
+#include "runtime/server/listen.hpp"
 #include "runtime/server/net/tls.hpp"
 #include "runtime/server/net/web.hpp"
 #include "runtime/server/registry/test_hooks.hpp"
@@ -37,22 +38,6 @@ constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
 // served go on between them.
 constexpr Clock::duration kBetween = std::chrono::microseconds(500);
 
-tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
-  boost::system::error_code ec;
-  const net::ip::address address =
-      net::ip::make_address(where.host == "localhost" ? "127.0.0.1" : where.host, ec);
-  if (ec)
-    throw Error(ErrorKind::usage, "listen", "'" + where.host + "' is no address",
-                "use a numeric one such as 127.0.0.1:7070");
-  const bool guarded = !options.certificate.empty() && !options.token.empty();
-  if (!address.is_loopback() && !guarded && !options.insecure) {
-    throw Error(ErrorKind::refused, where.host, "is reachable by others, who could read and take part",
-                "give --tls-certificate, --tls-key and --token-file, listen on 127.0.0.1 and tunnel, or add "
-                "--insecure on a network that you trust");
-  }
-  return {address, where.port};
-}
-
 void check_options(const Options& options) {
   if (options.certificate.empty() != options.key.empty())
     throw Error(ErrorKind::usage, "TLS", "a certificate and its key go together",
@@ -63,38 +48,16 @@ void check_options(const Options& options) {
                 "use 16 to 1024 that nobody can guess, e.g. of openssl rand -hex 32");
 }
 
-void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
-  boost::system::error_code ec;
-  const std::string where = endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
-  const auto check = [&] {
-    if (!ec) return;
-    if (ec == net::error::address_in_use) {
-      throw Error(ErrorKind::temporary, where, "the address is in use",
-                  "stop the other server, or --listen on another port; 0 picks a free one");
-    }
-    throw Error(ErrorKind::usage, where, "cannot listen: " + ec.message(),
-                "use an address of this machine and a port that you may use");
-  };
-  acceptor.open(endpoint.protocol(), ec);
-  check();
-  acceptor.set_option(tcp::acceptor::reuse_address(true), ec);
-  check();
-  acceptor.bind(endpoint, ec);
-  check();
-  acceptor.listen(net::socket_base::max_listen_connections, ec);
-  check();
-}
-
 }  // namespace
 
 struct Server::Impl {
   Impl(Options options, std::vector<NamedModel> models, Workers& workers_, TestHooks hooks)
       : workers(workers_), wrap(hooks.transport) {
     check_options(options);
-    bind(acceptor, endpoint_of(options.listen, options));
+    start_listening(acceptor, endpoint_of(options.listen, options));
     port = acceptor.local_endpoint().port();
     if (options.http) {
-      bind(http_acceptor, endpoint_of(*options.http, options));
+      start_listening(http_acceptor, endpoint_of(*options.http, options));
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/net/transport.hpp"
 
-#include <netinet/tcp.h>
-#include <poll.h>
-
 #include <algorithm>
 #include <array>
-#include <string_view>
 #include <utility>
 
+#include "core/platform/socket_options.hpp"
 #include "runtime/server/net/write_turn.hpp"
 
 namespace ecorche::server {
@@ -16,7 +13,6 @@ namespace {
 
 // What the kernel keeps for a client that does not read, besides what is on its way: more is of no use to
 // anybody, and 32 clients that come and stop reading would have it clear 200 MB at once.
-using Unsent = net::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
 constexpr int kMostUnsent = 1 << 20;
 
 // What of `frame` has not left yet.
@@ -119,23 +115,16 @@ std::unique_ptr<Transport> tcp_transport(tcp::socket socket) {
 // of TCP do, sends next to nothing. Where the system does not have BBR, or keeps it for itself, things stay
 // as they are.
 void prefer_bbr(tcp::socket& socket) {
-#ifdef TCP_CONGESTION
   boost::system::error_code ec;
   const tcp::endpoint peer = socket.remote_endpoint(ec);
-  if (ec || peer.address().is_loopback()) return;
-  constexpr std::string_view kBbr = "bbr";
-  static_cast<void>(setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_CONGESTION, kBbr.data(),
-                               static_cast<socklen_t>(kBbr.size())));
-#else
-  static_cast<void>(socket);
-#endif
+  if (!ec && !peer.address().is_loopback()) platform::prefer_bbr(socket.native_handle());
 }
 
 void prepare(tcp::socket& socket) {
   boost::system::error_code ec;
   prefer_bbr(socket);
   socket.set_option(tcp::no_delay(true), ec);
-  socket.set_option(Unsent(kMostUnsent), ec);
+  platform::limit_unsent(socket.native_handle(), kMostUnsent);
 }
 
 std::string peer_of(const tcp::socket& socket) {
@@ -145,23 +134,11 @@ std::string peer_of(const tcp::socket& socket) {
 }
 
 bool hung_up(tcp::socket& socket) {
-#ifdef POLLRDHUP
-  pollfd asked{.fd = socket.native_handle(), .events = POLLRDHUP, .revents = 0};
-  return ::poll(&asked, 1, 0) > 0;
-#else
-  static_cast<void>(socket);
-  return false;
-#endif
+  return platform::has_hung_up(socket.native_handle());
 }
 
 Clock::duration waited(tcp::socket& socket) {
-#ifdef __linux__
-  tcp_info info{};
-  socklen_t size = sizeof info;
-  if (getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) == 0)
-    return std::chrono::milliseconds(info.tcpi_last_data_recv);
-#endif
-  return {};
+  return platform::since_received(socket.native_handle());
 }
 
 }  // namespace ecorche::server

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
 #include "runtime/server/resources/shares.hpp"
 
 namespace ecorche::server {
@@ -49,7 +50,7 @@ Status Recordings::begin(Session& session, const std::string& name, const std::s
 }
 
 Status Recordings::check(const std::string& name, const std::string& address, std::filesystem::path& path) {
-  if (!identifier(name))
+  if (!is_identifier(name))
     return {StatusCode::invalid_argument, "record: a name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   path = options_.record_folder / (name + ".ecrec");
   std::erase_if(running_, [](const auto& one) { return one.expired(); });

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/registry/session_registry.hpp"
+#include "core/values/identifier.hpp"
 
 #include <spdlog/spdlog.h>
 
@@ -100,7 +101,7 @@ Status SessionRegistry::open(const v1::OpenModel& request, const std::string& ad
   if (model == models_.end())
     return {StatusCode::not_found, "open: no model of that name (ListModels has the names)"};
   const bool named = !request.session().empty();
-  if (named && !identifier(request.session())) {
+  if (named && !is_identifier(request.session())) {
     return {StatusCode::invalid_argument,
             "open: a session's name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   }

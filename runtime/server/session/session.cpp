@@ -55,12 +55,6 @@ Session::~Session() {
   player_->release();
 }
 
-bool identifier(const std::string& name) {
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-  });
-}
-
 void Session::log_error(const std::string& what) const {
   if (journal_) journal_->line(spdlog::level::err, "session " + name_ + ": " + what);
 }

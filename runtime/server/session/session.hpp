@@ -51,9 +51,6 @@ struct SessionOwner {
   std::shared_ptr<Account> account = {};  ///< jobs are done on a part of it; may be null
 };
 
-/// [a-z0-9_]{1,64}
-bool identifier(const std::string& name);
-
 /// Lives on the I/O thread, and wires what a posed body is made of:
 ///
 ///   Control            members, and who of them poses

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/model_file/huge_pages.hpp"
+#include "core/platform/huge_pages.hpp"
 
 #include <sys/mman.h>
 
 #include <cstdint>
 
-namespace ecorche::model_file {
+namespace ecorche::platform {
 
-void wish_for_huge_pages([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes) {
+void advise_huge_pages([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes) {
 #ifdef MADV_HUGEPAGE
   constexpr std::size_t huge = std::size_t{1} << 21, few = 2 * huge;
   if (bytes < few) return;
@@ -18,4 +18,4 @@ void wish_for_huge_pages([[maybe_unused]] void* memory, [[maybe_unused]] std::si
 #endif
 }
 
-}  // namespace ecorche::model_file
+}  // namespace ecorche::platform

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/big_heap.hpp"
+#include "core/platform/heap.hpp"
 
 #include <malloc.h>
 #include <sys/mman.h>
@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-namespace ecorche::app {
+namespace ecorche::platform {
 
 void use_big_heap() {
 #ifdef __GLIBC__
@@ -36,4 +36,4 @@ void use_tidy_heap() {
 #endif
 }
 
-}  // namespace ecorche::app
+}  // namespace ecorche::platform

@@ -9,11 +9,12 @@
 
 #include <ecorche/values/context.hpp>
 
-namespace ecorche::tet {
+namespace ecorche::platform {
 
 struct ChildOptions {
-  double seconds = 600;                           ///< of wall clock; then the child is killed
-  std::uint64_t bytes = std::uint64_t{16} << 30;  ///< of memory on top of what the parent has
+  double seconds = 600;                                 ///< of wall clock; then the child is killed
+  std::uint64_t bytes = std::uint64_t{16} << 30;        ///< of memory on top of what the parent has
+  std::string mend = "free some memory and try again";  ///< what to do where no process can be made
 };
 
 struct ChildResult {
@@ -30,4 +31,4 @@ struct ChildResult {
 ChildResult run_in_child(const std::function<std::vector<std::byte>()>& work, const ChildOptions& options,
                          const Context& context);
 
-}  // namespace ecorche::tet
+}  // namespace ecorche::platform

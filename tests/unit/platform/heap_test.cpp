@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/big_heap.hpp"
+#include "core/platform/heap.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <cstdlib>
 
-namespace ecorche::app {
+namespace ecorche::platform {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -55,4 +55,4 @@ TEST(BigHeapDeathTest, by_default_it_does_not) {
 #endif
 
 }  // namespace
-}  // namespace ecorche::app
+}  // namespace ecorche::platform

@@ -3,7 +3,7 @@
 // servers.
 #pragma once
 
-namespace ecorche::app {
+namespace ecorche::platform {
 
 /// From now on freed memory stays with the process, and comes in huge pages where the kernel gives them on
 /// request. By default every large array is mapped when it is made and unmapped when it is dropped, and the
@@ -19,4 +19,4 @@ void use_big_heap();
 /// threads start. Does nothing where the C library is not glibc.
 void use_tidy_heap();
 
-}  // namespace ecorche::app
+}  // namespace ecorche::platform

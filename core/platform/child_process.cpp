@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/tet/tetgen/child_process.hpp"
+#include "core/platform/child_process.hpp"
 
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -17,19 +17,18 @@
 #include <fstream>
 #include <thread>
 
-namespace ecorche::tet {
+namespace ecorche::platform {
 namespace {
 
-Error system_error(const char* what) {
-  return {ErrorKind::internal, "child process", std::string(what) + ": " + std::strerror(errno),
-          "free some memory and try again, or use another mesher"};
+Error system_error(const char* what, const std::string& mend) {
+  return {ErrorKind::internal, "child process", std::string(what) + ": " + std::strerror(errno), mend};
 }
 
 /// An unnamed file in memory, which parent and child share.
 class MemoryFile {
  public:
-  explicit MemoryFile(const char* name) : fd_(memfd_create(name, 0)) {
-    if (fd_ < 0) throw system_error("cannot make a file in memory");
+  MemoryFile(const char* name, const std::string& mend) : fd_(memfd_create(name, 0)), mend_(mend) {
+    if (fd_ < 0) throw system_error("cannot make a file in memory", mend_);
   }
   ~MemoryFile() { close(fd_); }
   MemoryFile(const MemoryFile&) = delete;
@@ -48,11 +47,11 @@ class MemoryFile {
 
   std::vector<std::byte> read_all() const {
     struct stat info {};
-    if (fstat(fd_, &info) != 0) throw system_error("cannot read the child's result");
+    if (fstat(fd_, &info) != 0) throw system_error("cannot read the child's result", mend_);
     std::vector<std::byte> bytes(static_cast<std::size_t>(info.st_size));
     for (std::size_t done = 0; done < bytes.size();) {
       const ssize_t n = pread(fd_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
-      if (n <= 0) throw system_error("cannot read the child's result");
+      if (n <= 0) throw system_error("cannot read the child's result", mend_);
       done += static_cast<std::size_t>(n);
     }
     return bytes;
@@ -60,6 +59,7 @@ class MemoryFile {
 
  private:
   int fd_;
+  const std::string& mend_;
 };
 
 std::string last_line(const std::vector<std::byte>& bytes) {
@@ -92,7 +92,7 @@ void limit_memory(std::uint64_t more) {
     code = result.write_all(work()) ? 0 : 1;
   } catch (const std::exception& e) {
     std::printf("%s\n", e.what());
-  } catch (...) {  // TetGen throws numbers, after it has printed why
+  } catch (...) {  // a number, say; libraries have then printed why
   }
   std::fflush(nullptr);
   _exit(code);  // no destructors of the parent's objects
@@ -102,10 +102,10 @@ void limit_memory(std::uint64_t more) {
 
 ChildResult run_in_child(const std::function<std::vector<std::byte>()>& work, const ChildOptions& options,
                          const Context& context) {
-  const MemoryFile result("result"), log("log");
+  const MemoryFile result("result", options.mend), log("log", options.mend);
   std::fflush(nullptr);  // or the child would print the parent's pending output again
   const pid_t parent = getpid(), child = fork();
-  if (child < 0) throw system_error("cannot start a process");
+  if (child < 0) throw system_error("cannot start a process", options.mend);
   if (child == 0) be_child(work, options, parent, result, log);
 
   const auto start = std::chrono::steady_clock::now();
@@ -119,7 +119,7 @@ ChildResult run_in_child(const std::function<std::vector<std::byte>()>& work, co
   for (;;) {
     const pid_t ended = waitpid(child, &status, WNOHANG);
     if (ended == child) break;
-    if (ended < 0 && errno != EINTR) throw system_error("cannot wait for the process");
+    if (ended < 0 && errno != EINTR) throw system_error("cannot wait for the process", options.mend);
     if (context.stop.stop_requested()) {
       end_child(status);
       context.check_stop();
@@ -144,4 +144,4 @@ ChildResult run_in_child(const std::function<std::vector<std::byte>()>& work, co
   return out;
 }
 
-}  // namespace ecorche::tet
+}  // namespace ecorche::platform

@@ -4,10 +4,10 @@
 
 #include <cstddef>
 
-namespace ecorche::model_file {
+namespace ecorche::platform {
 
 /// The memory is going to be written: in huge pages where the kernel gives them on request, since clearing
 /// small ones one by one takes longer than reading a file into them. A wish, not a need.
-void wish_for_huge_pages(void* memory, std::size_t bytes);
+void advise_huge_pages(void* memory, std::size_t bytes);
 
-}  // namespace ecorche::model_file
+}  // namespace ecorche::platform
