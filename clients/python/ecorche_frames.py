@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What comes from a server and goes to it (docs/protocol.md), as numpy arrays: the bytes of frames, bodies, posed surfaces and
+"""What comes from a server and goes to it (docs/reference/protocol.md), as numpy arrays: the bytes of frames, bodies, posed surfaces and
 volumes. Needs no connection."""
 import struct
 

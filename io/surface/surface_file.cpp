@@ -127,7 +127,7 @@ void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets&
     const std::array both{&nodes, &tets};
     return files::commit_together(both);
   }
-  const bool mcnp = extension_of(path.stem()) == ".mcnp";
+  const bool mcnp = text::lower(path.stem().extension().string()) == ".mcnp";
   if (mcnp) tet_formats::refuse_degenerate(V, T, path.string());
   files::write_text(
       path, mcnp ? tet_formats::encode_mcnp(V, T, regions) : tet_formats::encode_abaqus(V, T, regions));

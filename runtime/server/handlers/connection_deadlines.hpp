@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// By when a client must have done something (docs/protocol.md, "Limits").
+// By when a client must have done something (docs/reference/protocol.md, "Limits").
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a client gets its place back that lost its connection (docs/protocol.md, "Coming back").
+// How a client gets its place back that lost its connection (docs/reference/protocol.md, "Coming back").
 #pragma once
 
 #include <cstdint>

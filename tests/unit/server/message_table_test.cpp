@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each message needs: as envelope.proto and docs/protocol.md say, and as a client hears it.
+// What each message needs: as envelope.proto and docs/reference/protocol.md say, and as a client hears it.
 #include "runtime/server/handlers/message_table.hpp"
 
 #include <fstream>
