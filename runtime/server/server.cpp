@@ -75,12 +75,12 @@ struct Server::Impl {
                                                  std::move(hooks));
   }
 
-  net::awaitable<void> accept(tcp::acceptor& at, bool web);
+  net::awaitable<void> accept(tcp::acceptor& at, bool http);
   net::awaitable<void> watch();
   net::awaitable<void> pause(net::steady_timer& timer, Clock::duration time = kTick);
   bool admit(WebKind kind, const std::string& peer);
   Clock::duration look_after(Clock::time_point now);
-  void receive(tcp::socket socket, bool web);
+  void receive(tcp::socket socket, bool http);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
   bool admit_request(Clock::time_point now);
@@ -153,7 +153,7 @@ void Server::reload() {
   });
 }
 
-net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
+net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool http) {
   boost::system::error_code ec;
   net::steady_timer next(io);
   while (at.is_open()) {
@@ -161,7 +161,7 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
     try {
       tcp::socket socket = co_await at.async_accept(quietly(ec));
       if (!at.is_open()) co_return;
-      if (!ec) receive(std::move(socket), web);
+      if (!ec) receive(std::move(socket), http);
       failed = static_cast<bool>(ec);
       // Out of file descriptors, or the client is gone already: neither ends the server.
       if (ec) registry->journal().line(spdlog::level::warn, "accept: " + ec.message());
@@ -177,7 +177,7 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
   }
 }
 
-void Server::Impl::receive(tcp::socket socket, bool web) {
+void Server::Impl::receive(tcp::socket socket, bool http) {
   std::string peer = peer_of(socket);
   const Clock::duration in_kernel = waited(socket);
   std::unique_ptr<Transport> transport;
@@ -186,7 +186,7 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
     transport = carrier->carry(std::move(socket));
     if (wrap) transport = wrap(std::move(transport));
   }
-  if (!web) return welcome(std::move(transport), std::move(peer), false, in_kernel);
+  if (!http) return welcome(std::move(transport), std::move(peer), false, in_kernel);
   if (!admit_request(Clock::now())) return registry->metrics().hit("connections");
   {
     const MayFail may_fail;

@@ -13,7 +13,7 @@ namespace ecorche::server {
 namespace {
 
 constexpr int kMaxTargets = 64;
-constexpr int kMaxPending = 2;        // of one client
+constexpr int kMaxPendingIk = 2;      // of one client
 constexpr double kMaxDistance = 1e6;  // mm, as of translations
 
 struct IkOutcome {
@@ -100,7 +100,7 @@ Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& 
   Pose start;
   if (Status status = read_start(solve, segments, session.poses().present().pose, start); !status.ok())
     return status;
-  if (client.pending().ik >= kMaxPending) {
+  if (client.pending().ik >= kMaxPendingIk) {
     return {StatusCode::resource_exhausted, "ik: two are being solved for this connection (wait for them)"};
   }
   ++client.pending().ik;

@@ -24,7 +24,8 @@ constexpr Needs kHello{};
 constexpr Needs kModel{.model = true};
 constexpr Needs kControl{.model = true, .control = Needs::Control::yes};
 
-// In the order of envelope.proto. docs/reference/protocol.md ("What a message needs") says the same, as a test holds.
+// In the order of envelope.proto. docs/reference/protocol.md ("What a message needs") says the same, as a
+// test holds.
 constexpr std::array kMessages{
     MessageRow{E::kClientHello, "hello", Needs{.hello = false}, Refusal::end,
                call<&E::client_hello, handle_client_hello>},

@@ -13,7 +13,7 @@ namespace ecorche::server {
 namespace {
 
 constexpr std::size_t kMaxPoints = 10000;
-constexpr int kMaxPending = 4;  // of one client
+constexpr int kMaxPendingProbes = 4;  // of one client
 // So few are asked on the spot: quicker than a worker wakes. Those by tissue cost many times more.
 constexpr std::size_t kFewPoints = 16;
 
@@ -143,7 +143,7 @@ Status handle_probe_points(Client& client, const v1::ProbePoints& points, const 
   probe->id = request.id();
   if (Status status = read_request(points, request.payload, model->model(), *probe); !status.ok())
     return status;
-  if (client.pending().probes >= kMaxPending)
+  if (client.pending().probes >= kMaxPendingProbes)
     return {StatusCode::resource_exhausted, "probe: four wait already (read their answers first)"};
   ++client.pending().probes;
   client.session()->probe(

@@ -22,7 +22,7 @@ std::vector<SubscriptionRequest*> lacking_streams(std::vector<SubscriptionReques
   std::vector<SubscriptionRequest*> lacking;
   for (SubscriptionRequest& asked : subscriptions) {
     const auto* mesh = std::get_if<MeshSpec>(&asked.spec);
-    if (mesh && takes_long(*mesh) && asked.streams.empty() && !session.shows(asked.spec))
+    if (mesh && takes_long(*mesh) && asked.streams.empty() && !session.subscriptions().shows(asked.spec))
       lacking.push_back(&asked);
   }
   return lacking;
