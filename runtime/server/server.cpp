@@ -61,16 +61,17 @@ struct Server::Impl {
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
-    web = {.token = options.token,
-           .origins = options.origins,
-           .header_bytes = options.limits.hello_bytes,
-           .messages_per_second = options.limits.messages_per_second,
-           .ready = [this] { return !stopping; },
-           .metrics = [this] { return metrics(); },
-           .denied = [this] { registry->metrics().denied(); },
-           .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
-           .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
-                             bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
+    web_context = {
+        .token = options.token,
+        .origins = options.origins,
+        .header_bytes = options.limits.hello_bytes,
+        .messages_per_second = options.limits.messages_per_second,
+        .ready = [this] { return !stopping; },
+        .metrics = [this] { return metrics(); },
+        .denied = [this] { registry->metrics().denied(); },
+        .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
+        .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
+                          bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
     registry = std::make_unique<SessionRegistry>(io, workers, std::move(options), std::move(models),
                                                  std::move(hooks));
   }
@@ -97,7 +98,7 @@ struct Server::Impl {
   std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> wrap;
   std::uint16_t port = 0, http_port = 0;
   std::unique_ptr<Carrier> carrier;
-  WebContext web;
+  WebContext web_context;
   std::unique_ptr<SessionRegistry> registry;
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
@@ -190,7 +191,7 @@ void Server::Impl::receive(tcp::socket socket, bool http) {
   if (!admit_request(Clock::now())) return registry->metrics().hit("connections");
   {
     const MayFail may_fail;
-    requests.push_back(web_request(std::move(transport), std::move(peer), web));
+    requests.push_back(web_request(std::move(transport), std::move(peer), web_context));
   }
   requests.back()->start();
 }
