@@ -33,7 +33,7 @@ namespace {
 namespace fs = std::filesystem;
 using preprocess::StageTime;
 
-struct Settings {
+struct PreprocessSettings {
   fs::path case_path, output;
   io::CaseOptions input;
   preprocess::Options options;
@@ -74,7 +74,8 @@ std::string spheres_line(const Model& model) {
   return out.str();
 }
 
-std::string text_report(const Model& model, const Settings& settings, const std::vector<StageTime>& stages) {
+std::string text_report(const Model& model, const PreprocessSettings& settings,
+                        const std::vector<StageTime>& stages) {
   const Certificate& c = model.certificate;
   std::ostringstream out;
   out << settings.output.string() << ": " << model.tet_count() << " tets, " << model.node_count()
@@ -108,7 +109,7 @@ void sweep(const fs::path& output) {
 }
 
 // What would fail only after minutes of work is refused first.
-void check_outputs(const Settings& settings) {
+void check_outputs(const PreprocessSettings& settings) {
   if (settings.output.extension() != ".hdf") {
     throw Error(ErrorKind::usage, "--output", "'" + settings.output.string() + "' does not end in .hdf",
                 "name it so: ParaView opens VTKHDF files by that ending");
@@ -147,7 +148,7 @@ std::string write_refused(const fs::path& output, const preprocess::WorstTets& w
   return "its " + std::to_string(worst.tet.size()) + " worst tets are in " + path.string();
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const PreprocessSettings& settings) {
   check_outputs(settings);
   use_big_heap();
   std::optional<StageFolder> kept;
@@ -239,7 +240,7 @@ std::vector<std::string> strings(const std::vector<std::string_view>& names) {
 
 void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   using preprocess::Options;
-  const auto settings = std::make_shared<Settings>();
+  const auto settings = std::make_shared<PreprocessSettings>();
   CLI::App* command =
       app.add_subcommand("preprocess", "prepare a case for posing: rig, tets, weights, centres, mapping");
   command->add_option("CASE", settings->case_path, "a case.yaml, or the folder that holds one")->required();

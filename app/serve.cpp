@@ -23,7 +23,7 @@
 namespace ecorche::app {
 namespace {
 
-struct Settings {
+struct ServeSettings {
   std::vector<std::string> models;
   std::string listen = "127.0.0.1:7070";
   std::string http;
@@ -47,7 +47,7 @@ server::ModelParts read_model(const std::string& path, const std::string& clips,
   return parts;
 }
 
-std::vector<server::NamedModel> read_models(const Settings& settings, const Program& program) {
+std::vector<server::NamedModel> read_models(const ServeSettings& settings, const Program& program) {
   std::vector<server::NamedModel> models;
   for (const std::string& path : settings.models) {
     server::ModelParts parts = read_model(path, settings.clips, program, program.context("read model"));
@@ -71,7 +71,7 @@ std::string written(const std::string& host, std::uint16_t port) {
   return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
 
-int run_serve(const Settings& settings, const Program& program) {
+int run_serve(const ServeSettings& settings, const Program& program) {
   use_tidy_heap();
   // stdout is for the result.
   spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
@@ -121,7 +121,7 @@ int run_serve(const Settings& settings, const Program& program) {
 }  // namespace
 
 void declare_serve(CLI::App& app, Program& program, Run& chosen) {
-  auto settings = std::make_shared<Settings>();
+  auto settings = std::make_shared<ServeSettings>();
   CLI::App* command = app.add_subcommand("serve", "serve models: poses in, meshes and volumes out, over TCP");
   command
       ->add_option("models", settings->models, "model files; clients ask for them by file name without .hdf")

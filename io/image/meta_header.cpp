@@ -11,9 +11,9 @@ namespace {
 using fields::refuse;
 using fields::set_wide;
 using Path = std::filesystem::path;
-using Fields = std::map<std::string, std::string, std::less<>>;
+using MetaFields = std::map<std::string, std::string, std::less<>>;
 
-void set_type(ImageHeader& header, const std::string& name, const Path& path) {
+void set_meta_type(ImageHeader& header, const std::string& name, const Path& path) {
   static const std::map<std::string, ScalarType, std::less<>> types{
       {"MET_CHAR", ScalarType::i8},    {"MET_UCHAR", ScalarType::u8},  {"MET_SHORT", ScalarType::i16},
       {"MET_USHORT", ScalarType::u16}, {"MET_INT", ScalarType::i32},   {"MET_UINT", ScalarType::u32},
@@ -29,8 +29,8 @@ void set_type(ImageHeader& header, const std::string& name, const Path& path) {
 }
 
 // Reads the lines up to ElementDataFile, which ends the header; `offset` becomes the byte after it.
-Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
-  Fields fields;
+MetaFields read_meta_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
+  MetaFields fields;
   std::size_t at = 0;
   for (int line = 1; at < head.size(); ++line) {
     const std::size_t end = head.find('\n', at);
@@ -59,18 +59,18 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
   refuse(path, "its header has no line 'ElementDataFile = ...'", "it must be a MetaImage");
 }
 
-std::string value_of(const Fields& fields, std::string_view key, const std::string& otherwise) {
+std::string value_of(const MetaFields& fields, std::string_view key, const std::string& otherwise) {
   const auto found = fields.find(key);
   return found == fields.end() ? otherwise : found->second;
 }
 
-std::string needed(const Fields& fields, std::string_view key, const Path& path) {
+std::string needed(const MetaFields& fields, std::string_view key, const Path& path) {
   const auto found = fields.find(key);
   if (found == fields.end()) refuse(path, "its header lacks '" + std::string(key) + "'");
   return found->second;
 }
 
-bool truth(const Fields& fields, std::string_view key, bool otherwise) {
+bool truth(const MetaFields& fields, std::string_view key, bool otherwise) {
   const std::string value = value_of(fields, key, otherwise ? "True" : "False");
   return value == "True" || value == "true" || value == "1";
 }
@@ -79,7 +79,7 @@ bool truth(const Fields& fields, std::string_view key, bool otherwise) {
 
 ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   ImageHeader header;
-  const Fields fields = read_fields(head, path, header.data_offset);
+  const MetaFields fields = read_meta_fields(head, path, header.data_offset);
   if (value_of(fields, "ObjectType", "Image") != "Image") {
     refuse(path, "holds a '" + fields.at("ObjectType") + "'", "it must be an image");
   }
@@ -94,7 +94,7 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   }
   header.components = static_cast<int>(fields::integer(value_of(fields, "ElementNumberOfChannels", "1"), 1,
                                                        1 << 16, "ElementNumberOfChannels", path));
-  set_type(header, needed(fields, "ElementType", path), path);
+  set_meta_type(header, needed(fields, "ElementType", path), path);
   fields::check_size(header, path);
   if (!truth(fields, "BinaryData", false)) refuse(path, "its voxels are text", "save it as binary");
   header.gzip = truth(fields, "CompressedData", false);

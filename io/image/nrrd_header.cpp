@@ -16,9 +16,9 @@ using fields::set_wide;
 using Path = std::filesystem::path;
 
 // Field names without spaces, in lower case: teem takes `data file` and `datafile` for the same.
-using Fields = std::map<std::string, std::string>;
+using NrrdFields = std::map<std::string, std::string>;
 
-void set_type(ImageHeader& header, const std::string& name, const Path& path) {
+void set_nrrd_type(ImageHeader& header, const std::string& name, const Path& path) {
   static const std::map<std::string, ScalarType, std::less<>> types{{"signed char", ScalarType::i8},
                                                                     {"int8", ScalarType::i8},
                                                                     {"int8_t", ScalarType::i8},
@@ -63,9 +63,9 @@ void set_type(ImageHeader& header, const std::string& name, const Path& path) {
 }
 
 // Reads the lines up to the empty one; `offset` becomes the byte after it.
-Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset,
-                   Fields* free_keys = nullptr) {
-  Fields fields;
+NrrdFields read_nrrd_fields(std::string_view head, const Path& path, std::uint64_t& offset,
+                            NrrdFields* free_keys = nullptr) {
+  NrrdFields fields;
   std::size_t at = 0;
   bool ended = false;
   for (int line = 1; at < head.size(); ++line) {
@@ -106,14 +106,14 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
   return fields;
 }
 
-std::string needed(const Fields& fields, const char* key, const Path& path) {
+std::string needed(const NrrdFields& fields, const char* key, const Path& path) {
   const auto found = fields.find(key);
   if (found == fields.end()) refuse(path, "its header lacks '" + std::string(key) + "'");
   return found->second;
 }
 
 // Whether the first axis holds the components of a voxel: it has no direction in space.
-void check_axes(const Fields& fields, std::int64_t dimension, const Path& path) {
+void check_axes(const NrrdFields& fields, std::int64_t dimension, const Path& path) {
   if (dimension == 3) return;
   const auto found = fields.find("spacedirections");
   const std::vector<std::string_view> axes =
@@ -125,7 +125,7 @@ void check_axes(const Fields& fields, std::int64_t dimension, const Path& path) 
   }
 }
 
-void check_unit(const Fields& fields, const Path& path) {
+void check_unit(const NrrdFields& fields, const Path& path) {
   const auto found = fields.find("spaceunits");
   if (found == fields.end()) return;
   for (const std::string_view unit : fields::words(found->second)) {
@@ -137,7 +137,7 @@ void check_unit(const Fields& fields, const Path& path) {
 
 // Lines go first; bytes are those of the voxels, so that of a stream they are inflated ones; -1: all but the
 // voxels.
-void read_skips(const Fields& fields, ImageHeader& header, const Path& path) {
+void read_skips(const NrrdFields& fields, ImageHeader& header, const Path& path) {
   const auto number = [&](const char* key, std::int64_t least) {
     const auto found = fields.find(key);
     return found == fields.end() ? 0
@@ -151,7 +151,7 @@ void read_skips(const Fields& fields, ImageHeader& header, const Path& path) {
 }
 
 // Vectors such as "(1,0,0) (0, 1, 0) none": those in parentheses.
-std::vector<std::array<double, 3>> vectors(const Fields& fields, const char* key) {
+std::vector<std::array<double, 3>> vectors(const NrrdFields& fields, const char* key) {
   std::vector<std::array<double, 3>> out;
   const auto found = fields.find(key);
   std::string_view rest = found == fields.end() ? std::string_view() : std::string_view(found->second);
@@ -174,7 +174,7 @@ std::vector<std::array<double, 3>> vectors(const Fields& fields, const char* key
 }
 
 // The grid in LPS of an image that says its space and directions.
-std::optional<ImageGrid> grid_of(const Fields& fields, const ImageHeader& header, const Path& path) {
+std::optional<ImageGrid> grid_of(const NrrdFields& fields, const ImageHeader& header, const Path& path) {
   static const std::map<std::string, std::array<double, 3>, std::less<>> spaces{
       {"left-posterior-superior", {1, 1, 1}},   {"lps", {1, 1, 1}},
       {"right-anterior-superior", {-1, -1, 1}}, {"ras", {-1, -1, 1}},
@@ -205,16 +205,16 @@ std::optional<ImageGrid> grid_of(const Fields& fields, const ImageHeader& header
 }  // namespace
 
 std::map<std::string, std::string> read_nrrd_keys(const Path& path) {
-  Fields keys;
+  NrrdFields keys;
   const std::string head = read_head(path);
   std::uint64_t offset = 0;
-  if (head.starts_with("NRRD000")) read_fields(head, path, offset, &keys);
+  if (head.starts_with("NRRD000")) read_nrrd_fields(head, path, offset, &keys);
   return keys;
 }
 
 ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   ImageHeader header;
-  const Fields fields = read_fields(head, path, header.data_offset);
+  const NrrdFields fields = read_nrrd_fields(head, path, header.data_offset);
   const std::int64_t dimension = fields::integer(needed(fields, "dimension", path), 0, 16, "dimension", path);
   if (dimension != 3 && dimension != 4) {
     refuse(path, "has " + std::to_string(dimension) + " axes", "save a 3-D image");
@@ -233,7 +233,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
       header.size[i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
     }
   }
-  set_type(header, fields::lower(needed(fields, "type", path)), path);
+  set_nrrd_type(header, fields::lower(needed(fields, "type", path)), path);
   fields::check_size(header, path);
   const std::string encoding = fields::lower(needed(fields, "encoding", path));
   header.gzip = encoding == "gzip" || encoding == "gz";

@@ -15,7 +15,7 @@ namespace {
 using fields::refuse;
 using Path = std::filesystem::path;
 
-std::string number(double x) {
+std::string exact(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g", x);
   return text;
@@ -55,7 +55,7 @@ Image whole(const Image& image, const Path& path) {
         values.size() - static_cast<std::size_t>(std::count_if(fraction, values.end(), is_whole)) - at;
     refuse(path,
            std::to_string(count) + " of " + std::to_string(values.size()) +
-               " labels are no whole numbers, the first " + number(static_cast<double>(*fraction)) + " at " +
+               " labels are no whole numbers, the first " + exact(static_cast<double>(*fraction)) + " at " +
                place_of(image, at),
            "if it was resampled, resample the label map by nearest neighbour");
   }
@@ -65,7 +65,7 @@ Image whole(const Image& image, const Path& path) {
   if (low < std::numeric_limits<std::int32_t>::min() || high > std::numeric_limits<std::int32_t>::max()) {
     const auto worst = high > std::numeric_limits<std::int32_t>::max() ? most : least;
     refuse(path,
-           "holds the label " + number(static_cast<double>(*worst)) + " at " +
+           "holds the label " + exact(static_cast<double>(*worst)) + " at " +
                place_of(image, static_cast<std::size_t>(worst - values.begin())),
            "labels fit 32 bits: renumber them");
   }

@@ -31,9 +31,9 @@ struct Drawn {
   std::vector<Freedom> freedoms;
 };
 
-class Parser {
+class AsfParser {
  public:
-  explicit Parser(TextStream& stream) : in_(stream) {}
+  explicit AsfParser(TextStream& stream) : in_(stream) {}
 
   File parse() {
     while (!in_.peek().empty()) section();
@@ -233,7 +233,7 @@ class Parser {
 }  // namespace
 
 File parse(TextStream& stream) {
-  return Parser(stream).parse();
+  return AsfParser(stream).parse();
 }
 
 Quaterniond turn_of(const std::vector<Freedom>& freedoms, const double* values, double radians) {

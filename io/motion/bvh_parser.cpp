@@ -11,9 +11,9 @@ namespace {
 
 constexpr std::size_t kMostJoints = 4096, kMostDepth = 256, kLongestName = 256;
 
-class Parser {
+class BvhParser {
  public:
-  explicit Parser(TextStream& stream) : in_(stream) {}
+  explicit BvhParser(TextStream& stream) : in_(stream) {}
 
   Header parse() {
     in_.expect("HIERARCHY");
@@ -121,7 +121,7 @@ class Parser {
 }  // namespace
 
 Header read_header(TextStream& stream) {
-  return Parser(stream).parse();
+  return BvhParser(stream).parse();
 }
 
 bool read_frame(TextStream& stream, const Header& header, std::size_t frame, std::span<double> values) {

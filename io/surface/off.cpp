@@ -12,9 +12,9 @@ namespace ecorche::io::off {
 namespace {
 
 // Words one after the other, wherever lines end; the rest of a line can be passed over.
-class Words {
+class OffWords {
  public:
-  Words(std::string_view file, const std::string& where) : lines_(file, where), where_(where) {}
+  OffWords(std::string_view file, const std::string& where) : lines_(file, where), where_(where) {}
 
   // The next line that says something, without its comment.
   std::string_view next_line() {
@@ -60,7 +60,7 @@ class Words {
 
 SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
   files::Budget budget(file.size(), limits, where);
-  Words words(file, where);
+  OffWords words(file, where);
   MeshBuilder mesh(budget);
   words.next_line();
   const std::string_view keyword = words.next();

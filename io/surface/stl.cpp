@@ -95,9 +95,9 @@ bool is_word(std::string_view word, std::string_view expected) {
 }
 
 // Words of a text STL, with the line for messages.
-class Words {
+class StlWords {
  public:
-  Words(std::string_view text, const std::string& where) : text_(text), where_(where) {}
+  StlWords(std::string_view text, const std::string& where) : text_(text), where_(where) {}
 
   std::string_view next() {
     while (at_ < text_.size() && space(text_[at_])) line_ += text_[at_++] == '\n';
@@ -142,7 +142,7 @@ class Words {
 
 SurfaceMesh decode_text(std::string_view text, files::Budget& budget) {
   const std::string& where = budget.where();
-  Words words(text, where);
+  StlWords words(text, where);
   // The shortest facet that anyone writes takes over 80 bytes.
   VertexMerge merge(3 * (text.size() / 80));
   std::vector<std::array<std::int32_t, 3>> facets;

@@ -10,13 +10,13 @@
 namespace ecorche::io {
 namespace {
 
-constexpr std::size_t kLargestFile = std::size_t{1} << 33;
+constexpr std::size_t kLargestSkeletonFile = std::size_t{1} << 33;
 constexpr std::uint64_t kMostNames = 65536;
 constexpr double kOffVoxel = 0.01;  // of a voxel: points are float32
 
-class Reader {
+class SkeletonReader {
  public:
-  Reader(std::string_view bytes, const std::string& where, const files::ReadLimits& limits)
+  SkeletonReader(std::string_view bytes, const std::string& where, const files::ReadLimits& limits)
       : where_(where),
         budget_(bytes.size(), limits, where),
         document_(vtk_xml::parse(bytes, "PolyData", {"Points", "PointData", "Lines"},
@@ -200,12 +200,12 @@ class Reader {
 
 VolumetricSkeletonFile decode_volumetric_skeleton(std::string_view bytes, const std::string& where,
                                                   const files::ReadLimits& limits) {
-  return Reader(bytes, where, limits).read();
+  return SkeletonReader(bytes, where, limits).read();
 }
 
 VolumetricSkeletonFile read_volumetric_skeleton(const std::filesystem::path& path,
                                                 const files::ReadLimits& limits) {
-  return decode_volumetric_skeleton(files::read_text(path, kLargestFile), path.string(), limits);
+  return decode_volumetric_skeleton(files::read_text(path, kLargestSkeletonFile), path.string(), limits);
 }
 
 }  // namespace ecorche::io

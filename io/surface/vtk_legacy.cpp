@@ -41,9 +41,9 @@ std::optional<Scalar> scalar_from(std::string_view name) {
   return std::nullopt;
 }
 
-class Reader {
+class LegacyReader {
  public:
-  Reader(std::string_view file, files::Budget& budget)
+  LegacyReader(std::string_view file, files::Budget& budget)
       : rest_(file), where_(budget.where()), budget_(budget), mesh_(budget) {}
 
   SurfaceMesh read() {
@@ -264,7 +264,7 @@ class Reader {
 
 SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
   files::Budget budget(file.size(), limits, where);
-  return Reader(file, budget).read();
+  return LegacyReader(file, budget).read();
 }
 
 std::optional<std::string> space_tag(std::string_view file) {

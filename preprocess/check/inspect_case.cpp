@@ -46,7 +46,7 @@ std::string larger(double factor) {
                     : std::to_string(std::lround(1 / factor)) + " times smaller";
 }
 
-std::string rounded(double x) {
+std::string three_digits(double x) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.3g", x);
   return text.data();
@@ -56,7 +56,7 @@ std::string rounded(double x) {
 std::string closing_of(const std::vector<Hole>& holes) {
   double edge = 0;
   for (const Hole& hole : holes) edge = std::max(edge, hole.filling_edge);
-  return edge > 0 ? "ecorche repair --holes " + rounded(std::ceil(1.05 * edge)) + " closes them"
+  return edge > 0 ? "ecorche repair --holes " + three_digits(std::ceil(1.05 * edge)) + " closes them"
                   : "their edges form no loop: mend them where the surface was made";
 }
 
@@ -174,8 +174,8 @@ class Inspector {
       const Hole& longest = figures.holes.front();
       tell(harm, name,
            plural(figures.open.count, "open edge") + " in " + plural(count_of(figures.holes), "hole") +
-               ", the longest of " + plural(longest.edges, "edge") + " and " + rounded(longest.length_mm) +
-               " mm",
+               ", the longest of " + plural(longest.edges, "edge") + " and " +
+               three_digits(longest.length_mm) + " mm",
            longest.middle, closing_of(figures.holes));
     }
     tell_of(figures.nonmanifold, harm, "non-manifold edge", "let at most two triangles share an edge");
@@ -191,7 +191,7 @@ class Inspector {
              line.intersections->first, "voxels do not mind; mend it if a simulator will read it");
     }
     if (figures.closed() && figures.triangles > 0 && figures.volume_mm3 < 0) {
-      tell(harm, name, "is inside out: its volume is " + rounded(figures.volume_mm3 / 1000) + " ml", {},
+      tell(harm, name, "is inside out: its volume is " + three_digits(figures.volume_mm3 / 1000) + " ml", {},
            "flip its triangles, or mend the frame");
     }
     tell_parts(line, parts);
@@ -205,7 +205,7 @@ class Inspector {
     };
     if (line.specks > 0) {
       tell(Severity::note, line.name,
-           plural(line.specks, "speck") + " less than " + rounded(speck_mm) + " mm across",
+           plural(line.specks, "speck") + " less than " + three_digits(speck_mm) + " mm across",
            first([&](std::int32_t p) { return parts.speck(p, speck_mm); }), "ecorche repair drops them");
     }
     if (line.inner > 0) {
@@ -228,9 +228,9 @@ class Inspector {
     }
     if (extent < kSmallestSkin || extent > kLargestSkin) {
       const double factor = unit_factor(extent, kLikelySkin, kLargestSkin);
-      tell(Severity::warning, patient_.skin_name, "is " + rounded(extent) + " mm long", {},
+      tell(Severity::warning, patient_.skin_name, "is " + three_digits(extent) + " mm long", {},
            factor > 0 ? "mend the case's unit: with one " + larger(factor) + " it would be " +
-                            rounded(extent * factor) + " mm"
+                            three_digits(extent * factor) + " mm"
                       : "mend the case's unit, if that is wrong");
     }
   }
@@ -262,9 +262,9 @@ class Inspector {
       if (figures.triangles == 0 || (extent <= 1.5 * whole && extent >= 1e-3 * whole)) continue;
       const double factor = unit_factor(extent, 1e-2 * whole, whole);
       tell(Severity::warning, report_.surfaces[i].name,
-           "is " + rounded(extent) + " mm long, the skin " + rounded(whole) + " mm", figures.low,
+           "is " + three_digits(extent) + " mm long, the skin " + three_digits(whole) + " mm", figures.low,
            factor > 0 ? "mend its unit: with one " + larger(factor) + " it would be " +
-                            rounded(extent * factor) + " mm"
+                            three_digits(extent * factor) + " mm"
                       : "mend its unit, if that is wrong");
     }
   }
@@ -291,8 +291,8 @@ class Inspector {
       what += (mend.empty() ? "" : " and ") + found->size();
       mend += std::string(mend.empty() ? "" : ", and ") + "a unit " + larger(found->scale);
     }
-    tell(Severity::warning, "bones", what + ", " + rounded(100 * found->share) + " % of the bones lie inside",
-         {}, mend);
+    tell(Severity::warning, "bones",
+         what + ", " + three_digits(100 * found->share) + " % of the bones lie inside", {}, mend);
   }
 
   void tell_outside() {
@@ -305,7 +305,8 @@ class Inspector {
       const bool lost = !bone && out.largest_mm > tissue_lost_share * skin_mm_;
       tell(bone || lost ? Severity::warning : Severity::note, line.name,
            std::to_string(out.count) + (out.count == 1 ? " vertex (" : " vertices (") +
-               rounded(100 * out.share) + " %) outside the skin, by up to " + rounded(out.largest_mm) + " mm",
+               three_digits(100 * out.share) + " %) outside the skin, by up to " +
+               three_digits(out.largest_mm) + " mm",
            out.farthest,
            lost   ? "mend its frame or unit: farther out than 10 % of the body's length no model is made"
            : bone ? "the body will be skin and bones together; mend one of them if that is not meant"

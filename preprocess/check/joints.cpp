@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <numbers>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/degrees.hpp"
 #include "preprocess/check/inside.hpp"
 #include "preprocess/check/joint_places.hpp"
 #include "preprocess/rig/fit_rig.hpp"
@@ -19,7 +19,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kOutside = 0.02;  // of the longer bone: surfaces of skin and bones are no truer
 // Hinges of limbs stand across the shafts of both bones: condyles 80 to 96 degrees to the femur (Paley 2002),
 // an elbow's axis 75 to 100 to the humerus (London 1981) and, by the carrying angle of up to 28 (Zampagni et
@@ -225,7 +224,8 @@ class Joints {
       // end.
       const Vector3d from = bones_[of].middle() - joint(row).center;
       if (std::abs(bones_[of].shaft->dot(from)) < 0.9 * from.norm()) continue;
-      const double angle = std::acos(std::min(1.0, std::abs(axis.dot(*bones_[of].shaft)))) * kDegrees;
+      const double angle =
+          std::acos(std::min(1.0, std::abs(axis.dot(*bones_[of].shaft)))) * degrees_per_radian;
       if (angle >= 90 - kAcross) continue;
       tell(row,
            "its axis stands " + rounded(angle) + " degrees to the shaft of '" + segment(of) +

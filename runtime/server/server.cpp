@@ -98,16 +98,16 @@ struct Server::Impl {
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
-    room = {.token = options.token,
-            .origins = options.origins,
-            .header_bytes = options.limits.hello_bytes,
-            .messages_per_second = options.limits.messages_per_second,
-            .ready = [this] { return !stopping; },
-            .metrics = [this] { return metrics(); },
-            .denied = [this] { registry->metrics().denied(); },
-            .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
-            .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
-                              bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
+    web = {.token = options.token,
+           .origins = options.origins,
+           .header_bytes = options.limits.hello_bytes,
+           .messages_per_second = options.limits.messages_per_second,
+           .ready = [this] { return !stopping; },
+           .metrics = [this] { return metrics(); },
+           .denied = [this] { registry->metrics().denied(); },
+           .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
+           .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
+                             bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
     registry = std::make_unique<SessionRegistry>(io, workers, std::move(options), std::move(models),
                                                  std::move(hooks));
   }
@@ -120,8 +120,8 @@ struct Server::Impl {
   void receive(tcp::socket socket, bool web);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
-  bool room_for_request(Clock::time_point now);
-  void make_room(Clock::time_point now, Clock::duration patience);
+  bool admit_request(Clock::time_point now);
+  void drop_unread(Clock::time_point now, Clock::duration patience);
   void begin_shutdown();
   void without_memory();
   std::string metrics();
@@ -134,7 +134,7 @@ struct Server::Impl {
   std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> wrap;
   std::uint16_t port = 0, http_port = 0;
   std::unique_ptr<Carrier> carrier;
-  WebRoom room;
+  WebContext web;
   std::unique_ptr<SessionRegistry> registry;
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
@@ -224,16 +224,16 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
     if (wrap) transport = wrap(std::move(transport));
   }
   if (!web) return welcome(std::move(transport), std::move(peer), false, in_kernel);
-  if (!room_for_request(Clock::now())) return registry->metrics().hit("connections");
+  if (!admit_request(Clock::now())) return registry->metrics().hit("connections");
   {
     const MayFail may_fail;
-    requests.push_back(web_request(std::move(transport), std::move(peer), room));
+    requests.push_back(web_request(std::move(transport), std::move(peer), web));
   }
   requests.back()->start();
 }
 
 // Of requests, too, the oldest makes way.
-bool Server::Impl::room_for_request(Clock::time_point now) {
+bool Server::Impl::admit_request(Clock::time_point now) {
   std::erase_if(requests, [](const auto& request) { return request->over(); });
   if (requests.size() < registry->limits().connections) return true;
   if (now - requests.front()->born() < kTimeToGreet) return false;
@@ -284,7 +284,7 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
 
 // Of those who read nothing, whoever holds most: the longest queue is pushed out (Wei, Coyle, Hsiao 1991), if
 // it is longer than half of what each would have of the memory. One at a time: its bytes are given back soon.
-void Server::Impl::make_room(Clock::time_point now, Clock::duration patience) {
+void Server::Impl::drop_unread(Clock::time_point now, Clock::duration patience) {
   std::uint64_t most = registry->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
   Connection* longest = nullptr;
   for (const auto& connection : connections) {
@@ -345,7 +345,7 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });
   if (const auto patience = registry->patience(now)) {
-    make_room(now, *patience);
+    drop_unread(now, *patience);
     next = std::min(next, kRoomTick);
   }
   registry->sweep(now);

@@ -199,7 +199,7 @@ void Connection::handle_open(const v1::Envelope& request) {
   if (const Status status = registry_.open(open, address_, session); !status.ok())
     return answer_status(request.request_id(), status);
   if (session_) {  // of the model that was
-    if (session_->controls(*this)) heir_ = session_->name();
+    if (session_->control().controls(*this)) heir_ = session_->name();
     session_->leave(*this, false);
     for (const std::uint32_t subscription : subscriptions_) outbox_.forget(subscription);
     subscriptions_.clear();
@@ -226,7 +226,7 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
     return answer_status(id,
                          {StatusCode::failed_precondition, "subscribe: no model is open (OpenModel first)"});
   StreamSpec spec;
-  if (const Status status = read_want(request.subscribe(), session_->model()->model(), spec); !status.ok()) {
+  if (const Status status = read_spec(request.subscribe(), session_->model()->model(), spec); !status.ok()) {
     return answer_status(id, status);
   }
   if (subscriptions_.size() + preparing_ >= registry_.limits().subscriptions) {
@@ -255,7 +255,8 @@ void Connection::handle_subscribe(const v1::Envelope& request) {
   ++preparing_;
   const auto made = std::make_shared<Prepared>();
   made->asked = {.id = 0, .spec = spec, .request = request.subscribe()};
-  registry_.run_in_background(
+  registry_.executor().run(
+      Service::background,
       [made, model = session_->model()] {
         made->status = guarded("subscribe", [&]() -> Status {
           made->asked.streams = open_streams(*model, std::get<MeshSpec>(made->asked.spec));

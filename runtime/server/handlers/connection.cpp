@@ -141,7 +141,7 @@ void Connection::close(const char* why) {
   pause_.cancel();
   leave_place();
   try {
-    registry_.destroy_later(outbox_.clear());
+    registry_.executor().destroy_later(outbox_.clear());
   } catch (const std::bad_alloc&) {  // then it goes with the connection
   }
 }
@@ -152,8 +152,9 @@ void Connection::leave_place() {
   std::optional<SavedPlace> place;
   if (session && !departed_ && !session->retired()) {
     try {
-      place = SavedPlace{
-          .session = session, .asked = session->requests_of(*this), .controlled = session->controls(*this)};
+      place = SavedPlace{.session = session,
+                         .asked = session->subscriptions().requests_of(*this),
+                         .controlled = session->control().controls(*this)};
     } catch (const std::bad_alloc&) {  // then nobody comes back to it
     }
   }
@@ -164,7 +165,7 @@ void Connection::leave_place() {
 void Connection::give_up() {
   const MustNotFail half_way;
   try {
-    registry_.destroy_later(outbox_.clear());
+    registry_.executor().destroy_later(outbox_.clear());
     end({StatusCode::aborted,
          "resume: another connection showed this one's token, and has its place (go on there)"});
   } catch (const std::bad_alloc&) {
@@ -235,7 +236,7 @@ void Connection::stalled() {
     registry_.metrics().hit("stall");
     return close("stalled");
   }
-  registry_.destroy_later(outbox_.clear());
+  registry_.executor().destroy_later(outbox_.clear());
   hit("stall", {StatusCode::deadline_exceeded,
                 "frame: none was acknowledged in time (send FrameAck for each as soon as it is read)"});
 }
@@ -436,7 +437,7 @@ net::awaitable<void> Connection::write_frames() {
     co_await transport_->write(buffers, ec);
     writing_.reset();
     if (ec) {
-      registry_.destroy_later(std::make_shared<std::vector<SharedFrame>>(std::move(frames)));
+      registry_.executor().destroy_later(std::make_shared<std::vector<SharedFrame>>(std::move(frames)));
       close("client left");
       co_return;
     }

@@ -52,11 +52,12 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
   std::vector<SubscriptionRequest*> lacking;
   for (SubscriptionRequest& asked : back->asked) {
     const auto* mesh = std::get_if<MeshSpec>(&asked.spec);
-    if (mesh && takes_long(*mesh) && asked.streams.empty() && !session->shows(asked.spec))
+    if (mesh && takes_long(*mesh) && asked.streams.empty() && !session->subscriptions().shows(asked.spec))
       lacking.push_back(&asked);
   }
   if (!lacking.empty()) {
-    registry_.run_in_background(
+    registry_.executor().run(
+        Service::background,
         [back, lacking, weak = weak_from_this(), model = session->model(), &hooks = registry_.hooks()] {
           if (weak.expired()) return;
           const HandlingScope handling(hooks);
@@ -92,7 +93,7 @@ void Connection::resume(const std::shared_ptr<Returning>& back) {
 
 void Connection::take_place(Returning& back, bool controlled) {
   role_ = session_->rejoin(*this, controlled);
-  last_sequence_ = session_->last_sequence();
+  last_sequence_ = session_->poses().last_sequence();
   v1::Resumed& resumed = *back.answer.mutable_server_hello()->mutable_resumed();
   resumed.set_model(session_->model()->summary.name());
   resumed.set_session(session_->name());
@@ -115,13 +116,13 @@ void Connection::take_place(Returning& back, bool controlled) {
 void Connection::handle_claim(const v1::Envelope& request) {
   if (const Status status = may("control", false); !status.ok())
     return answer_status(request.request_id(), status);
-  if (!session_->claim(*this)) {
+  if (!session_->control().claim(*this, Clock::now())) {
     return answer_status(request.request_id(),
                          {StatusCode::permission_denied,
                           "control: another connection holds it, or may come back to it (try again later)"});
   }
   role_ = v1::ROLE_CONTROLLER;
-  last_sequence_ = session_->last_sequence();
+  last_sequence_ = session_->poses().last_sequence();
   v1::Envelope envelope;
   envelope.mutable_control_granted()->set_last_sequence(last_sequence_);
   answer(request.request_id(), std::move(envelope));
@@ -131,7 +132,7 @@ void Connection::handle_release(const v1::Envelope& request) {
   if (const Status status = may("control", true); !status.ok())
     return answer_status(request.request_id(), status);
   answer_status(request.request_id(), {});
-  session_->release(*this);
+  session_->control().release(*this, Clock::now());
 }
 
 void Connection::control_changed(v1::Role role, bool vacant, double reserved_seconds) {

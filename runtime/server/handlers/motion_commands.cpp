@@ -61,7 +61,7 @@ void Connection::handle_solve(const v1::Envelope& request) {
     if (solve.apply_as() != 0) {
       if (Status status = check_sequence(solve.apply_as()); !status.ok()) return status;
     }
-    start = session_->present().pose;
+    start = session_->poses().present().pose;
     if (solve.rotation().empty()) return {};
     v1::PoseUpdate update;
     wire::to_proto(start, update);
@@ -84,7 +84,7 @@ void Connection::handle_solve(const v1::Envelope& request) {
       return Status{};
     });
   };
-  registry_.run_on_worker(
+  registry_.executor().run_request(
       work,
       [weak = weak_from_this(), outcome, id, solve] {
         if (const auto self = weak.lock()) self->take_back([&] { self->solved(id, solve, *outcome); });
@@ -117,7 +117,7 @@ void Connection::solved(std::uint64_t id, const v1::SolveIk& request, const IkOu
   PoseRequest next;
   next.sequence = request.apply_as();
   next.pose = result.pose;
-  next.skinning = session_->present().skinning;
+  next.skinning = session_->poses().present().skinning;
   session_->pose(std::move(next));
 }
 
@@ -159,7 +159,7 @@ void Connection::handle_record(const v1::Envelope& request) {
   const std::uint64_t id = request.request_id();
   if (const Status status = may("record", true); !status.ok()) return answer_status(id, status);
   if (!request.record().on()) return finish_recording(id);
-  if (session_->recording()) {
+  if (session_->recorder().running()) {
     return answer_status(
         id, {StatusCode::failed_precondition, "record: a recording runs in this session (end it first)"});
   }
@@ -167,7 +167,7 @@ void Connection::handle_record(const v1::Envelope& request) {
 }
 
 void Connection::finish_recording(std::uint64_t id) {
-  if (!session_->recording()) {
+  if (!session_->recorder().running()) {
     return answer_status(
         id, {StatusCode::failed_precondition, "record: no recording runs in this session (begin one)"});
   }

@@ -119,13 +119,13 @@ void Connection::handle_probe(const wire::Frame& frame) {
         ask(*model, *body, *asked);
         return self->answer_probe(id, asked, body);
       }
-      self->registry_.run_on_worker([model, body, asked] { ask(*model, *body, *asked); },
-                                    [weak, id, asked, body] {
-                                      const auto still = weak.lock();
-                                      if (still)
-                                        still->take_back([&] { still->answer_probe(id, asked, body); });
-                                    },
-                                    self->account_);
+      self->registry_.executor().run_request(
+          [model, body, asked] { ask(*model, *body, *asked); },
+          [weak, id, asked, body] {
+            const auto still = weak.lock();
+            if (still) still->take_back([&] { still->answer_probe(id, asked, body); });
+          },
+          self->account_);
     });
   };
   session_->probe(ready, !few);

@@ -26,14 +26,14 @@ class Window {
 
   bool empty() const { return frame_.empty(); }
 
-  /// At most `room` bytes of it, in a few pieces; good until the next call.
-  std::span<const net::const_buffer> next(std::size_t room) {
+  /// At most `most` bytes of it, in a few pieces; good until the next call.
+  std::span<const net::const_buffer> next(std::size_t most) {
     std::size_t count = 0;
-    for (std::size_t i = 0; i < frame_.size() && count < pieces_.size() && room > 0; ++i) {
-      const net::const_buffer piece = net::buffer(frame_[i] + (i == 0 ? at_ : 0), room);
+    for (std::size_t i = 0; i < frame_.size() && count < pieces_.size() && most > 0; ++i) {
+      const net::const_buffer piece = net::buffer(frame_[i] + (i == 0 ? at_ : 0), most);
       if (piece.size() == 0) continue;
       pieces_[count++] = piece;
-      room -= piece.size();
+      most -= piece.size();
     }
     return std::span(pieces_).first(count);
   }
@@ -79,7 +79,7 @@ class TcpTransport final : public Transport {
     WriteTurn turn(socket_.get_executor());
     ec = {};
     while (!left.empty()) {
-      const std::size_t sent = socket_.write_some(left.next(WriteTurn::room()), ec);
+      const std::size_t sent = socket_.write_some(left.next(WriteTurn::allowance()), ec);
       left.advance(sent);
       if (sent > 0) moved_ = Clock::now();
       if (ec == net::error::would_block) {
