@@ -2,87 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """`ecorche refill`, `tears`, `deformers` and `pose --deformer spheres`: the way through, and each mistake with its code and words."""
 import gzip
-import json
 import os
 import pathlib
 import re
-import shutil
-import subprocess
 import sys
-import tempfile
 import unittest
-import zlib
 
 import numpy as np
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "scripts/renderer"))
+from bar_skeletons import ARM, BarTest, run, write_nrrd
+
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "mistakes"))
-import bodies  # noqa: E402
 import body  # noqa: E402
-import volumes  # noqa: E402
 
-ECORCHE = os.environ["ECORCHE_BIN"]
 CASE = pathlib.Path(os.environ["ECORCHE_CASE"])
-ERROR_LINE = re.compile(r"^error: .+: .+ \(.+\)$", re.M)
-
-ARM = """ecorche_skeleton: 1
-name: arm
-segments:
-  upper: {joint: {name: shoulder, kind: free, center: [6, 8, 7.5]}}
-  lower: {parent: upper, joint: {name: elbow, kind: ball, center: [30, 8, 7.5], sequence: [{flexion: z}, {abduction: y}, {rotation: x}]}}
-"""
-BENT = "ecorche_pose: 1\nskeleton: arm\njoints:\n  elbow: {flexion_deg: 50}\n"
 
 
-def run(*words):
-    return subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=200)
-
-
-def write_nrrd(path, voxels, spacing=1.0):
-    kind = {"uint8": "uint8", "int16": "int16"}[voxels.dtype.name]
-    head = (f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: {' '.join(map(str, voxels.shape[::-1]))}\n"
-            f"space directions: ({spacing},0,0) (0,{spacing},0) (0,0,{spacing})\nkinds: domain domain domain\nendian: little\nencoding: raw\n"
-            f"space origin: (0,0,0)\n\n")
-    path.write_bytes(head.encode() + voxels.tobytes())
-    return path
-
-
-class Refill(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-        cls.addClassCleanup(shutil.rmtree, cls.folder)
-        labels = np.zeros((16, 17, 64), np.uint8)
-        labels[2:14, 2:15, 2:62] = 3
-        labels[6:9, 6:9, 4:60] = 7
-        cls.bar = write_nrrd(cls.folder / "bar.nrrd", labels)
-        cls.voxels = labels
-        cls.rig = cls.folder / "arm.yaml"
-        cls.rig.write_text(ARM)
-        cls.pose = cls.folder / "bent.yaml"
-        cls.pose.write_text(BENT)
-        cls.all = cls.folder / "all.vtp"
-        cls.few = cls.folder / "few.vtp"
-        cls.loose = cls.folder / "loose.vtp"
-        for out, words in ((cls.all, ("--tp", -2, "--tree", "--skeleton", cls.rig)), (cls.few, ("--tp", 0.3, "--tree", "--skeleton", cls.rig)), (cls.loose, ("--tp", 0.3))):
-            done = run("thin", cls.bar, "-o", out, *words)
-            assert done.returncode == 0, done.stderr
-
-    def ok(self, *words):
-        done = run("--json", *words)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return json.loads(done.stdout)
-
-    def read(self, path):
-        return bodies.read_placed_image(path)
-
-    def assert_error(self, code, words, *parts):
-        done = run(*words)
-        self.assertEqual(done.returncode, code, done.stderr)
-        self.assertRegex(done.stderr, ERROR_LINE)
-        for part in parts:
-            self.assertIn(part, done.stderr)
-
+class Refill(BarTest):
     def test_every_voxel_kept_fills_the_object_again(self):
         out = self.folder / "rest.nrrd"
         result = self.ok("refill", self.all, self.bar, "-o", out, "--sampling", "nearest", "--object", self.bar)
@@ -281,68 +217,6 @@ class Refill(unittest.TestCase):
         self.assert_error(64, ("tears", self.few, "--sweep"), "--rig: a rig must move the skeleton (add --rig SKELETON.yaml or MODEL.hdf)")
         self.assertFalse(out.exists())
 
-    def test_a_skeleton_of_picked_points_goes_out_and_its_motion_comes_back(self):
-        picks, rig, few = self.folder / "picks.csv", self.folder / "picked.yaml", self.folder / "picked.vtp"
-        # A bare list, from the hand to the shoulder and the root first; beside the middle, and one outside the bar.
-        picks.write_text("4,6,9\n58,9,7\n30,12,5\n45,20,7\n")
-        made = self.ok("thin", self.bar, "-o", few, "--tp", 0.3, "--picks", picks, "--snapped", rig)
-        self.assertEqual(made["parents"], {"joint_01": None, "joint_02": "joint_04", "joint_03": "joint_01", "joint_04": "joint_03"})
-        self.assertEqual(sum(made["segments"].values()), made["skeletal"])
-        self.assertGreater(made["snapped_mm"]["joint_04"], 5)
-        # Bent, as keys of an animation say it.
-        (self.folder / "keys.yaml").write_text(
-            "ecorche_pose_sequence: 1\nskeleton: picked\nframes_per_second: 10\nkeys:\n  - {time_s: 0}\n"
-            "  - {time_s: 1, joints: {joint_03: {z_deg: 50, x_deg: 20}, joint_04: {y_deg: -30}, joint_02: {x_deg: 15}}, root: {translation_mm: [5, 7, -3]}}\n")
-        out = [self.folder / name for name in ("own.nrrd", "back.nrrd")]
-        self.ok("refill", few, self.bar, "-o", out[0], "--rig", rig, "--motion", self.folder / "keys.yaml", "--frames", 10, "--sampling", "nearest")
-        own, _, own_at = self.read(out[0])
-        self.assertFalse(own.shape == self.voxels.shape and (own == self.voxels).all())
-        names = [f"joint_0{n}" for n in (1, 2, 3, 4)]
-        for kind in ("bvh", "glb"):
-            still, file = self.folder / f"rest.{kind}", self.folder / f"move.{kind}"
-            self.assertEqual(self.ok("export", rig, "-o", still)["rigs"][0]["joints"], 4)
-            self.ok("export", rig, "-o", file, "--motion", self.folder / "keys.yaml")
-            data = still.read_bytes()
-            self.assertTrue(all(name.encode() in data for name in names), kind)
-            self.ok("refill", few, self.bar, "-o", out[1], "--rig", rig, "--motion", file, "--frames", 10, "--sampling", "nearest")
-            back, _, back_at = self.read(out[1])
-            self.assertTrue(np.array_equal(own_at, back_at) and own.shape == back.shape, kind)
-            self.assertLess((own != back).mean(), 1e-3, kind)
-        # The rest pose is the scan.
-        self.ok("refill", few, self.bar, "-o", out[1], "--rig", rig, "--motion", self.folder / "rest.bvh", "--frames", 0, "--sampling", "nearest")
-        rest = self.ok("refill", few, self.bar, "-o", out[0], "--sampling", "nearest")["frames"][0]
-        self.assertTrue((self.read(out[0])[0] == self.read(out[1])[0]).all(), rest)
-        self.assert_error(64, ("export", rig, "-o", self.folder / "x.vtu"), "a skeleton has no tets")
-        self.assert_error(65, ("export", picks, "-o", self.folder / "x.glb"), "picks.csv: is not an HDF5 file")
-
-    def test_picks_that_are_none(self):
-        picks, rig, out = self.folder / "bad.csv", self.folder / "bad.yaml", self.folder / "bad.vtp"
-        words = ("thin", self.bar, "-o", out, "--tp", 0.3, "--picks", picks, "--snapped", rig)
-        for code, text, parts in ((65, "name,x,y,z\nHip,4,8,8\n", ("bad.csv:2", "'Hip' is no name")),
-                                  (65, "4,8\n", ("bad.csv:1", "is no point")),
-                                  (65, "name,x,y\na,4,8\n", ("bad.csv:1", "no column is named 'z'")),
-                                  (65, "# nothing\n", ("it holds no points",)),
-                                  (78, "name,x,y,z\na,4,8,8\na,30,8,8\n", ("pick 'a'", "two have this name")),
-                                  (78, "4,8,8\n4.1,8,8\n", ("pick 'joint_02'", "also that of 'joint_01'")),
-                                  (78, "name,x,y,z,parent\na,4,8,8,b\nb,30,8,8,\n", ("the first is the root",)),
-                                  (78, "name,x,y,z,parent\na,4,8,8,\nb,30,8,8,hip\n", ("its parent 'hip' is no pick",)),
-                                  (78, "name,x,y,z,parent\na,4,8,8,\nb,30,8,8,c\nc,50,8,8,b\n", ("pick 'b'", "lead back to itself"))):
-            picks.write_text(text)
-            self.assert_error(code, words, *parts)
-            self.assertFalse(out.exists() or rig.exists())
-        picks.write_text("4,8,8\n")
-        self.assert_error(64, words[:-2], "--picks", "--snapped")
-        self.assert_error(64, (*words, "--skeleton", self.rig), "--picks", "stands beside")
-        self.assert_error(64, ("thin", self.few, "-o", out, "--picks", picks, "--snapped", rig), "--picks")
-        # Two bars: the tree joins no pick of the one to the other's.
-        two = np.zeros((16, 17, 64), np.uint8)
-        two[2:14, 2:15, 2:28] = two[2:14, 2:15, 40:62] = 1
-        picks.write_text("4,8,8\n50,8,8\n")
-        apart = (words[0], write_nrrd(self.folder / "two.nrrd", two), *words[2:])
-        self.assert_error(78, apart, "pick 'joint_02'", "does not join it to 'joint_01'", "--connect")
-        self.ok(*apart, "--connect")
-        self.assertTrue(rig.exists())
-
     def test_odd_masks_fill_again(self):
         empty = np.zeros((10, 10, 10), np.uint8)
         sheet, line, one, two = (empty.copy() for _ in range(4))
@@ -377,38 +251,6 @@ class Refill(unittest.TestCase):
             self.assertEqual(gzip.decompress(data) if b"gzip" in head else data, rgb.tobytes())
         self.assert_error(64, ("thin", image, "-o", skeleton, "--component", 5, "--threshold", "50:"), "--component", "3 component(s)")
 
-    def test_a_posed_clip_is_rendered(self):
-        keys, clip, pictures = self.folder / "clip.yaml", self.folder / "clip.nrrd", self.folder / "pictures"
-        keys.write_text("ecorche_pose_sequence: 1\nskeleton: arm\nframes_per_second: 10\nkeys:\n  - {time_s: 0}\n"
-                        "  - {time_s: 1, joints: {elbow: {abduction_deg: 80}}}\n")
-        frames = self.ok("refill", self.few, self.bar, "-o", clip, "--rig", self.rig, "--motion", keys, "--frames", "0:11:5", "--sampling", "nearest")["frames"]
-        render = pathlib.Path(__file__).resolve().parents[3] / "scripts/render"
-        done = subprocess.run([render, *(frame["file"] for frame in frames), "-o", pictures, "--name", "bend", "--height", "90"],
-                              capture_output=True, text=True, timeout=200)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual([pathlib.Path(line).name for line in done.stdout.split()], ["bend_0000.png", "bend_0001.png", "bend_0002.png", "bend_clip.png"])
-        data, at, drawn, size = (pictures / "bend_clip.png").read_bytes(), 8, [], None
-        while at < len(data):
-            length, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
-            body = data[at + 8:at + 8 + length]
-            if kind == b"IHDR":
-                size = (int.from_bytes(body[4:8], "big"), int.from_bytes(body[:4], "big"))
-            if kind in (b"IDAT", b"fdAT"):
-                rows = np.frombuffer(zlib.decompress(body[4 * (kind == b"fdAT"):]), np.uint8).reshape(size[0], 1 + 3 * size[1])
-                drawn.append(rows[:, 1:].reshape(*size, 3).astype(int))
-            at += 12 + length
-        self.assertEqual((len(drawn), size[0]), (3, 90))
-        shown = [np.abs(frame - frame[0, 0]).max(axis=2) > 30 for frame in drawn]
-        for mask in shown:
-            self.assertGreater(mask.mean(), 0.02)
-        # The arm swings: what is shown moves on from frame to frame.
-        for one, two in zip(shown, shown[1:]):
-            self.assertGreater((one ^ two).mean(), 0.01)
-
-    def test_an_animated_picture_holds_every_frame(self):
-        frames = [np.full((5, 7, 3), 40 * i, np.uint8) for i in range(3)]
-        data = volumes.animated(frames, self.folder / "clip.png").read_bytes()
-        self.assertEqual((data.count(b"acTL"), data.count(b"fcTL"), data.count(b"fdAT")), (1, 3, 2))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/motion/text_stream.hpp"
+#include "tests/unit/io/base64.hpp"
 
 namespace ecorche::io {
 
@@ -79,19 +80,6 @@ inline const std::string kAsf = R"(# a leg
 inline const std::string kAmc =
     "#!OML:ASF x\n:FULLY-SPECIFIED\n:DEGREES\n1\nroot 1 2 3 10 20 30\nthigh 40 50 60\nshank 70\n"
     "2\nroot 1 2 3 0 0 0\nshank 0\nthigh 0 0 0\n";
-
-inline std::string base64(const std::vector<float>& values) {
-  constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
-  const std::size_t size = 4 * values.size();
-  std::string out;
-  for (std::size_t i = 0; i < size; i += 3) {
-    unsigned word = 0;
-    for (std::size_t k = 0; k < 3; ++k) word = word << 8 | (i + k < size ? bytes[i + k] : 0U);
-    for (std::size_t k = 0; k < 4; ++k) out += i + k > size ? '=' : letters[word >> (18 - 6 * k) & 63];
-  }
-  return out;
-}
 
 // A still node, a hip below it that moves and turns, a knee that turns; both with axes of their own at rest.
 // Keys at 0, 0.5, 1 s: the knee by a quarter turn about its own x from key to key.

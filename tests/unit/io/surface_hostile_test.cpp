@@ -20,6 +20,7 @@
 #include "io/surface/surface_file.hpp"
 #include "io/surface/vtk_legacy.hpp"
 #include "io/surface/vtp.hpp"
+#include "tests/unit/io/base64.hpp"
 #include "tests/unit/io/foreign_surfaces.hpp"
 #include "tests/unit/io/scratch.hpp"
 #include "tests/unit/io/small_case.hpp"
@@ -59,18 +60,6 @@ SurfaceMesh decode(const std::string& name, std::string_view bytes) {
   if (extension == ".vtk") return vtk_legacy::decode(bytes, name);
   if (extension == ".vtp") return vtp::decode(bytes, name).mesh;
   return gltf::decode(bytes, name);
-}
-
-std::string base64(const std::string& bytes) {
-  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[word >> (18 - 6 * k) & 63];
-  }
-  return out;
 }
 
 std::vector<Sample> samples() {

@@ -10,6 +10,7 @@
 #include <random>
 
 #include <ecorche/kinematics/forward.hpp>
+#include "tests/unit/runtime/largest_step.hpp"
 #include "tests/unit/runtime/loose_toys.hpp"
 #include "tests/unit/runtime/reference_skinning.hpp"
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tests/unit/runtime/largest_step.hpp"
 #include "tests/unit/runtime/loose_toys.hpp"
 
 namespace ecorche::runtime {
@@ -33,13 +34,6 @@ double largest_stretch(const Model& model, const std::vector<float>& nodes) {
       }
     }
   }
-  return worst;
-}
-
-double largest_step(const std::vector<float>& a, const std::vector<float>& b) {
-  double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    worst = std::max(worst, std::abs(static_cast<double>(a[i] - b[i])));
   return worst;
 }
 

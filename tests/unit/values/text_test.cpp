@@ -54,7 +54,9 @@ TEST(Text, NumbersAreThoseOfPrintf) {
       std::snprintf(printed, sizeof printed, "%.*g", digits, x);
       EXPECT_EQ(text::number(x, digits), printed);
     }
-    if (std::isfinite(x)) EXPECT_EQ(std::stod(text::shortest(x)), x);
+    if (std::isfinite(x)) {
+      EXPECT_EQ(std::stod(text::shortest(x)), x);
+    }
   }
   EXPECT_EQ(text::shortest(0.1), "0.1");
   EXPECT_EQ(text::shortest(-std::numeric_limits<double>::max()), "-1.7976931348623157e+308");
