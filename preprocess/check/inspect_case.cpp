@@ -382,23 +382,6 @@ class Inspector {
 
 }  // namespace
 
-std::string_view severity_name(Severity severity) {
-  switch (severity) {
-    case Severity::note:
-      return "note";
-    case Severity::warning:
-      return "warning";
-    case Severity::error:
-      break;
-  }
-  return "error";
-}
-
-bool Report::possible() const {
-  return std::none_of(findings.begin(), findings.end(),
-                      [](const Finding& f) { return f.severity == Severity::error; });
-}
-
 Report inspect(const Case& patient, const Context& context, const Options& options) {
   return Inspector(patient, context, options).run();
 }

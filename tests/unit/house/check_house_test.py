@@ -89,7 +89,7 @@ class House(unittest.TestCase):
             self.assertEqual(problems({path: f"{spdx}{comment}\n", "CONVENTIONS.md": f"| {paper} | a paper |\n"}), [""])
 
     def test_large_rooms(self):
-        self.assert_refused("app/a.cpp", SPDX + "int a;\n" * 501, "one idea a file")
+        self.assert_refused("app/a.cpp", SPDX + "int a;\n" * 401, "one idea a file")
 
 
 if __name__ == "__main__":
