@@ -78,7 +78,7 @@ TEST(RecordedFrames, OfTheLastPoseCome) {
     ASSERT_TRUE(ended);
     stage.run_until([&] { return stage.session->poses().present().sequence == 2; });
     stage.workers.drain();
-    stage.volume_workers.drain();  // where there is a volume
+    stage.executor.drain(Service::volumes);  // where there is a volume
     stage.wait(milliseconds(20));
     ended = false;
     stage.session->recorder().stop([&] { ended = true; });
