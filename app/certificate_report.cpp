@@ -11,7 +11,7 @@ nlohmann::json certificate_json(const Certificate& certificate, const preprocess
   nlohmann::json out = nlohmann::json::array();
   for (const preprocess::JudgedFigure& figure : preprocess::judge(certificate, size)) {
     nlohmann::json row{{"figure", figure.figure}, {"value", figure.value}, {"kept", figure.kept}};
-    row["bound"] = figure.bound != nullptr ? nlohmann::json(preprocess::said(*figure.bound)) : nullptr;
+    row["bound"] = figure.bound != nullptr ? nlohmann::json(preprocess::describe(*figure.bound)) : nullptr;
     row["least"] = figure.least ? nlohmann::json(*figure.least) : nullptr;
     row["most"] = figure.most ? nlohmann::json(*figure.most) : nullptr;
     row["reason"] = figure.bound != nullptr ? nlohmann::json(figure.bound->reason) : nullptr;
@@ -25,7 +25,7 @@ std::string certificate_text(const Certificate& certificate, const preprocess::B
       "figure                           value  bound                                   because\n";
   for (const preprocess::JudgedFigure& figure : preprocess::judge(certificate, size)) {
     char line[128];
-    const std::string bound = figure.bound != nullptr ? preprocess::said(*figure.bound) : "";
+    const std::string bound = figure.bound != nullptr ? preprocess::describe(*figure.bound) : "";
     std::snprintf(line, sizeof line, "%-26s %11.6g  %-38s", std::string(figure.figure).c_str(), figure.value,
                   bound.c_str());
     out += line;

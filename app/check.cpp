@@ -23,7 +23,7 @@ using check::Finding;
 using check::Report;
 using check::SurfaceLine;
 
-struct Settings {
+struct CheckSettings {
   std::filesystem::path path;
   io::CaseOptions input;
   bool all = false;  // a line for every surface
@@ -137,7 +137,7 @@ std::string text_report(const Report& report, bool all) {
   return out;
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const CheckSettings& settings) {
   Case patient = io::read_case(settings.path, settings.input, program.context("read"));
   const std::set<std::string> drawn = drawn_surfaces(patient);
   label_surfaces::resolve(patient, program.context("surfaces"));
@@ -163,7 +163,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_check(CLI::App& app, Program& program, Run& chosen) {
-  const auto settings = std::make_shared<Settings>();
+  const auto settings = std::make_shared<CheckSettings>();
   CLI::App* command =
       app.add_subcommand("check", "read a whole case and say what is wrong with it; changes nothing");
   command->add_option("CASE", settings->path, "a case.yaml, or the folder that holds one")->required();

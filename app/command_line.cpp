@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/text.hpp"
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {
@@ -30,7 +31,7 @@ const std::vector<std::pair<std::string, std::string>> kExamples{
     {"path", "ecorche path body.vtp --from -88,0,300 --to 0,0,900 -o way.csv"},
     {"deformers", "ecorche deformers patient.hdf --volume labels --pose lib:sitting -o compared"},
     {"tears", "ecorche tears patient.hdf --motion patient/motion/walk.bvh --frames 0:30:10"},
-    {"contact", "ecorche contact patient.hdf patient.hdf --b-pose lib:sitting"},
+    {"contact", "ecorche contact patient.hdf patient.hdf --other-pose lib:sitting"},
 };
 
 // Examples that need what a test cannot know beforehand.
@@ -79,12 +80,6 @@ std::string_view first_word(const CLI::App& app, int argc, char** argv) {
     if (option != nullptr && option->get_items_expected_max() > 0) ++i;
   }
   return {};
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string out;
-  for (const std::string& word : words) out += (out.empty() ? "" : ", ") + word;
-  return out;
 }
 
 // Options of the program and of the subcommand, as they are written.
@@ -136,14 +131,15 @@ void parse(CLI::App& app, int argc, char** argv) {
   if (!word.empty() && std::find(known.begin(), known.end(), word) == known.end()) {
     const std::string near = io::yaml::nearest(word, known);
     throw Error(ErrorKind::usage, "ecorche", "unknown subcommand '" + std::string(word) + "'",
-                near.empty() ? "one of " + joined(known) : "did you mean '" + near + "'?");
+                near.empty() ? "one of " + text::joined(known) : "did you mean '" + near + "'?");
   }
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success&) {
     throw;
   } catch (const CLI::ParseError& error) {
-    if (word.empty()) throw Error(ErrorKind::usage, "ecorche", "no subcommand", "one of " + joined(known));
+    if (word.empty())
+      throw Error(ErrorKind::usage, "ecorche", "no subcommand", "one of " + text::joined(known));
     throw misuse(app, word, error);
   }
 }

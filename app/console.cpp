@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Progress and messages on stderr; the result on stdout.
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -9,6 +7,7 @@
 
 #include "app/abandonable.hpp"
 #include "app/command.hpp"
+#include "core/platform/terminal.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -18,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 // Draws one stage. On a terminal a bar in place, at most ten times a second; otherwise a line each 10 s.
 class Bar {
  public:
-  explicit Bar(std::string label) : label_(std::move(label)), terminal_(isatty(STDERR_FILENO) == 1) {}
+  explicit Bar(std::string label) : label_(std::move(label)), terminal_(platform::stderr_is_terminal()) {}
   ~Bar() {
     if (drawn_ && terminal_) std::fputs("\r\x1b[K", stderr);
   }

@@ -15,13 +15,13 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Body {
+struct ContactBody {
   fs::path skeleton, rig;
   std::string pose;
 };
 
-struct Settings {
-  std::array<Body, 2> bodies;
+struct ContactSettings {
+  std::array<ContactBody, 2> bodies;
 };
 
 // The segment that a ball hangs on; empty where it hangs on none.
@@ -34,8 +34,8 @@ std::string segment_of(const PlacedBalls& body, std::size_t ball) {
              : std::string();
 }
 
-int run(const Program& program, const Settings& s) {
-  const auto read = [&](const Body& body) {
+int run(const Program& program, const ContactSettings& s) {
+  const auto read = [&](const ContactBody& body) {
     return read_placed_balls(program, body.skeleton, body.rig, body.pose);
   };
   const PlacedBalls a = read(s.bodies[0]), b = read(s.bodies[1]);
@@ -65,11 +65,11 @@ int run(const Program& program, const Settings& s) {
 }  // namespace
 
 void declare_contact(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<ContactSettings>();
   CLI::App* command = app.add_subcommand(
       "contact",
       "whether two posed bodies meet, where and how deep, by the balls of their volumetric skeletons");
-  const auto declare = [&](Body& body, const char* name, const std::string& prefix) {
+  const auto declare = [&](ContactBody& body, const char* name, const std::string& prefix) {
     command
         ->add_option(name, body.skeleton,
                      "a skeleton that thin made (.vtp), or a model that holds spheres (.hdf)")

@@ -15,7 +15,7 @@ nlohmann::json contacts_json(const Model& model) {
                    {"other", name(touch.other)},
                    {"area_cm2", touch.area_mm2 / 100},
                    {"at", {touch.at.x(), touch.at.y(), touch.at.z()}},
-                   {"text", check::said(touch, model.rig.skeleton)},
+                   {"text", check::describe(touch, model.rig.skeleton)},
                    {"mend", check::parting_advice(check::cube_mm(model.nodes, model.tets))}});
   }
   return out;

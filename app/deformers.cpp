@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Settings {
+struct DeformersSettings {
   fs::path model, output;
   FrameChoice frames;
   std::string volume, sampling = "nearest", skinning = "cor";
@@ -129,7 +129,7 @@ std::vector<std::byte> background_bytes(const ModelVolume& volume) {
   return out;
 }
 
-json compare_frame(const Settings& s, const runtime::BodyPoser& poser, const ModelVolume& volume,
+json compare_frame(const DeformersSettings& s, const runtime::BodyPoser& poser, const ModelVolume& volume,
                    const runtime::VolumeBalls& balls, const Frame& frame, const Context& context) {
   const Model& model = poser.model();
   runtime::PosedBody body = poser.make_frame();
@@ -176,7 +176,7 @@ json compare_frame(const Settings& s, const runtime::BodyPoser& poser, const Mod
           {"spheres", {{"seconds", spheres}, {"mib", spheres_mib}}}};
 }
 
-std::string text_of(const json& frames) {
+std::string differences_text(const json& frames) {
   std::string text;
   char line[300];
   for (const json& f : frames) {
@@ -194,7 +194,7 @@ std::string text_of(const json& frames) {
   return text;
 }
 
-int run(const Program& program, const Settings& s) {
+int run(const Program& program, const DeformersSettings& s) {
   const auto model = std::make_shared<const Model>(model_file::read(s.model, program.context("read")));
   const auto volume = std::find_if(model->volumes.begin(), model->volumes.end(),
                                    [&](const ModelVolume& v) { return v.name == s.volume; });
@@ -210,18 +210,18 @@ int run(const Program& program, const Settings& s) {
   json rows = json::array();
   for (const Frame& frame : frames)
     rows.push_back(compare_frame(s, poser, *volume, balls, frame, program.context("pose")));
-  program.result(text_of(rows), {{"ok", true},
-                                 {"volume", s.volume},
-                                 {"balls", spheres.size()},
-                                 {"tets", model->tet_count()},
-                                 {"frames", rows}});
+  program.result(differences_text(rows), {{"ok", true},
+                                          {"volume", s.volume},
+                                          {"balls", spheres.size()},
+                                          {"tets", model->tet_count()},
+                                          {"frames", rows}});
   return 0;
 }
 
 }  // namespace
 
 void declare_deformers(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<DeformersSettings>();
   CLI::App* command =
       app.add_subcommand("deformers", "pose a volume by tets and by spheres, and say where they differ");
   command->add_option("MODEL", s->model, "a model that holds spheres")->required();

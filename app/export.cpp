@@ -13,7 +13,7 @@
 namespace ecorche::app {
 namespace {
 
-struct Settings {
+struct ExportSettings {
   std::filesystem::path model;
   std::vector<std::filesystem::path> outputs;
   RigChoice rig;
@@ -32,7 +32,7 @@ std::vector<io::GridArray> weight_arrays(const Model& model) {
   return arrays;
 }
 
-std::string to_text(const nlohmann::json& rig) {
+std::string export_text(const nlohmann::json& rig) {
   char text[256] = "";
   if (rig.contains("truncation_mm"))
     std::snprintf(text, sizeof text,
@@ -50,7 +50,7 @@ std::string to_text(const nlohmann::json& rig) {
 }
 
 // A model, or a skeleton file as one that has nothing but its rig.
-Model read(const Program& program, const Settings& settings) {
+Model read(const Program& program, const ExportSettings& settings) {
   if (settings.model.extension() != ".yaml")
     return model_file::read(settings.model, program.context("reading"));
   for (const std::filesystem::path& output : settings.outputs) {
@@ -63,7 +63,7 @@ Model read(const Program& program, const Settings& settings) {
   return model;
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const ExportSettings& settings) {
   const Model model = read(program, settings);
   const io::TetRegions regions = tet_regions(model);
   const Context context = program.context("writing");
@@ -76,7 +76,7 @@ int run(const Program& program, const Settings& settings) {
     if (is_rig_file(output)) {
       rigs.push_back(export_rig(program, model, settings.rig, output));
       written.push_back(output.string());
-      text += (text.empty() ? "" : "\n") + to_text(rigs.back());
+      text += (text.empty() ? "" : "\n") + export_text(rigs.back());
       continue;
     }
     io::write_tets(output, model.nodes, model.tets, weights,
@@ -98,7 +98,7 @@ int run(const Program& program, const Settings& settings) {
 void declare_export(CLI::App& app, Program& program, Run& chosen) {
   auto* command = app.add_subcommand(
       "export", "a model for other programs: its rest tets with their regions, or its rig with a motion");
-  auto s = std::make_shared<Settings>();
+  auto s = std::make_shared<ExportSettings>();
   command
       ->add_option("model", s->model, "a model (.hdf), or a skeleton file (.yaml) whose rig alone is written")
       ->required();

@@ -4,6 +4,7 @@
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include "app/point_table.hpp"
+#include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/case/attachment_file.hpp"
 #include "preprocess/thin/attach.hpp"
@@ -11,10 +12,6 @@
 
 namespace ecorche::app {
 namespace {
-
-[[noreturn]] void refuse(const char* option, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, option, what, mend);
-}
 
 Skeleton read_rig(const Program& program, const HangSettings& settings) {
   if (!settings.model.empty())
@@ -123,17 +120,17 @@ void add_hang_options(CLI::App& command, HangSettings& settings) {
 
 void check_hang_options(const HangSettings& settings) {
   if (!settings.skeleton.empty() && !settings.model.empty())
-    refuse("--model", "stands beside --skeleton", "give one of the two");
+    usage_error("--model", "stands beside --skeleton", "give one of the two");
   if (!settings.picks.empty() && (!settings.skeleton.empty() || !settings.model.empty()))
-    refuse("--picks", "stands beside --skeleton or --model", "give one of them");
+    usage_error("--picks", "stands beside --skeleton or --model", "give one of them");
   if (!settings.picks.empty() && settings.snapped.empty())
-    refuse("--picks", "nothing keeps the skeleton that they make", "add --snapped SKELETON.yaml");
+    usage_error("--picks", "nothing keeps the skeleton that they make", "add --snapped SKELETON.yaml");
   if (!settings.attaches() && settings.snap)
-    refuse("--snap", "there are no joints to move", "give --skeleton or --model");
+    usage_error("--snap", "there are no joints to move", "give --skeleton or --model");
   if (!settings.attaches() && !settings.reassign.empty())
-    refuse("--reassign", "nothing is attached", "give --skeleton, --model or --picks");
+    usage_error("--reassign", "nothing is attached", "give --skeleton, --model or --picks");
   if (!settings.snap && settings.picks.empty() && !settings.snapped.empty())
-    refuse("--snapped", "joints are not moved", "give --snap as well");
+    usage_error("--snapped", "joints are not moved", "give --snap as well");
 }
 
 void hang(const Program& program, const HangSettings& settings, const thin::Mask& mask,

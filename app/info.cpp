@@ -8,7 +8,9 @@
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
 #include "app/joint_json.hpp"
+#include "app/text_line.hpp"
 #include "core/model_file/figures.hpp"
+#include "core/values/text.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -48,10 +50,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"spheres", Json::array()},
            {"contacts", contacts_json(model)},
            {"provenance", model.provenance}};
-  char identity[17];
-  std::snprintf(identity, sizeof identity, "%016llx",
-                static_cast<unsigned long long>(model_file::identity(model)));
-  out["identity"] = identity;
+  out["identity"] = text::hex(model_file::identity(model));
   for (std::size_t row = 0; row < model.segment_count(); ++row)
     out["rig"].push_back(joint_json(model.rig, row));
   for (const Tissue& tissue : model.tissues) {
@@ -102,13 +101,6 @@ std::string printable_lines(const std::string& text) {
   return out;
 }
 
-template <class... Values>
-std::string line(const char* format, Values... values) {
-  char buffer[512];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return std::string(buffer) + "\n";
-}
-
 std::string range(const Json& angle) {
   const auto word = [](const Json& limit_deg) {
     char buffer[32];
@@ -121,17 +113,17 @@ std::string range(const Json& angle) {
 }
 
 // The same facts as the JSON, as tables.
-std::string to_text(const Json& info) {
+std::string info_text(const Json& info) {
   const auto text = [](const Json& value) { return printable(value.get<std::string>()); };
   const auto count = [](const Json& value) { return value.get<unsigned long long>(); };
   std::string out =
-      line("%s: %llu nodes, %llu tets, %llu segments, %llu bones, %llu weights, %.1f MiB, identity %s",
-           text(info["name"]).c_str(), count(info["nodes"]), count(info["tets"]), count(info["segments"]),
-           count(info["bones"]), count(info["weights"]), info["bytes"].get<double>() / (1 << 20),
-           text(info["identity"]).c_str());
+      text_line("%s: %llu nodes, %llu tets, %llu segments, %llu bones, %llu weights, %.1f MiB, identity %s",
+                text(info["name"]).c_str(), count(info["nodes"]), count(info["tets"]),
+                count(info["segments"]), count(info["bones"]), count(info["weights"]),
+                info["bytes"].get<double>() / (1 << 20), text(info["identity"]).c_str());
   out += "\non disk, KiB\n";
   for (const auto& [part, bytes] : info["sizes"].items()) {
-    out += line("  %-24s %12.1f", part.c_str(), bytes.get<double>() / 1024);
+    out += text_line("  %-24s %12.1f", part.c_str(), bytes.get<double>() / 1024);
   }
   out += "\nrig " + text(info["skeleton"]) +
          ": segment, joint, kind, centre (mm LPS), fit residual (mm) and confidence, limits (deg)\n";
@@ -139,28 +131,30 @@ std::string to_text(const Json& info) {
     const Json& c = row["center_mm"];
     std::string limits;
     for (const Json& angle : row["angles"]) limits += (limits.empty() ? "" : ", ") + range(angle);
-    out += line("  %-20s %-20s %-10s %8.1f %8.1f %8.1f  %-10s %6.3f %4.2f  %s", text(row["segment"]).c_str(),
-                text(row["joint"]).c_str(), text(row["kind"]).c_str(), c[0].get<double>(), c[1].get<double>(),
-                c[2].get<double>(), text(row["fit"]["rule"]).c_str(), row["fit"]["residual_mm"].get<double>(),
-                row["fit"]["confidence"].get<double>(), limits.c_str());
+    out += text_line("  %-20s %-20s %-10s %8.1f %8.1f %8.1f  %-10s %6.3f %4.2f  %s",
+                     text(row["segment"]).c_str(), text(row["joint"]).c_str(), text(row["kind"]).c_str(),
+                     c[0].get<double>(), c[1].get<double>(), c[2].get<double>(),
+                     text(row["fit"]["rule"]).c_str(), row["fit"]["residual_mm"].get<double>(),
+                     row["fit"]["confidence"].get<double>(), limits.c_str());
   }
   out += "\ntissues: name, group, vertices, triangles, follows\n";
   for (const Json& row : info["tissues"]) {
-    out += line("  %-28s %-10s %10llu %10llu  %s", text(row["name"]).c_str(), text(row["group"]).c_str(),
-                count(row["vertices"]), count(row["triangles"]),
-                row["segment"].is_null() ? "the tets" : text(row["segment"]).c_str());
+    out += text_line("  %-28s %-10s %10llu %10llu  %s", text(row["name"]).c_str(), text(row["group"]).c_str(),
+                     count(row["vertices"]), count(row["triangles"]),
+                     row["segment"].is_null() ? "the tets" : text(row["segment"]).c_str());
   }
   out += "\nvolumes: name, voxels, spacing (mm), type\n";
   for (const Json& row : info["volumes"]) {
     const Json &n = row["size"], &s = row["spacing_mm"];
-    out += line("  %-20s %5d x %5d x %5d  %.3f x %.3f x %.3f  %s%s", text(row["name"]).c_str(),
-                n[0].get<int>(), n[1].get<int>(), n[2].get<int>(), s[0].get<double>(), s[1].get<double>(),
-                s[2].get<double>(), text(row["type"]).c_str(), row["labels"].get<bool>() ? ", labels" : "");
+    out +=
+        text_line("  %-20s %5d x %5d x %5d  %.3f x %.3f x %.3f  %s%s", text(row["name"]).c_str(),
+                  n[0].get<int>(), n[1].get<int>(), n[2].get<int>(), s[0].get<double>(), s[1].get<double>(),
+                  s[2].get<double>(), text(row["type"]).c_str(), row["labels"].get<bool>() ? ", labels" : "");
   }
   if (!info["contacts"].empty()) out += "\n" + printable_lines(contacts_text(info["contacts"]));
   out += "\ncertificate\n";
   for (const auto& [name, value] : info["certificate"].items()) {
-    out += line("  %-28s %s", name.c_str(), value.dump().c_str());
+    out += text_line("  %-28s %s", name.c_str(), value.dump().c_str());
   }
   out += "\nprovenance\n";
   for (const auto& [key, value] : info["provenance"].items())
@@ -188,7 +182,7 @@ void declare_info(CLI::App& app, Program& program, Run& chosen) {
         return 0;
       }
       const Json info = to_json(*path, model);
-      program.result(to_text(info), info);
+      program.result(info_text(info), info);
       return 0;
     };
   });

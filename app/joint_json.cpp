@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/joint_json.hpp"
+#include "core/values/degrees.hpp"
 
 #include <cmath>
-#include <numbers>
 
 #include <ecorche/values/joint_rule.hpp>
 
@@ -12,12 +12,11 @@ using Json = nlohmann::json;
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr const char* kKinds[] = {"ball", "hinge", "universal", "fixed", "free"};
+constexpr const char* kJointKinds[] = {"ball", "hinge", "universal", "fixed", "free"};
 
 // Infinite limits are null in JSON: it has no word for them.
 Json limit(double radians) {
-  return std::isfinite(radians) ? Json(radians * kDegrees) : Json();
+  return std::isfinite(radians) ? Json(radians * degrees_per_radian) : Json();
 }
 
 }  // namespace
@@ -32,7 +31,7 @@ Json joint_json(const Rig& rig, std::size_t row) {
   Json angles = Json::array();
   for (const AngleAxis& angle : joint.sequence) {
     angles.push_back({{"name", angle.name},
-                      {"rest_deg", angle.rest * kDegrees},
+                      {"rest_deg", angle.rest * degrees_per_radian},
                       {"min_deg", limit(angle.min)},
                       {"max_deg", limit(angle.max)}});
   }
@@ -45,7 +44,7 @@ Json joint_json(const Rig& rig, std::size_t row) {
                          ? Json()
                          : Json(rig.skeleton.segments[static_cast<std::size_t>(segment.parent)].name)},
           {"joint", joint.name},
-          {"kind", kKinds[static_cast<std::size_t>(joint.kind)]},
+          {"kind", kJointKinds[static_cast<std::size_t>(joint.kind)]},
           {"center_mm", {joint.center[0], joint.center[1], joint.center[2]}},
           {"axes", axes},
           {"angles", angles},

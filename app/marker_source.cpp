@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kWrongSize = 1.5;  // times the patient
+constexpr double kWrongMarkerSize = 1.5;  // times the patient
 
 class MarkerSource final : public MotionSource {
  public:
@@ -95,7 +95,7 @@ class MarkerSource final : public MotionSource {
       scale_ = 1 / ratio;
       return;
     }
-    if (ratio < kWrongSize && ratio > 1 / kWrongSize) return;
+    if (ratio < kWrongMarkerSize && ratio > 1 / kWrongMarkerSize) return;
     char size[64];
     std::snprintf(size, sizeof size, "%.3g times as far apart as on the patient", ratio);
     throw Error(ErrorKind::data, choice.file.string(), std::string("its markers are ") + size,

@@ -3,33 +3,25 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <numbers>
 
 #include <ecorche/model_file/model_file.hpp>
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
+#include "app/text_line.hpp"
 #include "core/kinematics/motion_compare.hpp"
 #include "core/kinematics/motion_report.hpp"
+#include "core/values/degrees.hpp"
 
 namespace ecorche::app {
 namespace {
 
 using nlohmann::json;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-
-struct Settings {
+struct MotionSettings {
   MotionChoice motion;
   std::filesystem::path model, against;
   double most_deg = 0;
 };
-
-template <class... Values>
-std::string line(const char* format, Values... values) {
-  char buffer[512];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return std::string(buffer) + "\n";
-}
 
 json joints_json(const Rig& rig, MotionSource& source, const kinematics::Retarget& match) {
   json out = json::array();
@@ -40,7 +32,7 @@ json joints_json(const Rig& rig, MotionSource& source, const kinematics::Retarge
                    : match.rest_turn[s].angularDistance(match.rest_turn[static_cast<std::size_t>(parent)]);
     out.push_back({{"segment", rig.skeleton.segments[s].name},
                    {"moved", match.clip_joint[s] >= 0},
-                   {"aligned_deg", turned * kDegrees}});
+                   {"aligned_deg", turned * degrees_per_radian}});
   }
   return {{"reference", source.reference},
           {"figure_to_patient", match.limbs.figure},
@@ -60,17 +52,17 @@ json report_json(const kinematics::MotionReport& report) {
   for (const kinematics::LimitViolation& limit : report.limits)
     out["beyond_limits"].push_back({{"joint", limit.joint},
                                     {"share", limit.share},
-                                    {"mean_deg", limit.mean * kDegrees},
-                                    {"worst_deg", limit.worst * kDegrees},
+                                    {"mean_deg", limit.mean * degrees_per_radian},
+                                    {"worst_deg", limit.worst * degrees_per_radian},
                                     {"worst_frame", limit.worst_frame}});
   return out;
 }
 
-std::string to_text(const json& result) {
+std::string motion_text(const json& result) {
   const auto text = [](const json& value) { return value.get<std::string>(); };
-  std::string out = line("%s: %llu frames, %.1f per second, %.2f s", text(result["motion"]).c_str(),
-                         result["frames"].get<unsigned long long>(),
-                         1 / result["frame_seconds"].get<double>(), result["seconds"].get<double>());
+  std::string out = text_line("%s: %llu frames, %.1f per second, %.2f s", text(result["motion"]).c_str(),
+                              result["frames"].get<unsigned long long>(),
+                              1 / result["frame_seconds"].get<double>(), result["seconds"].get<double>());
   if (result.contains("match")) {
     const json& match = result["match"];
     std::size_t moved = 0;
@@ -79,30 +71,33 @@ std::string to_text(const json& result) {
       moved += segment["moved"].get<bool>() ? 1 : 0;
       if (!segment["moved"].get<bool>()) still += (still.empty() ? "" : ", ") + text(segment["segment"]);
     }
-    out += line("moves %zu of %zu segments (still: %s), aligned at %s; its figure is %.3f of the patient's",
-                moved, match["segments"].size(), still.empty() ? "none" : still.c_str(),
-                text(match["reference"]).c_str(), match["figure_to_patient"].get<double>());
+    out +=
+        text_line("moves %zu of %zu segments (still: %s), aligned at %s; its figure is %.3f of the patient's",
+                  moved, match["segments"].size(), still.empty() ? "none" : still.c_str(),
+                  text(match["reference"]).c_str(), match["figure_to_patient"].get<double>());
   }
   const json& ground = result["ground_mm_per_s"];
   const double speed = std::hypot(ground[0].get<double>(), ground[1].get<double>());
-  if (speed > 0) out += line("walks in place: the ground goes by at %.0f mm/s, as on a treadmill", speed);
+  if (speed > 0)
+    out += text_line("walks in place: the ground goes by at %.0f mm/s, as on a treadmill", speed);
   out += "\nfoot sliding over the ground: joint, in contact (% of frames), mean and worst (mm/s)\n";
   for (const json& foot : result["foot_sliding"])
-    out += line("  %-28s %6.1f %8.1f %8.1f", text(foot["joint"]).c_str(),
-                100 * foot["contact_share"].get<double>(), foot["mean_mm_per_s"].get<double>(),
-                foot["worst_mm_per_s"].get<double>());
+    out += text_line("  %-28s %6.1f %8.1f %8.1f", text(foot["joint"]).c_str(),
+                     100 * foot["contact_share"].get<double>(), foot["mean_mm_per_s"].get<double>(),
+                     foot["worst_mm_per_s"].get<double>());
   out += "\nbeyond limits: joint, % of frames, mean and worst (deg), worst frame\n";
   for (const json& limit : result["beyond_limits"])
-    out += line("  %-28s %6.1f %8.1f %8.1f %8llu", text(limit["joint"]).c_str(),
-                100 * limit["share"].get<double>(), limit["mean_deg"].get<double>(),
-                limit["worst_deg"].get<double>(), limit["worst_frame"].get<unsigned long long>());
+    out += text_line("  %-28s %6.1f %8.1f %8.1f %8llu", text(limit["joint"]).c_str(),
+                     100 * limit["share"].get<double>(), limit["mean_deg"].get<double>(),
+                     limit["worst_deg"].get<double>(), limit["worst_frame"].get<unsigned long long>());
   if (!result.contains("against")) return out;
   out += "\nagainst " + text(result["against"]) + ", both aligned at " + text(result["aligned_at"]) +
-         line(", the first begins at %.4f s of it", result["begins_later_s"].get<double>());
+         text_line(", the first begins at %.4f s of it", result["begins_later_s"].get<double>());
   out += "joint, mean, worst, mean without a constant turn (deg)\n";
   for (const json& joint : result["differences"])
-    out += line("  %-28s %8.2f %8.2f %8.2f", text(joint["joint"]).c_str(), joint["mean_deg"].get<double>(),
-                joint["worst_deg"].get<double>(), joint["varying_deg"].get<double>());
+    out +=
+        text_line("  %-28s %8.2f %8.2f %8.2f", text(joint["joint"]).c_str(), joint["mean_deg"].get<double>(),
+                  joint["worst_deg"].get<double>(), joint["varying_deg"].get<double>());
   return out;
 }
 
@@ -111,7 +106,7 @@ void stop(const Program& program) {
     throw Error(ErrorKind::interrupted, "motion", "interrupted", "run it again");
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const MotionSettings& settings) {
   const Model model = model_file::read(settings.model, program.context("read model"));
   const Rig& rig = model.rig;
   const auto motion = open_motion(program, settings.motion, rig);
@@ -152,21 +147,21 @@ int run(const Program& program, const Settings& settings) {
     result["against"] = settings.against.string();
     result["differences"] = json::array();
     for (const kinematics::JointDifference& d : apart_by.joints) {
-      apart = apart || (settings.most_deg > 0 && d.mean * kDegrees > settings.most_deg);
+      apart = apart || (settings.most_deg > 0 && d.mean * degrees_per_radian > settings.most_deg);
       result["differences"].push_back({{"joint", d.joint},
-                                       {"mean_deg", d.mean * kDegrees},
-                                       {"worst_deg", d.worst * kDegrees},
-                                       {"varying_deg", d.varying * kDegrees}});
+                                       {"mean_deg", d.mean * degrees_per_radian},
+                                       {"worst_deg", d.worst * degrees_per_radian},
+                                       {"varying_deg", d.varying * degrees_per_radian}});
     }
   }
-  program.result(to_text(result), result);
+  program.result(motion_text(result), result);
   return apart ? 1 : 0;
 }
 
 }  // namespace
 
 void declare_motion(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<MotionSettings>();
   CLI::App* command = app.add_subcommand(
       "motion",
       "how a motion plays on a model: joints matched, feet that slide, limits passed; how two motions agree");

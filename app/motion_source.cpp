@@ -5,11 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include <ecorche/values/error.hpp>
 #include "app/marker_source.hpp"
 #include "app/read_budget.hpp"
+#include "app/usage_error.hpp"
+#include "core/values/degrees.hpp"
+#include "core/values/text.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/case/pose_sequence.hpp"
@@ -19,21 +21,16 @@
 namespace ecorche::app {
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 // Times the patient. Statures of adults from the 1st percentile of women (1.48 m) to the 99th of men (1.92 m,
 // ANSUR II: Gordon et al. 2014) differ by 1.3; an inch taken for a centimetre by 2.54.
 constexpr double kStrangeSize = 1.4, kWrongSize = 20;
 constexpr double kFits = 1.25;
-constexpr double kNoBody = 120 / kDegrees;  // a limb that points so far off is in no zero pose
-constexpr double kNoted = 5 / kDegrees;     // of an alignment, else any two bodies differ so
-constexpr std::size_t kTried = 64;          // frames in which a reference and bends are looked for
-
-[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, where, what, mend);
-}
+constexpr double kNoBody = 120 / degrees_per_radian;  // a limb that points so far off is in no zero pose
+constexpr double kNoted = 5 / degrees_per_radian;     // of an alignment, else any two bodies differ so
+constexpr std::size_t kTried = 64;                    // frames in which a reference and bends are looked for
 
 std::string degrees(double radians) {
-  return std::to_string(std::lround(radians * kDegrees));
+  return std::to_string(std::lround(radians * degrees_per_radian));
 }
 
 // The first names of a long list.
@@ -59,8 +56,8 @@ std::optional<double> decimal(std::string_view text) {
 }
 
 [[noreturn]] void no_reference(const std::string& word) {
-  usage("--motion-rest", "'" + word + "' is no reference",
-        "use auto, zero, clip, FRAME, SECONDSs or CLIP:FRAME");
+  usage_error("--motion-rest", "'" + word + "' is no reference",
+              "use auto, zero, clip, FRAME, SECONDSs or CLIP:FRAME");
 }
 
 kinematics::ClipFrame frame_of(io::ClipFile& clip, std::size_t frame) {
@@ -130,7 +127,8 @@ class ClipSource final : public MotionSource {
     const Clip& head = clip_->head();
     kinematics::ClipFrame named;
     if (*frame >= other->frames())
-      usage("--motion-rest", "the clip has " + std::to_string(other->frames()) + " frames", "count from 0");
+      usage_error("--motion-rest", "the clip has " + std::to_string(other->frames()) + " frames",
+                  "count from 0");
     const kinematics::ClipFrame read = frame_of(*other, *frame);
     const kinematics::ClipPlaces places = kinematics::places(other->head(), read);
     named.root_position = read.root_position;
@@ -151,8 +149,8 @@ class ClipSource final : public MotionSource {
 
   void align_at(io::ClipFile& clip, std::size_t frame, const std::string& name) {
     if (frame >= clip.frames())
-      usage("--motion-rest", "the clip has frames 0 to " + std::to_string(clip.frames() - 1),
-            "name one of them");
+      usage_error("--motion-rest", "the clip has frames 0 to " + std::to_string(clip.frames() - 1),
+                  "name one of them");
     const kinematics::ClipFrame read = frame_of(clip, frame);
     kinematics::align_at(rig_, clip_->head(), std::span(&read, 1), match_);
     reference = name;
@@ -197,7 +195,7 @@ class ClipSource final : public MotionSource {
       match_.scale = 1 / figure;
       return;
     }
-    const std::string size = number(figure) + " times as long as the patient's";
+    const std::string size = text::number(figure) + " times as long as the patient's";
     if (figure > kWrongSize || figure < 1 / kWrongSize) {
       throw Error(ErrorKind::data, path_, "the limbs of its figure are " + size + ": its unit is another",
                   "say it by --motion-unit, or fit it to the patient by --motion-unit body");
@@ -205,12 +203,6 @@ class ClipSource final : public MotionSource {
     if (figure > kStrangeSize || figure < 1 / kStrangeSize)
       program.note("warning: " + path_ + ": the limbs of its figure are " + size + read_in(choice) +
                    other_unit(choice, figure) + ": --motion-unit body would fit them to the patient");
-  }
-
-  static std::string number(double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", x);
-    return text;
   }
 
   // Millimetres of the unit that it was read in, where that is not the file's own.
@@ -228,7 +220,7 @@ class ClipSource final : public MotionSource {
     for (const char* name : {"mm", "cm", "in", "m"}) {
       const double made = used > 0 ? figure * *io::unit_from_name(name) / used : 0;
       if (made < kFits && made > 1 / kFits)
-        return ": --motion-unit " + std::string(name) + " would make that " + number(made);
+        return ": --motion-unit " + std::string(name) + " would make that " + text::number(made);
     }
     return "";
   }
@@ -245,8 +237,9 @@ class AngleSource final : public MotionSource {
   AngleSource(const Program& program, const MotionChoice& choice, const Rig& rig)
       : rig_(rig), file_(io::TextStream::open(choice.file)) {
     if (!choice.unit.empty() || !choice.frame.empty() || !choice.asf.empty())
-      usage("--motion", choice.file.string() + " is a table of angles: it has no unit, frame or skeleton",
-            "leave out --motion-unit, --motion-frame and --asf");
+      usage_error("--motion",
+                  choice.file.string() + " is a table of angles: it has no unit, frame or skeleton",
+                  "leave out --motion-unit, --motion-frame and --asf");
     reference = "the anatomical zero";
     io::MotionMap map = io::opensim_map(rig);
     if (!choice.map.empty()) {
@@ -282,7 +275,7 @@ class AngleSource final : public MotionSource {
 
   Pose at(std::size_t frame) override {
     const auto row = file_.read(frame);
-    const double unit = file_.in_degrees() ? 1 / kDegrees : 1;
+    const double unit = file_.in_degrees() ? 1 / degrees_per_radian : 1;
     std::array<double, 6> root{0, 0, 0, 0, 0, 0};
     std::vector<kinematics::AngleValue> values;
     for (std::size_t c = 0; c < row.size(); ++c) {
@@ -338,14 +331,15 @@ io::MotionSpace motion_space(const MotionChoice& choice) {
   if (!choice.frame.empty()) {
     const auto axes = io::axes_from_code(choice.frame);
     if (!axes)
-      usage("--motion-frame", "'" + choice.frame + "' names no axes", "use three letters such as LSA or RAS");
+      usage_error("--motion-frame", "'" + choice.frame + "' names no axes",
+                  "use three letters such as LSA or RAS");
     space.axes = *axes;
   }
   if (!choice.unit.empty() && choice.unit != "body") {
     space.unit_mm = io::unit_from_name(choice.unit);
     if (!space.unit_mm)
-      usage("--motion-unit", "'" + choice.unit + "' is no unit",
-            "use um, mm, cm, m, in, millimetres a unit such as 56.44, or body");
+      usage_error("--motion-unit", "'" + choice.unit + "' is no unit",
+                  "use um, mm, cm, m, in, millimetres a unit such as 56.44, or body");
   }
   return space;
 }

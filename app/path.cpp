@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Settings {
+struct PathSettings {
   fs::path skeleton, rig, output;
   std::string pose;
   std::vector<double> from, to;
@@ -25,7 +25,7 @@ runtime::Vec3 place(const std::vector<double>& xyz) {
   return {xyz[0], xyz[1], xyz[2]};
 }
 
-int run(const Program& program, const Settings& s) {
+int run(const Program& program, const PathSettings& s) {
   const auto [skeleton, rig, set] = read_placed_balls(program, s.skeleton, s.rig, s.pose);
   json points = json::array();
   std::string table = "x_mm,y_mm,z_mm,radius_mm\n";
@@ -55,7 +55,7 @@ int run(const Program& program, const Settings& s) {
 }  // namespace
 
 void declare_path(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<PathSettings>();
   CLI::App* command = app.add_subcommand(
       "path", "a way through the middle of a body, along the tree of its volumetric skeleton");
   command

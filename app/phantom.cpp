@@ -17,7 +17,7 @@ namespace ecorche::app {
 
 namespace {
 
-struct Settings {
+struct PhantomSettings {
   std::filesystem::path folder;
   std::string size = "standard";
   std::uint64_t seed = 1;
@@ -25,7 +25,7 @@ struct Settings {
   bool bar = false;
 };
 
-phantom::Size size_of(const Settings& settings) {
+phantom::Size size_of(const PhantomSettings& settings) {
   return settings.size == "small"   ? phantom::Size::small
          : settings.size == "paper" ? phantom::Size::paper
                                     : phantom::Size::standard;
@@ -44,7 +44,7 @@ void check_target(const std::filesystem::path& folder) {
   }
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const PhantomSettings& settings) {
   check_target(settings.folder);
   const phantom::Phantom made = settings.bar ? phantom::make_bar(size_of(settings), program.context("bar"))
                                              : phantom::make(size_of(settings), settings.seed,
@@ -89,7 +89,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
-  const auto settings = std::make_shared<Settings>();
+  const auto settings = std::make_shared<PhantomSettings>();
   CLI::App* command = app.add_subcommand("phantom", "write the built-in synthetic patient as a case");
   command->add_option("-o,--output", settings->folder, "folder of the case")->required();
   command

@@ -11,24 +11,18 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
+#include "core/values/text.hpp"
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r";
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
 std::vector<std::string_view> cells_of(std::string_view line) {
   std::vector<std::string_view> out;
   for (;;) {
     const std::size_t comma = line.find(',');
-    out.push_back(trimmed(line.substr(0, comma)));
+    out.push_back(text::trim(line.substr(0, comma)));
     if (comma == std::string_view::npos) return out;
     line.remove_prefix(comma + 1);
   }
@@ -68,7 +62,7 @@ std::vector<Row> rows_of(const std::filesystem::path& path) {
   std::size_t line_number = 0;
   for (std::string_view rest = text; !rest.empty();) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const std::string_view line = trimmed(rest.substr(0, end));
+    const std::string_view line = text::trim(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
     ++line_number;
     if (line.empty() || line.front() == '#') continue;
@@ -124,7 +118,7 @@ std::vector<NamedPoint> read_named_points(const std::filesystem::path& path) {
   for (const Row& row : rows_of(path)) {
     out.push_back({row.cell("name"), row.cell("parent"), {row.point[0], row.point[1], row.point[2]}});
     for (const std::string& name : {out.back().name, out.back().parent}) {
-      if (!name.empty() && !io::yaml::is_identifier(name))
+      if (!name.empty() && !is_identifier(name))
         throw Error(ErrorKind::data, row.where, "'" + name + "' is no name",
                     "use a to z, 0 to 9 and _, at most 64 of them");
     }

@@ -22,6 +22,7 @@
 #include "app/posed_tets.hpp"
 #include "app/tet_regions.hpp"
 #include "app/unknown_name.hpp"
+#include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
@@ -34,7 +35,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 // As the command line says it.
-struct Settings {
+struct PoseSettings {
   fs::path model, output;
   FrameChoice frames;
   std::string skinning = "cor";
@@ -50,7 +51,7 @@ struct Settings {
   bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
 };
 
-runtime::Sampling sampling_of(const Settings& settings) {
+runtime::Sampling sampling_of(const PoseSettings& settings) {
   return settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
 }
 
@@ -60,10 +61,6 @@ struct Plan {
   bool tets = false, field = false;
   std::map<std::string, runtime::VolumeBalls> balls;  // of volumes that are refilled, by name
 };
-
-[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, where, what, mend);
-}
 
 // `all`, `none` or names -> rows of `items`, ascending.
 template <class Items>
@@ -86,16 +83,16 @@ std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::st
 }
 
 // What is not named is not written; naming nothing writes everything.
-Plan plan_of(const Settings& settings, const Model& model) {
+Plan plan_of(const PoseSettings& settings, const Model& model) {
   if (!settings.bridge && settings.deformer != "spheres")
-    usage("--no-bridge", "tets open no gaps", "add --deformer spheres");
+    usage_error("--no-bridge", "tets open no gaps", "add --deformer spheres");
   if (settings.as_case) {
     if (settings.chooses())
-      usage("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
-    if (settings.formats != Settings{}.formats || settings.volume_format != Settings{}.volume_format)
-      usage("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
+      usage_error("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
+    if (settings.formats != PoseSettings{}.formats || settings.volume_format != PoseSettings{}.volume_format)
+      usage_error("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
     if (settings.deformer != "tets")
-      usage("--as-case", "a case's surfaces and volumes follow the same tets", "leave out --deformer");
+      usage_error("--as-case", "a case's surfaces and volumes follow the same tets", "leave out --deformer");
     return {{}, {}, true, false, {}};  // the case itself, and the tets beside it
   }
   const std::vector<std::string> all{"all"};
@@ -108,8 +105,8 @@ Plan plan_of(const Settings& settings, const Model& model) {
   for (const std::uint32_t v : plan.volumes) {
     const std::string& name = model.volumes[v].name;
     if (plan.field && (name == "displacement" || name == "mask")) {
-      usage("--field", "volume '" + name + "' would be written over by the displacement field",
-            "name the other volumes by --volumes");
+      usage_error("--field", "volume '" + name + "' would be written over by the displacement field",
+                  "name the other volumes by --volumes");
     }
   }
   return plan;
@@ -118,7 +115,7 @@ Plan plan_of(const Settings& settings, const Model& model) {
 // Writes one posed body. Every file is checked for a stop request before it is begun.
 class FrameWriter {
  public:
-  FrameWriter(const Settings& settings, const Plan& plan, const runtime::VolumePoser& poser,
+  FrameWriter(const PoseSettings& settings, const Plan& plan, const runtime::VolumePoser& poser,
               const runtime::PosedBody& body, const std::vector<float>& det_f, fs::path stage,
               fs::path folder, const Context& context)
       : settings_(settings),
@@ -242,7 +239,7 @@ class FrameWriter {
     return grid;
   }
 
-  const Settings& settings_;
+  const PoseSettings& settings_;
   const Plan& plan_;
   const runtime::VolumePoser& poser_;
   const Model& model_;
@@ -253,7 +250,7 @@ class FrameWriter {
   json written_ = json::array();
 };
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const PoseSettings& settings) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   Plan plan = plan_of(settings, *model);
   if (settings.deformer == "spheres" && model->spheres.empty())
@@ -319,7 +316,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_pose(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<PoseSettings>();
   CLI::App* command = app.add_subcommand(
       "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
   command->add_option("MODEL", s->model, "a model that preprocess made")->required();

@@ -8,13 +8,10 @@
 #include <ecorche/io/pose_library.hpp>
 #include <ecorche/values/error.hpp>
 #include "app/solved_pose.hpp"
+#include "app/usage_error.hpp"
 
 namespace ecorche::app {
 namespace {
-
-[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, where, what, mend);
-}
 
 // A, A:B or A:B:STEP -> frames A, A + STEP, ... below B.
 std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t frames) {
@@ -25,7 +22,7 @@ std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t fram
     std::size_t value = 0;
     const auto [next, error] = std::from_chars(at, end, value);
     if (error != std::errc() || parts.size() == 3 || (next != end && *next != ':')) {
-      usage("--frames", "'" + text + "' is not A, A:B or A:B:STEP", "for example --frames 0:60:30");
+      usage_error("--frames", "'" + text + "' is not A, A:B or A:B:STEP", "for example --frames 0:60:30");
     }
     parts.push_back(value);
     more = next != end;
@@ -35,8 +32,8 @@ std::vector<std::size_t> frame_numbers(const std::string& text, std::size_t fram
   const std::size_t past = parts.size() > 1 ? parts[1] : first + 1;
   const std::size_t step = parts.size() > 2 ? parts[2] : 1;
   if (first >= past || past > frames || step == 0) {
-    usage("--frames", "'" + text + "' names no frames of this motion",
-          "it has frames 0 to " + std::to_string(frames - 1) + "; B is one past the last");
+    usage_error("--frames", "'" + text + "' names no frames of this motion",
+                "it has frames 0 to " + std::to_string(frames - 1) + "; B is one past the last");
   }
   std::vector<std::size_t> numbers;
   for (std::size_t f = first; f < past; f += step) numbers.push_back(f);
@@ -74,18 +71,18 @@ std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice
   const int given =
       (choice.pose.empty() ? 0 : 1) + (choice.ik.empty() ? 0 : 1) + (choice.motion.file.empty() ? 0 : 1);
   if (given != 1) {
-    usage("pose",
-          given == 0          ? "nothing to pose"
-          : choice.ik.empty() ? "both --pose and --motion are given"
-                              : "--ik stands beside --pose or --motion",
-          "give one of --pose FILE, --ik FILE, or --motion CLIP --frames A:B");
+    usage_error("pose",
+                given == 0          ? "nothing to pose"
+                : choice.ik.empty() ? "both --pose and --motion are given"
+                                    : "--ik stands beside --pose or --motion",
+                "give one of --pose FILE, --ik FILE, or --motion CLIP --frames A:B");
   }
   if (!choice.ik.empty()) {
     SolvedPose solved = solve_pose(program, choice.ik, rig, choice.ik_tolerance_mm);
     return {{"", std::move(solved.pose), std::move(solved.report), std::move(solved.warnings)}};
   }
   if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig), {}, nlohmann::json::array()}};
-  if (choice.frames.empty()) usage("--motion", "no frames are named", "add --frames A:B[:STEP]");
+  if (choice.frames.empty()) usage_error("--motion", "no frames are named", "add --frames A:B[:STEP]");
   const auto motion = open_motion(program, choice.motion, rig);
   std::vector<Frame> frames;
   const std::vector<std::size_t> numbers = frame_numbers(choice.frames, motion->frames());

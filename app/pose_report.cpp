@@ -82,7 +82,7 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
 
 namespace {
 
-constexpr std::size_t kTold = 4;  // warnings of a frame; the others stand in quality.json
+constexpr std::size_t kMostWarnings = 4;  // warnings of a frame; the others stand in quality.json
 
 std::string warning_line(const json& warning) {
   std::string out = "  warning: " + warning["what"].get<std::string>();
@@ -116,9 +116,9 @@ std::string line_of(const json& frame) {
       100 * quality["unsigned_volume_change"].get<double>(), quality["bone_rigidity_mm"].get<double>(),
       frame["files"].size());
   const json& warnings = quality["warnings"];
-  for (std::size_t w = 0; w < std::min(kTold, warnings.size()); ++w) out += warning_line(warnings[w]);
-  if (warnings.size() > kTold)
-    out += fmt::format("  and {} more warnings, in quality.json\n", warnings.size() - kTold);
+  for (std::size_t w = 0; w < std::min(kMostWarnings, warnings.size()); ++w) out += warning_line(warnings[w]);
+  if (warnings.size() > kMostWarnings)
+    out += fmt::format("  and {} more warnings, in quality.json\n", warnings.size() - kMostWarnings);
   for (const json& clamped : quality["clamped"]) out += clamped_line(clamped);
   return out;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/pose_warnings.hpp"
+#include "core/values/degrees.hpp"
 
 #include <fmt/format.h>
 
@@ -20,8 +21,7 @@ using nlohmann::json;
 using runtime::Breach;
 using runtime::Figure;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kTurned = 1 / kDegrees;  // a joint that turns by less is not to blame
+constexpr double kTurned = 1 / degrees_per_radian;  // a joint that turns by less is not to blame
 
 double turn_of(const Pose& pose, std::size_t joint) {
   const Eigen::Quaterniond& q = pose.rotation[joint];
@@ -98,15 +98,15 @@ class Wording {
   json joint(const Breach& breach, json out) const {
     const runtime::DoubtfulJoint& doubtful = quality_.doubtful[breach.row];
     const Joint& joint = model_.rig.skeleton.segments[static_cast<std::size_t>(doubtful.joint)].joint;
-    out["value"] = doubtful.turned * kDegrees;
-    out["threshold"] = breach.threshold * kDegrees;
+    out["value"] = doubtful.turned * degrees_per_radian;
+    out["threshold"] = breach.threshold * degrees_per_radian;
     out["kind"] = "doubtful_joint";
     out["joint"] = joint.name;
     out["confidence"] = doubtful.confidence;
     out["at_mm"] = {joint.center.x(), joint.center.y(), joint.center.z()};
     out["what"] =
         fmt::format("{} turns by {:.0f} degrees though it was found with a confidence of only {:.2f}",
-                    joint.name, doubtful.turned * kDegrees, doubtful.confidence);
+                    joint.name, doubtful.turned * degrees_per_radian, doubtful.confidence);
     out["mend"] = "ecorche rig CASE says how it was found; give its center and axes in the skeleton";
     return out;
   }
@@ -125,7 +125,7 @@ class Wording {
     const std::string& name = model_.rig.skeleton.segments[*joint].joint.name;
     out["joint"] = name;
     out["mend"] = fmt::format("{}turn {} less than its {:.0f} degrees", try_first, name,
-                              turn_of(body_.pose, *joint) * kDegrees);
+                              turn_of(body_.pose, *joint) * degrees_per_radian);
     return out;
   }
 
@@ -205,11 +205,12 @@ json clamped_json(const Skeleton& skeleton, const Pose& pose, std::span<const Cl
           if (axis.min == axis.max ||
               std::abs(std::remainder(angles[i] - limit, 2 * std::numbers::pi)) > kAtLimit)
             continue;
-          limits.push_back({{"angle", axis.name}, {"at_deg", limit * kDegrees}});
+          limits.push_back({{"angle", axis.name}, {"at_deg", limit * degrees_per_radian}});
         }
       }
     }
-    out.push_back({{"joint", joint.name}, {"removed_deg", c.removed * kDegrees}, {"limits", limits}});
+    out.push_back(
+        {{"joint", joint.name}, {"removed_deg", c.removed * degrees_per_radian}, {"limits", limits}});
   }
   return out;
 }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/case/digest.hpp"
 
 namespace ecorche::app {
@@ -16,14 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr std::array<std::string_view, 9> kKinds{"surface", "image",   "labels", "tets", "scan",
-                                                 "pose",    "quality", "field",  "other"};
-
-std::string hex(std::uint64_t number) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(number));
-  return text;
-}
+constexpr std::array<std::string_view, 9> kFileKinds{"surface", "image",   "labels", "tets", "scan",
+                                                     "pose",    "quality", "field",  "other"};
 
 template <class T>
 T number_from(const std::string& text, int base) {
@@ -65,10 +60,10 @@ PosedSurface surface_from(const json& from) {
 
 PosedFile file_from(const json& from) {
   const std::string kind = from.at("is");
-  const auto found = std::find(kKinds.begin(), kKinds.end(), kind);
-  if (found == kKinds.end()) throw std::invalid_argument(kind);
-  PosedFile out{from.at("file"),  static_cast<PosedKind>(found - kKinds.begin()),   from.value("of", ""),
-                from.at("bytes"), number_from<std::uint64_t>(from.at("xxh64"), 16), {}};
+  const auto found = std::find(kFileKinds.begin(), kFileKinds.end(), kind);
+  if (found == kFileKinds.end()) throw std::invalid_argument(kind);
+  PosedFile out{from.at("file"),  static_cast<PosedKind>(found - kFileKinds.begin()), from.value("of", ""),
+                from.at("bytes"), number_from<std::uint64_t>(from.at("xxh64"), 16),   {}};
   const json labels = from.value("labels", json::object());
   for (const auto& [value, name] : labels.items())
     out.labels.emplace(number_from<std::int64_t>(value, 10), name);
@@ -91,7 +86,7 @@ PosedManifest manifest_from(const json& from) {
 }  // namespace
 
 std::string_view kind_name(PosedKind kind) {
-  return kKinds[static_cast<std::size_t>(kind)];
+  return kFileKinds[static_cast<std::size_t>(kind)];
 }
 
 const PosedFile* PosedManifest::find(const std::string& file) const {
@@ -107,12 +102,12 @@ std::string to_json(const PosedManifest& manifest) {
     files.push_back({{"file", file.file},
                      {"is", kind_name(file.kind)},
                      {"bytes", file.bytes},
-                     {"xxh64", hex(file.digest)}});
+                     {"xxh64", text::hex(file.digest)}});
     if (!file.of.empty()) files.back()["of"] = file.of;
     for (const auto& [value, name] : file.labels) files.back()["labels"][std::to_string(value)] = name;
   }
   const json out{{"ecorche_posed", 1},
-                 {"model", {{"name", manifest.model}, {"identity", hex(manifest.identity)}}},
+                 {"model", {{"name", manifest.model}, {"identity", text::hex(manifest.identity)}}},
                  {"pose", kPoseFile},
                  {"skinning", manifest.skinning},
                  {"deformer", manifest.deformer},

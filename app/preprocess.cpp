@@ -10,7 +10,6 @@
 
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/model_file/model_file.hpp>
-#include "app/big_heap.hpp"
 #include "app/case_options.hpp"
 #include "app/command.hpp"
 #include "app/drawn_surfaces.hpp"
@@ -19,6 +18,8 @@
 #include "app/stage_folder.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/files/stale_parts.hpp"
+#include "core/platform/heap.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inspect_case.hpp"
@@ -33,7 +34,7 @@ namespace {
 namespace fs = std::filesystem;
 using preprocess::StageTime;
 
-struct Settings {
+struct PreprocessSettings {
   fs::path case_path, output;
   io::CaseOptions input;
   preprocess::Options options;
@@ -74,7 +75,8 @@ std::string spheres_line(const Model& model) {
   return out.str();
 }
 
-std::string text_report(const Model& model, const Settings& settings, const std::vector<StageTime>& stages) {
+std::string text_report(const Model& model, const PreprocessSettings& settings,
+                        const std::vector<StageTime>& stages) {
   const Certificate& c = model.certificate;
   std::ostringstream out;
   out << settings.output.string() << ": " << model.tet_count() << " tets, " << model.node_count()
@@ -108,7 +110,7 @@ void sweep(const fs::path& output) {
 }
 
 // What would fail only after minutes of work is refused first.
-void check_outputs(const Settings& settings) {
+void check_outputs(const PreprocessSettings& settings) {
   if (settings.output.extension() != ".hdf") {
     throw Error(ErrorKind::usage, "--output", "'" + settings.output.string() + "' does not end in .hdf",
                 "name it so: ParaView opens VTKHDF files by that ending");
@@ -147,9 +149,9 @@ std::string write_refused(const fs::path& output, const preprocess::WorstTets& w
   return "its " + std::to_string(worst.tet.size()) + " worst tets are in " + path.string();
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const PreprocessSettings& settings) {
   check_outputs(settings);
-  use_big_heap();
+  platform::use_big_heap();
   std::optional<StageFolder> kept;
   if (!settings.cache.empty()) kept.emplace(settings.cache, settings.cache_gib);
   std::vector<StageTime> stages;
@@ -211,12 +213,6 @@ int run(const Program& program, const Settings& settings) {
 }
 
 // `cgal, lattice or ...` for help texts.
-std::string listed(const std::vector<std::string_view>& names) {
-  std::string out;
-  for (const std::string_view name : names) out += (out.empty() ? "" : ", ") + std::string(name);
-  return out;
-}
-
 // 0, or a value in range: told as one thing.
 template <class T>
 CLI::Validator or_zero(const preprocess::Options::Range<T>& range, const std::string& unit) {
@@ -239,7 +235,7 @@ std::vector<std::string> strings(const std::vector<std::string_view>& names) {
 
 void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   using preprocess::Options;
-  const auto settings = std::make_shared<Settings>();
+  const auto settings = std::make_shared<PreprocessSettings>();
   CLI::App* command =
       app.add_subcommand("preprocess", "prepare a case for posing: rig, tets, weights, centres, mapping");
   command->add_option("CASE", settings->case_path, "a case.yaml, or the folder that holds one")->required();
@@ -248,7 +244,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   Options& o = settings->options;
   const auto meshers = tet::mesher_names();
   o.mesher = meshers.front();
-  command->add_option("--mesher", o.mesher, "who makes the tets: " + listed(meshers))
+  command->add_option("--mesher", o.mesher, "who makes the tets: " + text::joined(meshers))
       ->check(CLI::IsMember(strings(meshers)))
       ->capture_default_str();
   command
@@ -273,7 +269,7 @@ void declare_preprocess(CLI::App& app, Program& program, Run& chosen) {
   command
       ->add_option("--solver", o.solver,
                    "who solves for the weights: auto (" + solvers[1] + ", and amg for large meshes), " +
-                       listed(weights::solver_names()))
+                       text::joined(weights::solver_names()))
       ->check(CLI::IsMember(solvers))
       ->capture_default_str();
   command

@@ -22,14 +22,14 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Settings {
+struct ProbeSettings {
   fs::path model, points, output;
   std::string pose, skinning = "cor", direction = "posed-to-rest", sampling = "trilinear";
   std::vector<std::string> volumes{"all"};
   bool gradient = false;
 };
 
-runtime::ProbeWants wants_of(const Settings& settings, const Model& model) {
+runtime::ProbeWants wants_of(const ProbeSettings& settings, const Model& model) {
   runtime::ProbeWants wants{.gradient = settings.gradient, .tissue = true};
   const auto sampling =
       settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
@@ -46,7 +46,7 @@ runtime::ProbeWants wants_of(const Settings& settings, const Model& model) {
   return wants;
 }
 
-Pose pose_of(const Program& program, const Settings& settings, const Model& model) {
+Pose pose_of(const Program& program, const ProbeSettings& settings, const Model& model) {
   if (settings.pose.empty()) return Pose::rest(model.segment_count());
   FrameChoice choice;
   choice.pose = settings.pose;
@@ -113,7 +113,7 @@ std::vector<float> moved(const RigidTransform& motion, std::vector<float> points
 }
 
 // The body is probed with its root as scanned, where float32 is fine, whatever the root does to it.
-runtime::Probed probed_at(const runtime::BodyPoser& poser, const Pose& pose, const Settings& settings,
+runtime::Probed probed_at(const runtime::BodyPoser& poser, const Pose& pose, const ProbeSettings& settings,
                           const std::vector<float>& points, const runtime::ProbeWants& wants) {
   runtime::PosedBody body = poser.make_frame();
   const auto [code, what] = poser.run(pose, runtime::skinning_from_name(settings.skinning), {}, body,
@@ -138,7 +138,7 @@ runtime::Probed probed_at(const runtime::BodyPoser& poser, const Pose& pose, con
   return probed;
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const ProbeSettings& settings) {
   const std::vector<float> points = read_points(settings.points);
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   const runtime::ProbeWants wants = wants_of(settings, *model);
@@ -172,7 +172,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_probe(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<ProbeSettings>();
   CLI::App* command =
       app.add_subcommand("probe", "points through a posed body: where they were or went, and what is there");
   command->add_option("MODEL", s->model, "a model that preprocess made")->required();

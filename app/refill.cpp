@@ -11,6 +11,7 @@
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/read_budget.hpp"
+#include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
@@ -29,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Settings {
+struct RefillSettings {
   fs::path skeleton, volume, output, rig, object;
   FrameChoice frames;
   std::vector<double> region;
@@ -46,36 +47,33 @@ struct Settings {
   }
 };
 
-[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, where, what, mend);
-}
-
 bool is_surface(const fs::path& path) {
   const std::string ending = path.extension().string();
   return ending == ".glb" || ending == ".vtp" || ending == ".stl" || ending == ".ply" || ending == ".obj" ||
          ending == ".off";
 }
 
-void check(const Settings& s) {
+void check(const RefillSettings& s) {
   const bool rigged = !s.rig.empty() || s.skeleton.extension() == ".hdf";
-  if (s.poses() && !rigged) usage("--rig", "a pose needs a rig", "add --rig SKELETON.yaml or MODEL.hdf");
+  if (s.poses() && !rigged)
+    usage_error("--rig", "a pose needs a rig", "add --rig SKELETON.yaml or MODEL.hdf");
   if (!s.rig.empty() && !s.poses())
-    usage("--rig", "nothing is posed", "add --pose FILE or --motion CLIP --frames A:B");
-  if (s.back && !s.poses()) usage("--back", "no pose to come back from", "add --rig and --pose");
-  if (s.bulge != 0 && !rigged) usage("--bulge", "joints are needed", "add --rig and --pose");
+    usage_error("--rig", "nothing is posed", "add --pose FILE or --motion CLIP --frames A:B");
+  if (s.back && !s.poses()) usage_error("--back", "no pose to come back from", "add --rig and --pose");
+  if (s.bulge != 0 && !rigged) usage_error("--bulge", "joints are needed", "add --rig and --pose");
   if (is_surface(s.output) && (!s.region.empty() || !s.volume.empty()))
-    usage("--output", "a preview shows no values", "leave out VOLUME and --region, or name an image");
+    usage_error("--output", "a preview shows no values", "leave out VOLUME and --region, or name an image");
   if (!s.morph.empty() && (s.volume.empty() || s.poses() || !s.region.empty() || s.voxel_mm > 0))
-    usage("--morph", "two objects at rest become each other",
-          "give VOLUME, and neither a pose, a region nor --voxel");
+    usage_error("--morph", "two objects at rest become each other",
+                "give VOLUME, and neither a pose, a region nor --voxel");
   for (std::size_t a = 0; a + 3 < s.region.size(); ++a) {
     if (!(s.region[a] <= s.region[a + 3]))
-      usage("--region", "its low corner is not the low one", "give X0,Y0,Z0,X1,Y1,Z1");
+      usage_error("--region", "its low corner is not the low one", "give X0,Y0,Z0,X1,Y1,Z1");
   }
 }
 
 // A frame's own file: OUT itself, or OUT_frame_0012 where there are several.
-fs::path output_of(const Settings& s, const Frame& frame) {
+fs::path output_of(const RefillSettings& s, const Frame& frame) {
   if (frame.name.empty()) return s.output;
   // `.nii.gz` is one ending.
   std::string name = s.output.filename().string();
@@ -83,7 +81,7 @@ fs::path output_of(const Settings& s, const Frame& frame) {
   return s.output.parent_path() / (name.substr(0, dot) + "_" + frame.name + name.substr(dot));
 }
 
-void apply_effects(const Settings& s, const Rig& rig, runtime::BallSet& set) {
+void apply_effects(const RefillSettings& s, const Rig& rig, runtime::BallSet& set) {
   if (s.bulge != 0) runtime::bulge(set, rig.skeleton, runtime::bulges_of(set, rig.skeleton, s.bulge), s.time);
   if (s.melt) runtime::melt(set, s.time);
   if (s.explode != 0) runtime::explode(set, s.time, s.explode);
@@ -103,8 +101,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 // What one frame wrote.
-json write_frame(const Settings& s, const runtime::BallSet& set, const Image& volume, const fs::path& path,
-                 const Context& context) {
+json write_frame(const RefillSettings& s, const runtime::BallSet& set, const Image& volume,
+                 const fs::path& path, const Context& context) {
   const auto start = std::chrono::steady_clock::now();
   json out{{"file", path.string()}, {"balls", set.balls.size()}};
   if (is_surface(s.output)) {
@@ -119,7 +117,7 @@ json write_frame(const Settings& s, const runtime::BallSet& set, const Image& vo
     region = {{s.region[0], s.region[1], s.region[2]}, {s.region[3], s.region[4], s.region[5]}};
   const runtime::LatticeBox box = runtime::box_for(set, region);
   if (grid_of(set.lattice, box).voxels() > (std::size_t{1} << 31))
-    usage("--region", "it holds more than 2^31 voxels", "make it smaller");
+    usage_error("--region", "it holds more than 2^31 voxels", "make it smaller");
   const Image image = volume.bytes.empty()
                           ? runtime::covered(set, box, context)
                           : runtime::refill(set, box, volume, s.background, s.how(), context);
@@ -130,7 +128,7 @@ json write_frame(const Settings& s, const runtime::BallSet& set, const Image& vo
   return out;
 }
 
-json run_morph(const Settings& s, const VolumetricSkeleton& skeleton, const Image& volume,
+json run_morph(const RefillSettings& s, const VolumetricSkeleton& skeleton, const Image& volume,
                const Image& target, const Context& context) {
   const VolumetricSkeleton other = read_skeleton_and_rig(s.morph[0], {}).first;
   const runtime::BallSet from = runtime::balls_at_rest(skeleton, skeleton.grid);
@@ -146,7 +144,7 @@ json run_morph(const Settings& s, const VolumetricSkeleton& skeleton, const Imag
 }
 
 // Reconstruction loss: what the object has and no ball at rest holds.
-json loss(const Settings& s, const VolumetricSkeleton& skeleton, const files::ReadOptions& options,
+json loss(const RefillSettings& s, const VolumetricSkeleton& skeleton, const files::ReadOptions& options,
           const Context& context) {
   const std::size_t object = count_object(s.object, options);
   const runtime::BallSet rest = runtime::balls_at_rest(skeleton, skeleton.grid);
@@ -164,7 +162,7 @@ json loss(const Settings& s, const VolumetricSkeleton& skeleton, const files::Re
           {"seconds", seconds_since(start)}};
 }
 
-std::string text_of(const json& result) {
+std::string refill_text(const json& result) {
   std::string text;
   char line[400];
   for (const json& f : result["frames"]) {
@@ -189,7 +187,7 @@ std::string text_of(const json& result) {
 }
 
 // The volume's own lattice, so that what is posed and brought back lies where it lay; see posed_lattice.
-ImageGrid lattice_for(const Settings& s, const VolumetricSkeleton& skeleton, const Image& volume) {
+ImageGrid lattice_for(const RefillSettings& s, const VolumetricSkeleton& skeleton, const Image& volume) {
   if (s.voxel_mm > 0) return runtime::lattice_of(skeleton, s.voxel_mm);
   if (volume.bytes.empty()) return skeleton.grid;
   ModelVolume shown;
@@ -197,7 +195,7 @@ ImageGrid lattice_for(const Settings& s, const VolumetricSkeleton& skeleton, con
   return runtime::posed_lattice(skeleton, shown);
 }
 
-int run(const Program& program, const Settings& s) {
+int run(const Program& program, const RefillSettings& s) {
   const auto start = std::chrono::steady_clock::now();
   check(s);
   { const files::AtomicFile probe(s.output); }
@@ -231,14 +229,14 @@ int run(const Program& program, const Settings& s) {
     }
   }
   result["seconds"] = seconds_since(start);
-  program.result(text_of(result), result);
+  program.result(refill_text(result), result);
   return 0;
 }
 
 }  // namespace
 
 void declare_refill(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<RefillSettings>();
   CLI::App* command = app.add_subcommand(
       "refill", "fill a volume again around its volumetric skeleton: posed, changed, or at rest");
   command

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Settings {
+struct RepairSettings {
   fs::path path, output;
   io::CaseOptions input;
   repair::Options options;
@@ -56,7 +56,7 @@ constexpr Column kColumns[] = {
 };
 
 // A case is never written over another, least of all over the one that is read.
-void check_output(const Settings& settings) {
+void check_output(const RepairSettings& settings) {
   std::error_code ignored;
   const fs::path input =
       fs::is_directory(settings.path, ignored) ? settings.path : settings.path.parent_path();
@@ -73,7 +73,7 @@ void check_output(const Settings& settings) {
   }
 }
 
-std::vector<Line> mend(Case& patient, const Settings& settings, const Context& context) {
+std::vector<Line> mend(Case& patient, const RepairSettings& settings, const Context& context) {
   std::vector<SurfaceMesh*> meshes{&patient.skin};
   std::vector<Line> lines{{patient.skin_name, {}, {}, {}}};
   for (CaseBone& bone : patient.bones) {
@@ -118,7 +118,7 @@ std::string left_open(const Line& line) {
   return out;
 }
 
-std::string text_report(const std::vector<Line>& lines, const Settings& settings) {
+std::string text_report(const std::vector<Line>& lines, const RepairSettings& settings) {
   std::string out = fmt::format("{:<24}", "surface");
   for (const Column& column : kColumns) out += fmt::format(" {:>7}", column.title);
   out += fmt::format(" {:>10} {:>10}\n", "open left", "n-m. left");
@@ -156,7 +156,7 @@ nlohmann::json json_report(const std::vector<Line>& lines) {
   return out;
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const RepairSettings& settings) {
   if (settings.output.empty() && !settings.dry_run) {
     throw Error(ErrorKind::usage, "--output", "is missing",
                 "name a folder for the mended case, or use --dry-run");
@@ -175,7 +175,7 @@ int run(const Program& program, const Settings& settings) {
 
 void declare_repair(CLI::App& app, Program& program, Run& chosen) {
   using repair::Options;
-  const auto settings = std::make_shared<Settings>();
+  const auto settings = std::make_shared<RepairSettings>();
   CLI::App* command = app.add_subcommand("repair", "mend the surfaces of a case and write it as a new one");
   command->add_option("CASE", settings->path, "a case.yaml, or the folder that holds one")->required();
   command->add_option("-o,--output", settings->output, "the folder for the mended case");

@@ -85,7 +85,7 @@ class Replay {
         compare(envelope.volume_frame(), frame->payload, at, expected);
       }
     }
-    give_up(at);
+    unsubscribe_finished(at);
   }
 
   std::uint64_t frames() const { return frames_; }
@@ -102,7 +102,7 @@ class Replay {
 
   // What has no frame after this step: a server allows so many subscriptions at a time, and a session may
   // have seen any number come and go.
-  void give_up(std::size_t at) {
+  void unsubscribe_finished(std::size_t at) {
     for (auto subscription = now_.begin(); subscription != now_.end();) {
       std::erase_if(subscription->second, [&](std::uint32_t was) { return last_step_[was] <= at; });
       if (!subscription->second.empty()) {

@@ -18,12 +18,12 @@
 namespace ecorche::app {
 namespace {
 
-struct Settings {
+struct RigSettings {
   std::filesystem::path case_path, output, bones, evidence;
   io::CaseOptions input;
 };
 
-std::string to_text(const nlohmann::json& rig) {
+std::string rig_text(const nlohmann::json& rig) {
   std::string out =
       "joint, rule, centre (mm LPS), residual (mm), inliers (%), vertices, confidence; rest angles (deg)\n";
   for (const nlohmann::json& row : rig) {
@@ -82,7 +82,7 @@ void write_evidence(const std::filesystem::path& file, const Rig& rig,
   files::write_text(file, joints.dump());
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const RigSettings& settings) {
   Case patient = io::read_case(settings.case_path, settings.input, program.context("read"));
   label_surfaces::resolve(patient, program.context("surfaces"));
   std::vector<rig::JointEvidence> evidence;
@@ -112,7 +112,7 @@ int run(const Program& program, const Settings& settings) {
     text += std::string(check::severity_name(f.severity)) + ": " + f.where + ": " + f.what + " (" + f.mend +
             ")\n";
   }
-  program.result(text + to_text(joints),
+  program.result(text + rig_text(joints),
                  {{"ok", possible}, {"skeleton", rig.skeleton.name}, {"rig", joints}, {"findings", told}});
   return possible ? 0 : exit_code(ErrorKind::data);
 }
@@ -120,7 +120,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_rig(CLI::App& app, Program& program, Run& chosen) {
-  const auto settings = std::make_shared<Settings>();
+  const auto settings = std::make_shared<RigSettings>();
   CLI::App* command = app.add_subcommand("rig", "find the joints of a case, and say how well each was found");
   command->add_option("CASE", settings->case_path, "a case.yaml, or the folder that holds one")->required();
   command->add_option("-o,--output", settings->output,

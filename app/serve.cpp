@@ -12,18 +12,18 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
-#include "app/big_heap.hpp"
 #include "app/command.hpp"
 #include "app/served_clips.hpp"
 #include "app/signals.hpp"
 #include "app/token_file.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/platform/heap.hpp"
 #include "runtime/server/server.hpp"
 
 namespace ecorche::app {
 namespace {
 
-struct Settings {
+struct ServeSettings {
   std::vector<std::string> models;
   std::string listen = "127.0.0.1:7070";
   std::string http;
@@ -47,7 +47,7 @@ server::ModelParts read_model(const std::string& path, const std::string& clips,
   return parts;
 }
 
-std::vector<server::NamedModel> read_models(const Settings& settings, const Program& program) {
+std::vector<server::NamedModel> read_models(const ServeSettings& settings, const Program& program) {
   std::vector<server::NamedModel> models;
   for (const std::string& path : settings.models) {
     server::ModelParts parts = read_model(path, settings.clips, program, program.context("read model"));
@@ -71,8 +71,8 @@ std::string written(const std::string& host, std::uint16_t port) {
   return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
 
-int run_serve(const Settings& settings, const Program& program) {
-  use_tidy_heap();
+int run_serve(const ServeSettings& settings, const Program& program) {
+  platform::use_tidy_heap();
   // stdout is for the result.
   spdlog::set_default_logger(spdlog::stderr_logger_st("serve"));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
@@ -121,7 +121,7 @@ int run_serve(const Settings& settings, const Program& program) {
 }  // namespace
 
 void declare_serve(CLI::App& app, Program& program, Run& chosen) {
-  auto settings = std::make_shared<Settings>();
+  auto settings = std::make_shared<ServeSettings>();
   CLI::App* command = app.add_subcommand("serve", "serve models: poses in, meshes and volumes out, over TCP");
   command
       ->add_option("models", settings->models, "model files; clients ask for them by file name without .hdf")

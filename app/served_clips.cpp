@@ -6,6 +6,7 @@
 #include <string>
 
 #include "app/motion_source.hpp"
+#include "core/values/identifier.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -17,12 +18,6 @@ bool is_motion(const std::filesystem::path& file) {
   static const std::set<std::string> endings{".bvh", ".amc", ".gltf", ".glb", ".mot",
                                              ".sto", ".trc", ".yaml", ".yml"};
   return endings.contains(file.extension().string());
-}
-
-bool identifier(const std::string& name) {
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-  });
 }
 
 server::Clip read_clip(const Program& program, const std::filesystem::path& file, const Rig& rig) {
@@ -57,7 +52,7 @@ std::vector<server::Clip> read_clips(const Program& program, const std::filesyst
   std::set<std::string> names;
   std::vector<server::Clip> clips;
   for (const std::filesystem::path& file : files) {
-    if (const std::string name = file.stem().string(); !identifier(name) || !names.insert(name).second) {
+    if (const std::string name = file.stem().string(); !is_identifier(name) || !names.insert(name).second) {
       throw Error(ErrorKind::config, file.string(), "clients could not ask for a clip of this name",
                   "name the files differently, with 1 to 64 of a-z, 0-9 and _");
     }

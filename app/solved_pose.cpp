@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/solved_pose.hpp"
+#include "core/values/degrees.hpp"
 
 #include <fmt/format.h>
-
-#include <numbers>
 
 #include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>
@@ -14,7 +13,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kLookMm = 200;  // from where a look is as near as a target, as IkProblem::tolerance_mm says
 
 json vector_json(const Eigen::Vector3d& v) {
@@ -29,7 +27,7 @@ json angles_json(const Rig& rig, const Pose& pose) {
     if (joint.sequence.empty()) continue;
     const std::array<double, 3> angles = kinematics::angles_from_rotation(joint, pose.rotation[row]);
     for (std::size_t a = 0; a < joint.sequence.size() && a < angles.size(); ++a)
-      out[joint.name][joint.sequence[a].name + "_deg"] = angles[a] * kDegrees;
+      out[joint.name][joint.sequence[a].name + "_deg"] = angles[a] * degrees_per_radian;
   }
   return out;
 }
@@ -49,9 +47,9 @@ json missed_target(const std::string& name, const Eigen::Vector3d& at, double aw
 json missed_look(const std::string& name, double off, double tolerance_mm) {
   return {{"kind", "missed_look"},
           {"goal", name},
-          {"value", off * kDegrees},
-          {"threshold", tolerance_mm / kLookMm * kDegrees},
-          {"what", fmt::format("{} is {:.1f} degrees off", name, off * kDegrees)},
+          {"value", off * degrees_per_radian},
+          {"threshold", tolerance_mm / kLookMm * degrees_per_radian},
+          {"what", fmt::format("{} is {:.1f} degrees off", name, off * degrees_per_radian)},
           {"mend", "look at a place that the neck can turn to, or write move_root: true"}};
 }
 
@@ -83,10 +81,10 @@ SolvedPose solve_pose(const Program& program, const std::filesystem::path& file,
     const std::string& name = request.names[problem.targets.size() + i];
     const bool near = kLookMm * result.off[i] <= tolerance_mm;
     if (near)
-      program.note(fmt::format("note: {} is {:.1f} degrees off", name, result.off[i] * kDegrees));
+      program.note(fmt::format("note: {} is {:.1f} degrees off", name, result.off[i] * degrees_per_radian));
     else
       out.warnings.push_back(missed_look(name, result.off[i], tolerance_mm));
-    looks.push_back({{"name", name}, {"off_deg", result.off[i] * kDegrees}, {"reached", near}});
+    looks.push_back({{"name", name}, {"off_deg", result.off[i] * degrees_per_radian}, {"reached", near}});
   }
   const Eigen::Quaterniond& turn = result.pose.rotation.at(0);
   out.report = {{"reached", out.warnings.empty()},

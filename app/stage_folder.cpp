@@ -11,6 +11,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/files/stale_parts.hpp"
 #include "core/model_file/digest.hpp"
+#include "core/platform/process.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -27,7 +28,7 @@ std::uint64_t digest_of(std::string_view bytes) {
 
 // XXH64 of this very program: what another build made is not taken for ours.
 std::uint64_t own_digest() {
-  std::ifstream self("/proc/self/exe", std::ios::binary);
+  std::ifstream self(platform::own_program(), std::ios::binary);
   model_file::Digest digest;
   digest.text(ECORCHE_VERSION);
   std::vector<char> block(1 << 20);

@@ -23,7 +23,7 @@ namespace {
 using client::Client;
 using client::Clock;
 
-struct Settings {
+struct StreamSettings {
   std::string address;
   std::string open, session;
   MotionChoice motion;
@@ -82,7 +82,7 @@ v1::Encoding encoding_to_proto(const std::string& encoding) {
 // The motion's poses, or the rest pose alone; one after another, `rate` times a second.
 class Motion {
  public:
-  Motion(const Settings& settings, const Rig& rig, const Program& program)
+  Motion(const StreamSettings& settings, const Rig& rig, const Program& program)
       : rate_(settings.rate), rest_(Pose::rest(rig.skeleton.segments.size())) {
     if (settings.motion.file.empty()) return;
     source_ = open_motion(program, settings.motion, rig);
@@ -107,7 +107,7 @@ class Motion {
 // One run of the command.
 class Stream {
  public:
-  Stream(const Settings& settings, const Program& program)
+  Stream(const StreamSettings& settings, const Program& program)
       : settings_(settings),
         program_(program),
         skinning_(runtime::skinning_from_name(settings.skinning)),
@@ -311,7 +311,7 @@ class Stream {
     Clock::time_point at;
   };
 
-  const Settings& settings_;
+  const StreamSettings& settings_;
   const Program& program_;
   runtime::Skinning skinning_;
   Client client_;
@@ -333,7 +333,7 @@ class Stream {
 }  // namespace
 
 void declare_stream(CLI::App& app, Program& program, Run& chosen) {
-  auto settings = std::make_shared<Settings>();
+  auto settings = std::make_shared<StreamSettings>();
   CLI::App* command =
       app.add_subcommand("stream", "play a motion clip against a server, check and measure what comes back");
   command->add_option("address", settings->address, "HOST:PORT of ecorche serve")->required();

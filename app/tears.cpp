@@ -15,6 +15,7 @@
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
+#include "app/usage_error.hpp"
 #include "runtime/spheres/effects.hpp"
 #include "runtime/spheres/seams.hpp"
 #include "runtime/spheres/tears.hpp"
@@ -25,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Settings {
+struct TearsSettings {
   fs::path skeleton, rig;
   FrameChoice frames;
   double voxel_mm = 0, bulge = 0, step_deg = 10;
@@ -33,12 +34,8 @@ struct Settings {
   int prove = 0;
 };
 
-[[noreturn]] void usage(const std::string& where, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, where, what, mend);
-}
-
 // A body, and what a torn one of it looks like.
-struct Body {
+struct TearingBody {
   VolumetricSkeleton skeleton;
   Rig rig;
   runtime::BallSet rest;
@@ -69,7 +66,7 @@ json frame_json(const Skeleton& rig, const std::string& name, const runtime::Tea
   return out;
 }
 
-json look_at_frames(const Program& program, const Settings& s, const Body& body) {
+json look_at_frames(const Program& program, const TearsSettings& s, const TearingBody& body) {
   json frames = json::array();
   std::size_t torn = 0;
   const std::vector<Frame> poses = read_frames(program, s.frames, body.rig);
@@ -99,8 +96,8 @@ int angles_of(const Joint& joint) {
 }
 
 // The first multiple of the step at which the body tears, or 0 where it does not up to 180 degrees.
-double first_tear(const Body& body, std::size_t joint, const AngleAxis& angle, double sign, double step,
-                  double gain, bool bridged, const Context& context) {
+double first_tear(const TearingBody& body, std::size_t joint, const AngleAxis& angle, double sign,
+                  double step, double gain, bool bridged, const Context& context) {
   for (double degrees = step; degrees <= 180; degrees += step) {
     Pose pose = Pose::rest(body.rig.skeleton.segments.size());
     Eigen::Vector3d axis = Eigen::Vector3d::Zero();
@@ -111,7 +108,7 @@ double first_tear(const Body& body, std::size_t joint, const AngleAxis& angle, d
   return 0;
 }
 
-json sweep(const Program& program, const Settings& s, const Body& body) {
+json sweep(const Program& program, const TearsSettings& s, const TearingBody& body) {
   json rows = json::array();
   const Context context = program.context("sweep");
   const auto& segments = body.rig.skeleton.segments;
@@ -144,7 +141,7 @@ bool hangs_on(const Skeleton& rig, int segment, int on) {
 }
 
 // From the rest of the body towards what hangs on the joint, unit; zero where one of them has no balls.
-Eigen::Vector3d way_out(const Body& body, int joint) {
+Eigen::Vector3d way_out(const TearingBody& body, int joint) {
   std::array<Eigen::Vector3d, 2> sum{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   std::array<double, 2> count{0, 0};
   for (std::size_t b = 0; b < body.rest.balls.size(); ++b) {
@@ -159,7 +156,7 @@ Eigen::Vector3d way_out(const Body& body, int joint) {
 
 // Tears that are there for certain: everything beyond a joint is drawn away from the rest, roughly straight,
 // by two to four times the body's radius there.
-json prove(const Settings& s, const Body& body) {
+json prove(const TearsSettings& s, const TearingBody& body) {
   std::mt19937 random(2001);
   std::uniform_real_distribution<double> way(-1, 1), factor(2, 4);
   const std::vector<double> radius = runtime::radii_at_joints(body.rest, body.rig.skeleton);
@@ -167,7 +164,7 @@ json prove(const Settings& s, const Body& body) {
   for (std::size_t j = 1; j < radius.size(); ++j) {
     if (radius[j] > 0 && way_out(body, static_cast<int>(j)).norm() > 0) joints.push_back(j);
   }
-  if (joints.empty()) usage("--prove", "no joint lies within the body", "check the rig");
+  if (joints.empty()) usage_error("--prove", "no joint lies within the body", "check the rig");
   int found = 0;
   for (int seed = 0; seed < s.prove; ++seed) {
     const std::size_t joint = joints[random() % joints.size()];
@@ -211,7 +208,7 @@ std::string what_is_torn(const json& frame) {
   return text;
 }
 
-std::string text_of(const json& result) {
+std::string tears_text(const json& result) {
   std::string text;
   char line[240];
   const auto degrees = [](const json& row, const char* key) {
@@ -248,14 +245,14 @@ std::string text_of(const json& result) {
   return text;
 }
 
-int run(const Program& program, const Settings& s) {
+int run(const Program& program, const TearsSettings& s) {
   const bool frames = !s.frames.pose.empty() || !s.frames.motion.file.empty();
   if (!frames && !s.sweep && s.prove == 0)
-    usage("tears", "nothing is to be looked at",
-          "give --motion CLIP --frames A:B, --pose, --sweep or --prove N");
+    usage_error("tears", "nothing is to be looked at",
+                "give --motion CLIP --frames A:B, --pose, --sweep or --prove N");
   if (s.rig.empty() && s.skeleton.extension() != ".hdf")
-    usage("--rig", "a rig must move the skeleton", "add --rig SKELETON.yaml or MODEL.hdf");
-  Body body;
+    usage_error("--rig", "a rig must move the skeleton", "add --rig SKELETON.yaml or MODEL.hdf");
+  TearingBody body;
   std::tie(body.skeleton, body.rig) = read_skeleton_and_rig(s.skeleton, s.rig);
   body.rest = runtime::balls_at_rest(
       body.skeleton, s.voxel_mm > 0 ? runtime::lattice_of(body.skeleton, s.voxel_mm) : body.skeleton.grid);
@@ -269,14 +266,14 @@ int run(const Program& program, const Settings& s) {
   if (s.prove > 0) result.update(prove(s, body));
   if (s.sweep) result.update(sweep(program, s, body));
   if (frames) result.update(look_at_frames(program, s, body));
-  program.result(text_of(result), result);
+  program.result(tears_text(result), result);
   return 0;
 }
 
 }  // namespace
 
 void declare_tears(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<TearsSettings>();
   CLI::App* command = app.add_subcommand(
       "tears",
       "where the body of a volumetric skeleton tears: frames of a motion, or a sweep of every joint");

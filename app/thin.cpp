@@ -14,6 +14,7 @@
 #include "app/hang_skeleton.hpp"
 #include "app/read_budget.hpp"
 #include "app/step_clock.hpp"
+#include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
@@ -24,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Settings {
+struct ThinSettings {
   fs::path input, output;
   std::string threshold;
   thin::Segmentation segmentation;
@@ -39,16 +40,12 @@ struct Settings {
   std::vector<std::string> for_images;  // options that were given and have no meaning for a skeleton
 };
 
-[[noreturn]] void refuse(const char* option, const std::string& what, const std::string& mend) {
-  throw Error(ErrorKind::usage, option, what, mend);
-}
-
 std::optional<double> bound(const std::string& word, const std::string& all) {
   if (word.empty()) return std::nullopt;
   double value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-    refuse("--threshold", "'" + all + "' is not LOW:HIGH", "as 300:1500, 300: or :1500");
+    usage_error("--threshold", "'" + all + "' is not LOW:HIGH", "as 300:1500, 300: or :1500");
   return value;
 }
 
@@ -57,7 +54,7 @@ void read_threshold(const std::string& text, thin::Segmentation& how) {
   if (text.empty()) return;
   const std::size_t colon = text.find(':');
   if (colon == text.npos || text.size() == 1)
-    refuse("--threshold", "'" + text + "' is not LOW:HIGH", "as 300:1500, 300: or :1500");
+    usage_error("--threshold", "'" + text + "' is not LOW:HIGH", "as 300:1500, 300: or :1500");
   how.low = bound(text.substr(0, colon), text);
   how.high = bound(text.substr(colon + 1), text);
 }
@@ -67,14 +64,14 @@ bool is_skeleton(const fs::path& path) {
 }
 
 // The image with cubes for voxels, which is told where it had others.
-Image isotropic(const Program& program, const Settings& settings, Image image, nlohmann::json& report) {
+Image isotropic(const Program& program, const ThinSettings& settings, Image image, nlohmann::json& report) {
   const auto& old = image.grid;
   if (!settings.isotropic_mm) {
     if (thin::is_isotropic(old)) return image;
     std::ostringstream what;
     what << "voxels of " << old.spacing[0] << " x " << old.spacing[1] << " x " << old.spacing[2]
          << " mm are not isotropic";
-    refuse("--isotropic", what.str(), "resample them: --isotropic 0 for the finest edge, or give mm");
+    usage_error("--isotropic", what.str(), "resample them: --isotropic 0 for the finest edge, or give mm");
   }
   const bool grey = !settings.threshold.empty();
   Image out = thin::to_isotropic(image, settings.segmentation.component, *settings.isotropic_mm,
@@ -113,7 +110,7 @@ void note_object(const Program& program, const thin::Mask& mask) {
 }
 
 // A fresh skeleton of an image, and the object that it is of.
-VolumetricSkeleton from_image(const Program& program, const Settings& settings, thin::Mask& mask,
+VolumetricSkeleton from_image(const Program& program, const ThinSettings& settings, thin::Mask& mask,
                               StepClock& clock, nlohmann::json& report) {
   thin::Segmentation how = settings.segmentation;
   read_threshold(settings.threshold, how);
@@ -152,9 +149,9 @@ VolumetricSkeleton from_image(const Program& program, const Settings& settings, 
   return skeleton;
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const ThinSettings& settings) {
   if (settings.output.extension() != ".vtp")
-    refuse("--output", "'" + settings.output.string() + "' does not end in .vtp", "name it so");
+    usage_error("--output", "'" + settings.output.string() + "' does not end in .vtp", "name it so");
   { const files::AtomicFile probe(settings.output); }
   check_hang_options(settings.hang);
   nlohmann::json report;
@@ -163,7 +160,7 @@ int run(const Program& program, const Settings& settings) {
   io::VolumetricSkeletonFile file;
   if (is_skeleton(settings.input)) {
     if (!settings.for_images.empty())
-      refuse(settings.for_images[0].c_str(), "has no meaning for a skeleton", "thin the image again");
+      usage_error(settings.for_images[0].c_str(), "has no meaning for a skeleton", "thin the image again");
     file = clock.time("read", [&] { return io::read_volumetric_skeleton(settings.input, settings.limits); });
     file.skeleton = clock.time("thinning", [&] { return thin::thinner(file.skeleton, settings.thinness); });
   } else {
@@ -209,7 +206,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_thin(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<ThinSettings>();
   CLI::App* command = app.add_subcommand("thin", "thin a sampled volume to its volumetric skeleton");
   command
       ->add_option("IMAGE", s->input, "an image, or a skeleton (.vtp), out of which a thinner one is taken")

@@ -6,6 +6,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 
 namespace ecorche::app {
 
@@ -13,12 +14,10 @@ namespace ecorche::app {
 /// lines, and what reading throws.
 inline std::string read_token(const std::string& path) {
   const std::string text = files::read_text(path, 4096);
-  const auto first = text.find_first_not_of(" \t\r\n");
-  const auto last = text.find_last_not_of(" \t\r\n");
-  std::string token = first == std::string::npos ? std::string() : text.substr(first, last - first + 1);
-  if (token.empty() || token.find_first_of(" \t\r\n") != std::string::npos)
+  const std::vector<std::string_view> words = text::words(text);
+  if (words.size() != 1)
     throw Error(ErrorKind::config, path, "does not hold one token", "write one line without blanks to it");
-  return token;
+  return std::string(words.front());
 }
 
 }  // namespace ecorche::app

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Settings {
+struct UnposeSettings {
   fs::path posed, output, model;
   std::vector<fs::path> files;
   std::vector<std::string> labels;
@@ -45,7 +45,7 @@ bool is_body(const fs::path& file) {
 }
 
 // `labels`, `labels_2`, ... and what the user names.
-bool is_labels(const std::string& name, const Settings& settings) {
+bool is_labels(const std::string& name, const UnposeSettings& settings) {
   return name == "labels" || name.starts_with("labels_") ||
          std::find(settings.labels.begin(), settings.labels.end(), name) != settings.labels.end();
 }
@@ -64,7 +64,7 @@ struct Item {
 // What `root` says of itself, held against what lies there.
 class Source {
  public:
-  Source(const Program& program, const Settings& settings)
+  Source(const Program& program, const UnposeSettings& settings)
       : settings_(settings),
         context_(program.context("check")),
         tets_(fs::is_directory(settings.posed) ? settings.posed / kTets : settings.posed),
@@ -135,7 +135,7 @@ class Source {
                                 : "pose again, or name it to bring it back with what lies around it");
   }
 
-  const Settings& settings_;
+  const UnposeSettings& settings_;
   Context context_;
   fs::path tets_, root_;
   std::optional<PosedManifest> manifest_;
@@ -143,7 +143,7 @@ class Source {
 
 class WayBack {
  public:
-  WayBack(const Settings& settings, const Source& source, const Model* model, const Context& context)
+  WayBack(const UnposeSettings& settings, const Source& source, const Model* model, const Context& context)
       : settings_(settings),
         source_(source),
         model_(model),
@@ -251,7 +251,7 @@ class WayBack {
     return file;
   }
 
-  const Settings& settings_;
+  const UnposeSettings& settings_;
   const Source& source_;
   const Model* model_;
   const Context& context_;
@@ -265,7 +265,7 @@ class WayBack {
 };
 
 // The model that was posed.
-Model read_scan(const Program& program, const Settings& settings, const Source& source) {
+Model read_scan(const Program& program, const UnposeSettings& settings, const Source& source) {
   Model model = model_file::read(settings.model, program.context("read"));
   if (source.manifest() == nullptr || model_file::identity(model) != source.manifest()->identity)
     throw Error(ErrorKind::data, settings.model.string(), "is not the model that was posed",
@@ -273,7 +273,7 @@ Model read_scan(const Program& program, const Settings& settings, const Source& 
   return model;
 }
 
-int run(const Program& program, const Settings& settings) {
+int run(const Program& program, const UnposeSettings& settings) {
   const Source source(program, settings);
   std::error_code ignored;
   if (fs::equivalent(settings.output, source.root(), ignored))
@@ -299,7 +299,7 @@ int run(const Program& program, const Settings& settings) {
 }  // namespace
 
 void declare_unpose(CLI::App& app, Program& program, Run& chosen) {
-  const auto s = std::make_shared<Settings>();
+  const auto s = std::make_shared<UnposeSettings>();
   CLI::App* command = app.add_subcommand(
       "unpose", "bring what was posed, or drawn on the posed body, back to the scan: surfaces and images");
   command->add_option("POSED", s->posed, "a folder that pose wrote, with its body.vtu; or that file")

@@ -75,7 +75,7 @@ Verdict verify(const std::string& path, const Program& program) {
   return verdict;
 }
 
-std::string to_text(const Verdict& v) {
+std::string verify_text(const Verdict& v) {
   std::string text = std::to_string(v.checked) + " datasets, " + std::to_string(v.bad) + " damaged\n";
   if (v.read) {
     text += std::to_string(v.model.node_count()) + " nodes, " + std::to_string(v.model.tet_count()) +
@@ -106,7 +106,7 @@ void declare_verify(CLI::App& app, Program& program, Run& chosen) {
       nlohmann::json report = model_report(verdict.faults.empty(), verdict.read ? &verdict.model : nullptr,
                                            verdict.found, verdict.checked, verdict.bad);
       report["contacts"] = verdict.contacts;
-      program.result(to_text(verdict), report);
+      program.result(verify_text(verdict), report);
       return verdict.faults.empty() ? 0 : exit_code(ErrorKind::data);
     };
   });

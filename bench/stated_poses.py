@@ -7,13 +7,10 @@ of a pose (no legs, say), the model's own limited angles take its place, in even
 one alone, or all at once and half as far.
 """
 import argparse
-import json
 import math
 import pathlib
-import subprocess
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-ECORCHE = ROOT / "build/release/bin/ecorche"
+import programs
 
 
 def both(joint, **angles):
@@ -83,7 +80,7 @@ def rigid(count):
 
 def write(model, folder, rigid_turns=6):
     """Writes the poses that `model` can take, and turns of the whole; returns the names of both."""
-    info = json.loads(subprocess.run([ECORCHE, "--json", "info", model], check=True, stdout=subprocess.PIPE).stdout)
+    info = programs.ecorche("info", model)
     known = {row["joint"]: {angle["name"] for angle in row["angles"]} for row in info["rig"]}
     head = f"# SPDX-License-Identifier: Apache-2.0\necorche_pose: 1\nskeleton: {info['skeleton']}\n"
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-# ecorche_library(NAME [FOREIGN] [CGAL] [PRECOMPILED kind] [HEADERS folder] SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
+# ecorche_library(NAME [FOREIGN] [CGAL] [PRECOMPILED kind] [HEADERS folder] SOURCES ... [KERNELS ...] [PUBLIC libs...] [PRIVATE libs...])
 #   HEADERS:     its public headers stand in that folder: <ecorche/...>.
 #   FOREIGN:     mostly somebody else's templates (CGAL, ITK, VTK): built without sanitizers and precompiled headers.
 #   CGAL:        compiled in the job pool of one.
 #   PRECOMPILED: which headers (ecorche_precompiled.cmake); `plain` where it is not said, `none` for none.
+#   KERNELS:     sources that Highway compiles once per instruction set.
 function(ecorche_library name)
-  cmake_parse_arguments(A "FOREIGN;CGAL" "PRECOMPILED;HEADERS" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(A "FOREIGN;CGAL" "PRECOMPILED;HEADERS" "SOURCES;KERNELS;PUBLIC;PRIVATE" ${ARGN})
   if(NOT A_PRECOMPILED)
     set(A_PRECOMPILED plain)
   endif()
-  add_library(${name} STATIC ${A_SOURCES})
+  add_library(${name} STATIC ${A_SOURCES} ${A_KERNELS})
+  # A kernel includes itself again and again, so it stands alone. Intel's intrinsics, read from a precompiled header,
+  # make gcc 12 warn of its own headers.
+  set_source_files_properties(${A_KERNELS} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON SKIP_PRECOMPILE_HEADERS ON)
   target_compile_features(${name} PUBLIC cxx_std_20)
   target_link_libraries(${name} PUBLIC ${A_PUBLIC} PRIVATE $<BUILD_INTERFACE:ecorche_flags> ${A_PRIVATE})
   if(A_HEADERS)
@@ -18,6 +22,7 @@ function(ecorche_library name)
   if(NOT A_FOREIGN)
     target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:ecorche_sanitizers>)
     ecorche_precompiled(${name} ${A_PRECOMPILED})
+    ecorche_unity(${name})
   elseif(ECORCHE_FUZZ)
     # libFuzzer goes where it sees branches: those of tinygltf decide what a glTF holds.
     target_compile_options(${name} PRIVATE -fsanitize=fuzzer-no-link,address)
@@ -27,12 +32,17 @@ function(ecorche_library name)
   endif()
 endfunction()
 
+# ecorche_unity(TARGET): its sources are compiled six at a time, as one: what they share is then read, instantiated and
+# optimised once. With ECORCHE_UNITY off each is compiled alone.
+function(ecorche_unity name)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${ECORCHE_UNITY} UNITY_BUILD_BATCH_SIZE 6)
+endfunction()
+
 # What the sanitizers build.
 add_custom_target(unit_tests)
 
 # ecorche_test(NAME SOURCES ... [LIBS ...] [ARGS ...] [PRECOMPILED kind] [TIMEOUT seconds] [LABELS ...] [FIXTURES ...])
-# One gtest executable and one ctest entry: a process start per case would cost more than the cases. Its sources are
-# compiled six at a time, as one: what they share is then read and instantiated once.
+# One gtest executable and one ctest entry: a process start per case would cost more than the cases.
 function(ecorche_test name)
   cmake_parse_arguments(A "" "PRECOMPILED;TIMEOUT" "SOURCES;LIBS;ARGS;LABELS;FIXTURES" ${ARGN})
   if(NOT A_PRECOMPILED)
@@ -50,7 +60,7 @@ function(ecorche_test name)
     # At -O1 gcc 12 does not see that a value of std::optional is read only where there is one.
     target_compile_options(${name} PRIVATE -Wno-maybe-uninitialized)
   endif()
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+  ecorche_unity(${name})
   ecorche_precompiled(${name} ${A_PRECOMPILED})
   if(name MATCHES "^unit_" AND NOT A_LABELS MATCHES "release_only|slow")
     add_dependencies(unit_tests ${name})

@@ -11,23 +11,23 @@ namespace ecorche::phantom {
 
 namespace {
 
-using Vec3 = Eigen::Vector3d;
+using Eigen::Vector3d;
 
 constexpr double kLength = 800, kHalfWidth = 50;  // mm
 constexpr double kBoneHalfLength = 80, kBoneHalfWidth = 15;
 
 /// A box as a regular grid of squares, each cut in two, no vertex twice.
-SurfaceMesh box_mesh(const Vec3& lo, const Vec3& hi, double edge) {
+SurfaceMesh box_mesh(const Vector3d& lo, const Vector3d& hi, double edge) {
   std::array<int, 3> n{};
   for (int a = 0; a < 3; ++a)
     n[static_cast<std::size_t>(a)] = std::max(1, static_cast<int>(std::lround((hi[a] - lo[a]) / edge)));
   std::map<std::array<int, 3>, std::int32_t> row;
   std::vector<std::array<std::int32_t, 3>> triangles;
-  std::vector<Vec3> points;
+  std::vector<Vector3d> points;
   const auto vertex = [&](const std::array<int, 3>& at) {
     const auto [found, fresh] = row.try_emplace(at, static_cast<std::int32_t>(points.size()));
     if (fresh) {
-      Vec3 p;
+      Vector3d p;
       for (int a = 0; a < 3; ++a)
         p[a] = lo[a] + (hi[a] - lo[a]) * at[static_cast<std::size_t>(a)] / n[static_cast<std::size_t>(a)];
       points.push_back(p);

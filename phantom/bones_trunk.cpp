@@ -2,14 +2,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "phantom/bones.hpp"
 
 namespace ecorche::phantom {
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// A stretch of spine: bodies and discs, arches, spinous and transverse processes. Its ends are round, their
 /// tips at `z0` and `z1`, so that neighbours can roll on each other.
@@ -56,9 +55,9 @@ Vec on_thorax(const Shape& envelope, double angle, double z) {
 /// sternum.
 Vec rib_point(const Shape& envelope, int rib, double s) {
   const double z_spine = 1434 - 25.0 * (rib - 1), z_front = 1388 - 19.0 * (rib - 1);
-  const double z =
-      z_spine + (z_front - z_spine) * s - (4 + 8.0 * rib) * std::pow(std::sin(kPi * std::min(s, 1.0)), 1.3);
-  return on_thorax(envelope, (0.10 + 0.88 * s) * kPi, z);
+  const double z = z_spine + (z_front - z_spine) * s -
+                   (4 + 8.0 * rib) * std::pow(std::sin(std::numbers::pi * std::min(s, 1.0)), 1.3);
+  return on_thorax(envelope, (0.10 + 0.88 * s) * std::numbers::pi, z);
 }
 
 Shape rib(const Shape& envelope, int number) {
@@ -82,7 +81,7 @@ Shape hip_bone(const Landmarks& at) {
   ilium = subtract(ilium, ellipsoid(wing + tilt * Vec(-24, -6, 8), {27, 76, 76}, tilt), 4);
   std::vector<Vec> crest;
   for (int i = 0; i <= 12; ++i) {
-    const double a = (25 + 130.0 * i / 12) / 180 * kPi;
+    const double a = (25 + 130.0 * i / 12) / 180 * std::numbers::pi;
     crest.push_back(wing + tilt * Vec(5, -72 * std::cos(a), 67 * std::sin(a)));
   }
   const Shape crest_tube = chain(crest, std::vector<double>(crest.size(), 7.5));
@@ -154,7 +153,7 @@ Shape rib_cage(const Landmarks& at) {
   std::vector<double> radii;
   for (int i = 0; i <= 10; ++i) {
     const double z = 1392 - 14.0 * i;
-    breast.push_back(on_thorax(envelope, kPi, z));
+    breast.push_back(on_thorax(envelope, std::numbers::pi, z));
     radii.push_back(i == 10 ? 5 : 9);
   }
   std::vector<Vec> beside = breast;

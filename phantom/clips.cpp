@@ -12,7 +12,7 @@ namespace ecorche::phantom {
 
 namespace {
 
-using Vec3 = Eigen::Vector3d;
+using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846, kDegree = kPi / 180;
 
@@ -31,8 +31,8 @@ Eigen::Quaterniond turn(const Joint& joint, const std::map<std::string, double>&
   for (const AngleAxis& angle : joint.sequence) {
     const auto found = degrees.find(angle.name);
     const double more = found == degrees.end() ? 0 : found->second * kDegree;
-    rest = rest * Eigen::AngleAxisd(angle.sign * angle.rest, Vec3::Unit(angle.axis));
-    posed = posed * Eigen::AngleAxisd(angle.sign * (angle.rest + more), Vec3::Unit(angle.axis));
+    rest = rest * Eigen::AngleAxisd(angle.sign * angle.rest, Vector3d::Unit(angle.axis));
+    posed = posed * Eigen::AngleAxisd(angle.sign * (angle.rest + more), Vector3d::Unit(angle.axis));
   }
   const Eigen::Quaterniond axes(joint.axes);
   return (axes * rest.conjugate() * posed * axes.conjugate()).normalized();
@@ -54,7 +54,7 @@ Clip empty_clip(const Skeleton& truth, std::string name) {
   return clip;
 }
 
-void add_frame(const Skeleton& truth, const Angles& angles, const Vec3& root, Clip& clip) {
+void add_frame(const Skeleton& truth, const Angles& angles, const Vector3d& root, Clip& clip) {
   for (const Segment& segment : truth.segments) {
     const auto found = angles.find(segment.joint.name);
     clip.rotation.push_back(found == angles.end() ? Eigen::Quaterniond::Identity()
@@ -64,7 +64,7 @@ void add_frame(const Skeleton& truth, const Angles& angles, const Vec3& root, Cl
 }
 
 /// Where the ankle of one side comes to lie when the root stays.
-Vec3 ankle_at(const Skeleton& truth, const Angles& angles, const std::string& ankle) {
+Vector3d ankle_at(const Skeleton& truth, const Angles& angles, const std::string& ankle) {
   std::vector<RigidTransform> global(truth.segments.size());
   for (std::size_t i = 0; i < truth.segments.size(); ++i) {
     const Segment& segment = truth.segments[i];
@@ -75,7 +75,7 @@ Vec3 ankle_at(const Skeleton& truth, const Angles& angles, const std::string& an
     global[i] = segment.parent < 0 ? local : global[static_cast<std::size_t>(segment.parent)] * local;
     if (segment.joint.name == ankle) return global[i] * segment.joint.center;
   }
-  return Vec3::Zero();
+  return Vector3d::Zero();
 }
 
 }  // namespace
@@ -83,7 +83,7 @@ Vec3 ankle_at(const Skeleton& truth, const Angles& angles, const std::string& an
 Clip make_walk(const Skeleton& truth) {
   Clip clip = empty_clip(truth, "walk");
   constexpr int stride = 36, strides = 2;
-  const Vec3 rest = truth.segments.front().joint.center;
+  const Vector3d rest = truth.segments.front().joint.center;
   for (int frame = 0; frame < stride * strides; ++frame) {
     const double t = static_cast<double>(frame) / stride;
     const double swing = std::cos(2 * kPi * t);  // 1 when the left heel strikes
@@ -107,7 +107,7 @@ Clip make_walk(const Skeleton& truth) {
     angles["cervicothoracic"] = {{"rotation", -2 * swing}};
     angles["atlantooccipital"] = {{"rotation", -2 * swing}};
     // Lowest in double support, shifted over the standing leg.
-    add_frame(truth, angles, rest + Vec3(12 * std::sin(2 * kPi * t), 0, -16 - 12 * std::cos(4 * kPi * t)),
+    add_frame(truth, angles, rest + Vector3d(12 * std::sin(2 * kPi * t), 0, -16 - 12 * std::cos(4 * kPi * t)),
               clip);
   }
   return clip;
@@ -116,7 +116,7 @@ Clip make_walk(const Skeleton& truth) {
 Clip make_bend(const Skeleton& truth) {
   Clip clip = empty_clip(truth, "bend");
   constexpr int frames = 120;
-  const Vec3 rest = truth.segments.front().joint.center;
+  const Vector3d rest = truth.segments.front().joint.center;
   const int ankle = truth.find_joint("ankle_left");
   for (int frame = 0; frame < frames; ++frame) {
     const double u = 0.5 - 0.5 * std::cos(2 * kPi * frame / frames);  // 0 upright, 1 all the way down
@@ -137,9 +137,9 @@ Clip make_bend(const Skeleton& truth) {
       angles["wrist" + end] = {{"flexion", -15 * u}};
     }
     // The ankles stay where they stand.
-    const Vec3 moved =
+    const Vector3d moved =
         ankle_at(truth, angles, "ankle_left") - truth.segments[static_cast<std::size_t>(ankle)].joint.center;
-    add_frame(truth, angles, rest - Vec3(0, moved.y(), moved.z()), clip);
+    add_frame(truth, angles, rest - Vector3d(0, moved.y(), moved.z()), clip);
   }
   return clip;
 }

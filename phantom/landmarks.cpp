@@ -8,7 +8,7 @@
 namespace ecorche::phantom {
 
 namespace {
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kRadians = 3.14159265358979323846 / 180;
 }
 
 Landmarks make_landmarks(std::uint64_t seed) {
@@ -27,20 +27,20 @@ Landmarks make_landmarks(std::uint64_t seed) {
   at.knee = at.hip + leg * Vec(36, 0, -410);
   at.ankle = at.knee + leg * Vec(20, 20, -409);
   at.knee_axis = Vec(1, 0, 0.07).normalized();
-  const double toe_out = 8 * kDegree;
+  const double toe_out = 8 * kRadians;
   at.foot = Eigen::AngleAxisd(toe_out, Vec::UnitZ()).toRotationMatrix();
   at.ankle_axis = at.foot.col(0);
   at.ball = at.ankle + at.foot * Vec(0, -143, -71);
 
   at.sternoclavicular = {25, -58, 1410};
   at.shoulder = {176, 6, 1398};
-  const Vec upper_arm(std::sin(14 * kDegree), 0, -std::cos(14 * kDegree));
+  const Vec upper_arm(std::sin(14 * kRadians), 0, -std::cos(14 * kRadians));
   at.elbow = at.shoulder + arm * 300 * upper_arm;
   // The elbow is bent forwards and a little inwards, as a hanging arm is.
   const Vec forwards = Vec(-0.5, -0.86, 0);
   at.elbow_axis = forwards.cross(upper_arm).normalized();
   if (at.elbow_axis.x() < 0) at.elbow_axis = -at.elbow_axis;
-  at.elbow_flexion = 17 * kDegree;
+  at.elbow_flexion = 17 * kRadians;
   const Vec forearm = Eigen::AngleAxisd(-at.elbow_flexion, at.elbow_axis) * upper_arm;
   at.wrist = at.elbow + arm * 255 * forearm;
   // The palm faces the thigh.

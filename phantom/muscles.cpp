@@ -2,6 +2,7 @@
 // Muscles as spindles along their lines of action, wrapped round the rib cage where they cross it. Left side;
 // the right one is its mirror image.
 #include <cmath>
+#include <numbers>
 
 #include "phantom/bones.hpp"
 
@@ -9,12 +10,11 @@ namespace ecorche::phantom {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kLinks = 18;
 
 double spindle(double t, double r0, double belly, double r1) {
   const double ends = r0 + (r1 - r0) * t;
-  return ends + (belly - ends) * std::pow(std::sin(kPi * t), 1.3);
+  return ends + (belly - ends) * std::pow(std::sin(std::numbers::pi * t), 1.3);
 }
 
 /// A belly between two tendons.

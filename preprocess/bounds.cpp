@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/model_file/figures.hpp"
+#include "core/values/text.hpp"
 
 namespace ecorche::preprocess {
 namespace {
@@ -52,12 +53,6 @@ constexpr std::array kBounds{
         Bound::Unit::grain},
 };
 
-std::string number(double value) {
-  std::ostringstream out;
-  out << value;
-  return out.str();
-}
-
 }  // namespace
 
 std::span<const Bound> bounds() {
@@ -78,12 +73,13 @@ BodySize body_size(const Model& model) {
   return size;
 }
 
-std::string said(const Bound& bound) {
+std::string describe(const Bound& bound) {
   if (bound.most == 0.0) return "0";  // counts are not negative
   if (bound.unit == Bound::Unit::length)
-    return "<= " + number(bound.most.value_or(0)) + " mm, 10 % under 0.5 m, 3 % over 1.7 m";
-  if (bound.unit == Bound::Unit::grain) return "<= " + number(bound.most.value_or(0)) + " grains of float32";
-  return bound.least ? ">= " + number(*bound.least) : "<= " + number(*bound.most);
+    return "<= " + text::number(bound.most.value_or(0), 6) + " mm, 10 % under 0.5 m, 3 % over 1.7 m";
+  if (bound.unit == Bound::Unit::grain)
+    return "<= " + text::number(bound.most.value_or(0), 6) + " grains of float32";
+  return bound.least ? ">= " + text::number(*bound.least, 6) : "<= " + text::number(*bound.most, 6);
 }
 
 std::vector<JudgedFigure> judge(const Certificate& certificate, const BodySize& size) {
@@ -111,9 +107,10 @@ std::vector<std::string> broken_bounds(const Certificate& certificate, const Bod
   std::vector<std::string> broken;
   for (const JudgedFigure& figure : judge(certificate, size)) {
     if (figure.kept) continue;
-    std::string bound = said(*figure.bound);
-    if (figure.bound->unit != Bound::Unit::plain) bound += " = " + number(*figure.most);
-    broken.push_back(std::string(figure.figure) + " is " + number(figure.value) + ", the bound is " + bound);
+    std::string bound = describe(*figure.bound);
+    if (figure.bound->unit != Bound::Unit::plain) bound += " = " + text::number(*figure.most, 6);
+    broken.push_back(std::string(figure.figure) + " is " + text::number(figure.value, 6) + ", the bound is " +
+                     bound);
   }
   return broken;
 }

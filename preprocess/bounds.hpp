@@ -40,7 +40,7 @@ struct Bound {
 std::span<const Bound> bounds();
 
 /// `>= 0.5`, `<= 1`, `<= 4 grains of float32`, or `0` where only that will do.
-std::string said(const Bound& bound);
+std::string describe(const Bound& bound);
 
 /// A figure of a certificate with the bound that it has, if any.
 struct JudgedFigure {

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include <ecorche/model_file/model_file.hpp>
+#include "core/platform/process.hpp"
 #include "preprocess/bounds.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/check/joints.hpp"
@@ -229,7 +230,7 @@ void warn_of_contacts(const Case& patient, const Model& model, const Context& co
   const double cube = check::cube_mm(model.nodes, model.tets);
   std::string line;
   for (const check::Touch& touch : check::touching_limbs(model))
-    line += (line.empty() ? "" : "; ") + check::said(touch, model.rig.skeleton);
+    line += (line.empty() ? "" : "; ") + check::describe(touch, model.rig.skeleton);
   if (!line.empty()) context.warn(line + " (" + check::parting_advice(cube) + ")");
   if (!patient.labels || !patient.labels->apart) return;
   const double gap = patient.labels->apart->gap_mm;
@@ -261,14 +262,7 @@ Certificate certify(const Model& model, const Context& context) {
 }  // namespace
 
 double peak_rss_mib() {
-  std::ifstream status("/proc/self/status");
-  for (std::string word; status >> word;) {
-    if (word != "VmHWM:") continue;
-    double kib = 0;
-    status >> kib;
-    return kib / 1024;
-  }
-  return 0;
+  return static_cast<double>(platform::peak_memory_bytes()) / (1 << 20);
 }
 
 Result run(const Case& patient, const Options& options, const Context& outer, const Hooks& hooks) {

@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/provenance.hpp"
 #include <ecorche/version.hpp>
+#include "core/values/text.hpp"
 
 #include <Eigen/Core>
-#include <charconv>
 
 namespace ecorche::preprocess {
 namespace {
-
-// The shortest decimal that reads back as the same double.
-std::string decimal(double value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
-std::string hexadecimal(std::uint64_t value) {
-  std::string text(16, '0');
-  for (auto at = text.rbegin(); value != 0; ++at, value >>= 4) *at = "0123456789abcdef"[value & 15];
-  return text;
-}
 
 std::string eigen_version() {
   return std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
@@ -35,12 +23,12 @@ std::map<std::string, std::string> provenance(const Case& patient, const Options
   out["option/mesher"] = mesher;
   out["option/solver"] = solver;
   out["option/weights"] = options.weights;
-  out["option/voxel_mm"] = decimal(voxel_mm);
+  out["option/voxel_mm"] = text::shortest(voxel_mm);
   out["option/max_tets"] = std::to_string(options.max_tets);
   out["option/max_nodes"] = std::to_string(options.max_nodes);
-  out["option/cor_sigma"] = decimal(options.cor_sigma);
+  out["option/cor_sigma"] = text::shortest(options.cor_sigma);
   if (options.spheres_tp) {
-    out["option/spheres_tp"] = decimal(*options.spheres_tp);
+    out["option/spheres_tp"] = text::shortest(*options.spheres_tp);
     out["option/spheres_by"] = options.spheres_by;
   }
   out["library/eigen"] = eigen_version();
@@ -49,7 +37,7 @@ std::map<std::string, std::string> provenance(const Case& patient, const Options
   if (mesher == "tetgen") out["library/tetgen"] = ECORCHE_TETGEN_VERSION;
   if (solver == "cholmod") out["library/cholmod"] = ECORCHE_CHOLMOD_VERSION;
 #endif
-  for (const auto& [path, digest] : patient.input_digests) out["input/" + path] = hexadecimal(digest);
+  for (const auto& [path, digest] : patient.input_digests) out["input/" + path] = text::hex(digest);
   return out;
 }
 

@@ -79,7 +79,7 @@ std::array<float, 9> inverse_of(const std::array<double, 9>& m) {
   return inverse;
 }
 
-Status bad(const std::string& what) {
+Status bad_delta(const std::string& what) {
   return {StatusCode::invalid_argument, "delta: " + what + " (ask for float32, or for a new keyframe)"};
 }
 
@@ -219,7 +219,7 @@ void DeltaKey::fit(const Block& block, const std::int16_t* key, const std::uint1
 Status decode_delta(std::span<const std::byte> bytes, std::span<const std::uint16_t> key,
                     std::span<std::uint16_t> out) {
   if (key.size() % 3 != 0 || key.size() != out.size())
-    return bad("the keyframe has another number of vertices");
+    return bad_delta("the keyframe has another number of vertices");
   const std::size_t vertices = key.size() / 3;
   std::size_t at = 0;
   for (std::size_t b = 0; b < delta::blocks_of(vertices); ++b) {
@@ -227,11 +227,12 @@ Status decode_delta(std::span<const std::byte> bytes, std::span<const std::uint1
     const std::size_t count = std::min(block_vertices, vertices - first);
     const std::size_t rows = rows_of(count);
     Header header;
-    if (bytes.size() - at < delta::header_bytes) return bad("it ends within block " + std::to_string(b));
-    if (!header.load(&bytes[at])) return bad("block " + std::to_string(b) + " has no header");
+    if (bytes.size() - at < delta::header_bytes)
+      return bad_delta("it ends within block " + std::to_string(b));
+    if (!header.load(&bytes[at])) return bad_delta("block " + std::to_string(b) + " has no header");
     at += delta::header_bytes;
     const std::size_t size = header.data_bytes(rows);
-    if (bytes.size() - at < size) return bad("it ends within block " + std::to_string(b));
+    if (bytes.size() - at < size) return bad_delta("it ends within block " + std::to_string(b));
     const std::byte* data = bytes.data() + at;
     at += size;
     if (count % lanes == 0) {
@@ -243,7 +244,7 @@ Status decode_delta(std::span<const std::byte> bytes, std::span<const std::uint1
     kernels::decode_block(header, data, padded.data(), rows, whole.data());
     std::copy_n(whole.begin(), 3 * count, &out[3 * first]);
   }
-  if (at != bytes.size()) return bad("it goes on behind its last block");
+  if (at != bytes.size()) return bad_delta("it goes on behind its last block");
   return {};
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kMostLevels = 16;  // kept keyframes: what a server says must not fill the memory
 
-Status bad(const std::string& what) {
+Status bad_mesh(const std::string& what) {
   return {StatusCode::invalid_argument, "mesh frame: " + what + " (use a server that keeps the protocol)"};
 }
 
@@ -30,7 +30,7 @@ void to_positions(const v1::QuantiseBox& box, DecodedTissue& tissue) {
 Status read_normals(const v1::Array& array, const Payload& payload, DecodedTissue& tissue) {
   std::span<const std::int8_t> packed;
   if (!find(array, payload, 2, packed) || packed.size() / 2 != tissue.positions.size() / 3)
-    return bad("its normals are not one per vertex");
+    return bad_mesh("its normals are not one per vertex");
   tissue.normals.resize(tissue.positions.size());
   for (std::size_t v = 0; v < packed.size() / 2; ++v) {
     const auto normal = from_oct16(packed[2 * v], packed[2 * v + 1]);
@@ -46,9 +46,9 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
   const bool delta = frame.encoding() == v1::ENCODING_U16_DELTA;
   const bool is_key = delta && frame.keyframe() == frame.frame();
   if (!delta && frame.encoding() != v1::ENCODING_F32 && frame.encoding() != v1::ENCODING_U16)
-    return bad("encoding " + std::to_string(frame.encoding()) + " is unknown");
+    return bad_mesh("encoding " + std::to_string(frame.encoding()) + " is unknown");
   if (is_key && !keyframes_.contains(frame.level()) && keyframes_.size() >= kMostLevels)
-    return bad("more levels than there are");
+    return bad_mesh("more levels than there are");
   const auto key = keyframes_.find(frame.level());
   if (delta && !is_key && (key == keyframes_.end() || key->second.frame != frame.keyframe())) {
     return {StatusCode::failed_precondition, "mesh frame: its keyframe " + std::to_string(frame.keyframe()) +
@@ -57,12 +57,12 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
   std::size_t count = 0;  // of tissues
   for (const v1::MeshArray& array : frame.arrays()) {
     if (array.kind() == v1::MeshArray::KIND_NORMALS) {
-      if (count == 0 || out[count - 1].tissue != array.tissue()) return bad("normals without positions");
+      if (count == 0 || out[count - 1].tissue != array.tissue()) return bad_mesh("normals without positions");
       if (Status status = read_normals(array.array(), payload, out[count - 1]); !status.ok()) return status;
       continue;
     }
     if (array.kind() != v1::MeshArray::KIND_POSITIONS) continue;
-    if (count > 0 && array.tissue() <= out[count - 1].tissue) return bad("its tissues do not ascend");
+    if (count > 0 && array.tissue() <= out[count - 1].tissue) return bad_mesh("its tissues do not ascend");
     if (out.size() == count) out.emplace_back();
     DecodedTissue& tissue = out[count];
     tissue.tissue = array.tissue();
@@ -71,21 +71,21 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
     const std::string where = "the positions of tissue " + std::to_string(array.tissue());
     if (frame.encoding() == v1::ENCODING_F32) {
       std::span<const float> positions;
-      if (!find(array.array(), payload, 3, positions)) return bad(where + " are no float32");
+      if (!find(array.array(), payload, 3, positions)) return bad_mesh(where + " are no float32");
       tissue.positions.assign(positions.begin(), positions.end());
     } else if (delta && !is_key) {
       std::span<const std::uint8_t> bytes;
-      if (!find(array.array(), payload, 1, bytes)) return bad(where + " are no deltas");
+      if (!find(array.array(), payload, 1, bytes)) return bad_mesh(where + " are no deltas");
       const auto& tissues = key->second.tissues;
       if (count >= tissues.size() || tissues[count].tissue != array.tissue())
-        return bad(where + " are not in the keyframe");
+        return bad_mesh(where + " are not in the keyframe");
       tissue.numbers.resize(tissues[count].numbers.size());
       if (Status status = decode_delta(std::as_bytes(bytes), tissues[count].numbers, tissue.numbers);
           !status.ok())
         return status;
     } else {
       std::span<const std::uint16_t> numbers;
-      if (!find(array.array(), payload, 3, numbers)) return bad(where + " are no u16");
+      if (!find(array.array(), payload, 3, numbers)) return bad_mesh(where + " are no u16");
       tissue.numbers.assign(numbers.begin(), numbers.end());
     }
     if (frame.encoding() != v1::ENCODING_F32) to_positions(frame.box(), tissue);

@@ -19,7 +19,7 @@ constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 33;
 constexpr std::uint64_t kMostRatio = std::uint64_t{1} << 15;
 constexpr std::int32_t kBrick = 32;
 
-Status bad(const std::string& what) {
+Status bad_volume(const std::string& what) {
   return {StatusCode::invalid_argument, "volume frame: " + what + " (use a server that keeps the protocol)"};
 }
 
@@ -28,19 +28,19 @@ Status find_voxels(const v1::VolumeFrame& frame, const Payload& payload, std::ve
                    Image& like, std::span<const std::byte>& out) {
   const v1::Array& array = frame.has_content() ? frame.content() : frame.voxels();
   if (!from_proto(array.type(), like.type) || array.components() == 0 || array.components() > 16)
-    return bad("its voxels are of no type");
+    return bad_volume("its voxels are of no type");
   like.components = static_cast<int>(array.components());
-  if (!find(frame.voxels(), payload, out)) return bad("its voxels reach beyond the payload");
+  if (!find(frame.voxels(), payload, out)) return bad_volume("its voxels reach beyond the payload");
   if (!frame.has_content()) return {};
   const std::uint64_t row = scalar_bytes(like.type) * std::uint64_t{array.components()};
   if (array.count() > std::min(kMostBytes, kMostRatio * out.size()) / row)
-    return bad("it says that it holds too much");
+    return bad_volume("it says that it holds too much");
   const std::uint64_t size = array.count() * row;
   if (frame.voxels().type() != v1::SCALAR_TYPE_U8 || ZSTD_getFrameContentSize(out.data(), out.size()) != size)
-    return bad("its voxels are no zstd frame of the size it says");
+    return bad_volume("its voxels are no zstd frame of the size it says");
   room.resize(size);
   if (ZSTD_decompress(room.data(), room.size(), out.data(), out.size()) != size)
-    return bad("its voxels are damaged");
+    return bad_volume("its voxels are damaged");
   out = room;
   return {};
 }
@@ -55,7 +55,7 @@ Status put_bricks(std::span<const std::uint32_t> bricks, std::span<const std::by
   std::size_t at = 0;
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     if (bricks[i] >= all || (i > 0 && bricks[i] <= bricks[i - 1]))
-      return bad("its bricks are not those of the grid");
+      return bad_volume("its bricks are not those of the grid");
     std::array<std::int32_t, 3> first{}, last{};
     std::uint32_t b = bricks[i];
     for (std::size_t a = 0; a < 3; ++a) {
@@ -66,13 +66,13 @@ Status put_bricks(std::span<const std::uint32_t> bricks, std::span<const std::by
     const std::size_t run = static_cast<std::size_t>(last[0] - first[0]) * voxel;
     for (std::int32_t k = first[2]; k < last[2]; ++k) {
       for (std::int32_t j = first[1]; j < last[1]; ++j) {
-        if (voxels.size() - at < run) return bad("its bricks are cut short");
+        if (voxels.size() - at < run) return bad_volume("its bricks are cut short");
         std::copy_n(voxels.data() + at, run, image.bytes.data() + image.grid.offset(first[0], j, k) * voxel);
         at += run;
       }
     }
   }
-  return at == voxels.size() ? Status{} : bad("it goes on behind its last brick");
+  return at == voxels.size() ? Status{} : bad_volume("it goes on behind its last brick");
 }
 
 }  // namespace
@@ -96,14 +96,14 @@ Status VolumeDecoder::decode(const v1::VolumeFrame& frame, const Payload& payloa
                                                    " did not come (wait for the next keyframe)"};
     }
     std::span<const std::uint32_t> bricks;
-    if (!find(frame.bricks(), payload, 1, bricks)) return bad("its bricks are no u32");
+    if (!find(frame.bricks(), payload, 1, bricks)) return bad_volume("its bricks are no u32");
     if (like.grid != keyframe_.grid || like.type != keyframe_.type || like.components != keyframe_.components)
-      return bad("its grid is not the keyframe's");
+      return bad_volume("its grid is not the keyframe's");
     out = keyframe_;
     return put_bricks(bricks, voxels, out);
   }
   if (voxels.size() / voxel != like.grid.voxels() || voxels.size() % voxel != 0)
-    return bad("its voxels are not those of its grid");
+    return bad_volume("its voxels are not those of its grid");
   like.bytes.assign(voxels.begin(), voxels.end());
   out = std::move(like);
   if (frame.keyframe() == 0) return {};

@@ -9,6 +9,7 @@
 #include "app/report/places.hpp"
 #include "app/report/quality.hpp"
 #include "app/report/slice.hpp"
+#include "core/values/text.hpp"
 #include "preprocess/bounds.hpp"
 
 namespace ecorche::app::report {
@@ -38,10 +39,6 @@ std::string picture(const Picture& drawn, const std::string& caption) {
          data_uri(drawn) + "'><figcaption>" + escaped(caption) + "</figcaption></figure>\n";
 }
 
-std::string number(double value) {
-  return text("%.6g", value);
-}
-
 std::string header(const Model& model) {
   const Certificate& c = model.certificate;
   const bool good = preprocess::broken_bounds(c, preprocess::body_size(model)).empty();
@@ -58,9 +55,9 @@ std::string certificate(const Certificate& c, const preprocess::BodySize& size) 
   std::string out = "<h2>Certificate</h2>\n<table><tr><th>figure<th class=n>value<th>bound<th>because</tr>\n";
   for (const preprocess::JudgedFigure& figure : preprocess::judge(c, size)) {
     out += text("<tr><td>%s<td class='n%s'>%s<td>", escaped(figure.figure).c_str(), figure.kept ? "" : " bad",
-                number(figure.value).c_str());
+                text::number(figure.value, 6).c_str());
     if (figure.bound != nullptr) {
-      out += escaped(preprocess::said(*figure.bound)) + "<td class=why>" + escaped(figure.bound->reason);
+      out += escaped(preprocess::describe(*figure.bound)) + "<td class=why>" + escaped(figure.bound->reason);
     } else {
       out += "<td>";
     }

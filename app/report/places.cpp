@@ -7,11 +7,12 @@
 
 #include "app/report/html.hpp"
 #include "app/report/view.hpp"
+#include "core/values/identifier.hpp"
 
 namespace ecorche::app::report {
 namespace {
 
-constexpr Colour kGround{250, 250, 248}, kSkin{206, 196, 186}, kBone{236, 228, 208}, kFound{214, 72, 48};
+constexpr Colour kPlaceGround{250, 250, 248}, kSkin{206, 196, 186}, kBone{236, 228, 208}, kFound{214, 72, 48};
 constexpr Colour kGreen{46, 140, 78}, kYellow{214, 150, 20}, kRed{200, 40, 40};
 constexpr double kAbout = 80;            // mm shown about what is named
 constexpr std::size_t kMostRings = 200;  // of vertices in no tet
@@ -52,7 +53,6 @@ Box box_of(const Model& model) {
 }
 
 std::vector<WarningGroup> grouped(const Model& model, const std::vector<std::string>& warnings) {
-  const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
   const auto once = [](std::vector<std::string>& names, const std::string& name) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
@@ -63,7 +63,7 @@ std::vector<WarningGroup> grouped(const Model& model, const std::vector<std::str
     std::string pattern;
     for (std::size_t i = 0; i < warning.size();) {
       std::size_t end = i;
-      while (end < warning.size() && in_name(warning[end])) ++end;
+      while (end < warning.size() && in_identifier(warning[end])) ++end;
       const std::string word = warning.substr(i, std::max<std::size_t>(1, end - i));
       i += word.size();
       if (model.rig.skeleton.find_joint(word) >= 0) {
@@ -104,7 +104,7 @@ Place place_of(const Model& model, const WarningGroup& group) {
          tissue->V.colwise().maxCoeff().transpose().cast<double>());
   }
   const Eigen::Vector3d about = Eigen::Vector3d::Constant(kAbout);
-  Scene scene(View::coronal().of(box.low - about, box.high + about, 360), kGround);
+  Scene scene(View::coronal().of(box.low - about, box.high + about, 360), kPlaceGround);
   draw_body(scene, model, tissues);
   for (const Tissue* tissue : tissues) {
     if (tissue->group == Group::skin) {
@@ -133,7 +133,7 @@ std::vector<Place> rig_pictures(const Model& model, int pixels) {
   std::vector<Place> out;
   for (const auto& [caption, view] :
        {std::pair{"from the front", View::coronal()}, {"from the left", View::sagittal()}}) {
-    Scene scene(view.of(box.low, box.high, pixels), kGround);
+    Scene scene(view.of(box.low, box.high, pixels), kPlaceGround);
     draw_body(scene, model, {});
     for (std::size_t s = 0; s < model.segment_count(); ++s)
       scene.mark(model.rig.skeleton.segments[s].joint.center, 5, of_confidence(model.rig.fits[s].confidence));

@@ -25,6 +25,7 @@
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include "bench/ik/peers.hpp"
+#include "bench/table.hpp"
 
 namespace {
 
@@ -57,10 +58,12 @@ struct Tally {
     std::sort(x.begin(), x.end());
     return x[static_cast<std::size_t>(share * static_cast<double>(x.size() - 1))];
   }
-  void print(const char* name) {
-    std::printf("  %-21s %5.1f %%  %6.0f %6.0f %6.0f   %6.2f %7.2f   %6.1f %6.1f   %.0e\n", name,
-                100.0 * reached / static_cast<double>(micros.size()), at(micros, 0.5), at(micros, 0.99),
-                at(micros, 1), at(away, 0.5), at(away, 0.99), at(jump, 0.99), at(jump, 1), removed);
+  void print(const bench::Table& table, const std::string& problem, const char* name) {
+    using bench::fixed;
+    table.row({problem, name, fixed(100.0 * reached / static_cast<double>(micros.size()), 1),
+               fixed(at(micros, 0.5), 0), fixed(at(micros, 0.99), 0), fixed(at(micros, 1), 0),
+               fixed(at(away, 0.5), 2), fixed(at(away, 0.99), 2), fixed(at(jump, 0.99), 1),
+               fixed(at(jump, 1), 1), bench::exponent(removed, 0)});
   }
 
   Pose step(const Rig& rig, const Pose& start, const IkProblem& problem, const Solve& solve, bool follows) {
@@ -106,7 +109,8 @@ Rig without_limits(Rig rig) {
 
 class Bench {
  public:
-  explicit Bench(const Rig& rig) : rig_(rig), joints_(rig.skeleton.segments.size()) {}
+  Bench(const Rig& rig, const bench::Table& table)
+      : rig_(rig), table_(table), joints_(rig.skeleton.segments.size()) {}
 
   void far(std::size_t targets, const char* name = "far") {
     std::vector<std::size_t> ends = ends_of(rig_.skeleton);
@@ -122,8 +126,7 @@ class Bench {
       for (std::size_t m = 0; m < 3; ++m)
         tally[m].step(rig_, Pose::rest(joints_), problem, kMethods[m].solve, false);
     }
-    std::printf("%s, %zu target%s\n", name, targets, targets == 1 ? "" : "s");
-    for (std::size_t m = 0; m < 3; ++m) tally[m].print(kMethods[m].name);
+    print(name, targets, tally);
   }
 
   void drag(std::size_t targets) {
@@ -139,8 +142,7 @@ class Bench {
       }
       for (std::size_t m = 0; m < 3; ++m) along(tally[m], problem, curves, kMethods[m].solve);
     }
-    std::printf("drag, %zu target%s\n", targets, targets == 1 ? "" : "s");
-    for (std::size_t m = 0; m < 3; ++m) tally[m].print(kMethods[m].name);
+    print("drag", targets, tally);
   }
 
   void pull() {
@@ -167,11 +169,16 @@ class Bench {
                                  -Vector3d::UnitY(), point, 0.2});
       along(tally, problem, {any_curve(point)}, kMethods[0].solve);
     }
-    std::printf("pull, feet pinned, the head looks\n");
-    tally.print(kMethods[0].name);
+    tally.print(table_, "pull, feet pinned, the head looks", kMethods[0].name);
   }
 
  private:
+  void print(const std::string& what, std::size_t targets, Tally* tally) const {
+    for (std::size_t m = 0; m < 3; ++m)
+      tally[m].print(table_, what + ", " + std::to_string(targets) + (targets == 1 ? " target" : " targets"),
+                     kMethods[m].name);
+  }
+
   // From where the point is, around and back.
   struct Curve {
     Vector3d begin, a, b;
@@ -211,6 +218,7 @@ class Bench {
   }
 
   const Rig& rig_;
+  const bench::Table& table_;
   std::size_t joints_;
   std::mt19937 random_{1};
   std::normal_distribution<double> normal_;
@@ -225,15 +233,27 @@ int main(int argc, char** argv) {
   }
   for (int i = 1; i < argc; ++i) {
     const Rig rig = model_file::read(argv[i], Context{}).rig;
-    std::printf("%s: %zu joints\n  %-21s %7s  %20s   %14s   %13s   %s\n", argv[i],
-                rig.skeleton.segments.size(), "", "reached", "us: p50, p99, most", "mm: p50, p99",
-                "deg a frame: p99, most", "deg beyond limits");
-    Bench bench(rig);
+    std::printf(
+        "\n%s: %zu joints; microseconds, mm away from the goal, degrees that a joint turns from a frame to "
+        "the next\n",
+        argv[i], rig.skeleton.segments.size());
+    const bench::Table table({{"problem", 34},
+                              {"method", -21},
+                              {"reached %"},
+                              {"us p50"},
+                              {"p99"},
+                              {"most"},
+                              {"mm p50"},
+                              {"p99"},
+                              {"deg p99"},
+                              {"most"},
+                              {"deg beyond limits"}});
+    Bench bench(rig, table);
     for (const std::size_t targets : {std::size_t{1}, std::size_t{2}, std::size_t{4}}) bench.far(targets);
     for (const std::size_t targets : {std::size_t{1}, std::size_t{3}}) bench.drag(targets);
     bench.pull();
     const Rig free = without_limits(rig);
-    Bench(free).far(2, "free");
+    Bench(free, table).far(2, "free");
   }
   return 0;
 }

@@ -6,7 +6,7 @@
 //
 // Meshes are as the pipeline makes them: meshed, worst tets relaxed, nodes in float32. Times are of all that.
 // Distances are in voxels, two-sided, 99th percentile of points drawn by area over what is at least a voxel
-// thick; bones that are not, over a tenth of their area, are listed with theirs.
+// thick; bones that are not, over a tenth of their area, are listed below the table with theirs.
 #include <tbb/global_control.h>
 #include <algorithm>
 #include <chrono>
@@ -18,6 +18,7 @@
 
 #include <ecorche/io/case_file.hpp>
 #include "bench/meshers/measures.hpp"
+#include "bench/table.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/relax_slivers.hpp"
@@ -70,10 +71,10 @@ Settings parse(int argc, char** argv) {
 }
 
 /// Off-diagonals, and with --weights how far harmonic weights leave [0, 1].
-void print_weights(const Case& patient, const TetMesh& mesh, bool solve) {
+void add_weights(const Case& patient, const TetMesh& mesh, bool solve, std::vector<std::string>& cells) {
   double share = 0;
   weights::stiffness(mesh.V, mesh.T, {}, &share);
-  std::printf(" %9.4f", 100 * share);
+  cells.push_back(bench::fixed(100 * share, 4));
   if (!solve) return;
   std::map<std::string, std::int32_t> rows;
   std::vector<std::int32_t> owner;
@@ -81,14 +82,15 @@ void print_weights(const Case& patient, const TetMesh& mesh, bool solve) {
     owner.push_back(rows.try_emplace(bone.segment, static_cast<std::int32_t>(rows.size())).first->second);
   try {
     const Certificate c = weights::solve_weights(mesh, patient, owner, rows.size(), {}, {}).certificate;
-    std::printf(" %9.1e %9.1e %6llu", c.solved_min_weight, c.solved_max_weight - 1,
-                static_cast<unsigned long long>(c.repaired_rows));
-  } catch (const Error& e) {
-    std::printf(" refused: %s", e.what());
+    cells.insert(cells.end(), {bench::exponent(c.solved_min_weight, 1),
+                               bench::exponent(c.solved_max_weight - 1, 1), std::to_string(c.repaired_rows)});
+  } catch (const Error&) {
+    cells.insert(cells.end(), {"refused", "", ""});
   }
 }
 
-void print_fits(const std::vector<bench::SurfaceFit>& all) {
+void add_fits(const std::vector<bench::SurfaceFit>& all, const std::string& mesher,
+              std::vector<std::string>& cells, std::vector<std::string>& notes) {
   const auto worst = [](const bench::SurfaceFit& f) { return std::max(f.to_mesh_p99, f.to_input_p99); };
   std::vector<double> of_bones, volumes;
   const bench::SurfaceFit* last = nullptr;
@@ -101,18 +103,23 @@ void print_fits(const std::vector<bench::SurfaceFit>& all) {
   }
   std::sort(of_bones.begin(), of_bones.end());
   std::sort(volumes.begin(), volumes.end());
-  std::printf(" | skin %.2f %+.2f %%", worst(all[0]), 100 * all[0].volume_error);
+  using bench::fixed;
+  cells.insert(cells.end(), {fixed(worst(all[0]), 2), fixed(100 * all[0].volume_error, 2)});
   if (last != nullptr)
-    std::printf(" | bones median %.2f, %zu of %zu within 0.6, worst %.2f (%s); volume median %.1f %%",
-                of_bones[of_bones.size() / 2], within, all.size() - 1, worst(*last), last->name.c_str(),
-                100 * volumes[volumes.size() / 2]);
-  std::printf("\n");
+    cells.insert(cells.end(),
+                 {fixed(of_bones[of_bones.size() / 2], 2),
+                  std::to_string(within) + " of " + std::to_string(all.size() - 1),
+                  fixed(worst(*last), 2) + " " + last->name, fixed(100 * volumes[volumes.size() / 2], 1)});
+  std::string none, thin;
   for (const bench::SurfaceFit& f : all) {
-    if (!f.there) std::printf("    %s: no tet of it\n", f.name.c_str());
+    if (!f.there) none += (none.empty() ? "" : ", ") + f.name;
     if (f.there && f.thin_share > 0.1)
-      std::printf("    %s: %.0f %% thinner than a voxel, %.2f voxel there\n", f.name.c_str(),
-                  100 * f.thin_share, f.thin_p99);
+      thin += (thin.empty() ? "" : "; ") + f.name + " " + fixed(100 * f.thin_share, 0) + " %, " +
+              fixed(f.thin_p99, 2);
   }
+  if (!none.empty()) notes.push_back(mesher + ": no tet of " + none);
+  if (!thin.empty())
+    notes.push_back(mesher + ": share that is thinner than a voxel, distance there in voxels: " + thin);
 }
 
 int run(const Settings& s) {
@@ -122,10 +129,20 @@ int run(const Settings& s) {
   options.voxel_mm = s.voxel;
   const Image labels = voxel::voxelize(patient, options, {});
   const double voxel = labels.grid.spacing[0];
-  std::printf("%s: voxels of %.3f mm, at most %lld tets\n", patient.name.c_str(), voxel,
+  std::printf("\n%s: voxels of %.3f mm, at most %lld tets\n", patient.name.c_str(), voxel,
               static_cast<long long>(s.options.max_tets));
-  std::printf("%-12s %8s %8s %8s %7s %6s %6s %6s %6s %9s%s\n", "mesher", "tets", "nodes", "seconds", "least",
-              "1 %", "most", "ratio", "mean", "offdiag %", s.weights ? "  below 0   above 1 repair" : "");
+  std::vector<bench::Column> columns{
+      {"mesher", 14}, {"tets", 8}, {"nodes", 8}, {"seconds"}, {"least deg"},
+      {"1 %"},        {"most"},    {"ratio"},    {"mean"},    {"positive off-diagonals %"}};
+  if (s.weights) columns.insert(columns.end(), {{"weights below 0"}, {"above 1"}, {"repaired"}});
+  columns.insert(columns.end(), {{"skin, voxels"},
+                                 {"skin's volume %"},
+                                 {"bones, median"},
+                                 {"within 0.6"},
+                                 {"worst", -24},
+                                 {"bones' volume, median %"}});
+  const bench::Table table(columns);
+  std::vector<std::string> notes;
   for (const std::string& name : s.meshers) {
     const auto start = std::chrono::steady_clock::now();
     TetMesh mesh;
@@ -134,19 +151,27 @@ int run(const Settings& s) {
       tet::relax_slivers(mesh, {}, {});
       tet::canonicalize(mesh);
     } catch (const Error& e) {
-      std::printf("%-12s %s\n", name.c_str(), e.what());
+      table.row({name, "refused"});
+      notes.push_back(name + ": " + e.what());
       continue;
     }
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
     const bench::Shapes shapes = bench::shapes(mesh);
-    std::printf("%-12s %8lld %8lld %8.2f %7.2f %6.1f %6.1f %6.3f %6.3f", name.c_str(),
-                static_cast<long long>(mesh.T.rows()), static_cast<long long>(mesh.V.rows()), spent.count(),
-                shapes.least_deg, shapes.hundredth_deg, shapes.greatest_deg, shapes.least_ratio,
-                shapes.mean_ratio);
-    print_weights(patient, mesh, s.weights);
-    print_fits(bench::fits(patient, mesh, voxel, kSamples));
-    std::fflush(stdout);
+    using bench::fixed;
+    std::vector<std::string> cells{name,
+                                   std::to_string(mesh.T.rows()),
+                                   std::to_string(mesh.V.rows()),
+                                   fixed(spent.count(), 2),
+                                   fixed(shapes.least_deg, 2),
+                                   fixed(shapes.hundredth_deg, 1),
+                                   fixed(shapes.greatest_deg, 1),
+                                   fixed(shapes.least_ratio, 3),
+                                   fixed(shapes.mean_ratio, 3)};
+    add_weights(patient, mesh, s.weights, cells);
+    add_fits(bench::fits(patient, mesh, voxel, kSamples), name, cells, notes);
+    table.row(cells);
   }
+  bench::print_notes(notes);
   return 0;
 }
 
@@ -158,6 +183,6 @@ int main(int argc, char** argv) {
     return run(parse(argc, argv));
   } catch (const std::exception& e) {
     std::fprintf(stderr, "error: bench_meshers: %s\n", e.what());
-    return 1;
+    return 70;
   }
 }

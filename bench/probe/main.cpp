@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // One point a millisecond through a body that streams at 90 Hz, over loopback; then 10000 points a message.
-// usage: bench_probe MODEL.hdf [SECONDS] [f32|deltas] [TISSUE...]    (10 seconds, f32, all tissues)
-// REAL_TIME=server: as under --real-time; REAL_TIME=both: and who probes likewise, as a haptic device's loop
-// does.
+// bench/probe/run calls it, and makes a table of the one JSON object that it prints.
+//
+// usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|server|both
+// The last word: whose thread is on the kernel's real-time class, the server's as under --real-time, or that
+// of who probes as well, as a haptic device's loop would be.
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -30,15 +32,18 @@ double milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
-void print(const char* what, std::vector<double> took) {
+std::string spread(std::vector<double> took) {
   std::sort(took.begin(), took.end());
   const auto at = [&](double share) {
     return took[static_cast<std::size_t>(share * static_cast<double>(took.size() - 1))];
   };
   const auto within = std::upper_bound(took.begin(), took.end(), 1.0) - took.begin();
-  std::printf("%s: %zu, p50 %.3f ms, p90 %.3f ms, p99 %.3f ms, max %.3f ms, %.1f %% within 1 ms\n", what,
-              took.size(), at(0.5), at(0.9), at(0.99), took.back(),
-              100 * static_cast<double>(within) / static_cast<double>(took.size()));
+  char out[200];
+  std::snprintf(out, sizeof out,
+                R"({"p50": %.4f, "p90": %.4f, "p99": %.4f, "most": %.4f, "within_1_ms": %.4f})", at(0.5),
+                at(0.9), at(0.99), took.back(),
+                static_cast<double>(within) / static_cast<double>(took.size()));
+  return out;
 }
 
 v1::ModelOpened open(client::Client& client) {
@@ -51,22 +56,22 @@ v1::ModelOpened open(client::Client& client) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2)
-    return std::fprintf(stderr, "usage: bench_probe MODEL.hdf [SECONDS] [f32|deltas] [TISSUE...]\n"), 64;
-  const double seconds = argc > 2 ? std::atof(argv[2]) : 10;
+  if (argc != 5)
+    return std::fprintf(stderr, "usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|server|both\n"), 64;
+  const double seconds = std::atof(argv[2]);
   const auto model = std::make_shared<const Model>(model_file::read(argv[1], Context{}));
   tbb::task_arena arena;
   server::Workers workers(2, [&](const server::Job& job) { arena.execute(job); });
   server::Options options;
   options.listen.port = 0;
   server::Server server(options, {{"body", model}}, workers);
-  const char* const named = std::getenv("REAL_TIME");
-  const std::string_view real_time = named ? named : "";
-  const auto go_first = [](bool wanted) {
-    if (wanted && !server::going_first()) std::fprintf(stderr, "the system lets nobody go first\n");
+  const std::string_view real_time = argv[4];
+  std::atomic<bool> allowed = true;
+  const auto go_first = [&allowed](bool wanted) {
+    if (wanted && !server::going_first()) allowed = false;
   };
   std::thread serving([&] {
-    go_first(!real_time.empty());
+    go_first(real_time != "nobody");
     server.run();
   });
   const wire::Address address{"127.0.0.1", server.port()};
@@ -77,9 +82,8 @@ int main(int argc, char** argv) {
   const v1::ModelOpened opened = open(poser);
   v1::Envelope subscribe;
   v1::MeshSelection& mesh = *subscribe.mutable_subscribe()->mutable_mesh();
-  const bool deltas = argc > 3 && argv[3] == std::string_view("deltas");
+  const bool deltas = argv[3] == std::string_view("deltas");
   mesh.set_encoding(deltas ? v1::ENCODING_U16_DELTA : v1::ENCODING_F32);
-  for (int i = 4; i < argc; ++i) mesh.add_tissues(argv[i]);
   poser.call(subscribe);
   std::thread posing([&] {
     auto due = Clock::now();
@@ -135,12 +139,12 @@ int main(int argc, char** argv) {
     std::this_thread::sleep_until(due);
   }
   const double took = milliseconds(Clock::now() - start) / 1000;
-  std::printf("%.1f probes and %.1f frames a second of %zu bytes so far\n",
-              static_cast<double>(one.size()) / took, static_cast<double>(frames - before) / took,
-              static_cast<std::size_t>(poser.bytes_received()));
+  const double probed = static_cast<double>(one.size()) / took;
+  const double seen = static_cast<double>(frames - before) / took;
   for (int i = 0; i < 50; ++i) many.push_back(ask(10000));
-  print("1 point", one);
-  print("10000 points", many);
+  std::printf(R"({"allowed": %s, "probes": %.1f, "frames": %.1f, "one": %s, "many": %s})"
+              "\n",
+              allowed ? "true" : "false", probed, seen, spread(one).c_str(), spread(many).c_str());
   done = true;
   posing.join();
   server.stop();

@@ -15,6 +15,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/probe.hpp>
+#include "bench/table.hpp"
 #include "core/kinematics/retarget.hpp"
 #include "io/motion/bvh.hpp"
 #include "runtime/quality/bone_tets.hpp"
@@ -113,10 +114,15 @@ void measure(const std::string& path, const std::string& walk, double step) {
   const auto model = std::make_shared<const Model>(model_file::read(path, Context{}));
   const runtime::Probe probe(model);
   const BonePoints bones = points_in_bones(*model, probe, step);
-  std::printf("%s: %zu tets, %zu contested, %zu points in bones\n", path.c_str(), model->tet_count(),
+  std::printf("\n%s: %zu tets, %zu contested, %zu points in bones\n", path.c_str(), model->tet_count(),
               model->contested.size(), bones.segment.size());
-  std::printf("  %-12s %9s %9s %9s %12s %14s %9s\n", "pose", "bone tets", "inverted", "changed", "worst mm",
-              "CT bone off %", "worst mm");
+  const Table table({{"pose", 12},
+                     {"bone tets"},
+                     {"inverted"},
+                     {"changed"},
+                     {"worst mm"},
+                     {"CT bone off %"},
+                     {"worst mm"}});
   const runtime::BodyPoser poser(model);
   runtime::PosedBody body = poser.make_frame();
   runtime::Probe::PosedTree tree;
@@ -126,11 +132,9 @@ void measure(const std::string& path, const std::string& walk, double step) {
     const runtime::BoneTets tets = runtime::measure_bone_tets(*model, body.nodes);
     probe.follow(body.nodes, tree);
     const Wrong wrong = wrong_points(bones, body.segments, probe, tree);  // clamped as the tets were
-    std::printf("  %-12s %9llu %9llu %9llu %12.2e %14.3f %9.1f\n", pose.name.c_str(),
-                static_cast<unsigned long long>(tets.count), static_cast<unsigned long long>(tets.inverted),
-                static_cast<unsigned long long>(tets.changed), tets.largest_change_mm, 100 * wrong.share,
-                wrong.worst_mm);
-    std::fflush(stdout);
+    table.row({pose.name, std::to_string(tets.count), std::to_string(tets.inverted),
+               std::to_string(tets.changed), exponent(tets.largest_change_mm, 2), fixed(100 * wrong.share, 3),
+               fixed(wrong.worst_mm, 1)});
   }
 }
 

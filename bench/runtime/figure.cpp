@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <vector>
 
 namespace ecorche::bench {
@@ -20,13 +19,23 @@ Figure time(int frames, const std::function<void(int)>& work) {
   return {ms[ms.size() / 2], ms.front(), ms.back()};
 }
 
-void line(const std::string& what, int threads, const Figure& figure, double floor_ms, double against) {
-  std::printf("  %-38s %d thread%s %8.3f ms (%.3f .. %.3f)", what.c_str(), threads, threads == 1 ? " " : "s",
-              figure.median, figure.best, figure.worst);
-  if (floor_ms > 0) std::printf(", floor %7.3f, x%.2f", floor_ms, figure.median / floor_ms);
-  if (against > 0) std::printf(", plain Eigen x%.1f slower", against / figure.median);
-  std::printf("\n");
-  std::fflush(stdout);
+Table table_of_times() {
+  return Table({{"what", 48},
+                {"threads"},
+                {"median ms", 9},
+                {"best", 9},
+                {"worst", 9},
+                {"floor ms", 8},
+                {"over floor"},
+                {"plain Eigen"}});
+}
+
+void line(const Table& table, const std::string& what, int threads, const Figure& figure, double floor_ms,
+          double against) {
+  table.row({what, std::to_string(threads), fixed(figure.median, 3), fixed(figure.best, 3),
+             fixed(figure.worst, 3), floor_ms > 0 ? fixed(floor_ms, 3) : "",
+             floor_ms > 0 ? fixed(figure.median / floor_ms, 2) : "",
+             against > 0 ? fixed(against / figure.median, 1) + " x" : ""});
 }
 
 }  // namespace ecorche::bench

@@ -150,14 +150,14 @@ class Bench {
     const auto& clusters = parts_.clusters();
     std::size_t vertices = 0;
     for (const Tissue& tissue : model_->tissues) vertices += static_cast<std::size_t>(tissue.V.rows());
-    std::printf("%s: %zu tets, %zu nodes (%.0f %% needed by tissues), %zu segments, %zu tissue vertices\n",
+    std::printf("- %s: %zu tets, %zu nodes (%.0f %% needed by tissues), %zu segments, %zu tissue vertices\n",
                 model_->name.c_str(), model_->tet_count(), clusters.nodes,
                 100.0 * static_cast<double>(clusters.needed) / static_cast<double>(clusters.nodes),
                 model_->segment_count(), vertices);
-    std::printf("palette of a cluster %.2f segments; instruction set %s; %zu copies in turn\n",
+    std::printf("- palette of a cluster %.2f segments; instruction set %s; %zu copies in turn\n",
                 static_cast<double>(clusters.palette.size()) / static_cast<double>(clusters.clusters()),
                 hwy::TargetName(hwy::SupportedAndGeneratedTargets().front()), copies_);
-    std::printf("MiB of a frame: LBS, DQS %.2f, CoR %.2f, tissues %.2f, u16 %.2f, normals %.2f\n",
+    std::printf("- MiB of a frame: LBS, DQS %.2f, CoR %.2f, tissues %.2f, u16 %.2f, normals %.2f\n",
                 bytes_.nodes[0] / kMib, bytes_.nodes[2] / kMib, bytes_.tissues / kMib,
                 bytes_.quantised / kMib, bytes_.normals / kMib);
   }
@@ -165,21 +165,22 @@ class Bench {
  private:
   void run_here(int threads) {
     const double gbs = bandwidth(4 * 3 * last_cache() / kMib);
-    std::printf("%d thread%s: memory %.1f GB/s\n", threads, threads == 1 ? "" : "s", gbs);
-    if (wishes_.has("skin")) time_skin(threads, gbs);
-    if (wishes_.has("walk")) time_walk(threads);
+    std::printf("\n%d thread%s: memory %.1f GB/s\n", threads, threads == 1 ? "" : "s", gbs);
+    const Table table = table_of_times();
+    if (wishes_.has("skin")) time_skin(table, threads, gbs);
     runtime::PosedBody& frame = posed(7);
-    if (wishes_.has("quality")) time_quality(frame, threads);
-    if (wishes_.has("probe")) time_probe(model_, frame.nodes, threads);
-    if (wishes_.has("volume")) time_volumes(model_, frame.nodes, threads);
+    if (wishes_.has("quality")) time_quality(table, frame, threads);
+    if (wishes_.has("probe")) time_probe(table, model_, frame.nodes, threads);
+    if (wishes_.has("volume")) time_volumes(table, model_, frame.nodes, threads);
+    if (wishes_.has("walk")) time_walk(threads);
   }
 
-  void time_skin(int threads, double gbs) {
+  void time_skin(const Table& table, int threads, double gbs) {
     const auto floor_of = [&](double bytes) { return bytes / gbs / 1e6; };
     const std::vector<std::uint32_t> needed = needed_clusters();
     for (const Skinning skinning : kAll) {
       const Figure figure = time(kFrames, [&](int f) { skin(skinning, needed, f); });
-      line((std::string("nodes, ") + std::string(runtime::skinning_name(skinning))).c_str(), threads, figure,
+      line(table, std::string("nodes, ") + std::string(runtime::skinning_name(skinning)), threads, figure,
            floor_of(bytes_.nodes[static_cast<std::size_t>(skinning)]), plain_nodes(skinning));
     }
     const double plain = time(9, [&](int f) {
@@ -189,16 +190,24 @@ class Bench {
     std::size_t all = 0;
     for (const Tissue& tissue : model_->tissues) all += static_cast<std::size_t>(tissue.V.rows());
     const double body = bytes_.nodes[2] + bytes_.tissues;
-    line("frame, CoR, float32", threads, frames(plain_frames_), floor_of(body + size_of(all, 12)), plain);
-    line("frame, CoR, u16", threads, frames(wire_frames_), floor_of(body + bytes_.quantised), plain);
-    line("frame, CoR, u16 and normals", threads, frames(full_frames_),
+    line(table, "frame, CoR, float32", threads, frames(plain_frames_), floor_of(body + size_of(all, 12)),
+         plain);
+    line(table, "frame, CoR, u16", threads, frames(wire_frames_), floor_of(body + bytes_.quantised), plain);
+    line(table, "frame, CoR, u16 and normals", threads, frames(full_frames_),
          floor_of(body + bytes_.quantised + bytes_.normals));
-    line("plain Eigen, CoR, float32", threads, {plain, plain, plain}, 0);
+    line(table, "plain Eigen, CoR, float32", threads, {plain, plain, plain}, 0);
   }
 
   // As Sujar18 table 2: all tissues as float32, frames a second over a walk and in its worst frame.
   void time_walk(int threads) {
     const std::vector<Pose>& walk = walk_.empty() ? poses_ : walk_;
+    const Table table(
+        {{(walk_.empty() ? "own swing, " : "walk, ") + std::to_string(walk.size()) + " frames", 24},
+         {"threads"},
+         {"mean ms", 8},
+         {"a second"},
+         {"worst ms", 8},
+         {"a second"}});
     for (const Skinning skinning : kAll) {
       double sum = 0, worst = 0;
       for (std::size_t f = 0; f < walk.size() + 3; ++f) {
@@ -210,11 +219,8 @@ class Bench {
         worst = std::max(worst, took.count());
       }
       const double mean = sum / static_cast<double>(walk.size());
-      std::printf(
-          "  %s, %zu frames, %-18s %d thread%s mean %.3f ms, %.0f a second; worst %.3f ms, %.0f a second\n",
-          walk_.empty() ? "own swing" : "walk", walk.size(),
-          std::string(runtime::skinning_name(skinning)).c_str(), threads, threads == 1 ? " " : "s", mean,
-          1000 / mean, worst, 1000 / worst);
+      table.row({std::string(runtime::skinning_name(skinning)), std::to_string(threads), fixed(mean, 3),
+                 fixed(1000 / mean, 0), fixed(worst, 3), fixed(1000 / worst, 0)});
     }
   }
 
@@ -226,12 +232,12 @@ class Bench {
     return frame;
   }
 
-  void time_quality(const runtime::PosedBody& frame, int threads) {
+  void time_quality(const Table& table, const runtime::PosedBody& frame, int threads) {
     const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model_);
-    line("quality, all tets and tissues", threads,
+    line(table, "quality, all tets and tissues", threads,
          time(9, [&](int) { runtime::measure(*model_, frame, posers_[0]->all_tissues(), {}, closed); }));
     const runtime::QualityMeter meter(model_);
-    line("quality, subset of tets", threads,
+    line(table, "quality, subset of tets", threads,
          time(kFrames, [&](int) { meter.measure(frame, posers_[0]->all_tissues()); }));
   }
 

@@ -37,24 +37,28 @@ void write(const std::filesystem::path& path, const HungPoints& points,
 
 }  // namespace
 
-std::string armature_by_blender(const std::string& blender, const std::string& script,
-                                const HungPoints& points, std::span<const std::vector<Motion>> frames) {
+std::vector<std::string> armature_by_blender(const std::string& blender, const std::string& script,
+                                             const HungPoints& points,
+                                             std::span<const std::vector<Motion>> frames) {
   const std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("bench_runtime_" + std::to_string(getpid()) + ".bin");
   write(path, points, frames);
   const std::string command =
       "'" + blender + "' -b --factory-startup --python '" + script + "' -- '" + path.string() + "' 2>&1";
-  std::string out, last;
+  std::vector<std::string> out;
+  std::string last;
   if (FILE* pipe = popen(command.c_str(), "r")) {
     char text[1024];
     while (std::fgets(text, sizeof text, pipe) != nullptr) {
       last = text;
-      if (last.starts_with("  ")) out += last;
+      while (last.ends_with('\n')) last.pop_back();
+      if (last.starts_with("  ")) out.push_back(last.substr(2));
     }
     pclose(pipe);
   }
   std::filesystem::remove(path);
-  return out.empty() ? "  Blender: " + last : out;
+  if (out.empty()) out.push_back("Blender: " + last);
+  return out;
 }
 
 }  // namespace ecorche::bench

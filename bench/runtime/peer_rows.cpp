@@ -62,13 +62,21 @@ double worst_apart(const SkinningPeer& peer, std::span<const float> posed, std::
   return std::sqrt(worst);
 }
 
-void row(const std::string& name, const std::string& threads, const Figure& figure, double ours) {
-  std::printf("  %-44s %-9s %9.3f ms (%.3f .. %.3f), ours %.3f: x%.1f faster", name.c_str(), threads.c_str(),
-              figure.median, figure.best, figure.worst, ours, figure.median / ours);
+Table table_of_peers() {
+  return Table({{"peer", 48},
+                {"threads"},
+                {"median ms", 9},
+                {"best", 9},
+                {"worst", 9},
+                {"ours ms", 8},
+                {"ours faster"},
+                {"apart", -20}});
 }
 
-std::string threads_of(std::size_t threads) {
-  return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
+void row(const Table& table, const std::string& name, std::size_t threads, const Figure& figure, double ours,
+         const std::string& apart) {
+  table.row({name, std::to_string(threads), fixed(figure.median, 3), fixed(figure.best, 3),
+             fixed(figure.worst, 3), fixed(ours, 3), fixed(figure.median / ours, 1) + " x", apart});
 }
 
 }  // namespace
@@ -77,7 +85,7 @@ void skinning_peers(const OurSkinning& ours) {
   const HungPoints points = hung_points(ours.model, ours.clusters);
   std::vector<std::vector<Motion>> frames;
   for (const auto& frame : ours.frames) frames.push_back(motions_of(frame));
-  std::printf("peers on the %zu nodes that tissues need, %.2f weights each\n", points.points(),
+  std::printf("\nPeers on the %zu nodes that tissues need, %.2f weights each\n", points.points(),
               static_cast<double>(points.weight.size()) / static_cast<double>(points.points()));
   std::vector<std::string> absent;
   Peers peers;
@@ -97,31 +105,33 @@ void skinning_peers(const OurSkinning& ours) {
 #else
   absent.emplace_back("VTK");
 #endif
+  const Table table = table_of_peers();
   for (const auto& peer : peers) {
     const auto skinning = peer->dqs ? runtime::Skinning::dqs : runtime::Skinning::lbs;
     const Figure figure = time(kFrames, [&](int f) { peer->pose(frames[static_cast<std::size_t>(f)]); });
     const Figure mine = ours.time(skinning, static_cast<int>(peer->threads));
-    row(peer->name, threads_of(peer->threads), figure, mine.median);
     peer->pose(frames[7]);
-    std::printf("; apart by at most %.3f mm\n", worst_apart(*peer, ours.posed(skinning, 7), points.points()));
-    std::fflush(stdout);
+    row(table, peer->name, peer->threads, figure, mine.median,
+        "at most " + fixed(worst_apart(*peer, ours.posed(skinning, 7), points.points()), 3) + " mm");
   }
 #ifdef ECORCHE_BLENDER
-  std::printf("%s", armature_by_blender(ECORCHE_BLENDER, ECORCHE_BLENDER_SCRIPT, points,
-                                        std::span(frames).first(std::min(kBlenderFrames, frames.size())))
-                        .c_str());
+  std::vector<std::string> notes =
+      armature_by_blender(ECORCHE_BLENDER, ECORCHE_BLENDER_SCRIPT, points,
+                          std::span(frames).first(std::min(kBlenderFrames, frames.size())));
   for (const auto skinning : {runtime::Skinning::lbs, runtime::Skinning::dqs}) {
-    const std::string name(runtime::skinning_name(skinning));
-    line("    ours, " + name, 2, ours.time(skinning, 2));
+    notes.push_back("ours beside Blender, " + std::string(runtime::skinning_name(skinning)) + ": 2 threads " +
+                    fixed(ours.time(skinning, 2).median, 3) + " ms");
   }
   const std::span<const float> last =
       ours.posed(runtime::Skinning::lbs, static_cast<int>(std::min(kBlenderFrames, frames.size())) - 1);
-  std::printf("    ours, LBS: the first point ends at %.2f %.2f %.2f\n", static_cast<double>(last[0]),
-              static_cast<double>(last[1]), static_cast<double>(last[2]));
+  notes.push_back("ours, LBS: the first point ends at " + fixed(static_cast<double>(last[0]), 2) + " " +
+                  fixed(static_cast<double>(last[1]), 2) + " " + fixed(static_cast<double>(last[2]), 2));
 #else
+  std::vector<std::string> notes;
   absent.emplace_back("Blender");
 #endif
-  for (const std::string& name : absent) std::printf("  not here: %s\n", name.c_str());
+  for (const std::string& name : absent) notes.push_back("not here: " + name);
+  print_notes(notes);
 }
 
 void volume_peers(const Model& model, std::span<const float> nodes, const ModelVolume& volume,
@@ -139,12 +149,14 @@ void volume_peers(const Model& model, std::span<const float> nodes, const ModelV
                       nodes,
                       {model.tets.data(), static_cast<std::size_t>(model.tets.size())},
                       vectors};
-  const std::string all = threads_of(2);
-  std::printf("peers on a volume of %d x %d x %d, 8 bit; ours inverts and samples, trilinear\n", grid.size[0],
-              grid.size[1], grid.size[2]);
+  std::printf("\nPeers on a volume of %d x %d x %d, 8 bit; ours inverts and samples, trilinear\n",
+              grid.size[0], grid.size[1], grid.size[2]);
+  const Table table = table_of_peers();
+  std::vector<std::string> notes;
 #ifdef ECORCHE_PEER_VTK
   const VtkProbed probed = probe_by_vtk(job);
-  row(probed.name + ", the rest places alone", all, {probed.ms, probed.ms, probed.ms}, ours);
+  row(table, probed.name + ", the rest places alone", 2, {probed.ms, probed.ms, probed.ms}, ours,
+      "see below");
   std::size_t held = 0, other = 0, apart = 0;
   for (std::size_t v = 0; v < map.tet.size(); ++v) {
     const bool mine = map.tet[v] != runtime::InverseMap::none;
@@ -167,25 +179,25 @@ void volume_peers(const Model& model, std::span<const float> nodes, const ModelV
       apart += worst > 0.05 ? 1 : 0;
     }
   }
-  std::printf(
-      "; of %zu voxels within, %zu are outside for one of the two, %zu lie more than 0.05 voxel apart "
-      "(folds)\n",
-      held, other, apart);
+  notes.push_back(probed.name + ": of " + std::to_string(held) + " voxels within, " + std::to_string(other) +
+                  " are outside for one of the two, " + std::to_string(apart) +
+                  " lie more than 0.05 voxel apart (folds)");
 #else
-  std::printf("  not here: VTK\n");
+  notes.emplace_back("not here: VTK");
 #endif
 #ifdef ECORCHE_PEER_ITK
   const ItkWarped warped = warp_by_itk(job);
-  row(warped.name, all, {warped.ms, warped.ms, warped.ms}, ours);
   std::size_t differ = 0;
   const std::span<const std::uint8_t> mine = posed.scalars<std::uint8_t>();
   for (std::size_t v = 0; v < warped.values.size(); ++v) {
     differ += map.tet[v] != runtime::InverseMap::none && std::abs(warped.values[v] - mine[v]) > 1 ? 1 : 0;
   }
-  std::printf("; %zu voxels within differ by more than 1\n", differ);
+  row(table, warped.name, 2, {warped.ms, warped.ms, warped.ms}, ours,
+      std::to_string(differ) + " voxels by more than 1");
 #else
-  std::printf("  not here: ITK\n");
+  notes.emplace_back("not here: ITK");
 #endif
+  print_notes(notes);
 }
 
 }  // namespace ecorche::bench

@@ -85,7 +85,8 @@ ItkWarped warp_by_itk(const PosedGrid& grid);
 
 /// Lines that Blender's armature printed for the same points, through a file and `script`; what went wrong
 /// else.
-std::string armature_by_blender(const std::string& blender, const std::string& script,
-                                const HungPoints& points, std::span<const std::vector<Motion>> frames);
+std::vector<std::string> armature_by_blender(const std::string& blender, const std::string& script,
+                                             const HungPoints& points,
+                                             std::span<const std::vector<Motion>> frames);
 
 }  // namespace ecorche::bench

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include <ecorche/runtime/probe.hpp>
-#include "bench/runtime/figure.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -35,7 +34,8 @@ void draw_points(const Model& model, std::span<const float> nodes, std::size_t c
 
 }  // namespace
 
-void time_probe(const std::shared_ptr<const Model>& model, std::span<const float> nodes, int threads) {
+void time_probe(const Table& table, const std::shared_ptr<const Model>& model, std::span<const float> nodes,
+                int threads) {
   const runtime::Probe probe(model);
   std::vector<float> rest, posed;
   draw_points(*model, nodes, 10000, rest, posed);
@@ -43,24 +43,25 @@ void time_probe(const std::shared_ptr<const Model>& model, std::span<const float
   runtime::Probed out;
   runtime::ProbeWants wants{.gradient = true};
   for (std::uint32_t v = 0; v < model->volumes.size(); ++v) wants.volumes.push_back({v});
-  line("probe: a new pose", threads, time(30, [&](int) { probe.follow(nodes, tree); }));
-  line("  a new pose and one point", threads, time(30, [&](int f) {
+  line(table, "probe: a new pose", threads, time(30, [&](int) { probe.follow(nodes, tree); }));
+  line(table, "probe: a new pose and one point", threads, time(30, [&](int f) {
          probe.follow(nodes, tree);
          probe.posed_to_rest(tree, std::span(posed).subspan(3 * static_cast<std::size_t>(f), 3), wants, out);
        }));
-  line("  10 000 points back, where they were", threads,
+  line(table, "probe: 10 000 points back, where they were", threads,
        time(30, [&](int) { probe.posed_to_rest(tree, posed, {}, out); }));
-  line("  and their F and volumes", threads,
+  line(table, "probe: 10 000 back, F and volumes", threads,
        time(30, [&](int) { probe.posed_to_rest(tree, posed, wants, out); }));
-  line("  new pose, 10 000 back, F and volumes", threads, time(30, [&](int) {
+  line(table, "probe: new pose, 10 000 back, F and volumes", threads, time(30, [&](int) {
          probe.follow(nodes, tree);
          probe.posed_to_rest(tree, posed, wants, out);
        }));
-  line("  10 000 points there, where they went", threads,
+  line(table, "probe: 10 000 points there, where they went", threads,
        time(30, [&](int) { probe.rest_to_posed(tree, rest, {}, out); }));
   wants.tissue = true;
-  line("  and their tissues", threads, time(30, [&](int) { probe.posed_to_rest(tree, posed, wants, out); }));
-  line("  10 000 points there, all of it", threads,
+  line(table, "probe: 10 000 back, F, volumes and tissues", threads,
+       time(30, [&](int) { probe.posed_to_rest(tree, posed, wants, out); }));
+  line(table, "probe: 10 000 points there, all of it", threads,
        time(30, [&](int) { probe.rest_to_posed(tree, rest, wants, out); }));
 }
 

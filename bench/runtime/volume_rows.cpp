@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <string>
 
 #include <ecorche/runtime/resample.hpp>
@@ -36,23 +35,25 @@ ModelVolume sampled_on(const ImageGrid& fine, const std::string& name, bool wide
   return out;
 }
 
-void time_slow_twins(const Model& model, std::span<const float> nodes, const ModelVolume& volume,
-                     int threads) {
+void time_slow_twins(const Table& table, const Model& model, std::span<const float> nodes,
+                     const ModelVolume& volume, int threads) {
   runtime::InverseMap map;
   const ImageGrid grid = volume.image.grid;
-  std::printf("  volume %s on its rest grid, %d x %d x %d\n", volume.name.c_str(),
-              static_cast<int>(grid.size[0]), static_cast<int>(grid.size[1]), static_cast<int>(grid.size[2]));
-  line("  inverse map", threads, time(3, [&](int) { runtime::locate(model, nodes, grid, map); }));
-  line("  trilinear samples", threads,
+  const std::string where = "volume " + volume.name + ", " + std::to_string(grid.size[0]) + " x " +
+                            std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]);
+  line(table, where + ": slow inverse map", threads,
+       time(3, [&](int) { runtime::locate(model, nodes, grid, map); }));
+  line(table, where + ": slow trilinear samples", threads,
        time(3, [&](int) { runtime::resample(model, nodes, map, volume, runtime::Sampling::trilinear); }));
 }
 
 }  // namespace
 
-void time_volumes(const std::shared_ptr<const Model>& model, std::span<const float> nodes, int threads) {
+void time_volumes(const Table& table, const std::shared_ptr<const Model>& model, std::span<const float> nodes,
+                  int threads) {
   if (model->volumes.empty()) return;
   const ModelVolume& volume = model->volumes.front();
-  time_slow_twins(*model, nodes, volume, threads);
+  time_slow_twins(table, *model, nodes, volume, threads);
   const runtime::VolumePoser poser(model);
   runtime::VolumePoser::Scratch scratch;
   const ImageGrid fine = resized(volume.image.grid, kFine);
@@ -67,15 +68,16 @@ void time_volumes(const std::shared_ptr<const Model>& model, std::span<const flo
                               (sampling == runtime::Sampling::nearest ? " bit, nearest" : " bit, trilinear");
       const auto row = [&](const std::string& name, const ImageGrid& grid, int runs) {
         Image out;
-        line(std::string("  ").append(name).append(", ").append(how), threads,
+        line(table, std::string(name).append(", ").append(how), threads,
              time(runs, [&](int) { poser.pose(nodes, sampled, sampling, grid, out, scratch); }));
       };
       row("290 x 169 x 940", fine, 5);
       row("slice of 512 x 512", slice, 15);
       row("region of 256^3", region, 5);
-      line("    its samples alone", threads, samples_alone(sampled, sampling, region));
+      line(table, "region of 256^3, " + how + ", its samples alone", threads,
+           samples_alone(sampled, sampling, region));
       if (sampling == runtime::Sampling::nearest)
-        line("    its bytes copied", threads, copy_alone(sampled, region));
+        line(table, "region of 256^3, its bytes copied", threads, copy_alone(sampled, region));
     }
   }
 }

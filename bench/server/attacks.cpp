@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdio>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -21,6 +20,7 @@
 #include <ecorche/wire/framing.hpp>
 #include "bench/server/served.hpp"
 #include "bench/server/walking.hpp"
+#include "bench/table.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -185,22 +185,30 @@ Seen look(const Served& served, double seconds) {
   return seen;
 }
 
-void print(const std::string& what, const Seen& seen) {
-  const auto column = [](const std::vector<double>& ms) {
-    std::printf(" %8.1f / %8.1f", quantile(ms, 0.5),
-                ms.empty() ? 0 : *std::max_element(ms.begin(), ms.end()));
-  };
-  std::printf("%-58s %4zu", what.c_str(), seen.frame_ms.size());
-  for (const auto* ms : {&seen.frame_ms, &seen.socket_ms, &seen.health_ms}) column(*ms);
-  std::printf("  %6d  %6.0f\n", seen.failed, seen.most_mib);
-  std::fflush(stdout);
+void add(const Table& table, const std::string& what, const Seen& seen) {
+  std::vector<std::string> cells{what, std::to_string(seen.frame_ms.size())};
+  for (const auto* ms : {&seen.frame_ms, &seen.socket_ms, &seen.health_ms}) {
+    cells.push_back(fixed(quantile(*ms, 0.5), 1));
+    cells.push_back(fixed(ms->empty() ? 0 : *std::max_element(ms->begin(), ms->end()), 1));
+  }
+  cells.push_back(std::to_string(seen.failed));
+  cells.push_back(fixed(seen.most_mib, 0));
+  table.row(cells);
 }
 
 }  // namespace
 
 void attacks(const std::string& program, const std::string& model, double seconds) {
-  std::printf("%-58s %4s %19s %19s %19s  %6s  %6s\n", "attack", "new", "first frame p50/max",
-              "WebSocket p50/max", "/healthz p50/max", "failed", "MiB");
+  const Table table({{"attack", 48},
+                     {"newcomers"},
+                     {"first frame p50 ms (wanted: 100)"},
+                     {"most"},
+                     {"WebSocket p50 ms"},
+                     {"most"},
+                     {"/healthz p50 ms"},
+                     {"most"},
+                     {"failed (wanted: 0)"},
+                     {"MiB"}});
   const auto row = [&](const std::string& what,
                        const std::function<void(const Served&, const std::atomic<bool>&)>& attack,
                        int threads) {
@@ -212,7 +220,7 @@ void attacks(const std::string& program, const std::string& model, double second
       attacking.push_back(
           std::make_unique<Attack>([&](const std::atomic<bool>& stop) { attack(served, stop); }));
     if (threads > 0) std::this_thread::sleep_for(std::chrono::seconds(1));
-    print(what, look(served, seconds));
+    add(table, what, look(served, seconds));
   };
   row(
       "none", [](const Served&, const std::atomic<bool>&) {}, 0);

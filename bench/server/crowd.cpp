@@ -11,51 +11,21 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <numeric>
-#include <utility>
 
-#include <ecorche/values/error.hpp>
 #include <ecorche/wire/convert.hpp>
+#include "bench/server/crowd_member.hpp"
 #include "bench/server/walking.hpp"
 
 namespace ecorche::bench {
 namespace {
 
 constexpr std::size_t kScratch = 256 << 10;  // stays in the second-level cache
-constexpr std::size_t kStride = 90;          // poses of the stride, one a 90th of a second
-constexpr std::size_t kRemembered = 1024;    // when poses were sent
-constexpr double kKernelRounding = 1e-3;     // mm; as app/stream_check
-
-Error refused(const std::string& what) {
-  return Error(ErrorKind::temporary, "bench", what, "see the server");
-}
-
 void append_varint(std::string& out, std::uint64_t value) {
   for (; value >= 128; value >>= 7) out.push_back(static_cast<char>(value | 128));
   out.push_back(static_cast<char>(value));
 }
-
-std::uint32_t load_u32(const char* p) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, p, 4);
-  return value;
-}
-
-// Poses of a session: when each was sent.
-class Times {
- public:
-  void note(std::uint64_t sequence, Clock::time_point now) { at_[sequence % kRemembered] = {sequence, now}; }
-  const Clock::time_point* find(std::uint64_t sequence) const {
-    const auto& entry = at_[sequence % kRemembered];
-    return entry.first == sequence && sequence > 0 ? &entry.second : nullptr;
-  }
-
- private:
-  std::array<std::pair<std::uint64_t, Clock::time_point>, kRemembered> at_{};
-};
 
 }  // namespace
 
@@ -76,40 +46,6 @@ void Arrived::add(const Arrived& other) {
   unjudged += other.unjudged;
   if (!other.error.empty()) error = other.error;
 }
-
-struct Crowd::Held {
-  v1::MeshFrame frame;
-  wire::Payload payload;
-};
-
-struct Crowd::Member {
-  Asked asked;
-  int fd = -1;
-  std::size_t vertices = 0;
-  std::uint64_t sequence = 0;
-  Clock::time_point due{};
-  std::shared_ptr<Times> times;
-  std::string head;            // of the present frame, as far as it came
-  std::size_t head_bytes = 0;  // 0: not known yet
-  std::uint32_t envelope_bytes = 0;
-  std::size_t payload_left = 0, payload_bytes = 0;
-  bool keeps = false;  // the present frame's payload
-  wire::Payload payload;
-  v1::Envelope envelope;
-  std::vector<Held> held;  // to be checked
-  wire::MeshDecoder decoder;
-  std::vector<wire::DecodedTissue> decoded;
-  std::uint64_t seen = 0;
-  std::uint64_t last = 0;  // pose of the last frame
-  Arrived arrived;
-
-  void say(const std::string& bytes) const {
-    // Small and rare beside what the socket's buffer holds.
-    if (send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(bytes.size()) &&
-        errno != EPIPE && errno != ECONNRESET)
-      throw refused("the server does not read");
-  }
-};
 
 Crowd::Crowd(const wire::Address& address, std::shared_ptr<const Model> model)
     : address_(address), scratch_(kScratch), epoll_(epoll_create1(EPOLL_CLOEXEC)) {
@@ -189,7 +125,7 @@ std::size_t Crowd::join(const Asked& asked) {
     if (other && !asked.session.empty() && other->asked.session == asked.session)
       member->times = other->times;
   }
-  if (!member->times) member->times = std::make_shared<Times>();
+  if (!member->times) member->times = std::make_shared<PoseTimes>();
   // Clients do not all pose at the same moment.
   const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / std::max(asked.rate, 1.0)));
   member->due = Clock::now() + std::chrono::milliseconds(200) +
@@ -274,7 +210,6 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
   }
 }
 
-// The whole pose: the turns as they were encoded once, then what differs, which Protobuf merges.
 // Where the walk has come to.
 Eigen::Vector3d Crowd::place_of(const Asked& asked, std::uint64_t sequence) const {
   Eigen::Vector3d place = walking(rig_, static_cast<double>(sequence) / kStride).root_translation;
@@ -282,6 +217,7 @@ Eigen::Vector3d Crowd::place_of(const Asked& asked, std::uint64_t sequence) cons
   return place;
 }
 
+// The whole pose: the turns as they were encoded once, then what differs, which Protobuf merges.
 void Crowd::pose(Member& member) {
   const auto now = Clock::now();
   const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / member.asked.rate));
@@ -307,118 +243,6 @@ void Crowd::pose(Member& member) {
   ++member.arrived.sent;
   member.times->note(member.sequence, now);
   member.say(frame);
-}
-
-void Crowd::take(Member& member) {
-  if (member.fd < 0) return;
-  const ssize_t got = recv(member.fd, scratch_.data(), scratch_.size(), MSG_DONTWAIT);
-  if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return fail(member, "the server hung up");
-  std::size_t at = 0;
-  const auto size = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
-  while (at < size && member.fd >= 0) {
-    if (member.payload_left > 0) {
-      const std::size_t n = std::min(member.payload_left, size - at);
-      if (member.keeps)
-        member.payload.insert(member.payload.end(), scratch_.begin() + static_cast<std::ptrdiff_t>(at),
-                              scratch_.begin() + static_cast<std::ptrdiff_t>(at + n));
-      at += n;
-      member.payload_left -= n;
-      if (member.payload_left == 0) arrive(member);
-      continue;
-    }
-    const std::size_t want = (member.head_bytes == 0 ? 8 : member.head_bytes) - member.head.size();
-    const std::size_t n = std::min(want, size - at);
-    member.head.append(reinterpret_cast<const char*>(scratch_.data()) + at, n);
-    at += n;
-    if (n < want) continue;
-    if (member.head_bytes == 0) {
-      member.envelope_bytes = load_u32(member.head.data());
-      member.payload_bytes = load_u32(member.head.data() + 4);
-      member.head_bytes = wire::aligned(8 + member.envelope_bytes);
-      continue;
-    }
-    finish_head(member);
-  }
-}
-
-void Crowd::finish_head(Member& member) {
-  if (!member.envelope.ParseFromArray(member.head.data() + 8, static_cast<int>(member.envelope_bytes)))
-    return fail(member, "no envelope");
-  member.head.clear();
-  member.head_bytes = 0;
-  member.payload_left = member.payload_bytes;
-  const v1::Envelope& envelope = member.envelope;
-  if (envelope.has_status() && envelope.status().code() != 0)
-    return fail(member, envelope.status().message());
-  if (envelope.has_goodbye()) return fail(member, envelope.goodbye().status().message());
-  if (envelope.has_pose_ack() && envelope.pose_ack().status().code() != 0)
-    return fail(member, envelope.pose_ack().status().message());
-  member.keeps = false;
-  if (envelope.has_mesh_frame()) {
-    const v1::MeshFrame& frame = envelope.mesh_frame();
-    const std::uint64_t each = member.asked.check_each;
-    ++member.seen;
-    member.keeps = poser_ && each > 0 && (member.seen % each == 0 || frame.keyframe() == frame.frame());
-    member.payload.clear();
-    member.payload.reserve(member.keeps ? member.payload_bytes : 0);
-  }
-  if (member.payload_left == 0) arrive(member);
-}
-
-void Crowd::arrive(Member& member) {
-  if (!member.envelope.has_mesh_frame()) return;
-  const v1::MeshFrame& frame = member.envelope.mesh_frame();
-  const auto now = Clock::now();
-  v1::Envelope answer;
-  answer.mutable_frame_ack()->set_subscription(frame.subscription());
-  answer.mutable_frame_ack()->set_frame(frame.frame());
-  member.say(wire::encode(answer).head);
-  ++member.arrived.frames;
-  if (member.last > 0 && frame.pose_sequence() > member.last)
-    member.arrived.unseen += frame.pose_sequence() - member.last - 1;
-  member.last = frame.pose_sequence();
-  member.arrived.bytes += member.payload_bytes;
-  member.arrived.posed_ms.push_back(static_cast<double>(frame.timings().posed()) / 1e3);
-  member.arrived.encoded_ms.push_back(static_cast<double>(frame.timings().encoded()) / 1e3);
-  if (!frame.has_quality()) ++member.arrived.unjudged;
-  member.arrived.judged_ago.push_back(
-      static_cast<double>(frame.pose_sequence() - frame.quality().pose_sequence()));
-  if (const Clock::time_point* sent = member.times->find(frame.pose_sequence()))
-    member.arrived.ms.push_back(std::chrono::duration<double, std::milli>(now - *sent).count());
-  if (member.keeps) member.held.push_back({frame, std::move(member.payload)});
-}
-
-void Crowd::check() {
-  for (const auto& member : members_) {
-    if (!member) continue;
-    for (const Held& held : std::exchange(member->held, {})) check(*member, held);
-  }
-}
-
-// Decodes, and compares with offline posing: every vertex within the encoding's bound, float32 to the bit.
-void Crowd::check(Member& member, const Held& held) {
-  const v1::MeshFrame& frame = held.frame;
-  ++member.arrived.checked;
-  if (!member.decoder.decode(frame, held.payload, member.decoded).ok()) return void(++member.arrived.wrong);
-  std::vector<std::uint32_t> rows;
-  for (const wire::DecodedTissue& tissue : member.decoded) rows.push_back(tissue.tissue);
-  Pose pose = Pose::rest(rig_.skeleton.segments.size());
-  if (frame.pose_sequence() > 0) {
-    pose = walking(rig_, static_cast<double>(frame.pose_sequence() % kStride) / kStride);
-    pose.root_translation = place_of(member.asked, frame.pose_sequence());
-  }
-  bool right = poser_->run(pose, runtime::Skinning::cor, rows, body_, runtime::NodesOf::tissues).ok();
-  const double bound = frame.encoding() == v1::ENCODING_F32 ? 0 : frame.box().step() / 2 + kKernelRounding;
-  for (const wire::DecodedTissue& tissue : member.decoded) {
-    const std::vector<float>& expected = body_.tissues[tissue.tissue];
-    right = right && tissue.positions.size() == expected.size();
-    for (std::size_t i = 0; right && i < expected.size(); ++i) {
-      const double off =
-          std::abs(static_cast<double>(tissue.positions[i]) - static_cast<double>(expected[i]));
-      right = off <= bound + (bound > 0 ? 4e-7 * std::abs(static_cast<double>(expected[i])) : 0);
-    }
-  }
-  member.arrived.wrong += right ? 0 : 1;
 }
 
 }  // namespace ecorche::bench

@@ -68,7 +68,6 @@ class Crowd {
 
  private:
   struct Member;
-  struct Watched;
   void take(Member& member);
   void pose(Member& member);
   Eigen::Vector3d place_of(const Asked& asked, std::uint64_t sequence) const;

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
 #include <span>
 #include <vector>
 
 #include <ecorche/runtime/body_poser.hpp>
 #include "bench/server/walking.hpp"
+#include "bench/table.hpp"
 #include "proto/delta.hpp"
 
 namespace ecorche::bench {
@@ -44,8 +44,8 @@ double median(std::size_t vertices, int times, Work&& work) {
   return 1e6 * quantile(ms, 0.5) / static_cast<double>(vertices);
 }
 
-void row(const char* what, std::span<const std::uint16_t> key, std::span<const std::uint16_t> now,
-         int times) {
+void row(const Table& table, const char* what, std::span<const std::uint16_t> key,
+         std::span<const std::uint16_t> now, int times) {
   const std::size_t vertices = key.size() / 3;
   wire::DeltaKey prepared(vertices);
   prepared.prepare(key, 0, prepared.blocks());
@@ -59,14 +59,9 @@ void row(const char* what, std::span<const std::uint16_t> key, std::span<const s
     good = wire::decode_delta(std::span(bytes).first(size), key, out).ok() && good;
   });
   good = good && std::equal(out.begin(), out.end(), now.begin());
-  std::printf(
-      "deltas of %8zu vertices, one thread, %-22s encoded %.2f, decoded %.2f ms a million, %.1f times "
-      "smaller "
-      "than float32, %s  (must: 0.6 ms, 5 times)\n",
-      vertices, what, encode, decode,
-      static_cast<double>(sizeof(float) * key.size()) / static_cast<double>(size),
-      good ? "0 wrong" : "WRONG");
-  std::fflush(stdout);
+  table.row({what, std::to_string(vertices), fixed(encode, 2), fixed(decode, 2),
+             fixed(static_cast<double>(sizeof(float) * key.size()) / static_cast<double>(size), 1),
+             good ? "0" : "WRONG"});
 }
 
 }  // namespace
@@ -74,9 +69,15 @@ void row(const char* what, std::span<const std::uint16_t> key, std::span<const s
 void deltas(const std::shared_ptr<const Model>& model) {
   const runtime::BodyPoser poser(model);
   const std::vector<std::uint16_t> key = body_at(poser, 0), now = body_at(poser, kSeconds);
+  const Table table({{"deltas, one thread", 20},
+                     {"vertices", 8},
+                     {"encoded, ms a million (wanted: 0.6)"},
+                     {"decoded"},
+                     {"times smaller than float32 (wanted: 5)"},
+                     {"wrong"}});
   const std::size_t few = 3 * std::min(kInCaches, key.size() / 3);
-  row("in the caches:", std::span(key).first(few), std::span(now).first(few), 50);
-  row("the whole body:", key, now, 1);
+  row(table, "in the caches", std::span(key).first(few), std::span(now).first(few), 50);
+  row(table, "the whole body", key, now, 1);
 }
 
 }  // namespace ecorche::bench

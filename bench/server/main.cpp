@@ -4,7 +4,7 @@
 //
 // Client and server share the machine; all clients are one thread of this program, which holds some of the
 // frames against offline posing. A latency is from a pose's sending to the arrival of its whole frame; p50
-// and p99 are over the row's time.
+// and p99 are over the row's time. Rates are of the slowest client.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -29,6 +29,7 @@
 #include "bench/server/walking.hpp"
 #include "bench/server/watcher.hpp"
 #include "bench/server/wire.hpp"
+#include "bench/table.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -66,28 +67,67 @@ Sum sum_of(const Crowd& crowd, std::size_t first, std::size_t end) {
   return sum;
 }
 
-void print(const std::string& load, const Sum& sum, const Served& served, double cpu,
-           const std::string& must) {
+// The table of loads, and what is to be said below it.
+struct Loads {
+  const Table table{{{"load", 62},
+                     {"vertices", 8},
+                     {"kB/frame", 8},
+                     {"fps"},
+                     {"p50 ms"},
+                     {"p99 ms"},
+                     {"wanted", -24},
+                     {"MiB"},
+                     {"cores"},
+                     {"poses/s"},
+                     {"never seen"},
+                     {"posing p50 ms"},
+                     {"encoding p50 ms"},
+                     {"quality's age, poses, p50"},
+                     {"p99"},
+                     {"without"},
+                     {"held against offline"},
+                     {"wrong"},
+                     {"server ms/frame"},
+                     {"clients ms/frame"}}};
+  std::vector<std::string> notes;
+};
+
+struct Spent {
+  double cores = 0, server_ms = 0, clients_ms = 0;  // of processor; the last two a frame
+};
+
+void add(Loads& loads, const std::string& load, const Sum& sum, const Served& served, const Spent& spent,
+         double posed, const std::string& wanted) {
   const Arrived& all = sum.all;
   const double kilobytes =
       static_cast<double>(all.bytes) / 1e3 / std::max(1.0, static_cast<double>(all.frames));
-  std::printf("%-58s %8zu %9.1f %7.1f %8.2f %8.2f %7.0f %6.2f  %s\n", load.c_str(), sum.vertices, kilobytes,
-              sum.slowest, sum.p50(), sum.p99(), served.rss_mib(), cpu, must.c_str());
-  std::printf(
-      "  in the server: posing p50 %.2f ms, encoding p50 %.2f ms; quality of the pose %.0f before (p50), "
-      "%.0f (p99), none in "
-      "%llu frames; %llu frames held against offline posing, %llu wrong\n",
-      quantile(all.posed_ms, 0.5), quantile(all.encoded_ms, 0.5), quantile(all.judged_ago, 0.5),
-      quantile(all.judged_ago, 0.99), static_cast<unsigned long long>(all.unjudged),
-      static_cast<unsigned long long>(all.checked), static_cast<unsigned long long>(all.wrong));
-  if (!all.error.empty()) std::printf("  ERROR: %s\n", all.error.c_str());
-  std::fflush(stdout);
+  loads.table.row({load,
+                   std::to_string(sum.vertices),
+                   fixed(kilobytes, 1),
+                   fixed(sum.slowest, 1),
+                   fixed(sum.p50(), 2),
+                   fixed(sum.p99(), 2),
+                   wanted,
+                   fixed(served.rss_mib(), 0),
+                   fixed(spent.cores, 2),
+                   fixed(posed, 1),
+                   std::to_string(all.unseen),
+                   fixed(quantile(all.posed_ms, 0.5), 2),
+                   fixed(quantile(all.encoded_ms, 0.5), 2),
+                   fixed(quantile(all.judged_ago, 0.5), 0),
+                   fixed(quantile(all.judged_ago, 0.99), 0),
+                   std::to_string(all.unjudged),
+                   std::to_string(all.checked),
+                   std::to_string(all.wrong),
+                   fixed(spent.server_ms, 3),
+                   fixed(spent.clients_ms, 3)});
+  if (!all.error.empty()) loads.notes.push_back("ERROR: " + load + ": " + all.error);
 }
 
 // The clients [first, end) for the row's time, after a warm-up; warm already beside `peers`, as long as some
 // of them are there.
-Sum measure(const Settings& settings, const Served& served, const std::string& load, Crowd& crowd,
-            std::size_t first, std::size_t end, const std::string& must,
+Sum measure(const Settings& settings, Loads& loads, const Served& served, const std::string& load,
+            Crowd& crowd, std::size_t first, std::size_t end, const std::string& wanted,
             const std::function<void()>& tick = {}, const Peers* peers = nullptr, double seconds = 0) {
   if (seconds == 0) seconds = settings.seconds;
   if (!peers) crowd.run(kWarmUp, tick);
@@ -99,20 +139,15 @@ Sum measure(const Settings& settings, const Served& served, const std::string& l
   const double spent[] = {served.cpu_seconds() - server, cpu_seconds() - clients};
   crowd.check();
   Sum sum = sum_of(crowd, first, end);
-  print(load, sum, served, spent[0] / crowd.seconds(), must);
   const auto frames = static_cast<double>(sum_of(crowd, 0, end).all.frames);
-  std::printf(
-      "  poses sent %.1f a second, %llu of them never seen; of processor %.3f ms a frame in the server, "
-      "%.3f in the clients\n",
-      crowd.posed(), static_cast<unsigned long long>(sum.all.unseen), 1e3 * spent[0] / frames,
-      1e3 * spent[1] / frames);
-  std::fflush(stdout);
+  add(loads, load, sum, served,
+      {spent[0] / crowd.seconds(), 1e3 * spent[0] / frames, 1e3 * spent[1] / frames}, crowd.posed(), wanted);
   return sum;
 }
 
 // `count` clients that each pose.
-void posing(const Settings& settings, const std::string& load, std::size_t vertices, v1::Encoding encoding,
-            int count, const std::string& must) {
+void posing(const Settings& settings, Loads& loads, const std::string& load, std::size_t vertices,
+            v1::Encoding encoding, int count, const std::string& wanted) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
   const Asked asked{.vertices = vertices,
@@ -121,10 +156,10 @@ void posing(const Settings& settings, const std::string& load, std::size_t verti
                     .rate = 90,
                     .check_each = settings.check_each};
   for (int i = 0; i < count; ++i) crowd.join(asked);
-  measure(settings, served, load, crowd, 0, static_cast<std::size_t>(count), must);
+  measure(settings, loads, served, load, crowd, 0, static_cast<std::size_t>(count), wanted);
 }
 
-void observers(const Settings& settings) {
+void observers(const Settings& settings, Loads& loads) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
   Asked asked{.vertices = 100'000,
@@ -140,13 +175,13 @@ void observers(const Settings& settings) {
     asked.check_each = i % 8 == 0 ? settings.check_each : 0;
     crowd.join(asked);
   }
-  measure(settings, served, "64 observers of one pose, 100 k vertices, delta u16", crowd, 1, 65,
+  measure(settings, loads, served, "64 observers of one pose, 100 k vertices, delta u16", crowd, 1, 65,
           "at least 90, encoded once");
 }
 
 // Whoever is served, alone and beside `others`.
-void beside(const Settings& settings, const std::string& what,
-            const std::function<std::unique_ptr<Peers>(const Served&)>& others, const std::string& must) {
+void beside(const Settings& settings, Loads& loads, const std::string& what,
+            const std::function<std::unique_ptr<Peers>(const Served&)>& others, const std::string& wanted) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
   const Asked asked{.vertices = 100'000,
@@ -155,21 +190,17 @@ void beside(const Settings& settings, const std::string& what,
                     .rate = 90,
                     .check_each = settings.check_each};
   for (int i = 0; i < 4; ++i) crowd.join(asked);
-  const Sum alone = measure(settings, served, "4 clients, 100 k vertices, alone", crowd, 0, 4, "");
+  const Sum alone = measure(settings, loads, served, "4 clients, 100 k vertices, alone", crowd, 0, 4, "");
   const double before = served.rss_mib();
   const std::unique_ptr<Peers> peers = others(served);
   double most = 0;
   const auto look = [&] { most = std::max(most, served.rss_mib()); };
-  Sum there = measure(settings, served, "4 clients, 100 k vertices, as they come: " + what, crowd, 0, 4, "",
-                      look, peers.get(), kComing);
-  there.all.add(measure(settings, served, "4 clients, 100 k vertices, beside " + what, crowd, 0, 4, must,
-                        look, peers.get())
+  Sum there = measure(settings, loads, served, "4 clients, 100 k vertices, as they come: " + what, crowd, 0,
+                      4, "", look, peers.get(), kComing);
+  there.all.add(measure(settings, loads, served, "4 clients, 100 k vertices, beside " + what, crowd, 0, 4,
+                        wanted, look, peers.get())
                     .all);
-  std::printf(
-      "  %s: %s after %.2f s at most, each from its own beginning, counted beside for %.1f s; server's "
-      "memory %.0f MiB before, %.0f at most\n",
-      what.c_str(), peers->gone() ? "all gone" : "NOT ALL GONE", peers->longest(), crowd.seconds(), before,
-      most);
+  const double together = crowd.seconds();
   Sum row = there;
   const double left = settings.seconds - kComing - crowd.seconds();
   if (left > 0) {
@@ -177,15 +208,17 @@ void beside(const Settings& settings, const std::string& what,
     crowd.run(left);
     row.all.add(sum_of(crowd, 0, 4).all);
   }
-  std::printf(
-      "  p99 of all frames while they came and were there %.2f ms, over %.0f s from their coming %.2f; alone "
-      "%.2f\n",
-      there.p99(), settings.seconds, row.p99(), alone.p99());
-  std::fflush(stdout);
+  loads.notes.push_back(what + ": " + (peers->gone() ? "all gone" : "NOT ALL GONE") + " after " +
+                        fixed(peers->longest(), 2) +
+                        " s at most, each from its own beginning, counted beside for " + fixed(together, 1) +
+                        " s; server's memory " + fixed(before, 0) + " MiB before, " + fixed(most, 0) +
+                        " at most; p99 of all frames while they came and were there " +
+                        fixed(there.p99(), 2) + " ms, over " + fixed(settings.seconds, 0) +
+                        " s from their coming " + fixed(row.p99(), 2) + ", alone " + fixed(alone.p99(), 2));
 }
 
 // One who poses, alone and beside somebody who watches a volume of the same session.
-void volume(const Settings& settings) {
+void volume(const Settings& settings, Loads& loads) {
   const Served served(settings.program, settings.model);
   Crowd crowd(served.address(), settings.truth);
   crowd.join({.vertices = 100'000,
@@ -194,7 +227,7 @@ void volume(const Settings& settings) {
               .rate = 90,
               .on_the_spot = true,
               .check_each = settings.check_each});
-  measure(settings, served, "1 client, 100 k vertices, alone", crowd, 0, 1, "");
+  measure(settings, loads, served, "1 client, 100 k vertices, alone", crowd, 0, 1, "");
   v1::VolumeSelection whole, bricks;
   whole.set_compressed(true);
   bricks.set_changed_bricks(true);
@@ -202,32 +235,71 @@ void volume(const Settings& settings) {
                                         {"the whole CT, its changed bricks", bricks},
                                         {"the whole CT, compressed", whole}}) {
     Watcher watcher(served, "shared", selection);
-    measure(settings, served, "1 client, 100 k vertices, beside " + what, crowd, 0, 1, "as alone");
+    measure(settings, loads, served, "1 client, 100 k vertices, beside " + what, crowd, 0, 1, "as alone");
     watcher.stop();
     const auto seen = static_cast<double>(watcher.frames());
-    std::printf("  %s: %.1f frames a second of %.2f MB%s%s\n", what.c_str(),
-                seen / (crowd.seconds() + kWarmUp),
-                1e-6 * static_cast<double>(watcher.bytes()) / std::max(1.0, seen),
-                watcher.error().empty() ? "" : "; ERROR: ", watcher.error().c_str());
-    std::fflush(stdout);
+    loads.notes.push_back(what + ": " + fixed(seen / (crowd.seconds() + kWarmUp), 1) +
+                          " frames a second of " +
+                          fixed(1e-6 * static_cast<double>(watcher.bytes()) / std::max(1.0, seen), 2) +
+                          " MB" + (watcher.error().empty() ? "" : "; ERROR: " + watcher.error()));
   }
 }
 
 // Gagvani01's body lives at full resolution in a part of it.
 void region(const Settings& settings) {
+  const Table table({{"256^3 voxels of the CT at full resolution", 42},
+                     {"fps"},
+                     {"p50 ms"},
+                     {"p99 ms"},
+                     {"wanted", -7},
+                     {"posing p50 ms"},
+                     {"refilling or drawing, and encoding p50 ms"},
+                     {"processor ms/frame"},
+                     {"million voxels held"},
+                     {"MiB"}});
   for (const auto& [deformer, name] :
        {std::pair{v1::DEFORMER_SPHERES, "spheres"}, {v1::DEFORMER_TETS, "tets"}}) {
     const Served served(settings.program, settings.model);
     const RegionRate rate = region_rate(served, deformer, 256, settings.seconds);
-    std::printf(
-        "1 client, 256^3 voxels of the CT at full resolution, by %-8s %6.1f fps, p50 %.1f, p99 %.1f ms; "
-        "posing p50 "
-        "%.1f, refilling or drawing and encoding %.1f ms; %.0f ms of processor a frame; %.2f M voxels held; "
-        "%.0f MiB%s\n",
-        name, rate.per_second, rate.p50_ms, rate.p99_ms, rate.posed_ms, rate.encoded_ms, rate.cpu_ms,
-        rate.held / 1e6, served.rss_mib(), deformer == v1::DEFORMER_SPHERES ? "  (must: 10 fps)" : "");
-    std::fflush(stdout);
+    table.row({std::string("1 client, by ") + name, fixed(rate.per_second, 1), fixed(rate.p50_ms, 1),
+               fixed(rate.p99_ms, 1), deformer == v1::DEFORMER_SPHERES ? "10 fps" : "",
+               fixed(rate.posed_ms, 1), fixed(rate.encoded_ms, 1), fixed(rate.cpu_ms, 0),
+               fixed(rate.held / 1e6, 2), fixed(served.rss_mib(), 0)});
   }
+}
+
+constexpr const char* kLoads[] = {"body",    "f32",  "organ",    "posers", "observers",
+                                  "stalled", "idle", "dripping", "volume"};
+
+void run_loads(const Settings& settings, Loads& loads, const std::function<bool(const char*)>& chosen) {
+  if (chosen("body"))
+    posing(settings, loads, "1 client, the whole body, delta u16, 90 Hz", 0, v1::ENCODING_U16_DELTA, 1,
+           "90 fps, p50 6, p99 11");
+  if (chosen("f32"))
+    posing(settings, loads, "1 client, the whole body, float32, 90 Hz", 0, v1::ENCODING_F32, 1, "");
+  if (chosen("organ"))
+    posing(settings, loads, "1 client, 100 k vertices, delta u16", 100'000, v1::ENCODING_U16_DELTA, 1,
+           "p50 0.7, p99 3");
+  if (chosen("posers"))
+    posing(settings, loads, "64 clients with their own poses, 33 k vertices, delta u16", 33'000,
+           v1::ENCODING_U16_DELTA, 64, "all at 90, p99 11");
+  if (chosen("observers")) observers(settings, loads);
+  if (chosen("stalled")) {
+    beside(
+        settings, loads, "32 clients that stop reading",
+        [](const Served& s) { return stalled_readers(s.address(), 32); }, "p99 within 20 %, gone in 10 s");
+  }
+  if (chosen("idle")) {
+    beside(
+        settings, loads, "1000 idle connections",
+        [](const Served& s) { return idle_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
+  }
+  if (chosen("dripping")) {
+    beside(
+        settings, loads, "1000 that send a byte a second",
+        [](const Served& s) { return dripping_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
+  }
+  if (chosen("volume")) volume(settings, loads);
 }
 
 int run(const Settings& settings) {
@@ -235,39 +307,15 @@ int run(const Settings& settings) {
   getrlimit(RLIMIT_NOFILE, &files);
   files.rlim_cur = files.rlim_max;
   setrlimit(RLIMIT_NOFILE, &files);
-  std::printf("%-58s %8s %9s %7s %8s %8s %7s %6s  %s\n", "load", "vertices", "kB/frame", "fps", "p50 ms",
-              "p99 ms", "MiB", "cores", "must");
   const auto chosen = [&](const char* row) { return settings.only.empty() || settings.only.contains(row); };
   if (chosen("ready")) ready(settings.program, settings.model);
   if (chosen("deltas")) deltas(settings.truth);
-  if (chosen("body"))
-    posing(settings, "1 client, the whole body, delta u16, 90 Hz", 0, v1::ENCODING_U16_DELTA, 1,
-           "90 fps, p50 6, p99 11");
-  if (chosen("f32")) posing(settings, "1 client, the whole body, float32, 90 Hz", 0, v1::ENCODING_F32, 1, "");
-  if (chosen("organ"))
-    posing(settings, "1 client, 100 k vertices, delta u16", 100'000, v1::ENCODING_U16_DELTA, 1,
-           "p50 0.7, p99 3");
-  if (chosen("posers"))
-    posing(settings, "64 clients with their own poses, 33 k vertices, delta u16", 33'000,
-           v1::ENCODING_U16_DELTA, 64, "all at 90, p99 11");
-  if (chosen("observers")) observers(settings);
-  if (chosen("stalled")) {
-    beside(
-        settings, "32 clients that stop reading",
-        [](const Served& s) { return stalled_readers(s.address(), 32); }, "p99 within 20 %, gone in 10 s");
-  }
-  if (chosen("idle")) {
-    beside(
-        settings, "1000 idle connections",
-        [](const Served& s) { return idle_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
-  }
-  if (chosen("dripping")) {
-    beside(
-        settings, "1000 that send a byte a second",
-        [](const Served& s) { return dripping_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
+  if (std::any_of(std::begin(kLoads), std::end(kLoads), chosen)) {
+    Loads all;
+    run_loads(settings, all, chosen);
+    print_notes(all.notes);
   }
   if (chosen("attacks")) attacks(settings.program, settings.model, settings.seconds);
-  if (chosen("volume")) volume(settings);
   if (chosen("wire")) same_frame(settings.program, settings.model, settings.peers, settings.seconds);
   if (chosen("region")) region(settings);
   if (!settings.only.contains("soak")) return 0;  // half an hour: only by its name
@@ -302,7 +350,7 @@ int main(int argc, char** argv) {
     settings.truth = std::make_shared<const Model>(model_file::read(settings.model, Context{}));
     return bench::run(settings);
   } catch (const Error& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
-    return 1;
+    std::fprintf(stderr, "%s\n", error.what());
+    return exit_code(error.kind());
   }
 }

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <thread>
 
 #include <ecorche/client/client.hpp>
 #include "bench/server/served.hpp"
+#include "bench/table.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -59,13 +59,14 @@ void ready(const std::string& program, const std::string& model) {
     now.coarse = since(coarse);
     if (now.listens < best.listens) best = now;
   }
-  std::printf(
-      "ready to serve, the quickest of %d starts: listens after %.3f s (%.2f s of processor), first frame of "
-      "the whole body after %.3f s, %.0f MiB; who asks for a coarser level right then waits %.2f s, who asks "
-      "%.0f s later %.3f s  (must: 0.5 s)\n",
-      kStarts, best.listens, best.cpu, best.first, best.mebibytes, best.coarse, kLater,
-      coarse_later(program, model));
-  std::fflush(stdout);
+  const Table table(
+      {{"the quickest of " + std::to_string(kStarts) + " starts", 64}, {"here", 8}, {"wanted"}});
+  table.row({"listens after, s", fixed(best.listens, 3), "0.5"});
+  table.row({"processor until then, s", fixed(best.cpu, 2), ""});
+  table.row({"first frame of the whole body after, s", fixed(best.first, 3), ""});
+  table.row({"MiB", fixed(best.mebibytes, 0), ""});
+  table.row({"who asks for a coarser level right then waits, s", fixed(best.coarse, 2), ""});
+  table.row({"who asks " + fixed(kLater, 0) + " s later, s", fixed(coarse_later(program, model), 3), ""});
 }
 
 }  // namespace ecorche::bench

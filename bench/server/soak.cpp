@@ -2,7 +2,6 @@
 #include "bench/server/soak.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <ctime>
 #include <deque>
 #include <random>
@@ -11,6 +10,7 @@
 #include "bench/server/crowd.hpp"
 #include "bench/server/served.hpp"
 #include "bench/server/walking.hpp"
+#include "bench/table.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -50,6 +50,14 @@ bool soak(const std::string& program, const std::string& model, const std::share
   // Unnamed sessions wait for their clients to come back: no longer than a guest's stay here.
   const Served served(program, model,
                       {"--max-connections", "4000", "--max-sessions", "200", "--linger-seconds", "5"});
+  const Table table({{"minute", 8},
+                     {"MiB"},
+                     {"descriptors"},
+                     {"guests"},
+                     {"the one that stays: fps"},
+                     {"p50 ms"},
+                     {"p99 ms"}});
+  std::vector<std::string> errors;
   std::mt19937 random(1);
   std::vector<std::pair<double, double>> memory;
   std::uint64_t visits = 0, frames = 0, checked = 0, wrong = 0, failed = 0;
@@ -73,7 +81,7 @@ bool soak(const std::string& program, const std::string& model, const std::share
       checked += arrived.checked;
       wrong += arrived.wrong;
       if (!arrived.error.empty()) {
-        if (++failed <= 5) std::printf("  a client failed: %s\n", arrived.error.c_str());
+        if (++failed <= 5) errors.push_back("a client failed: " + arrived.error);
       }
       crowd.leave(number);
     };
@@ -98,12 +106,9 @@ bool soak(const std::string& program, const std::string& model, const std::share
       if (now_minutes() - said < 1) continue;
       said = now_minutes();
       const Arrived& own = crowd.arrived(0);
-      std::printf(
-          "  %5.1f min: %.1f MiB, %zu descriptors, %llu guests; the one that stays: %.1f fps, p50 %.2f, p99 "
-          "%.2f ms\n",
-          said, served.rss_mib(), served.descriptors(), static_cast<unsigned long long>(visits),
-          static_cast<double>(own.frames) / crowd.seconds(), quantile(own.ms, 0.5), quantile(own.ms, 0.99));
-      std::fflush(stdout);
+      table.row({fixed(said, 1), fixed(served.rss_mib(), 1), std::to_string(served.descriptors()),
+                 std::to_string(visits), fixed(static_cast<double>(own.frames) / crowd.seconds(), 1),
+                 fixed(quantile(own.ms, 0.5), 2), fixed(quantile(own.ms, 0.99), 2)});
       frames += own.frames;
       checked += own.checked;
       wrong += own.wrong;
@@ -119,17 +124,21 @@ bool soak(const std::string& program, const std::string& model, const std::share
   const std::size_t after = served.descriptors();
   const std::vector<std::pair<double, double>> later(
       memory.begin() + static_cast<std::ptrdiff_t>(memory.size() / 3), memory.end());
-  std::printf(
-      "soak of %.1f min: %llu guests, %llu failed; %llu frames, %llu held against offline posing, %llu "
-      "wrong; memory %.1f MiB, "
-      "slope %.2f MiB an hour over %.1f min, %.2f over the last two thirds (must: under 1 over 30 min); "
-      "descriptors %zu before, %zu at "
-      "most, %zu after; %.2f "
-      "cores\n",
-      minutes, static_cast<unsigned long long>(visits), static_cast<unsigned long long>(failed),
-      static_cast<unsigned long long>(frames), static_cast<unsigned long long>(checked),
-      static_cast<unsigned long long>(wrong), memory.empty() ? 0 : memory.back().second, slope_of(memory),
-      minutes - warm_up, slope_of(later), before, most, after, served.cpu_seconds() / (60 * now_minutes()));
+  if (!errors.empty()) print_notes(errors);
+  const Table whole({{"soak of " + fixed(minutes, 1) + " minutes", 56}, {"here", 8}, {"wanted"}});
+  whole.row({"guests", std::to_string(visits), ""});
+  whole.row({"failed", std::to_string(failed), "0"});
+  whole.row({"frames", std::to_string(frames), ""});
+  whole.row({"held against offline posing", std::to_string(checked), ""});
+  whole.row({"wrong", std::to_string(wrong), "0"});
+  whole.row({"memory at the end, MiB", fixed(memory.empty() ? 0 : memory.back().second, 1), ""});
+  whole.row({"its slope over " + fixed(minutes - warm_up, 1) + " minutes, MiB an hour",
+             fixed(slope_of(memory), 2), "1"});
+  whole.row({"over the last two thirds", fixed(slope_of(later), 2), "1"});
+  whole.row({"descriptors before", std::to_string(before), ""});
+  whole.row({"at most", std::to_string(most), ""});
+  whole.row({"after", std::to_string(after), "as before"});
+  whole.row({"cores", fixed(served.cpu_seconds() / (60 * now_minutes()), 2), ""});
   return failed == 0 && wrong == 0 && checked > 0 && after <= before;
 }
 

@@ -14,6 +14,7 @@
 #include <ecorche/wire/convert.hpp>
 #include "bench/server/served.hpp"
 #include "bench/server/walking.hpp"
+#include "bench/table.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -72,13 +73,16 @@ Times ours(const std::string& program, const std::string& model, double seconds)
 void same_frame(const std::string& program, const std::string& model, const std::string& peers,
                 double seconds) {
   const Times own = ours(program, model, seconds);
-  std::printf(
-      "the whole body in float32, %.1f MB, 20 Hz: ours p50 %.2f, p99 %.2f ms; %.1f ms of processor a frame, "
-      "both sides\n",
-      own.megabytes, own.p50, own.p99, own.cpu_ms);
-  std::fflush(stdout);
+  const Table table({{"the whole body in float32, 20 Hz", 34},
+                     {"MB"},
+                     {"p50 ms"},
+                     {"p99 ms"},
+                     {"processor ms/frame, both sides"},
+                     {"ours of their p50 (wanted: 0.6)"},
+                     {"ours of their processor"}});
+  table.row({"ours", fixed(own.megabytes, 1), fixed(own.p50, 2), fixed(own.p99, 2), fixed(own.cpu_ms, 1)});
   if (!std::filesystem::exists(peers)) {
-    std::printf("  gRPC: not built (install libgrpc++-dev and protobuf-compiler-grpc)\n");
+    table.row({"gRPC: not built"});
     return;
   }
   const std::string command =
@@ -87,11 +91,8 @@ void same_frame(const std::string& program, const std::string& model, const std:
   char name[16];
   double p50 = 0, p99 = 0, bytes = 0, cpu = 0;
   while (pipe && std::fscanf(pipe.get(), "%15s %lf %lf %lf %lf", name, &p50, &p99, &bytes, &cpu) == 5) {
-    std::printf(
-        "  %-6s %.1f MB: p50 %.2f, p99 %.2f ms; %.1f ms of processor; ours %.2f of their p50 (must: 0.6), "
-        "%.2f of their processor\n",
-        name, bytes / 1e6, p50, p99, cpu, own.p50 / p50, own.cpu_ms / cpu);
-    std::fflush(stdout);
+    table.row({name, fixed(bytes / 1e6, 1), fixed(p50, 2), fixed(p99, 2), fixed(cpu, 1),
+               fixed(own.p50 / p50, 2), fixed(own.cpu_ms / cpu, 2)});
   }
 }
 

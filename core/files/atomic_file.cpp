@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/files/atomic_file.hpp"
 
-#include <fcntl.h>
-#include <sys/random.h>
-#include <unistd.h>
-
+#include <array>
+#include <bit>
 #include <cerrno>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <system_error>
@@ -15,7 +12,9 @@
 #include <vector>
 
 #include <ecorche/values/error.hpp>
-#include "core/files/flush.hpp"
+#include "core/platform/file.hpp"
+#include "core/platform/process.hpp"
+#include "core/values/text.hpp"
 
 namespace ecorche::files {
 
@@ -25,104 +24,97 @@ namespace {
 
 // Writers of other libraries may not tell that the disk was full: a file behind which no block fits is not
 // trusted to be whole. Leaves its length alone.
-int room_behind(const fs::path& path) {
-  constexpr ::off_t block = 1 << 16;
-  const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
-  if (file < 0) return errno;
-  const ::off_t length = ::lseek(file, 0, SEEK_END);
-  int error = length < 0 ? errno : ::posix_fallocate(file, length, block);
-  if (length >= 0 && ::ftruncate(file, length) != 0 && error == 0) error = errno;
-  ::close(file);
-  return error == ENOSPC || error == EFBIG || error == EDQUOT ? error : 0;
+std::error_code room_behind(const fs::path& path) {
+  constexpr std::uint64_t block = 1 << 16;
+  std::error_code error;
+  platform::File file(path, platform::Open::write, error);
+  if (error) return error;
+  const std::uint64_t length = file.size(error);
+  if (!error) {
+    error = file.reserve(length, block);
+    const std::error_code cut = file.resize(length);
+    if (!error) error = cut;
+  }
+  return platform::is_full(error) ? error : std::error_code();
 }
 
 fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
-[[noreturn]] void cannot_write(const fs::path& path) {
-  throw Error(ErrorKind::cannot_create, path.string(),
-              "cannot write here: " + std::string(std::strerror(errno)),
+[[noreturn]] void cannot_write(const fs::path& path, const std::error_code& error) {
+  throw Error(ErrorKind::cannot_create, path.string(), "cannot write here: " + error.message(),
               "make the folder, or name another one");
 }
 
 // Hidden, with all extensions kept (.nii.gz): some writers choose the format by them. The process is named
 // for remove_stale_parts.
 fs::path hidden_beside(const fs::path& path) {
-  std::uint64_t guess = 0;
-  if (::getrandom(&guess, sizeof guess, 0) != static_cast<::ssize_t>(sizeof guess)) cannot_write(path);
-  char digits[17];
-  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(guess));
+  std::array<std::byte, sizeof(std::uint64_t)> guess{};
+  if (const std::error_code error = platform::fill_random(guess)) cannot_write(path, error);
   return folder_of(path) /
-         ("." + std::to_string(::getpid()) + "." + digits + ".part." + path.filename().string());
+         ("." + std::to_string(platform::process_id()) + "." +
+          text::hex(std::bit_cast<std::uint64_t>(guess)) + ".part." + path.filename().string());
 }
 
 [[noreturn]] void cannot_rename(const fs::path& path, const std::error_code& error) {
   throw Error(ErrorKind::io, path.string(), "cannot rename: " + error.message(), "check the folder's rights");
 }
 
-// What stood under the names of files that are committed together, until all of them are.
-class Aside {
+// Puts back what stood under the names of files that are committed together, unless all of them are.
+class Rollback {
  public:
-  explicit Aside(std::span<AtomicFile* const> files) : files_(files) {}
-  ~Aside() {
+  explicit Rollback(std::span<AtomicFile* const> files) : files_(files) {}
+  ~Rollback() {
     std::error_code ignored;
-    for (std::size_t i = 0; !done_ && i < appeared_; ++i) fs::remove(files_[i]->path(), ignored);
-    for (const auto& [path, hidden] : kept_) {
-      if (done_) {
+    for (std::size_t i = 0; !dismissed_ && i < placed_; ++i) fs::remove(files_[i]->path(), ignored);
+    for (const auto& [path, hidden] : moved_) {
+      if (dismissed_) {
         fs::remove(hidden, ignored);
       } else {
         fs::rename(hidden, path, ignored);
       }
     }
   }
-  Aside(const Aside&) = delete;
-  Aside& operator=(const Aside&) = delete;
+  Rollback(const Rollback&) = delete;
+  Rollback& operator=(const Rollback&) = delete;
 
-  void take(const fs::path& path) {
+  void move_old(const fs::path& path) {
     std::error_code error;
     const fs::file_status before = fs::symlink_status(path, error);
     if (!fs::exists(before) || fs::is_directory(before)) return;  // a folder stays, and is in the way
     const fs::path hidden = hidden_beside(path);
     fs::rename(path, hidden, error);
     if (error) cannot_rename(path, error);
-    kept_.emplace_back(path, hidden);
+    moved_.emplace_back(path, hidden);
   }
-  void appear(const AtomicFile& file) {
+  void place_new(const AtomicFile& file) {
     std::error_code error;
     fs::rename(file.temporary(), file.path(), error);
     if (error) cannot_rename(file.path(), error);
-    ++appeared_;
+    ++placed_;
   }
-  void done() { done_ = true; }
+  void dismiss() { dismissed_ = true; }
 
  private:
   std::span<AtomicFile* const> files_;
-  std::vector<std::pair<fs::path, fs::path>> kept_;
-  std::size_t appeared_ = 0;
-  bool done_ = false;
+  std::vector<std::pair<fs::path, fs::path>> moved_;
+  std::size_t placed_ = 0;
+  bool dismissed_ = false;
 };
 
 }  // namespace
-
-bool flush(const fs::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  const bool good = ::fsync(file) == 0;
-  ::close(file);
-  return good;
-}
 
 AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
   const fs::path folder = folder_of(path_);
   if (fs::is_directory(path_)) {
     throw Error(ErrorKind::cannot_create, path_.string(), "is a folder", "name a file");
   }
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) cannot_write(path_);
+  if (const std::error_code error = platform::cannot_make_in(folder)) cannot_write(path_, error);
   temporary_ = hidden_beside(path_);
-  const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-  if (file < 0) cannot_write(path_);
-  ::close(file);
+  std::error_code error;
+  const platform::File file(temporary_, platform::Open::make, error);
+  if (error) cannot_write(path_, error);
 }
 
 AtomicFile::~AtomicFile() {
@@ -132,12 +124,12 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::finish() const {
-  if (!flush(temporary_)) {
-    throw Error(ErrorKind::io, path_.string(), "cannot flush: " + std::string(std::strerror(errno)),
+  if (const std::error_code error = platform::flush(temporary_)) {
+    throw Error(ErrorKind::io, path_.string(), "cannot flush: " + error.message(),
                 "check the disk's free space");
   }
-  if (const int full = room_behind(temporary_); full != 0) {
-    throw Error(ErrorKind::io, path_.string(), "cannot be written whole: " + std::string(std::strerror(full)),
+  if (const std::error_code full = room_behind(temporary_)) {
+    throw Error(ErrorKind::io, path_.string(), "cannot be written whole: " + full.message(),
                 "free space on the disk, or name another one");
   }
 }
@@ -148,18 +140,18 @@ void AtomicFile::commit() {
   fs::rename(temporary_, path_, error);
   if (error) cannot_rename(path_, error);
   committed_ = true;
-  flush(folder_of(path_));  // the name itself; a file system that refuses still holds the data
+  platform::flush(folder_of(path_));  // the name itself; a file system that refuses still holds the data
 }
 
 void commit_together(std::span<AtomicFile* const> files) {
   for (const AtomicFile* file : files) file->finish();
-  Aside aside(files);
-  for (const AtomicFile* file : files) aside.take(file->path());
-  for (const AtomicFile* file : files) aside.appear(*file);
-  aside.done();
+  Rollback rollback(files);
+  for (const AtomicFile* file : files) rollback.move_old(file->path());
+  for (const AtomicFile* file : files) rollback.place_new(*file);
+  rollback.dismiss();
   for (AtomicFile* file : files) {
     file->committed_ = true;
-    flush(folder_of(file->path_));
+    platform::flush(folder_of(file->path_));
   }
 }
 

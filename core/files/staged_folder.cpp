@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/files/staged_folder.hpp"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <system_error>
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
-#include "core/files/flush.hpp"
 #include "core/files/stale_parts.hpp"
+#include "core/platform/file.hpp"
+#include "core/platform/process.hpp"
 
 namespace ecorche::files {
 namespace {
@@ -50,10 +46,12 @@ StagedFolder::StagedFolder(const fs::path& target, std::string seal)
   make_folder(around);
   const std::string name = within_ ? seal_ : target_.filename().string();
   remove_stale_folders(around, name);
-  stage_ = around / ("." + std::to_string(::getpid()) + ".part." + name);
-  if (::mkdir(stage_.c_str(), 0777) != 0) {  // never one that somebody else put there
+  stage_ = around / ("." + std::to_string(platform::process_id()) + ".part." + name);
+  std::error_code error;
+  if (!fs::create_directory(stage_, error)) {  // never one that somebody else put there
+    if (!error) error = std::make_error_code(std::errc::file_exists);
     throw Error(ErrorKind::cannot_create, target_.string(),
-                "cannot make a folder to write in meanwhile: " + std::string(std::strerror(errno)),
+                "cannot make a folder to write in meanwhile: " + error.message(),
                 "check the rights of the folder that it is in, or name another one");
   }
 }
@@ -66,10 +64,10 @@ StagedFolder::~StagedFolder() {
 void StagedFolder::commit(const std::vector<fs::path>& old) {
   if (within_) {
     move_into_target(old);
-    flush(target_);
+    platform::flush(target_);
   } else {
     move(stage_, target_);
-    flush(target_.has_parent_path() ? target_.parent_path() : fs::path("."));
+    platform::flush(target_.has_parent_path() ? target_.parent_path() : fs::path("."));
   }
 }
 

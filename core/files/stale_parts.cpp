@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/files/stale_parts.hpp"
 
-#include <signal.h>
-#include <sys/types.h>
-
-#include <cerrno>
 #include <charconv>
 #include <string>
 #include <system_error>
 #include <vector>
+
+#include "core/platform/process.hpp"
 
 namespace ecorche::files {
 namespace {
@@ -17,11 +15,11 @@ namespace fs = std::filesystem;
 
 /// Whether `file` is `.PID.RANDOM.part.NAME` (or, as written before, `.PID.part.NAME`), of a NAME that is
 /// meant, and no process has that number.
-template <class Meant>
-bool is_stale(std::string_view file, const Meant& meant) {
+template <class Matches>
+bool is_stale(std::string_view file, const Matches& matches) {
   constexpr std::string_view mark = ".part.";
   if (!file.starts_with('.')) return false;
-  pid_t process = 0;
+  int process = 0;
   const char* const end = file.data() + file.size();
   const auto [rest, error] = std::from_chars(file.data() + 1, end, process);
   if (error != std::errc() || process <= 0) return false;
@@ -32,16 +30,16 @@ bool is_stale(std::string_view file, const Meant& meant) {
     own.remove_prefix(digits + 1);
   if (!own.starts_with(mark)) return false;
   own.remove_prefix(mark.size());
-  return meant(own) && ::kill(process, 0) != 0 && errno == ESRCH;
+  return matches(own) && !platform::process_exists(process);
 }
 
-template <class Meant>
-void remove(const fs::path& folder, fs::file_type type, const Meant& meant) {
+template <class Matches>
+void remove(const fs::path& folder, fs::file_type type, const Matches& matches) {
   std::error_code error;
   std::vector<fs::path> stale;
   fs::directory_iterator at(folder, error);
   for (; !error && at != fs::directory_iterator(); at.increment(error)) {
-    if (is_stale(at->path().filename().string(), meant) && at->symlink_status(error).type() == type)
+    if (is_stale(at->path().filename().string(), matches) && at->symlink_status(error).type() == type)
       stale.push_back(at->path());
     error.clear();
   }

@@ -15,7 +15,7 @@ Eigen::Quaterniond in_space(const Eigen::Matrix3d& axes, const Eigen::Quaternion
   return {q.w(), v.x(), v.y(), v.z()};
 }
 
-void put_beside(Eigen::Quaterniond& q, const Eigen::Quaterniond& other) {
+void align_sign(Eigen::Quaterniond& q, const Eigen::Quaterniond& other) {
   if (q.dot(other) < 0) q.coeffs() = -q.coeffs();
 }
 
@@ -37,7 +37,7 @@ void forward(const Rig& rig, const Pose& pose, std::span<RigidTransform> out) {
     local.q = in_space(joint.axes, pose.rotation[s].normalized());
     local.t = joint.center - local.q * joint.center;
     if (segments[s].parent < 0) {
-      put_beside(local.q, Eigen::Quaterniond::Identity());
+      align_sign(local.q, Eigen::Quaterniond::Identity());
       local.t += pose.root_translation;
       out[s] = local;
       continue;
@@ -46,7 +46,7 @@ void forward(const Rig& rig, const Pose& pose, std::span<RigidTransform> out) {
     const RigidTransform& parent = out[static_cast<std::size_t>(segments[s].parent)];
     out[s] = parent * local;
     out[s].q.normalize();
-    put_beside(out[s].q, parent.q);
+    align_sign(out[s].q, parent.q);
   }
 }
 

@@ -5,6 +5,8 @@
 #include <cctype>
 #include <utility>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::kinematics {
 namespace {
 
@@ -77,8 +79,7 @@ std::string plain_name(std::string_view name) {
   if (colon != std::string_view::npos) name.remove_prefix(colon + 1);
   std::string out;
   for (const char c : name) {
-    if (c != ' ' && c != '_' && c != '-')
-      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (c != ' ' && c != '_' && c != '-') out += text::lower(c);
   }
   return out;
 }

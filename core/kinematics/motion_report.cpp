@@ -24,7 +24,8 @@ constexpr double kBeyond = 0.5 / 57.29577951308232;  // radians: half a degree l
 
 // What the limits of a joint took away. A hinge also drops all turns that it cannot make, which are no
 // limit's: of those the one about its own axis counts alone.
-double taken(const Joint& joint, const Quaterniond& asked, const Quaterniond& now, double removed) {
+double removed_by_limits(const Joint& joint, const Quaterniond& asked, const Quaterniond& now,
+                         double removed) {
   const bool follows = std::any_of(joint.coupled.begin(), joint.coupled.end(),
                                    [](const Coupling& by) { return by.slides() < 0; });
   if (joint.kind != JointKind::hinge || joint.sequence.empty() || follows) return removed;
@@ -116,7 +117,7 @@ MotionReport report(const Rig& rig, std::size_t frames, double frame_seconds,
       const auto j = static_cast<std::size_t>(c.joint);
       LimitViolation& limit = limits[j];
       const double removed =
-          taken(rig.skeleton.segments[j].joint, asked.rotation[j], now.rotation[j], c.removed);
+          removed_by_limits(rig.skeleton.segments[j].joint, asked.rotation[j], now.rotation[j], c.removed);
       if (removed < kBeyond) continue;
       ++limit.share;
       limit.mean += removed;

@@ -5,6 +5,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/kinematics/joint_names.hpp"
+#include "core/values/text.hpp"
 
 namespace ecorche::kinematics {
 namespace {
@@ -20,9 +21,7 @@ bool is_end_site(const Clip& clip, std::size_t joint) {
 }
 
 std::string list_of(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
-  return out.empty() ? "nothing" : out;
+  return names.empty() ? "nothing" : text::joined(names);
 }
 
 // Gives each still unmatched segment the clip joint that has one of its names of one sort.

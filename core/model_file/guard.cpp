@@ -8,6 +8,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include "core/model_file/hdf.hpp"
 #include "core/model_file/invariants.hpp"
+#include "core/values/identifier.hpp"
 
 namespace ecorche::model_file {
 namespace {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/model_file/element_type.hpp"
+#include "core/platform/file.hpp"
 
 namespace ecorche::model_file {
 
@@ -21,20 +22,17 @@ class InputFile {
  public:
   /// Throws Error{missing_input}.
   explicit InputFile(const std::filesystem::path& path);
-  ~InputFile();
-  InputFile(InputFile&& other) noexcept;
-  InputFile& operator=(InputFile&&) = delete;
 
   std::uint64_t size() const { return size_; }
   const std::string& name() const { return name_; }
   /// Fills `bytes` from `offset`. Throws Error{io}.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const;
   /// Whether `descriptor` is this very file.
-  bool is(int descriptor) const;
+  bool is(int descriptor) const { return file_.is_same(descriptor); }
 
  private:
   std::string name_;
-  int descriptor_ = -1;
+  platform::File file_;
   std::uint64_t size_ = 0;
 };
 

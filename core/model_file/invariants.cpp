@@ -10,6 +10,7 @@
 
 #include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/model_file/in_turn.hpp"
+#include "core/values/identifier.hpp"
 
 namespace ecorche::model_file {
 namespace {
@@ -318,11 +319,6 @@ class Checker {
 };
 
 }  // namespace
-
-bool is_identifier(std::string_view name) {
-  const auto plain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), plain);
-}
 
 void check_invariants(const Model& model, const std::string& where, ErrorKind kind, const Context& context) {
   Checker(model, where, kind, context).run();

@@ -3,15 +3,11 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include <ecorche/values/context.hpp>
 #include <ecorche/values/model.hpp>
 
 namespace ecorche::model_file {
-
-/// [a-z0-9_]{1,64}
-bool is_identifier(std::string_view name);
 
 /// Throws Error{kind, WHERE:DATASET} at the first invariant that does not hold: sizes agree, indices are in
 /// range, values are finite; parents come first; names are unique identifiers; joint frames and image

@@ -9,7 +9,7 @@
 
 #include <ecorche/values/context.hpp>
 #include "core/model_file/guard.hpp"
-#include "core/model_file/huge_pages.hpp"
+#include "core/platform/huge_pages.hpp"
 
 namespace ecorche::model_file {
 
@@ -47,7 +47,7 @@ class Source {
   static std::vector<T> room(std::size_t count) {
     std::vector<T> values;
     values.reserve(count);
-    wish_for_huge_pages(values.data(), count * sizeof(T));
+    platform::advise_huge_pages(values.data(), count * sizeof(T));
     values.resize(count);
     return values;
   }
@@ -63,7 +63,7 @@ class Source {
         find(path, element_type_of<typename M::Scalar>, flat ? Shape{any} : Shape{any, columns});
     if (flat && dataset.shape[0] % columns != 0) refuse(path, "does not fill its last row");
     M values(static_cast<Eigen::Index>(dataset.bytes / sizeof(typename M::Scalar) / columns), columns);
-    wish_for_huge_pages(values.data(), dataset.bytes);
+    platform::advise_huge_pages(values.data(), dataset.bytes);
     read(path, dataset,
          std::as_writable_bytes(std::span(values.data(), static_cast<std::size_t>(values.size()))));
     return values;

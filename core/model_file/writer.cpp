@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <array>
 #include <cstring>
 
@@ -11,6 +8,7 @@
 #include "core/model_file/hdf.hpp"
 #include "core/model_file/invariants.hpp"
 #include "core/model_file/layout.hpp"
+#include "core/platform/file.hpp"
 
 namespace ecorche::model_file {
 namespace {
@@ -24,12 +22,12 @@ constexpr hsize_t kAlignFrom = 65536, kAlignment = 4096;
 // So the disk is asked for all the space before HDF5 writes anything, while a full disk is still an ordinary
 // error.
 void reserve(const fs::path& path, const std::string& shown, std::uint64_t bytes) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
-  const int error = file < 0 ? errno : ::posix_fallocate(file, 0, static_cast<off_t>(bytes));
-  if (file >= 0) ::close(file);
-  if (error != 0) {
+  std::error_code error;
+  platform::File file(path, platform::Open::write_or_make, error);
+  if (!error) error = file.reserve(0, bytes);
+  if (error) {
     throw Error(ErrorKind::io, shown,
-                "no room for " + std::to_string(bytes >> 10) + " KiB: " + std::string(std::strerror(error)),
+                "no room for " + std::to_string(bytes >> 10) + " KiB: " + error.message(),
                 "free space on the disk, or name another one");
   }
 }

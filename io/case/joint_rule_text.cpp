@@ -33,18 +33,18 @@ std::string joined(const List& list, F&& text) {
 }
 
 std::string direction_to_yaml(const DirectionSource& source) {
-  using Kind = DirectionSource::Kind;
+  using enum DirectionSource::Kind;
   switch (source.kind) {
-    case Kind::fit:
+    case fit:
       return "{" + std::string(center_rule_name(source.from.rule)) + ": " + use_to_yaml(source.from.on) +
              ", towards: " + write_vector(source.direction) + "}";
-    case Kind::towards:
+    case towards:
       return "{from: " + point_to_yaml(source.from) + ", to: " + point_to_yaml(source.to) + "}";
-    case Kind::axis_of:
+    case axis_of:
       return "{" + word("axis_of", source.joint) + "}";
-    case Kind::first_good:
+    case first_good:
       return "{any: [" + joined(source.choices, direction_to_yaml) + "]}";
-    case Kind::given:
+    case given:
       break;
   }
   return write_vector(source.direction);

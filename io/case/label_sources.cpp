@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/values/identifier.hpp"
+#include "core/values/text.hpp"
 #include "io/image/label_table.hpp"
 
 namespace ecorche::io {
@@ -41,35 +43,13 @@ bool same_place(const ImageGrid& a, const ImageGrid& b) {
 }
 
 std::string described(const ImageGrid& grid) {
-  const auto number = [](double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", x);
-    return std::string(text);
-  };
   std::string out;
   for (std::size_t a = 0; a < 3; ++a) out += (a ? " x " : "") + std::to_string(grid.size[a]);
   out += " voxels of ";
-  for (std::size_t a = 0; a < 3; ++a) out += (a ? " x " : "") + number(grid.spacing[a]);
+  for (std::size_t a = 0; a < 3; ++a) out += (a ? " x " : "") + text::number(grid.spacing[a], 6);
   out += " mm from [";
-  for (std::size_t a = 0; a < 3; ++a) out += (a ? ", " : "") + number(grid.origin[a]);
+  for (std::size_t a = 0; a < 3; ++a) out += (a ? ", " : "") + text::number(grid.origin[a], 6);
   return out + "]";
-}
-
-// [a-z0-9_]{1,48}: room for an id behind it.
-std::string identifier_of(const std::string& name) {
-  std::string out;
-  for (const char c : name) {
-    const char low = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    const bool good = (low >= 'a' && low <= 'z') || (low >= '0' && low <= '9');
-    if (good) {
-      out += low;
-    } else if (!out.empty() && out.back() != '_') {
-      out += '_';
-    }
-    if (out.size() == 48) break;
-  }
-  while (!out.empty() && out.back() == '_') out.pop_back();
-  return out.empty() ? "label" : out;
 }
 
 // The name of the table that `word` means: itself, else the one that is the same identifier, as names out of
@@ -340,7 +320,8 @@ std::vector<CaseTissue> LabelSources::rest(const Value& entry, std::set<std::str
     const auto [found, fresh] = of_name.emplace(name, tissues.size());
     if (fresh) {
       CaseTissue tissue;
-      tissue.name = identifier_of(name);
+      tissue.name = identifier_from(name, 48);  // room for an id behind it
+      if (tissue.name.empty()) tissue.name = "label";
       if (taken.count(tissue.name) != 0) tissue.name += "_" + std::to_string(id);
       if (!taken.insert(tissue.name).second)
         entry.fail("no name is left for label " + std::to_string(id), "list it with a name of its own");

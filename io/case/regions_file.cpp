@@ -2,6 +2,7 @@
 // Named regions of bones: `regions.yaml` of a case, or `regions` of a skeleton.
 #include <algorithm>
 
+#include "core/values/identifier.hpp"
 #include "io/case/joint_rule_file.hpp"
 #include "io/case/skeleton_file.hpp"
 
@@ -35,8 +36,7 @@ PlacedRegion read_region(const std::string& name, const Value& value, const Fram
   PlacedRegion placed{{}, value, {}};
   Region& region = placed.region;
   region.name = name;
-  if (!yaml::is_identifier(name))
-    value.fail("'" + name + "' is no identifier", "use 1 to 64 of a-z, 0-9 and _");
+  if (!is_identifier(name)) value.fail("'" + name + "' is no identifier", "use 1 to 64 of a-z, 0-9 and _");
   const auto bone = value.find("bone"), segment = value.find("segment");
   if (bone.has_value() == segment.has_value())
     value.fail("is on no one place", "name its bone or its segment");

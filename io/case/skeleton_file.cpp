@@ -6,6 +6,7 @@
 #include <set>
 
 #include <ecorche/io/case_file.hpp>
+#include "core/values/identifier.hpp"
 #include "io/case/joint_axes.hpp"
 #include "io/case/yaml_text.hpp"
 
@@ -58,7 +59,7 @@ AngleAxis read_angle(const Value& value) {
   if (pairs.size() != 1)
     value.fail("names " + std::to_string(pairs.size()) + " angles", "write one, as {flexion: x}");
   const auto& [name, axis] = pairs.front();
-  if (!yaml::is_identifier(name) || name == "source") {
+  if (!is_identifier(name) || name == "source") {
     axis.fail("'" + name + "' cannot name an angle", "use 1 to 64 of a-z, 0-9 and _, but not 'source'");
   }
   AngleAxis angle;
@@ -302,8 +303,7 @@ PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
   std::vector<int> row_of(segments.size());
   for (const std::size_t i : order) {
     const auto& [name, value] = segments[i];
-    if (!yaml::is_identifier(name))
-      value.fail("'" + name + "' is no identifier", "use 1 to 64 of a-z, 0-9 and _");
+    if (!is_identifier(name)) value.fail("'" + name + "' is no identifier", "use 1 to 64 of a-z, 0-9 and _");
     Segment segment;
     segment.name = name;
     segment.parent = parents[i] < 0 ? -1 : row_of[static_cast<std::size_t>(parents[i])];

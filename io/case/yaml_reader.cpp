@@ -8,6 +8,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
 #include "io/case/yaml_tree.hpp"
 
 namespace ecorche::io::yaml {
@@ -77,11 +78,6 @@ std::string nearest(std::string_view word, std::span<const std::string> known) {
     }
   }
   return best;
-}
-
-bool is_identifier(std::string_view text) {
-  return !text.empty() && text.size() <= 64 &&
-         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == text.npos;
 }
 
 Value Value::parse(const std::string& text, const std::string& file) {

@@ -93,7 +93,4 @@ class Value {
 /// The word of `known` nearest to `word`, or empty where none is near.
 std::string nearest(std::string_view word, std::span<const std::string> known);
 
-/// Whether `text` is [a-z0-9_]{1,64}.
-bool is_identifier(std::string_view text);
-
 }  // namespace ecorche::io::yaml

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <numbers>
 
+#include "core/values/identifier.hpp"
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::io::yaml {

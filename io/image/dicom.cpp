@@ -6,6 +6,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
@@ -16,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr int kLookedAt = 64;  // files of a folder: a series lies with its like
 
 bool is_file_of_dicom(const fs::path& path) {
-  const std::string ending = fields::lower(path.extension().string());
+  const std::string ending = text::lower(path.extension().string());
   if (ending == ".dcm" || ending == ".ima") return true;
   std::ifstream file(path, std::ios::binary);
   std::array<char, 132> head{};

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 
 namespace ecorche::io::fields {
@@ -18,34 +18,11 @@ namespace ecorche::io::fields {
   throw Error(ErrorKind::data, path.string(), std::move(what), std::move(mend));
 }
 
-inline std::string_view trim(std::string_view text) {
-  constexpr std::string_view spaces = " \t\r\n\v\f";
-  const std::size_t begin = text.find_first_not_of(spaces);
-  if (begin == text.npos) return {};
-  return text.substr(begin, text.find_last_not_of(spaces) - begin + 1);
-}
-
-inline std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return out;
-}
-
-inline std::vector<std::string_view> words(std::string_view text) {
-  std::vector<std::string_view> out;
-  for (text = trim(text); !text.empty(); text = trim(text)) {
-    const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
-    out.push_back(text.substr(0, end));
-    text.remove_prefix(end);
-  }
-  return out;
-}
-
 /// A whole number from `least` to `most`; `key` for the message.
 inline std::int64_t integer(std::string_view text, std::int64_t least, std::int64_t most,
                             const std::string& key, const std::filesystem::path& path) {
   std::int64_t value = 0;
-  text = trim(text);
+  text = text::trim(text);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
     refuse(path, key + " is '" + std::string(text.substr(0, 40)) + "'",
@@ -57,7 +34,7 @@ inline std::int64_t integer(std::string_view text, std::int64_t least, std::int6
 /// A data file named by a header: a plain name beside it. Anything else could read any file of the machine.
 inline std::filesystem::path beside(const std::filesystem::path& path, std::string_view name) {
   const bool plain = !name.empty() && name != "." && name != ".." &&
-                     name.find_first_of("/\\%") == name.npos && fields::lower(name.substr(0, 4)) != "list" &&
+                     name.find_first_of("/\\%") == name.npos && text::lower(name.substr(0, 4)) != "list" &&
                      name.find_first_of(std::string_view("\0", 1)) == name.npos;
   if (!plain) {
     refuse(path, "its voxels are in '" + std::string(name.substr(0, 80)) + "'",

@@ -6,6 +6,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
@@ -25,7 +26,7 @@ constexpr std::size_t kLargestHeader = std::size_t{1} << 20;
 constexpr double kItkDegrees = 1e-6;  // what float32 rounds
 
 bool ends_with(const Path& path, std::string_view ending) {
-  return fields::lower(path.filename().string()).ends_with(ending);
+  return text::lower(path.filename().string()).ends_with(ending);
 }
 
 // A `.nii`, or a `.nii.gz` whose stream holds one.

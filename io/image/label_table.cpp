@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
+#include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
@@ -15,7 +17,7 @@ namespace {
 
 using Path = std::filesystem::path;
 
-constexpr std::size_t kLargestTable = std::size_t{16} << 20, kLongestName = 64;
+constexpr std::size_t kLargestTable = std::size_t{16} << 20;
 
 std::optional<std::int64_t> whole(std::string_view word) {
   std::int64_t value = 0;
@@ -32,12 +34,12 @@ class TableReader {
   }
 
   LabelNames read() {
-    const std::string ending = fields::lower(path_.extension().string());
+    const std::string ending = text::lower(path_.extension().string());
     if (ending == ".tsv") {
       read_tsv();
     } else if (ending == ".ctbl" || ending == ".txt" || ending == ".label") {
       for (std::string_view line; next(line);) {
-        line = fields::trim(line);
+        line = text::trim(line);
         if (line.empty() || line.front() == '#') continue;
         const bool quoted = line.back() == '"' && line.find('"') != line.size() - 1;
         quoted ? read_snap(line) : read_slicer(line);
@@ -84,7 +86,7 @@ class TableReader {
   void read_snap(std::string_view line) {
     constexpr const char* expected = "a line is: id r g b a visible mesh \"name\"";
     const std::size_t quote = line.find('"');
-    const auto words = fields::words(line.substr(0, quote));
+    const auto words = text::words(line.substr(0, quote));
     if (words.size() != 7) fail("has " + std::to_string(words.size()) + " numbers before its name", expected);
     check_numbers(words, 1, 7, expected);
     add(words[0], line.substr(quote + 1, line.size() - quote - 2));
@@ -93,7 +95,7 @@ class TableReader {
   // id name r g b a; a name may hold spaces.
   void read_slicer(std::string_view line) {
     constexpr const char* expected = "a line is: id name r g b a";
-    const auto words = fields::words(line);
+    const auto words = text::words(line);
     if (words.size() < 6) fail("has " + std::to_string(words.size()) + " columns", expected);
     check_numbers(words, words.size() - 4, words.size(), expected);
     const std::string_view first = words[1], last = words[words.size() - 5];
@@ -105,7 +107,7 @@ class TableReader {
     std::vector<std::string_view> out;
     while (true) {
       const std::size_t tab = line.find('\t');
-      out.push_back(fields::trim(line.substr(0, tab)));
+      out.push_back(text::trim(line.substr(0, tab)));
       if (tab == line.npos) return out;
       line.remove_prefix(tab + 1);
     }
@@ -117,7 +119,7 @@ class TableReader {
     const auto heads = cells(line);
     const auto column = [&](std::initializer_list<std::string_view> known) {
       for (std::size_t c = 0; c < heads.size(); ++c) {
-        const std::string head = fields::lower(heads[c]);
+        const std::string head = text::lower(heads[c]);
         if (std::find(known.begin(), known.end(), head) != known.end()) return c;
       }
       fail("has no column '" + std::string(*known.begin()) + "'",
@@ -126,7 +128,7 @@ class TableReader {
     const std::size_t id = column({"index", "id", "label", "value"}),
                       name = column({"name", "structure", "abbreviation"});
     while (next(line)) {
-      if (fields::trim(line).empty()) continue;
+      if (text::trim(line).empty()) continue;
       const auto row = cells(line);
       if (row.size() <= std::max(id, name))
         fail("has " + std::to_string(row.size()) + " columns", "one for every head");
@@ -142,21 +144,6 @@ class TableReader {
 
 }  // namespace
 
-std::string identifier_from(std::string_view name) {
-  std::string out;
-  for (const char c : fields::lower(name)) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-    if (plain) {
-      out += c;
-    } else if (!out.empty() && out.back() != '_') {
-      out += '_';
-    }
-  }
-  out.resize(std::min(out.size(), kLongestName));
-  while (out.ends_with('_')) out.pop_back();
-  return out;
-}
-
 LabelNames make_identifiers(const std::map<std::int64_t, std::string>& names) {
   LabelNames out;
   std::set<std::string> taken;
@@ -166,7 +153,7 @@ LabelNames make_identifiers(const std::map<std::int64_t, std::string>& names) {
         (id < 0 ? "minus_" : "") + std::to_string(id < 0 ? -(id + 1) + 1ULL : static_cast<std::uint64_t>(id));
     if (made.empty()) made = "label_" + number;
     if (taken.contains(made)) {
-      made.resize(std::min(made.size(), kLongestName - number.size() - 1));
+      made.resize(std::min(made.size(), longest_identifier - number.size() - 1));
       made += "_" + number;
     }
     // Whoever names things so that even this is taken gets the bare id.

@@ -18,12 +18,8 @@ using LabelNames = std::map<std::int64_t, std::string>;  ///< id -> identifier; 
 /// `make_identifiers`. Throws Error{missing_input} or Error{data} with the line.
 LabelNames read_label_table(const std::filesystem::path& path);
 
-/// A name as people write it made into an identifier, `[a-z0-9_]{0,64}`: letters become small, every run of
-/// other characters than letters and digits one `_`, none at the ends, cut after 64.
-std::string identifier_from(std::string_view name);
-
-/// The same for all names of a table, each once: what is left empty is `label_<id>`; of equal ones the later,
-/// by id, get `_<id>` behind them.
+/// Names as people write them made into identifiers (`identifier_from`), each once: what is left empty is
+/// `label_<id>`; of equal ones the later, by id, get `_<id>` behind them.
 LabelNames make_identifiers(const std::map<std::int64_t, std::string>& names);
 
 }  // namespace ecorche::io

@@ -2,6 +2,7 @@
 // https://itk.org/Wiki/ITK/MetaIO/Documentation
 #include <map>
 
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -11,9 +12,9 @@ namespace {
 using fields::refuse;
 using fields::set_wide;
 using Path = std::filesystem::path;
-using Fields = std::map<std::string, std::string, std::less<>>;
+using MetaFields = std::map<std::string, std::string, std::less<>>;
 
-void set_type(ImageHeader& header, const std::string& name, const Path& path) {
+void set_meta_type(ImageHeader& header, const std::string& name, const Path& path) {
   static const std::map<std::string, ScalarType, std::less<>> types{
       {"MET_CHAR", ScalarType::i8},    {"MET_UCHAR", ScalarType::u8},  {"MET_SHORT", ScalarType::i16},
       {"MET_USHORT", ScalarType::u16}, {"MET_INT", ScalarType::i32},   {"MET_UINT", ScalarType::u32},
@@ -29,8 +30,8 @@ void set_type(ImageHeader& header, const std::string& name, const Path& path) {
 }
 
 // Reads the lines up to ElementDataFile, which ends the header; `offset` becomes the byte after it.
-Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
-  Fields fields;
+MetaFields read_meta_fields(std::string_view head, const Path& path, std::uint64_t& offset) {
+  MetaFields fields;
   std::size_t at = 0;
   for (int line = 1; at < head.size(); ++line) {
     const std::size_t end = head.find('\n', at);
@@ -38,7 +39,7 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
     const std::string_view text = head.substr(at, end - at);
     at = end + 1;
     const std::size_t equals = text.find('=');
-    const std::string key(fields::trim(text.substr(0, std::min(equals, text.size()))));
+    const std::string key(text::trim(text.substr(0, std::min(equals, text.size()))));
     const bool named =
         equals != text.npos && !key.empty() &&
         key.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == key.npos;
@@ -48,7 +49,7 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
                  std::string(text.substr(0, 60)) + "'",
              "it must be a MetaImage");
     }
-    if (!fields.emplace(key, fields::trim(text.substr(equals + 1))).second) {
+    if (!fields.emplace(key, text::trim(text.substr(equals + 1))).second) {
       refuse(path, "its header gives '" + key + "' twice");
     }
     if (key == "ElementDataFile") {
@@ -59,18 +60,18 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
   refuse(path, "its header has no line 'ElementDataFile = ...'", "it must be a MetaImage");
 }
 
-std::string value_of(const Fields& fields, std::string_view key, const std::string& otherwise) {
+std::string value_of(const MetaFields& fields, std::string_view key, const std::string& otherwise) {
   const auto found = fields.find(key);
   return found == fields.end() ? otherwise : found->second;
 }
 
-std::string needed(const Fields& fields, std::string_view key, const Path& path) {
+std::string needed(const MetaFields& fields, std::string_view key, const Path& path) {
   const auto found = fields.find(key);
   if (found == fields.end()) refuse(path, "its header lacks '" + std::string(key) + "'");
   return found->second;
 }
 
-bool truth(const Fields& fields, std::string_view key, bool otherwise) {
+bool truth(const MetaFields& fields, std::string_view key, bool otherwise) {
   const std::string value = value_of(fields, key, otherwise ? "True" : "False");
   return value == "True" || value == "true" || value == "1";
 }
@@ -79,14 +80,14 @@ bool truth(const Fields& fields, std::string_view key, bool otherwise) {
 
 ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   ImageHeader header;
-  const Fields fields = read_fields(head, path, header.data_offset);
+  const MetaFields fields = read_meta_fields(head, path, header.data_offset);
   if (value_of(fields, "ObjectType", "Image") != "Image") {
     refuse(path, "holds a '" + fields.at("ObjectType") + "'", "it must be an image");
   }
   if (needed(fields, "NDims", path) != "3")
     refuse(path, "has " + fields.at("NDims") + " axes", "save a 3-D image");
   const std::string sizes = needed(fields, "DimSize", path);
-  const auto counts = fields::words(sizes);
+  const auto counts = text::words(sizes);
   if (counts.size() != 3) refuse(path, "its DimSize is '" + sizes + "'");
   for (std::size_t i = 0; i < 3; ++i) {
     header.size[i] = static_cast<std::int32_t>(
@@ -94,7 +95,7 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   }
   header.components = static_cast<int>(fields::integer(value_of(fields, "ElementNumberOfChannels", "1"), 1,
                                                        1 << 16, "ElementNumberOfChannels", path));
-  set_type(header, needed(fields, "ElementType", path), path);
+  set_meta_type(header, needed(fields, "ElementType", path), path);
   fields::check_size(header, path);
   if (!truth(fields, "BinaryData", false)) refuse(path, "its voxels are text", "save it as binary");
   header.gzip = truth(fields, "CompressedData", false);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -35,7 +36,7 @@ class Bytes {
 };
 
 // What of the two versions matters here.
-struct Fields {
+struct NiftiFields {
   std::array<std::int64_t, 8> dim{};
   int datatype = 0, units = 0, qform = 0, sform = 0;
   double offset = 0, slope = 0, intercept = 0;
@@ -44,8 +45,8 @@ struct Fields {
   std::array<double, 12> rows{};       // of the sform
 };
 
-Fields first_version(const Bytes& bytes) {
-  Fields f;
+NiftiFields first_version(const Bytes& bytes) {
+  NiftiFields f;
   for (std::size_t i = 0; i < 8; ++i) f.dim[i] = bytes.at<std::int16_t>(40 + 2 * i);
   f.datatype = bytes.at<std::int16_t>(70);
   f.offset = static_cast<double>(bytes.at<float>(108));
@@ -60,8 +61,8 @@ Fields first_version(const Bytes& bytes) {
   return f;
 }
 
-Fields second_version(const Bytes& bytes) {
-  Fields f;
+NiftiFields second_version(const Bytes& bytes) {
+  NiftiFields f;
   for (std::size_t i = 0; i < 8; ++i) f.dim[i] = bytes.at<std::int64_t>(16 + 8 * i);
   f.datatype = bytes.at<std::int16_t>(12);
   f.offset = static_cast<double>(bytes.at<std::int64_t>(168));
@@ -77,7 +78,7 @@ Fields second_version(const Bytes& bytes) {
 }
 
 // By the qform or the sform. NIfTI's x and y point right and anterior.
-ImageGrid grid_of(const Fields& f, const std::array<std::int32_t, 3>& size, bool by_qform) {
+ImageGrid grid_of(const NiftiFields& f, const std::array<std::int32_t, 3>& size, bool by_qform) {
   std::array<std::array<double, 3>, 3> axis{};
   std::array<double, 3> origin{};
   if (by_qform) {
@@ -127,14 +128,13 @@ double apart(const ImageGrid& a, const ImageGrid& b) {
 
 // Where both forms stand and agree, the qform: it is right-angled, and ITK takes it too. A NaN does not
 // agree.
-ImageGrid placed(const Fields& f, const std::array<std::int32_t, 3>& size, NiftiForm form, const Path& path) {
+ImageGrid placed(const NiftiFields& f, const std::array<std::int32_t, 3>& size, NiftiForm form,
+                 const Path& path) {
   const ImageGrid one = grid_of(f, size, f.qform > 0 && form != NiftiForm::sform);
   if (form != NiftiForm::either || f.qform <= 0 || f.sform <= 0) return one;
   const double mm = apart(one, grid_of(f, size, false));
   if (mm <= 0.5 * *std::min_element(one.spacing.begin(), one.spacing.end())) return one;
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", mm);
-  refuse(path, std::string("its qform and its sform lie ") + text.data() + " mm apart",
+  refuse(path, "its qform and its sform lie " + text::number(mm) + " mm apart",
          "write the image with one of them, or say in the case which counts: form: qform, or form: sform");
 }
 
@@ -182,7 +182,7 @@ void set_type(ImageHeader& header, int datatype, const Path& path) {
   }
 }
 
-void set_size(ImageHeader& header, const Fields& f, const Path& path) {
+void set_size(ImageHeader& header, const NiftiFields& f, const Path& path) {
   if (f.dim[0] < 3 || f.dim[0] > 7)
     refuse(path, "has " + std::to_string(f.dim[0]) + " axes", "save a 3-D image");
   for (std::size_t axis = 1; axis <= static_cast<std::size_t>(f.dim[0]); ++axis) {
@@ -217,7 +217,7 @@ ImageHeader parse_nifti_header(std::string_view head, const Path& path, NiftiFor
            "Analyze files do not say left from right: convert it");
   ImageHeader header;
   const Bytes& bytes = swap ? swapped : plain;
-  const Fields f = second ? second_version(bytes) : first_version(bytes);
+  const NiftiFields f = second ? second_version(bytes) : first_version(bytes);
   set_size(header, f, path);
   set_type(header, f.datatype, path);
   fields::check_size(header, path);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
@@ -41,10 +42,8 @@ void replace_non_finite(Image& image, const std::filesystem::path& path, const f
       for (const T x : scalars) least = std::isfinite(x) ? std::min(least, x) : least;
     }
     for (T& x : scalars) x = std::isfinite(x) ? x : least;
-    char value[32];
-    std::snprintf(value, sizeof value, "%.6g", static_cast<double>(least));
     options.say(path.string() + ": " + std::to_string(count) + " of " + std::to_string(all) +
-                " values are NaN or infinite: taken as " + value +
+                " values are NaN or infinite: taken as " + text::number(static_cast<double>(least), 6) +
                 (image.components == 1 ? ", the least of the others" : "") +
                 " (write other values there if that is not meant)");
   });

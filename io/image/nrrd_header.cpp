@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -16,9 +17,9 @@ using fields::set_wide;
 using Path = std::filesystem::path;
 
 // Field names without spaces, in lower case: teem takes `data file` and `datafile` for the same.
-using Fields = std::map<std::string, std::string>;
+using NrrdFields = std::map<std::string, std::string>;
 
-void set_type(ImageHeader& header, const std::string& name, const Path& path) {
+void set_nrrd_type(ImageHeader& header, const std::string& name, const Path& path) {
   static const std::map<std::string, ScalarType, std::less<>> types{{"signed char", ScalarType::i8},
                                                                     {"int8", ScalarType::i8},
                                                                     {"int8_t", ScalarType::i8},
@@ -63,9 +64,9 @@ void set_type(ImageHeader& header, const std::string& name, const Path& path) {
 }
 
 // Reads the lines up to the empty one; `offset` becomes the byte after it.
-Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offset,
-                   Fields* free_keys = nullptr) {
-  Fields fields;
+NrrdFields read_nrrd_fields(std::string_view head, const Path& path, std::uint64_t& offset,
+                            NrrdFields* free_keys = nullptr) {
+  NrrdFields fields;
   std::size_t at = 0;
   bool ended = false;
   for (int line = 1; at < head.size(); ++line) {
@@ -86,7 +87,7 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
     }
     if (text.front() == '#') continue;
     if (const std::size_t free = text.find(":="); free != text.npos) {
-      if (free_keys != nullptr) free_keys->emplace(text.substr(0, free), fields::trim(text.substr(free + 2)));
+      if (free_keys != nullptr) free_keys->emplace(text.substr(0, free), text::trim(text.substr(free + 2)));
       continue;
     }
     const std::size_t colon = text.find(": ");
@@ -94,9 +95,9 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
       refuse(path, "line " + std::to_string(line) + " of its header is no field: '" +
                        std::string(text.substr(0, 60)) + "'");
     }
-    std::string key = fields::lower(text.substr(0, colon));
+    std::string key = text::lower(text.substr(0, colon));
     std::erase(key, ' ');
-    if (!fields.emplace(key, fields::trim(text.substr(colon + 2))).second) {
+    if (!fields.emplace(key, text::trim(text.substr(colon + 2))).second) {
       refuse(path, "its header gives '" + key + "' twice");
     }
   }
@@ -106,18 +107,18 @@ Fields read_fields(std::string_view head, const Path& path, std::uint64_t& offse
   return fields;
 }
 
-std::string needed(const Fields& fields, const char* key, const Path& path) {
+std::string needed(const NrrdFields& fields, const char* key, const Path& path) {
   const auto found = fields.find(key);
   if (found == fields.end()) refuse(path, "its header lacks '" + std::string(key) + "'");
   return found->second;
 }
 
 // Whether the first axis holds the components of a voxel: it has no direction in space.
-void check_axes(const Fields& fields, std::int64_t dimension, const Path& path) {
+void check_axes(const NrrdFields& fields, std::int64_t dimension, const Path& path) {
   if (dimension == 3) return;
   const auto found = fields.find("spacedirections");
   const std::vector<std::string_view> axes =
-      found == fields.end() ? std::vector<std::string_view>() : fields::words(found->second);
+      found == fields.end() ? std::vector<std::string_view>() : text::words(found->second);
   const auto is_none = [](std::string_view axis) { return axis == "none"; };
   if (axes.empty() || !is_none(axes.front()) || std::count_if(axes.begin(), axes.end(), is_none) != 1) {
     refuse(path, "has 4 axes, and the first is not the only one with space direction 'none'",
@@ -125,10 +126,10 @@ void check_axes(const Fields& fields, std::int64_t dimension, const Path& path) 
   }
 }
 
-void check_unit(const Fields& fields, const Path& path) {
+void check_unit(const NrrdFields& fields, const Path& path) {
   const auto found = fields.find("spaceunits");
   if (found == fields.end()) return;
-  for (const std::string_view unit : fields::words(found->second)) {
+  for (const std::string_view unit : text::words(found->second)) {
     if (unit != "\"mm\"" && unit != "\"\"" && unit != "mm") {
       refuse(path, "its space units are " + found->second, "write it in mm");
     }
@@ -137,7 +138,7 @@ void check_unit(const Fields& fields, const Path& path) {
 
 // Lines go first; bytes are those of the voxels, so that of a stream they are inflated ones; -1: all but the
 // voxels.
-void read_skips(const Fields& fields, ImageHeader& header, const Path& path) {
+void read_skips(const NrrdFields& fields, ImageHeader& header, const Path& path) {
   const auto number = [&](const char* key, std::int64_t least) {
     const auto found = fields.find(key);
     return found == fields.end() ? 0
@@ -151,7 +152,7 @@ void read_skips(const Fields& fields, ImageHeader& header, const Path& path) {
 }
 
 // Vectors such as "(1,0,0) (0, 1, 0) none": those in parentheses.
-std::vector<std::array<double, 3>> vectors(const Fields& fields, const char* key) {
+std::vector<std::array<double, 3>> vectors(const NrrdFields& fields, const char* key) {
   std::vector<std::array<double, 3>> out;
   const auto found = fields.find(key);
   std::string_view rest = found == fields.end() ? std::string_view() : std::string_view(found->second);
@@ -159,7 +160,7 @@ std::vector<std::array<double, 3>> vectors(const Fields& fields, const char* key
     const std::size_t close = std::min(rest.find(')', open), rest.size());
     std::string inside(rest.substr(open + 1, close - open - 1));
     std::replace(inside.begin(), inside.end(), ',', ' ');
-    const auto numbers = fields::words(inside);
+    const auto numbers = text::words(inside);
     std::array<double, 3> v{};
     v.fill(std::nan(""));
     for (std::size_t i = 0; i < 3 && numbers.size() == 3; ++i) {
@@ -174,14 +175,14 @@ std::vector<std::array<double, 3>> vectors(const Fields& fields, const char* key
 }
 
 // The grid in LPS of an image that says its space and directions.
-std::optional<ImageGrid> grid_of(const Fields& fields, const ImageHeader& header, const Path& path) {
+std::optional<ImageGrid> grid_of(const NrrdFields& fields, const ImageHeader& header, const Path& path) {
   static const std::map<std::string, std::array<double, 3>, std::less<>> spaces{
       {"left-posterior-superior", {1, 1, 1}},   {"lps", {1, 1, 1}},
       {"right-anterior-superior", {-1, -1, 1}}, {"ras", {-1, -1, 1}},
       {"left-anterior-superior", {1, -1, 1}},   {"las", {1, -1, 1}}};
   const auto said = fields.find("space");
   if (said == fields.end()) return std::nullopt;
-  std::string name = fields::lower(said->second);
+  std::string name = text::lower(said->second);
   std::replace(name.begin(), name.end(), ' ', '-');
   const auto space = spaces.find(name);
   if (space == spaces.end()) {
@@ -205,16 +206,16 @@ std::optional<ImageGrid> grid_of(const Fields& fields, const ImageHeader& header
 }  // namespace
 
 std::map<std::string, std::string> read_nrrd_keys(const Path& path) {
-  Fields keys;
+  NrrdFields keys;
   const std::string head = read_head(path);
   std::uint64_t offset = 0;
-  if (head.starts_with("NRRD000")) read_fields(head, path, offset, &keys);
+  if (head.starts_with("NRRD000")) read_nrrd_fields(head, path, offset, &keys);
   return keys;
 }
 
 ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   ImageHeader header;
-  const Fields fields = read_fields(head, path, header.data_offset);
+  const NrrdFields fields = read_nrrd_fields(head, path, header.data_offset);
   const std::int64_t dimension = fields::integer(needed(fields, "dimension", path), 0, 16, "dimension", path);
   if (dimension != 3 && dimension != 4) {
     refuse(path, "has " + std::to_string(dimension) + " axes", "save a 3-D image");
@@ -222,7 +223,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   check_axes(fields, dimension, path);
   check_unit(fields, path);
   const std::string sizes = needed(fields, "sizes", path);
-  const auto counts = fields::words(sizes);
+  const auto counts = text::words(sizes);
   if (counts.size() != static_cast<std::size_t>(dimension)) refuse(path, "its sizes are '" + sizes + "'");
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::int64_t count =
@@ -233,9 +234,9 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
       header.size[i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
     }
   }
-  set_type(header, fields::lower(needed(fields, "type", path)), path);
+  set_nrrd_type(header, text::lower(needed(fields, "type", path)), path);
   fields::check_size(header, path);
-  const std::string encoding = fields::lower(needed(fields, "encoding", path));
+  const std::string encoding = text::lower(needed(fields, "encoding", path));
   header.gzip = encoding == "gzip" || encoding == "gz";
   if (!header.gzip && encoding != "raw") {
     refuse(path, "its encoding is '" + encoding + "'", "save it as raw or gzip");
@@ -248,7 +249,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   read_skips(fields, header, path);
   const auto endian = fields.find("endian");
   header.swapped =
-      header.stored_bytes() > 1 && endian != fields.end() && fields::lower(endian->second) == "big";
+      header.stored_bytes() > 1 && endian != fields.end() && text::lower(endian->second) == "big";
   header.grid = grid_of(fields, header, path);
   return header;
 }

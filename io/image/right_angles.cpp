@@ -8,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
@@ -21,12 +22,6 @@ using Direction = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 constexpr double kMostDegrees = 0.1;
 // Six digits, as text headers have them.
 constexpr double kRounding = 1e-4, kExact = 1e-12, kMostLength = 1e-3;
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
 
 Eigen::Vector3d vector(const std::array<double, 3>& p) {
   return {p[0], p[1], p[2]};
@@ -59,13 +54,13 @@ void make_right_angled(ImageGrid& grid, const std::filesystem::path& path,
   const double degrees = degrees_off(grid);
   if (!(degrees <= kMostDegrees)) {
     fields::refuse(
-        path, "its axes are not orthonormal: " + number(degrees) + " degrees off right angles",
+        path, "its axes are not orthonormal: " + text::number(degrees) + " degrees off right angles",
         "resample it onto a right-angled grid; of a NIfTI whose shear means nothing, set the qform from the "
         "sform");
   }
   const double length = (direction.colwise().norm().array() - 1).abs().maxCoeff();
   if (!(length <= kMostLength))
-    fields::refuse(path, "its axes are not orthonormal: the length of one is off by " + number(length));
+    fields::refuse(path, "its axes are not orthonormal: the length of one is off by " + text::number(length));
   const double skew = (direction.transpose() * direction - Direction::Identity()).cwiseAbs().maxCoeff();
   if (skew <= kExact) return;
   const ImageGrid before = grid;
@@ -79,9 +74,9 @@ void make_right_angled(ImageGrid& grid, const std::filesystem::path& path,
   for (std::size_t k = 0; k < 3; ++k) grid.origin[k] += way[static_cast<Eigen::Index>(k)];
   double moved = 0;
   for (int c = 0; c < 8; ++c) moved = std::max(moved, (corner(grid, c) - corner(before, c)).norm());
-  options.say(path.string() + ": its axes are " + number(degrees) +
+  options.say(path.string() + ": its axes are " + text::number(degrees) +
               " degrees off right angles: taken as right-angled, which moves its farthest voxel by " +
-              number(moved) + " mm (resample it onto right-angled voxels if that is too far)");
+              text::number(moved) + " mm (resample it onto right-angled voxels if that is too far)");
 }
 
 }  // namespace ecorche::io

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/image_file.hpp"
@@ -109,7 +110,7 @@ bool holds(const Image& layer, std::int64_t id) {
 }  // namespace
 
 void write_segmentation(const Path& path, const Segmentation& segmentation) {
-  if (!fields::lower(path.filename().string()).ends_with(".seg.nrrd"))
+  if (!text::lower(path.filename().string()).ends_with(".seg.nrrd"))
     throw Error(ErrorKind::usage, path.string(), "segmentations are written as .seg.nrrd", "name it so");
   std::string keys;
   std::size_t count = 0;

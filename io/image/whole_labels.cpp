@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/non_finite.hpp"
 
@@ -14,12 +15,6 @@ namespace {
 
 using fields::refuse;
 using Path = std::filesystem::path;
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.9g", x);
-  return text;
-}
 
 std::string place_of(const Image& image, std::size_t scalar) {
   std::size_t voxel = scalar / static_cast<std::size_t>(image.components);
@@ -55,8 +50,8 @@ Image whole(const Image& image, const Path& path) {
         values.size() - static_cast<std::size_t>(std::count_if(fraction, values.end(), is_whole)) - at;
     refuse(path,
            std::to_string(count) + " of " + std::to_string(values.size()) +
-               " labels are no whole numbers, the first " + number(static_cast<double>(*fraction)) + " at " +
-               place_of(image, at),
+               " labels are no whole numbers, the first " + text::number(static_cast<double>(*fraction), 9) +
+               " at " + place_of(image, at),
            "if it was resampled, resample the label map by nearest neighbour");
   }
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
@@ -65,7 +60,7 @@ Image whole(const Image& image, const Path& path) {
   if (low < std::numeric_limits<std::int32_t>::min() || high > std::numeric_limits<std::int32_t>::max()) {
     const auto worst = high > std::numeric_limits<std::int32_t>::max() ? most : least;
     refuse(path,
-           "holds the label " + number(static_cast<double>(*worst)) + " at " +
+           "holds the label " + text::number(static_cast<double>(*worst), 9) + " at " +
                place_of(image, static_cast<std::size_t>(worst - values.begin())),
            "labels fit 32 bits: renumber them");
   }

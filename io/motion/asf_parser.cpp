@@ -7,6 +7,8 @@
 #include <numbers>
 #include <optional>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::io::asf {
 namespace {
 
@@ -15,12 +17,6 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kMostBones = 4096;
 constexpr double kInch = 25.4;
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return out;
-}
 
 // What is written before the bones' tree is known.
 struct Drawn {
@@ -31,9 +27,9 @@ struct Drawn {
   std::vector<Freedom> freedoms;
 };
 
-class Parser {
+class AsfParser {
  public:
-  explicit Parser(TextStream& stream) : in_(stream) {}
+  explicit AsfParser(TextStream& stream) : in_(stream) {}
 
   File parse() {
     while (!in_.peek().empty()) section();
@@ -45,7 +41,7 @@ class Parser {
   bool at_section() { return in_.peek().empty() || in_.peek().front() == ':'; }
 
   void section() {
-    const std::string name = lower(in_.word());
+    const std::string name = text::lower(in_.word());
     if (name.starts_with('#')) return skip_line();
     if (name == ":units") {
       units();
@@ -73,12 +69,12 @@ class Parser {
     double length = 1;
     bool degrees = true;
     while (!at_section()) {
-      const std::string key = lower(in_.word());
+      const std::string key = text::lower(in_.word());
       if (key == "length") {
         length = in_.number();
         if (!(length > 0)) in_.fail("its unit of length is not positive");
       } else if (key == "angle") {
-        const std::string unit = lower(in_.word());
+        const std::string unit = text::lower(in_.word());
         if (unit != "deg" && unit != "rad") in_.unexpected("deg or rad", unit);
         degrees = unit == "deg";
       } else {
@@ -91,7 +87,7 @@ class Parser {
 
   Freedom freedom(std::string_view word) {
     constexpr std::array<std::string_view, 7> names{"rx", "ry", "rz", "tx", "ty", "tz", "l"};
-    const std::string name = lower(word);
+    const std::string name = text::lower(word);
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end()) in_.unexpected("a degree of freedom such as rx", word);
     return static_cast<Freedom>(found - names.begin());
@@ -104,7 +100,7 @@ class Parser {
   }
 
   std::string axis_order() {
-    std::string order = lower(in_.word());
+    std::string order = text::lower(in_.word());
     std::string sorted = order;
     std::sort(sorted.begin(), sorted.end());
     if (sorted != "xyz") in_.unexpected("an order of axes such as XYZ", order);
@@ -116,7 +112,7 @@ class Parser {
     file_.bones.emplace_back().name = "root";
     names_["root"] = 0;
     while (!at_section()) {
-      const std::string key = lower(in_.word());
+      const std::string key = text::lower(in_.word());
       if (key == "order") {
         for (int k = 0; k < 6; ++k) add_freedom(file_.bones[0].freedoms, std::string(in_.word()));
       } else if (key == "axis") {
@@ -138,7 +134,7 @@ class Parser {
     in_.expect("begin");
     Drawn drawn;
     std::string name;
-    for (std::string key = lower(in_.word()); key != "end"; key = lower(in_.word())) {
+    for (std::string key = text::lower(in_.word()); key != "end"; key = text::lower(in_.word())) {
       if (key == "id") {
         in_.word();
       } else if (key == "name") {
@@ -168,7 +164,7 @@ class Parser {
   }
 
   static bool is_freedom(std::string_view word) {
-    const std::string w = lower(word);
+    const std::string w = text::lower(word);
     return w == "l" || (w.size() == 2 && (w[0] == 'r' || w[0] == 't') && w[1] >= 'x' && w[1] <= 'z');
   }
 
@@ -182,13 +178,7 @@ class Parser {
     for (;;) {
       if (in_.peek().empty()) in_.unexpected("end", "");
       bool more = true;
-      std::string line(in_.line(more));
-      std::vector<std::string> words;
-      for (std::size_t at = 0; (at = line.find_first_not_of(" \t", at)) != line.npos;) {
-        const std::size_t past = std::min(line.find_first_of(" \t", at), line.size());
-        words.push_back(line.substr(at, past - at));
-        at = past;
-      }
+      const std::vector<std::string> words = in_.words(more);
       if (words.empty()) continue;
       if (words[0] == "end") return;
       const auto parent = names_.find(words[0]);
@@ -233,7 +223,7 @@ class Parser {
 }  // namespace
 
 File parse(TextStream& stream) {
-  return Parser(stream).parse();
+  return AsfParser(stream).parse();
 }
 
 Quaterniond turn_of(const std::vector<Freedom>& freedoms, const double* values, double radians) {

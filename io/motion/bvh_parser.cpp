@@ -6,14 +6,16 @@
 #include <algorithm>
 #include <set>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::io::bvh {
 namespace {
 
 constexpr std::size_t kMostJoints = 4096, kMostDepth = 256, kLongestName = 256;
 
-class Parser {
+class BvhParser {
  public:
-  explicit Parser(TextStream& stream) : in_(stream) {}
+  explicit BvhParser(TextStream& stream) : in_(stream) {}
 
   Header parse() {
     in_.expect("HIERARCHY");
@@ -27,16 +29,12 @@ class Parser {
  private:
   // Names run to the end of their line, or to their brace: some tools put spaces in them.
   std::string name() {
-    std::string out;
     const TextStream::Mark begin = in_.mark();
     bool more = true;
     const std::string_view line = in_.line(more);
     const std::size_t brace = line.find('{');
-    out = line.substr(0, brace);
+    std::string out(text::trim(line.substr(0, brace)));
     in_.seek({begin.byte + std::min(brace, line.size()), begin.line});
-    const auto space = [](char c) { return c == ' ' || (c >= '\t' && c <= '\r'); };
-    while (!out.empty() && space(out.back())) out.pop_back();
-    out.erase(0, std::min(out.find_first_not_of(" \t"), out.size()));
     if (out.empty() || out.size() > kLongestName)
       in_.fail("a joint has no name, or one of more than 256 letters");
     return out;
@@ -68,9 +66,7 @@ class Parser {
     constexpr std::array<std::string_view, 6> names{"xposition", "yposition", "zposition",
                                                     "xrotation", "yrotation", "zrotation"};
     const std::string_view met = in_.word();
-    std::string low(met.substr(0, 16));
-    for (char& c : low) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    const auto found = std::find(names.begin(), names.end(), low);
+    const auto found = std::find(names.begin(), names.end(), text::lower(met.substr(0, 16)));
     if (found == names.end()) in_.unexpected("a channel such as Xrotation", met);
     return static_cast<Channel>(found - names.begin());
   }
@@ -121,7 +117,7 @@ class Parser {
 }  // namespace
 
 Header read_header(TextStream& stream) {
-  return Parser(stream).parse();
+  return BvhParser(stream).parse();
 }
 
 bool read_frame(TextStream& stream, const Header& header, std::size_t frame, std::span<double> values) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/text.hpp"
 #include "io/motion/amc.hpp"
 #include "io/motion/bvh.hpp"
 #include "io/motion/gltf_clip.hpp"
@@ -13,12 +14,6 @@ namespace ecorche::io {
 namespace {
 
 constexpr std::size_t kMostRotations = std::size_t{1} << 26;
-
-std::string ending_of(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return ending;
-}
 
 }  // namespace
 
@@ -31,7 +26,7 @@ void check_unit(double unit_mm) {
 
 std::unique_ptr<ClipFile> open_clip(const std::filesystem::path& path, const MotionSpace& space,
                                     const std::filesystem::path& asf) {
-  const std::string ending = ending_of(path);
+  const std::string ending = text::lower(path.extension().string());
   if (ending == ".bvh") return open_bvh(path, space);
   if (ending == ".amc") return open_amc(path, asf.empty() ? asf_of(path) : asf, space);
   if (ending == ".gltf" || ending == ".glb") return open_gltf_clip(path, space);

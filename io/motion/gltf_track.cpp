@@ -14,7 +14,7 @@ namespace {
 using Eigen::Quaterniond;
 using Row = std::array<double, 4>;
 
-[[noreturn]] void refuse(const std::string& where, const std::string& what) {
+[[noreturn]] void refuse_track(const std::string& where, const std::string& what) {
   throw Error(ErrorKind::data, where, what, "export the motion again");
 }
 
@@ -68,26 +68,27 @@ GltfTrack read_track(const tinygltf::Model& model, const tinygltf::AnimationSamp
   } else if (sampler.interpolation == "CUBICSPLINE") {
     track.interpolation = Interpolation::cubic;
   } else if (sampler.interpolation != "LINEAR" && !sampler.interpolation.empty()) {
-    refuse(where, "an animation is interpolated by '" + sampler.interpolation.substr(0, 40) + "'");
+    refuse_track(where, "an animation is interpolated by '" + sampler.interpolation.substr(0, 40) + "'");
   }
   track.time = gltf::reals(model, sampler.input, 1, budget);
   track.values = gltf::reals(model, sampler.output, static_cast<int>(width), budget);
   const std::size_t parts = track.interpolation == Interpolation::cubic ? 3 : 1;
   if (track.time.empty() || track.values.size() != parts * width * track.time.size())
-    refuse(where, "an animation has " + std::to_string(track.time.size()) + " times and " +
-                      std::to_string(track.values.size() / (parts * width)) + " values");
+    refuse_track(where, "an animation has " + std::to_string(track.time.size()) + " times and " +
+                            std::to_string(track.values.size() / (parts * width)) + " values");
   for (std::size_t i = 0; i < track.time.size(); ++i) {
     if (!(track.time[i] >= 0 && track.time[i] < 1e6) || (i > 0 && !(track.time[i] > track.time[i - 1])))
-      refuse(where, "the times of an animation are not ascending");
+      refuse_track(where, "the times of an animation are not ascending");
   }
   for (const double value : track.values) {
     if (!(std::abs(value) <= 1e9))
-      refuse(where, "an animation holds a value that is not finite or far too large");
+      refuse_track(where, "an animation holds a value that is not finite or far too large");
   }
   for (std::size_t i = parts == 3 ? 1 : 0; width == 4 && i < parts * track.time.size(); i += parts) {
     double square = 0;
     for (std::size_t c = 0; c < 4; ++c) square += track.values[4 * i + c] * track.values[4 * i + c];
-    if (!(std::abs(square - 1) < 0.1)) refuse(where, "a rotation of an animation is no unit quaternion");
+    if (!(std::abs(square - 1) < 0.1))
+      refuse_track(where, "a rotation of an animation is no unit quaternion");
   }
   return track;
 }

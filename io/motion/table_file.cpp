@@ -8,43 +8,22 @@
 #include <optional>
 #include <set>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::io {
 namespace {
 
 constexpr std::size_t kMostColumns = 4096, kMostHeaderLines = 1000;
-
-std::string_view trim(std::string_view text) {
-  const auto space = [](char c) { return c == ' ' || (c >= '\t' && c <= '\r'); };
-  while (!text.empty() && space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && space(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return out;
-}
 
 // The fields between tabs; two tabs hold an empty one.
 std::vector<std::string_view> fields(std::string_view line) {
   std::vector<std::string_view> out;
   for (;;) {
     const std::size_t tab = line.find('\t');
-    out.push_back(trim(line.substr(0, tab)));
+    out.push_back(text::trim(line.substr(0, tab)));
     if (tab == line.npos) return out;
     line.remove_prefix(tab + 1);
   }
-}
-
-std::vector<std::string> words(std::string_view line) {
-  std::vector<std::string> out;
-  for (line = trim(line); !line.empty(); line = trim(line)) {
-    const std::size_t past = std::min(line.find_first_of(" \t"), line.size());
-    out.emplace_back(line.substr(0, past));
-    line.remove_prefix(past);
-  }
-  return out;
 }
 
 void need_unique(const TextStream& in, const std::vector<std::string>& names, const char* what) {
@@ -67,23 +46,23 @@ AngleFile::AngleFile(TextStream in) {
   std::optional<std::uint64_t> rows, columns;
   bool more = true;
   for (std::size_t i = 0;; ++i) {
-    const std::string line(trim(in.line(more)));
+    const std::string line(text::trim(in.line(more)));
     if (!more || i == kMostHeaderLines) in.fail("is no OpenSim motion: no 'endheader'");
     const std::size_t equals = line.find('=');
-    const std::string key = lower(trim(std::string_view(line).substr(0, equals)));
+    const std::string key = text::lower(text::trim(std::string_view(line).substr(0, equals)));
     if (key == "endheader") break;
     if (equals == line.npos) continue;
-    const std::string_view value = trim(std::string_view(line).substr(equals + 1));
+    const std::string_view value = text::trim(std::string_view(line).substr(equals + 1));
     if (key == "nrows") rows = count_of(in, value);
     if (key == "ncolumns") columns = count_of(in, value);
     if (key == "indegrees") {
-      if (lower(value) != "yes" && lower(value) != "no") in.unexpected("yes or no", value);
-      in_degrees_ = lower(value) == "yes";
+      if (text::lower(value) != "yes" && text::lower(value) != "no") in.unexpected("yes or no", value);
+      in_degrees_ = text::lower(value) == "yes";
     }
   }
   std::vector<std::string> names;
-  while (names.empty() && more) names = words(in.line(more));
-  if (names.size() < 2 || lower(names[0]) != "time")
+  while (names.empty() && more) names = in.words(more);
+  if (names.size() < 2 || text::lower(names[0]) != "time")
     in.fail("its first column is not 'time'", "write a row of names below 'endheader'");
   if (names.size() > kMostColumns) in.fail("more than " + std::to_string(kMostColumns) + " columns");
   if (columns && *columns != names.size())
@@ -110,8 +89,8 @@ MarkerFile::MarkerFile(TextStream in, const MotionSpace& space) : space_(space) 
   in.expect("PathFileType");
   bool more = true;
   in.line(more);
-  const std::vector<std::string> keys = words(in.line(more));
-  const std::vector<std::string> values = words(in.line(more));
+  const std::vector<std::string> keys = in.words(more);
+  const std::vector<std::string> values = in.words(more);
   if (keys.size() != values.size()) in.fail("its header has other values than names");
   std::uint64_t count = 0, frames = 0;
   std::string unit = "mm";
@@ -123,7 +102,7 @@ MarkerFile::MarkerFile(TextStream in, const MotionSpace& space) : space_(space) 
     }
     if (keys[i] == "NumFrames") frames = count_of(in, values[i]);
     if (keys[i] == "NumMarkers") count = count_of(in, values[i]);
-    if (keys[i] == "Units") unit = lower(values[i]);
+    if (keys[i] == "Units") unit = text::lower(values[i]);
   }
   if (unit != "mm" && unit != "cm" && unit != "m") in.unexpected("the unit mm, cm or m", unit);
   unit_mm_ = space.unit_mm.value_or(unit == "mm" ? 1 : unit == "cm" ? 10 : 1000);
@@ -144,7 +123,7 @@ MarkerFile::MarkerFile(TextStream in, const MotionSpace& space) : space_(space) 
       std::move(in), 3 * count, [](TextStream& text, std::size_t, std::span<double> out) {
         bool any = true;
         std::string_view line = text.line(any);
-        while (any && trim(line).empty()) line = text.line(any);
+        while (any && text::trim(line).empty()) line = text.line(any);
         if (!any) return false;
         std::vector<std::string_view> row_fields = fields(line);
         while (row_fields.size() > out.size() + 2 && row_fields.back().empty()) row_fields.pop_back();

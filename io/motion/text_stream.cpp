@@ -6,15 +6,12 @@
 #include <fstream>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/text.hpp"
 
 namespace ecorche::io {
 namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 16, kLongestWord = 4096, kLongestLine = std::size_t{1} << 20;
-
-bool space(int c) {
-  return c == ' ' || (c >= '\t' && c <= '\r');
-}
 
 }  // namespace
 
@@ -58,7 +55,7 @@ int TextStream::look() {
 }
 
 void TextStream::skip_spaces() {
-  for (int c = look(); space(c); c = look()) {
+  for (int c = look(); text::is_space(static_cast<char>(c)); c = look()) {
     line_ += c == '\n' ? 1 : 0;
     ++at_;
   }
@@ -67,7 +64,7 @@ void TextStream::skip_spaces() {
 std::string_view TextStream::word() {
   skip_spaces();
   word_.clear();
-  for (int c = look(); c >= 0 && !space(c); c = look()) {
+  for (int c = look(); c >= 0 && !text::is_space(static_cast<char>(c)); c = look()) {
     if (word_.size() == kLongestWord) fail("a word has more than 4096 letters");
     word_ += static_cast<char>(c);
     ++at_;
@@ -96,6 +93,11 @@ std::string_view TextStream::line(bool& more) {
   }
   while (!word_.empty() && word_.back() == '\r') word_.pop_back();
   return word_;
+}
+
+std::vector<std::string> TextStream::words(bool& more) {
+  const std::vector<std::string_view> words = text::words(line(more));
+  return {words.begin(), words.end()};
 }
 
 void TextStream::expect(std::string_view expected) {

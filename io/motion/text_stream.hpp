@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace ecorche::io {
 
@@ -33,6 +34,8 @@ class TextStream {
   std::string_view peek();
   /// The rest of this line without its end, 1 MiB at most; `more` becomes false where the file had ended.
   std::string_view line(bool& more);
+  /// The words of that rest.
+  std::vector<std::string> words(bool& more);
   void expect(std::string_view word);
   /// A finite number, 1e9 in size at most. What is too small for a double is 0.
   double number();

@@ -26,38 +26,6 @@ static_assert(std::endian::native == std::endian::little, "swapping is decided b
   throw Error(ErrorKind::data, where, std::move(what), std::move(mend));
 }
 
-inline std::string number(double x) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, x).ptr};
-}
-
-inline bool is_space(char c) {
-  return c == ' ' || (c >= '\t' && c <= '\r');
-}
-
-inline std::string_view trim(std::string_view text) {
-  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-inline std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return out;
-}
-
-/// The next word of `text`, cut off it; empty at the end.
-inline std::string_view cut_word(std::string_view& text) {
-  std::size_t begin = 0;
-  while (begin < text.size() && is_space(text[begin])) ++begin;
-  std::size_t end = begin;
-  while (end < text.size() && !is_space(text[end])) ++end;
-  const std::string_view word = text.substr(begin, end - begin);
-  text.remove_prefix(end);
-  return word;
-}
-
 /// A real number that is the whole word: nothing else, infinite where no double holds it, zero where it is
 /// smaller than any.
 inline std::optional<double> real(std::string_view word) {

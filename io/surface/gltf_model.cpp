@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/byte_reader.hpp"
 
 namespace ecorche::io::gltf {
@@ -62,7 +63,7 @@ std::string_view json_of_glb(std::string_view file, const std::string& where) {
 // Only plainly named files beside the glTF, and no pictures: anything else could read any file of the
 // machine.
 bool is_plain(const std::filesystem::path& name) {
-  const std::string ending = bytes::lower(name.extension().string());
+  const std::string ending = text::lower(name.extension().string());
   return !name.empty() && !name.has_parent_path() && name != "." && name != ".." && ending != ".png" &&
          ending != ".jpg" && ending != ".jpeg" && ending != ".webp" && ending != ".ktx2" && ending != ".dds";
 }
@@ -118,30 +119,31 @@ class Placer {
 
 tinygltf::Model parse(std::string_view file, const std::filesystem::path& path, files::Budget& budget) {
   const std::string& where = budget.where();
-  const bool binary = bytes::lower(path.extension().string()) == ".glb";
+  const bool binary = text::lower(path.extension().string()) == ".glb";
   if (file.size() > std::numeric_limits<std::uint32_t>::max()) refuse(where, "is larger than glTF can be");
   const std::string_view json = binary ? json_of_glb(file, where) : file;
-  if (!binary && !bytes::trim(json).starts_with('{')) refuse(where, "is no glTF: it is no JSON object");
+  if (!binary && !text::trim(json).starts_with('{')) refuse(where, "is no glTF: it is no JSON object");
   check_json(json, budget);
   tinygltf::TinyGLTF reader;
   reader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
                         nullptr);
-  struct Beside {
+  struct FolderFiles {
     std::filesystem::path folder;
     files::Budget& budget;
-  } beside{path.parent_path(), budget};
+  } folder_files{path.parent_path(), budget};
   tinygltf::FsCallbacks files{};
   files.FileExists = [](const std::string& name, void* base) {
-    return is_plain(name) && std::filesystem::is_regular_file(static_cast<Beside*>(base)->folder / name);
+    return is_plain(name) && std::filesystem::is_regular_file(static_cast<FolderFiles*>(base)->folder / name);
   };
   files.ExpandFilePath = [](const std::string& name, void*) { return name; };
   files.ReadWholeFile = [](std::vector<unsigned char>* out, std::string* problem, const std::string& name,
                            void* base) {
     try {
       if (!is_plain(name)) return false;
-      const std::string read = files::read_text(static_cast<Beside*>(base)->folder / name, kLargestBuffer);
-      static_cast<Beside*>(base)->budget.add_file(read.size());
+      const std::string read =
+          files::read_text(static_cast<FolderFiles*>(base)->folder / name, kLargestBuffer);
+      static_cast<FolderFiles*>(base)->budget.add_file(read.size());
       out->assign(read.begin(), read.end());
       return true;
     } catch (const Error& error) {
@@ -152,7 +154,7 @@ tinygltf::Model parse(std::string_view file, const std::filesystem::path& path, 
   files.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
     return false;
   };
-  files.user_data = &beside;
+  files.user_data = &folder_files;
   reader.SetFsCallbacks(files);
   tinygltf::Model model;
   std::string problem, warning;
@@ -163,7 +165,7 @@ tinygltf::Model parse(std::string_view file, const std::filesystem::path& path, 
              : reader.LoadASCIIFromString(&model, &problem, &warning, file.data(), size, "");
   if (!read) {
     std::replace(problem.begin(), problem.end(), '\n', ' ');
-    refuse(where, "is no glTF 2.0: " + std::string(bytes::trim(problem).substr(0, 300)));
+    refuse(where, "is no glTF 2.0: " + std::string(text::trim(problem).substr(0, 300)));
   }
   for (const std::string& extension : model.extensionsRequired) {
     const bool harmless = extension == "KHR_mesh_quantization" || extension.starts_with("KHR_materials_") ||

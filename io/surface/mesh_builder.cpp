@@ -7,6 +7,7 @@
 #include <limits>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/text.hpp"
 #include "io/surface/byte_reader.hpp"
 #include "io/surface/vertex_merge.hpp"
 
@@ -28,7 +29,7 @@ void MeshBuilder::add_point(const std::array<double, 3>& p) {
   for (const double x : p) {
     if (std::abs(x) <= largest_coordinate) continue;
     bytes::refuse(where(),
-                  "point " + std::to_string(points_.size()) + " has the coordinate " + bytes::number(x),
+                  "point " + std::to_string(points_.size()) + " has the coordinate " + text::shortest(x),
                   "every coordinate must be finite and below 1e9");
   }
   bytes::check_points(points_.size() + 1, most_points_, where());

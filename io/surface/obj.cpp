@@ -7,6 +7,7 @@
 #include <array>
 #include <vector>
 
+#include "core/values/text.hpp"
 #include "io/surface/mesh_builder.hpp"
 #include "io/surface/text_lines.hpp"
 
@@ -60,14 +61,14 @@ SurfaceMesh decode(std::string_view file, const std::string& where, const files:
   while (const auto next = lines.next()) {
     std::string_view line = whole_line(lines, *next, joined);
     line = line.substr(0, line.find('#'));
-    const std::string_view word = bytes::cut_word(line);
+    const std::string_view word = text::cut_word(line);
     if (word == "v") {
       std::array<double, 3> p{};
-      for (double& x : p) x = lines.real(bytes::cut_word(line));
+      for (double& x : p) x = lines.real(text::cut_word(line));
       mesh.add_point(p);  // a weight or a colour may follow
     } else if (word == "f" || word == "fo") {
       const std::size_t before = corners.size();
-      for (std::string_view c = bytes::cut_word(line); !c.empty(); c = bytes::cut_word(line))
+      for (std::string_view c = text::cut_word(line); !c.empty(); c = text::cut_word(line))
         corners.push_back(read_corner(c, mesh.points(), lines));
       if (corners.size() < before + 3) lines.fail("a face has fewer than three corners");
       budget.spend(corners.size() - before + 1, 2 * sizeof corners[0]);  // with room to grow

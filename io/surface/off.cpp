@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "core/values/text.hpp"
 #include "io/surface/mesh_builder.hpp"
 #include "io/surface/text_lines.hpp"
 
@@ -12,21 +13,21 @@ namespace ecorche::io::off {
 namespace {
 
 // Words one after the other, wherever lines end; the rest of a line can be passed over.
-class Words {
+class OffWords {
  public:
-  Words(std::string_view file, const std::string& where) : lines_(file, where), where_(where) {}
+  OffWords(std::string_view file, const std::string& where) : lines_(file, where), where_(where) {}
 
   // The next line that says something, without its comment.
   std::string_view next_line() {
     while (const auto line = lines_.next()) {
-      rest_ = bytes::trim(line->substr(0, line->find('#')));
+      rest_ = text::trim(line->substr(0, line->find('#')));
       if (!rest_.empty()) return rest_;
     }
     bytes::refuse(where_, "ends before all that it declares");
   }
   std::string_view next() {
-    if (bytes::trim(rest_).empty()) next_line();
-    return bytes::cut_word(rest_);
+    if (text::trim(rest_).empty()) next_line();
+    return text::cut_word(rest_);
   }
   double real() { return lines_.real(next()); }
   std::int64_t whole() { return lines_.whole(next()); }
@@ -46,7 +47,7 @@ class Words {
   }
   void check_end() {
     while (const auto rest = lines_.next()) {
-      if (!bytes::trim(rest->substr(0, rest->find('#'))).empty()) fail("has more lines than it declares");
+      if (!text::trim(rest->substr(0, rest->find('#'))).empty()) fail("has more lines than it declares");
     }
   }
 
@@ -60,7 +61,7 @@ class Words {
 
 SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
   files::Budget budget(file.size(), limits, where);
-  Words words(file, where);
+  OffWords words(file, where);
   MeshBuilder mesh(budget);
   words.next_line();
   const std::string_view keyword = words.next();

@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "core/values/text.hpp"
 #include "io/surface/byte_reader.hpp"
 #include "io/surface/mesh_builder.hpp"
 
@@ -65,7 +66,7 @@ class HeaderReader {
     while (true) {
       std::string_view line = next_line();
       if (!header_.space && line.starts_with("comment")) header_.space = bytes::space_tag(line);
-      const std::string_view word = bytes::cut_word(line);
+      const std::string_view word = text::cut_word(line);
       if (word == "end_header") break;
       if (word == "comment" || word == "obj_info" || word.empty()) continue;
       if (word == "format") {
@@ -101,7 +102,7 @@ class HeaderReader {
   }
 
   void read_format(std::string_view line) {
-    const std::string_view form = bytes::cut_word(line), version = bytes::cut_word(line);
+    const std::string_view form = text::cut_word(line), version = text::cut_word(line);
     if (form == "ascii") {
       header_.form = Form::text;
     } else if (form == "binary_little_endian") {
@@ -116,8 +117,8 @@ class HeaderReader {
 
   void read_element(std::string_view line) {
     Element element;
-    element.name = bytes::cut_word(line);
-    const std::string_view word = bytes::cut_word(line);
+    element.name = text::cut_word(line);
+    const std::string_view word = text::cut_word(line);
     const auto count = bytes::whole(word);
     if (!count || *count < 0) fail("'" + std::string(word.substr(0, 40)) + "' is no number of elements");
     element.count = static_cast<std::uint64_t>(*count);
@@ -130,18 +131,18 @@ class HeaderReader {
   void read_property(std::string_view line) {
     if (header_.elements.empty()) fail("a property stands before the first element");
     Property property;
-    std::string_view type = bytes::cut_word(line);
+    std::string_view type = text::cut_word(line);
     if (type == "list") {
-      const std::string_view count = bytes::cut_word(line);
+      const std::string_view count = text::cut_word(line);
       property.count = scalar_from(count);
       if (!property.count || bytes::is_real(*property.count))
         fail("'" + std::string(count.substr(0, 40)) + "' counts no list");
-      type = bytes::cut_word(line);
+      type = text::cut_word(line);
     }
     const auto scalar = scalar_from(type);
     if (!scalar) fail("no type is named '" + std::string(type.substr(0, 40)) + "'");
     property.type = *scalar;
-    property.name = bytes::cut_word(line);
+    property.name = text::cut_word(line);
     for (const Property& other : header_.elements.back().properties) {
       if (other.name == property.name) fail("property '" + property.name + "' is declared twice");
     }
@@ -207,7 +208,7 @@ class Data {
     }
   }
   void check_end() {
-    if (text_) rest_ = bytes::trim(rest_);
+    if (text_) rest_ = text::trim(rest_);
     if (!rest_.empty())
       refuse(where_, "has " + std::to_string(rest_.size()) + " bytes more than it declares");
   }
@@ -221,7 +222,7 @@ class Data {
     return at;
   }
   std::string_view next_word() {
-    const std::string_view word = bytes::cut_word(rest_);
+    const std::string_view word = text::cut_word(rest_);
     if (word.empty()) refuse(where_, "ends before all that it declares");
     return word;
   }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/text.hpp"
 #include "io/surface/mesh_builder.hpp"
 #include "io/surface/vertex_merge.hpp"
 
@@ -33,22 +34,9 @@ constexpr std::string_view kBadSave = "save the surface again";
   throw Error(ErrorKind::data, where, std::move(what), std::move(mend));
 }
 
-char lower(char c) {
-  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-}
-bool space(char c) {
-  return c == ' ' || (c >= '\t' && c <= '\r');
-}
-
-std::string number(double x) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, x).ptr;
-  return {text, end};
-}
-
 void check_coordinate(double x, const std::string& where, std::size_t facet) {
   if (std::abs(x) <= largest_coordinate) return;
-  refuse(where, "triangle " + std::to_string(facet) + " has the coordinate " + number(x),
+  refuse(where, "triangle " + std::to_string(facet) + " has the coordinate " + text::shortest(x),
          "every coordinate must be finite and below 1e9");
 }
 
@@ -89,20 +77,20 @@ SurfaceMesh decode_binary(std::string_view bytes, files::Budget& budget) {
 bool is_word(std::string_view word, std::string_view expected) {
   if (word.size() != expected.size()) return false;
   for (std::size_t i = 0; i < word.size(); ++i) {
-    if (lower(word[i]) != expected[i]) return false;
+    if (text::lower(word[i]) != expected[i]) return false;
   }
   return true;
 }
 
 // Words of a text STL, with the line for messages.
-class Words {
+class StlWords {
  public:
-  Words(std::string_view text, const std::string& where) : text_(text), where_(where) {}
+  StlWords(std::string_view text, const std::string& where) : text_(text), where_(where) {}
 
   std::string_view next() {
-    while (at_ < text_.size() && space(text_[at_])) line_ += text_[at_++] == '\n';
+    while (at_ < text_.size() && text::is_space(text_[at_])) line_ += text_[at_++] == '\n';
     const std::size_t begin = at_;
-    while (at_ < text_.size() && !space(text_[at_])) ++at_;
+    while (at_ < text_.size() && !text::is_space(text_[at_])) ++at_;
     return text_.substr(begin, at_ - begin);
   }
   void skip_line() {
@@ -142,7 +130,7 @@ class Words {
 
 SurfaceMesh decode_text(std::string_view text, files::Budget& budget) {
   const std::string& where = budget.where();
-  Words words(text, where);
+  StlWords words(text, where);
   // The shortest facet that anyone writes takes over 80 bytes.
   VertexMerge merge(3 * (text.size() / 80));
   std::vector<std::array<std::int32_t, 3>> facets;
@@ -183,7 +171,7 @@ SurfaceMesh decode_text(std::string_view text, files::Budget& budget) {
 
 bool begins_with_solid(std::string_view bytes) {
   std::size_t at = 0;
-  while (at < bytes.size() && space(bytes[at])) ++at;
+  while (at < bytes.size() && text::is_space(bytes[at])) ++at;
   return is_word(bytes.substr(at, 5), "solid");
 }
 

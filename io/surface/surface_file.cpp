@@ -6,6 +6,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/glb.hpp"
 #include "io/surface/gltf.hpp"
 #include "io/surface/obj.hpp"
@@ -23,12 +24,6 @@ namespace {
 
 constexpr std::size_t kLargestFile = std::size_t{1} << 33;
 
-std::string extension_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
-}
-
 void check_corners(const SurfaceMesh& mesh) {
   for (Eigen::Index i = 0; i < mesh.F.size(); ++i) {
     const std::int32_t v = mesh.F.data()[i];
@@ -41,7 +36,7 @@ void check_corners(const SurfaceMesh& mesh) {
 }  // namespace
 
 TaggedSurface read_tagged_surface(const std::filesystem::path& path, const files::ReadLimits& limits) {
-  const std::string extension = extension_of(path), where = path.string();
+  const std::string extension = text::lower(path.extension().string()), where = path.string();
   constexpr std::array<std::string_view, 8> known{".stl", ".obj", ".ply",  ".off",
                                                   ".vtp", ".vtk", ".gltf", ".glb"};
   if (std::find(known.begin(), known.end(), extension) == known.end()) {
@@ -70,7 +65,7 @@ SurfaceMesh read_surface(const std::filesystem::path& path, const files::ReadLim
 
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
                    const std::vector<GridArray>& point_data) {
-  const std::string extension = extension_of(path);
+  const std::string extension = text::lower(path.extension().string());
   if (extension == ".stl") return files::write_text(path, stl::encode(mesh));
   if (extension == ".obj" || extension == ".off") {
     check_corners(mesh);
@@ -91,9 +86,10 @@ void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
 }
 
 void write_surfaces(const std::filesystem::path& path, std::span<const NamedSurface> surfaces) {
-  if (extension_of(path) != ".glb") {
+  if (text::lower(path.extension().string()) != ".glb") {
     throw Error(ErrorKind::usage, path.string(),
-                "'" + extension_of(path) + "' does not hold several surfaces", "use .glb");
+                "'" + text::lower(path.extension().string()) + "' does not hold several surfaces",
+                "use .glb");
   }
   files::AtomicFile file(path);
   write_glb(file.temporary(), surfaces);
@@ -101,16 +97,16 @@ void write_surfaces(const std::filesystem::path& path, std::span<const NamedSurf
 }
 
 TetFile read_tets(const std::filesystem::path& path, const files::ReadLimits& limits) {
-  if (extension_of(path) != ".vtu")
-    throw Error(ErrorKind::data, path.string(), "'" + extension_of(path) + "' tets cannot be read",
-                "give a .vtu");
+  if (text::lower(path.extension().string()) != ".vtu")
+    throw Error(ErrorKind::data, path.string(),
+                "'" + text::lower(path.extension().string()) + "' tets cannot be read", "give a .vtu");
   return vtu::decode(files::read_text(path, kLargestFile), path.string(), limits);
 }
 
 void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets& T,
                 const std::vector<GridArray>& point_data, const std::vector<GridArray>& cell_data,
                 const TetRegions& regions) {
-  const std::string extension = extension_of(path);
+  const std::string extension = text::lower(path.extension().string());
   if (extension == ".vtu") {
     files::AtomicFile file(path);
     vtk_files::write_vtu(file.temporary(), V, T, point_data, cell_data);
@@ -131,7 +127,7 @@ void write_tets(const std::filesystem::path& path, const PointsF& V, const Tets&
     const std::array both{&nodes, &tets};
     return files::commit_together(both);
   }
-  const bool mcnp = extension_of(path.stem()) == ".mcnp";
+  const bool mcnp = text::lower(path.stem().extension().string()) == ".mcnp";
   if (mcnp) tet_formats::refuse_degenerate(V, T, path.string());
   files::write_text(
       path, mcnp ? tet_formats::encode_mcnp(V, T, regions) : tet_formats::encode_abaqus(V, T, regions));

@@ -10,11 +10,11 @@
 namespace ecorche::io {
 namespace {
 
-constexpr std::size_t kLargestFile = std::size_t{1} << 33;
+constexpr std::size_t kLargestTiedFile = std::size_t{1} << 33;
 
-class PieceReader {
+class TiedPieceReader {
  public:
-  PieceReader(const vtk_xml::Piece& piece, const vtk_xml::Document& document, const std::string& where)
+  TiedPieceReader(const vtk_xml::Piece& piece, const vtk_xml::Document& document, const std::string& where)
       : piece_(piece), document_(document), where_(where) {}
 
   TiedSurfaces read() const {
@@ -85,12 +85,12 @@ void write_tied_surfaces(const std::filesystem::path& path, const TiedSurfaces& 
 }
 
 TiedSurfaces read_tied_surfaces(const std::filesystem::path& path) {
-  const std::string where = path.string(), text = files::read_text(path, kLargestFile);
+  const std::string where = path.string(), text = files::read_text(path, kLargestTiedFile);
   files::Budget budget(text.size(), {}, where);
   const vtk_xml::Document document =
       vtk_xml::parse(text, "PolyData", {"Points", "Polys", "PointData"}, "pose again", budget);
   if (document.pieces.size() != 1) bytes::refuse(where, "is not one piece of surfaces", "pose again");
-  return PieceReader(document.pieces[0], document, where).read();
+  return TiedPieceReader(document.pieces[0], document, where).read();
 }
 
 }  // namespace ecorche::io

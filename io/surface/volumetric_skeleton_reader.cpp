@@ -4,19 +4,20 @@
 
 #include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 #include "io/surface/vtk_xml.hpp"
 
 namespace ecorche::io {
 namespace {
 
-constexpr std::size_t kLargestFile = std::size_t{1} << 33;
+constexpr std::size_t kLargestSkeletonFile = std::size_t{1} << 33;
 constexpr std::uint64_t kMostNames = 65536;
 constexpr double kOffVoxel = 0.01;  // of a voxel: points are float32
 
-class Reader {
+class SkeletonReader {
  public:
-  Reader(std::string_view bytes, const std::string& where, const files::ReadLimits& limits)
+  SkeletonReader(std::string_view bytes, const std::string& where, const files::ReadLimits& limits)
       : where_(where),
         budget_(bytes.size(), limits, where),
         document_(vtk_xml::parse(bytes, "PolyData", {"Points", "PointData", "Lines"},
@@ -24,7 +25,7 @@ class Reader {
 
   VolumetricSkeletonFile read() {
     if (const auto version = field("ecorche_volumetric_skeleton", 1); version[0] != 1)
-      refuse("is of version " + bytes::number(version[0]), "this program reads version 1");
+      refuse("is of version " + text::shortest(version[0]), "this program reads version 1");
     if (document_.pieces.size() != 1) refuse("has " + std::to_string(document_.pieces.size()) + " pieces");
     read_fields();
     read_voxels();
@@ -82,7 +83,8 @@ class Reader {
     s.name = word("name");
     for (std::size_t a = 0; a < 3; ++a) {
       const double n = numbers<3>("size")[a];
-      if (!(n >= 1 && n <= 65535) || n != std::floor(n)) refuse("its field 'size' holds " + bytes::number(n));
+      if (!(n >= 1 && n <= 65535) || n != std::floor(n))
+        refuse("its field 'size' holds " + text::shortest(n));
       s.grid.size[a] = static_cast<std::int32_t>(n);
     }
     s.grid.origin = numbers<3>("origin");
@@ -133,7 +135,7 @@ class Reader {
     const auto values = vtp::reals(*deficit, document_.storage, rows_, where_);
     check_length("deficit", values.size(), 1);
     for (const double x : values) {
-      if (!(std::abs(x) < 1e6)) refuse("its array 'deficit' holds " + bytes::number(x));
+      if (!(std::abs(x) < 1e6)) refuse("its array 'deficit' holds " + text::shortest(x));
       s.deficit.push_back(static_cast<float>(x));
     }
     if (piece().find("PointData", "segment") == nullptr) return;
@@ -200,12 +202,12 @@ class Reader {
 
 VolumetricSkeletonFile decode_volumetric_skeleton(std::string_view bytes, const std::string& where,
                                                   const files::ReadLimits& limits) {
-  return Reader(bytes, where, limits).read();
+  return SkeletonReader(bytes, where, limits).read();
 }
 
 VolumetricSkeletonFile read_volumetric_skeleton(const std::filesystem::path& path,
                                                 const files::ReadLimits& limits) {
-  return decode_volumetric_skeleton(files::read_text(path, kLargestFile), path.string(), limits);
+  return decode_volumetric_skeleton(files::read_text(path, kLargestSkeletonFile), path.string(), limits);
 }
 
 }  // namespace ecorche::io

@@ -7,6 +7,7 @@
 #include <ecorche/values/error.hpp>
 #include <ecorche/values/volumetric_skeleton_check.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/surface/byte_reader.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 
@@ -36,7 +37,7 @@ template <class Values>
 std::string numbers(const char* type, const char* name, const Values& values) {
   std::string xml = std::string("<DataArray type=\"") + type + "\" Name=\"" + name + "\" NumberOfTuples=\"" +
                     std::to_string(values.size()) + "\" format=\"ascii\">";
-  for (const double x : values) xml += bytes::number(x) + " ";
+  for (const double x : values) xml += text::shortest(x) + " ";
   return xml + "</DataArray>\n";
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "core/values/text.hpp"
 #include "io/surface/byte_reader.hpp"
 #include "io/surface/mesh_builder.hpp"
 
@@ -34,22 +35,22 @@ std::optional<Scalar> scalar_from(std::string_view name) {
                                                 {"vtkidtype", Scalar::i32},
                                                 {"float", Scalar::f32},
                                                 {"double", Scalar::f64}}};
-  const std::string word = bytes::lower(name);
+  const std::string word = text::lower(name);
   for (const Named& known : names) {
     if (word == known.name) return known.type;
   }
   return std::nullopt;
 }
 
-class Reader {
+class LegacyReader {
  public:
-  Reader(std::string_view file, files::Budget& budget)
+  LegacyReader(std::string_view file, files::Budget& budget)
       : rest_(file), where_(budget.where()), budget_(budget), mesh_(budget) {}
 
   SurfaceMesh read() {
     if (!next_line().starts_with("# vtk DataFile Version ")) refuse(where_, "is no legacy VTK file");
     next_line();  // the title
-    const std::string form = bytes::lower(bytes::trim(next_line()));
+    const std::string form = text::lower(text::trim(next_line()));
     if (form != "ascii" && form != "binary")
       refuse(where_, "is neither ASCII nor BINARY: '" + form.substr(0, 40) + "'");
     text_ = form == "ascii";
@@ -77,10 +78,10 @@ class Reader {
     rest_.remove_prefix(end + 1);
     return line.ends_with('\r') ? line.substr(0, end - 1) : line;
   }
-  std::string next_word() { return bytes::lower(bytes::cut_word(rest_).substr(0, 64)); }
+  std::string next_word() { return text::lower(text::cut_word(rest_).substr(0, 64)); }
   // Binary data begin after the end of their line.
   void end_line() {
-    if (!bytes::trim(next_line()).empty()) refuse(where_, "has words where a line should end");
+    if (!text::trim(next_line()).empty()) refuse(where_, "has words where a line should end");
   }
 
   // False at the end of the geometry.
@@ -95,7 +96,7 @@ class Reader {
       read_cells(false, false);
     } else if (word == "metadata") {
       end_line();
-      while (!bytes::trim(next_line()).empty()) {
+      while (!text::trim(next_line()).empty()) {
       }
     } else if (word == "field") {
       read_field();
@@ -129,7 +130,7 @@ class Reader {
   }
   double real(Scalar type) {
     if (!text_) return bytes::load_real(take(type), type, true);
-    const std::string_view word = bytes::cut_word(rest_);
+    const std::string_view word = text::cut_word(rest_);
     const auto value = bytes::real(word);
     if (!value) refuse(where_, "expected a number, found '" + std::string(word.substr(0, 40)) + "'");
     return *value;
@@ -144,7 +145,7 @@ class Reader {
         x = bytes::load_whole(take(type), type, true);
         continue;
       }
-      const std::string_view word = bytes::cut_word(rest_);
+      const std::string_view word = text::cut_word(rest_);
       const auto value = bytes::whole(word);
       if (!value) refuse(where_, "expected a whole number, found '" + std::string(word.substr(0, 40)) + "'");
       x = *value;
@@ -170,7 +171,7 @@ class Reader {
     end_line();
     // Since version 5: offsets and corners in two arrays, and the first count is that of the offsets.
     std::string_view ahead = rest_;
-    if (bytes::cut_word(ahead) == "OFFSETS") return read_offsets(first, second, keep, strips);
+    if (text::cut_word(ahead) == "OFFSETS") return read_offsets(first, second, keep, strips);
     const std::vector<std::int64_t> list = wholes(second, Scalar::i32);
     std::size_t at = 0;
     for (std::size_t cell = 0; cell < first; ++cell) {
@@ -185,7 +186,7 @@ class Reader {
 
   void read_offsets(std::size_t offset_count, std::size_t corner_count, bool keep, bool strips) {
     const auto array = [&](const char* name, std::size_t values) {
-      if (bytes::cut_word(rest_) != name) refuse(where_, "lacks " + std::string(name) + " of its cells");
+      if (text::cut_word(rest_) != name) refuse(where_, "lacks " + std::string(name) + " of its cells");
       const Scalar scalar = type();
       end_line();
       return wholes(values, scalar);
@@ -216,7 +217,7 @@ class Reader {
     for (std::size_t a = 0; a < arrays; ++a) {
       if (next_word() == "metadata") {
         end_line();
-        while (!bytes::trim(next_line()).empty()) {
+        while (!text::trim(next_line()).empty()) {
         }
         next_word();
       }
@@ -264,7 +265,7 @@ class Reader {
 
 SurfaceMesh decode(std::string_view file, const std::string& where, const files::ReadLimits& limits) {
   files::Budget budget(file.size(), limits, where);
-  return Reader(file, budget).read();
+  return LegacyReader(file, budget).read();
 }
 
 std::optional<std::string> space_tag(std::string_view file) {

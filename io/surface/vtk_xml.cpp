@@ -21,7 +21,7 @@ std::string_view value_of(const Attributes& attributes, std::string_view key) {
 }
 
 // What expat meets, kept as far as it was asked for.
-struct Reader {
+struct XmlReader {
   std::string_view type;
   std::initializer_list<std::string_view> sections;
   Attributes file;
@@ -34,15 +34,15 @@ struct Reader {
   bool too_deep = false;
 
   static void begin(void* self, const XML_Char* name, const XML_Char** attributes) {
-    static_cast<Reader*>(self)->begin_element(name, attributes);
+    static_cast<XmlReader*>(self)->begin_element(name, attributes);
   }
   static void end(void* self, const XML_Char*) {
-    auto& reader = *static_cast<Reader*>(self);
+    auto& reader = *static_cast<XmlReader*>(self);
     reader.open.pop_back();
     reader.filling = nullptr;
   }
   static void text(void* self, const XML_Char* from, int length) {
-    auto& reader = *static_cast<Reader*>(self);
+    auto& reader = *static_cast<XmlReader*>(self);
     if (reader.filling != nullptr) reader.filling->text.append(from, static_cast<std::size_t>(length));
   }
 
@@ -73,7 +73,7 @@ struct Reader {
 };
 
 // Appended raw bytes are no XML: the document ends where they begin.
-void read(std::string_view file, std::string_view& appended, Reader& reader, const std::string& where) {
+void read(std::string_view file, std::string_view& appended, XmlReader& reader, const std::string& where) {
   std::string xml(file);
   const std::size_t tag = file.find("<AppendedData");
   if (tag != file.npos) {
@@ -86,8 +86,8 @@ void read(std::string_view file, std::string_view& appended, Reader& reader, con
   const std::unique_ptr<XML_ParserStruct, void (*)(XML_Parser)> parser(XML_ParserCreate(nullptr),
                                                                        XML_ParserFree);
   XML_SetUserData(parser.get(), &reader);
-  XML_SetElementHandler(parser.get(), Reader::begin, Reader::end);
-  XML_SetCharacterDataHandler(parser.get(), Reader::text);
+  XML_SetElementHandler(parser.get(), XmlReader::begin, XmlReader::end);
+  XML_SetCharacterDataHandler(parser.get(), XmlReader::text);
   // Entities are what makes small XML large; VTK's files have none.
   if (xml.find("<!DOCTYPE") != xml.npos) refuse(where, "has a DOCTYPE, as no VTK file has");
   for (std::size_t at = 0; at <= xml.size();) {
@@ -104,7 +104,7 @@ void read(std::string_view file, std::string_view& appended, Reader& reader, con
   }
 }
 
-Storage storage_of(const Reader& reader, std::string_view appended, const std::string& where) {
+Storage storage_of(const XmlReader& reader, std::string_view appended, const std::string& where) {
   Storage storage;
   storage.big_endian = value_of(reader.file, "byte_order") == "BigEndian";
   storage.wide_header = value_of(reader.file, "header_type") == "UInt64";
@@ -132,7 +132,7 @@ Document parse(std::string_view file, std::string_view type, std::initializer_li
                const std::string& mend, files::Budget& budget) {
   const std::string& where = budget.where();
   std::string_view appended;
-  Reader reader;
+  XmlReader reader;
   reader.type = type;
   reader.sections = sections;
   read(file, appended, reader, where);

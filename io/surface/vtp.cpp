@@ -9,9 +9,9 @@ namespace {
 
 using bytes::refuse;
 
-class PieceReader {
+class VtpPieceReader {
  public:
-  PieceReader(const vtk_xml::Piece& piece, const vtk_xml::Document& document, MeshBuilder& mesh)
+  VtpPieceReader(const vtk_xml::Piece& piece, const vtk_xml::Document& document, MeshBuilder& mesh)
       : piece_(piece), document_(document), mesh_(mesh) {}
 
   void read() {
@@ -65,7 +65,7 @@ Decoded decode(std::string_view file, const std::string& where, const files::Rea
   const vtk_xml::Document document = vtk_xml::parse(file, "PolyData", {"Points", "Polys", "Strips"},
                                                     "save it as XML PolyData (.vtp)", budget);
   MeshBuilder mesh(budget);
-  for (const vtk_xml::Piece& piece : document.pieces) PieceReader(piece, document, mesh).read();
+  for (const vtk_xml::Piece& piece : document.pieces) VtpPieceReader(piece, document, mesh).read();
   Decoded out;
   if (const auto space = document.fields.find("SPACE"); space != document.fields.end())
     out.space = bytes::space_tag("SPACE=" + vtk_xml::letters(space->second, document.storage, 64, where));

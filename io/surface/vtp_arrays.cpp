@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::io::vtp {
 namespace {
 
@@ -37,7 +39,7 @@ std::string decode_base64(std::string_view text, std::size_t& at, std::uint64_t 
   while (out.size() < count) {
     std::array<int, 4> digits{-1, -1, -1, -1};
     for (int& digit : digits) {
-      while (at < text.size() && bytes::is_space(text[at])) ++at;
+      while (at < text.size() && text::is_space(text[at])) ++at;
       if (at >= text.size()) return out;
       if (text[at] != '=') {
         digit = base64_digit(text[at]);
@@ -150,7 +152,7 @@ std::string binary_bytes(const DataArray& array, const Storage& storage, std::ui
                         "', outside the file");
     from = storage.appended.substr(static_cast<std::size_t>(*offset));
   } else {
-    from = bytes::trim(from);
+    from = text::trim(from);
   }
   Source source(from, !appended || storage.base64_appended, where);
   if (storage.zlib) return packed_bytes(source, storage, limit, where);
@@ -171,7 +173,7 @@ std::vector<T> values(const DataArray& array, const Storage& storage, std::uint6
   const std::string_view format = array.attribute("format");
   if (format == "ascii") {
     std::string_view rest = array.text;
-    for (std::string_view word = bytes::cut_word(rest); !word.empty(); word = bytes::cut_word(rest)) {
+    for (std::string_view word = text::cut_word(rest); !word.empty(); word = text::cut_word(rest)) {
       const auto value = from_word(word);
       if (!value) refuse(where, "expected a number, found '" + std::string(word.substr(0, 40)) + "'");
       if (out.size() >= limit) refuse(where, "an array is larger than its counts say");

@@ -28,9 +28,9 @@ void append_floats(const std::vector<double>& from, std::vector<float>& to, cons
   }
 }
 
-class PieceReader {
+class VtuPieceReader {
  public:
-  PieceReader(const vtk_xml::Piece& piece, const vtk_xml::Document& document, const std::string& where)
+  VtuPieceReader(const vtk_xml::Piece& piece, const vtk_xml::Document& document, const std::string& where)
       : piece_(piece), document_(document), where_(where) {}
 
   void read(Grid& grid) const {
@@ -113,7 +113,7 @@ TetFile decode(std::string_view file, const std::string& where, const files::Rea
       vtk_xml::parse(file, "UnstructuredGrid", {"Points", "Cells", "PointData", "CellData"},
                      "save it as XML UnstructuredGrid (.vtu)", budget);
   Grid grid;
-  for (const vtk_xml::Piece& piece : document.pieces) PieceReader(piece, document, where).read(grid);
+  for (const vtk_xml::Piece& piece : document.pieces) VtuPieceReader(piece, document, where).read(grid);
   if (grid.corners.empty()) refuse(where, "has no tet");
   TetFile out;
   out.V = Eigen::Map<const PointsF>(grid.points.data(), static_cast<Eigen::Index>(grid.points.size() / 3), 3);

@@ -10,6 +10,7 @@
 
 #include <ecorche/preprocess/stage_store.hpp>
 #include <ecorche/values/context.hpp>
+#include "core/values/text.hpp"
 #include "preprocess/cache/archive.hpp"
 #include "preprocess/cache/fields.hpp"
 
@@ -20,9 +21,7 @@ template <class... Inputs>
 std::string key(const StageStore& store, std::string_view stage, const Inputs&... inputs) {
   Hasher hash;
   hash(store.program(), stage, inputs...);
-  char digits[18];
-  std::snprintf(digits, sizeof digits, "-%016llx", static_cast<unsigned long long>(hash.value()));
-  return std::string(stage) + digits;
+  return std::string(stage) + "-" + text::hex(hash.value());
 }
 
 /// What a stage made, and the warnings that it gave on the way: they are given again when it is taken.

@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <optional>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::check {
 namespace {
 
@@ -16,12 +18,6 @@ using Eigen::Vector3d;
 constexpr double kShare = 0.01;     // of the skin's vertices, and of its length
 constexpr double kVoxels = 2;       // skin drawn round voxels leaves them by half of one
 constexpr double kSameGrid = 1e-3;  // of a spacing
-
-std::string number(double x) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", x);
-  return text.data();
-}
 
 Vector3d point(const ImageGrid& grid, double i, double j, double k) {
   const auto p = grid.point(i, j, k);
@@ -61,13 +57,13 @@ std::optional<Misplaced> against_skin(const std::string& name, const ImageGrid& 
   }
   const double share = static_cast<double>(count) / static_cast<double>(skin.rows());
   if (least > 0) {
-    out.what = "does not meet the skin: they lie " + number(least) + " mm apart";
+    out.what = "does not meet the skin: they lie " + text::number(least) + " mm apart";
     out.mend = "mend the skin's frame or unit, or the image's header";
     return out;
   }
   if (share < kShare) return std::nullopt;
-  out.what =
-      number(100 * share) + " % of the skin lies outside of this image, by up to " + number(most) + " mm";
+  out.what = text::number(100 * share) + " % of the skin lies outside of this image, by up to " +
+             text::number(most) + " mm";
   out.mend = "there it has nothing to pose; mend the skin's frame or the image's header if that is not meant";
   return out;
 }
@@ -88,7 +84,7 @@ std::optional<Misplaced> against_labels(const std::string& name, const ImageGrid
     most = std::max(most, (at(grid) - at(labels)).norm());
   }
   if (most <= 0.5 * *std::min_element(grid.spacing.begin(), grid.spacing.end())) return std::nullopt;
-  return Misplaced{name, "has the label map's voxels, but lies up to " + number(most) + " mm from it",
+  return Misplaced{name, "has the label map's voxels, but lies up to " + text::number(most) + " mm from it",
                    middle(grid),
                    "mend the header of one of them (origin, direction; of a NIfTI its qform and sform)"};
 }

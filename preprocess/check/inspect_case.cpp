@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 
+#include "core/values/text.hpp"
 #include "preprocess/check/frames.hpp"
 #include "preprocess/check/image_places.hpp"
 #include "preprocess/check/inside.hpp"
@@ -46,17 +47,11 @@ std::string larger(double factor) {
                     : std::to_string(std::lround(1 / factor)) + " times smaller";
 }
 
-std::string rounded(double x) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", x);
-  return text.data();
-}
-
 // What closes them all; nothing closes chains that form no loop.
 std::string closing_of(const std::vector<Hole>& holes) {
   double edge = 0;
   for (const Hole& hole : holes) edge = std::max(edge, hole.filling_edge);
-  return edge > 0 ? "ecorche repair --holes " + rounded(std::ceil(1.05 * edge)) + " closes them"
+  return edge > 0 ? "ecorche repair --holes " + text::number(std::ceil(1.05 * edge)) + " closes them"
                   : "their edges form no loop: mend them where the surface was made";
 }
 
@@ -82,16 +77,16 @@ class Inspector {
     }
     look_at_surfaces();
     for (std::size_t i = 0; i < meshes_.size(); ++i) {
-      tell_surface(report_.surfaces[i], parts_[i]);
+      inspect_surface(report_.surfaces[i], parts_[i]);
       if (i == 0) check_skin();
     }
     if (patient_.bones.empty())
-      tell(Severity::error, "bones", "there is none", {}, "a case needs at least one bone");
+      add_finding(Severity::error, "bones", "there is none", {}, "a case needs at least one bone");
     if (patient_.skin.F.rows() > 0) {
       check_places();
       check_sizes();
       check_agreement();
-      tell_outside();
+      inspect_outside();
     }
     check_segments();
     check_volumes();
@@ -99,8 +94,8 @@ class Inspector {
   }
 
  private:
-  void tell(Severity severity, std::string where, std::string what, const std::optional<Vector3d>& at,
-            std::string mend) {
+  void add_finding(Severity severity, std::string where, std::string what, const std::optional<Vector3d>& at,
+                   std::string mend) {
     report_.findings.push_back({severity, std::move(where), std::move(what), at, std::move(mend)});
   }
 
@@ -158,64 +153,69 @@ class Inspector {
 
   // One surface by itself. Only skin and bones are filled when a body is prepared: faults of the rest do no
   // harm.
-  void tell_surface(const SurfaceLine& line, const SurfaceParts& parts) {
+  void inspect_surface(const SurfaceLine& line, const SurfaceParts& parts) {
     const SurfaceFigures& figures = line.figures;
     const std::string& name = line.name;
     const Severity harm =
         line.group == Group::skin || line.group == Group::bone ? Severity::warning : Severity::note;
-    const auto tell_of = [&](const Offenders& offenders, Severity severity, const std::string& noun,
-                             const std::string& mend) {
-      if (offenders.count > 0) tell(severity, name, plural(offenders.count, noun), offenders.first, mend);
+    const auto add_offenders = [&](const Offenders& offenders, Severity severity, const std::string& noun,
+                                   const std::string& mend) {
+      if (offenders.count > 0)
+        add_finding(severity, name, plural(offenders.count, noun), offenders.first, mend);
     };
     if (figures.triangles == 0)
-      tell(line.group == Group::skin ? Severity::error : harm, name, "has no triangle", {},
-           "export it again");
+      add_finding(line.group == Group::skin ? Severity::error : harm, name, "has no triangle", {},
+                  "export it again");
     if (!figures.holes.empty()) {
       const Hole& longest = figures.holes.front();
-      tell(harm, name,
-           plural(figures.open.count, "open edge") + " in " + plural(count_of(figures.holes), "hole") +
-               ", the longest of " + plural(longest.edges, "edge") + " and " + rounded(longest.length_mm) +
-               " mm",
-           longest.middle, closing_of(figures.holes));
+      add_finding(harm, name,
+                  plural(figures.open.count, "open edge") + " in " + plural(count_of(figures.holes), "hole") +
+                      ", the longest of " + plural(longest.edges, "edge") + " and " +
+                      text::number(longest.length_mm) + " mm",
+                  longest.middle, closing_of(figures.holes));
     }
-    tell_of(figures.nonmanifold, harm, "non-manifold edge", "let at most two triangles share an edge");
-    tell_of(figures.turned, harm, "flipped triangle", "orient all triangles outward");
+    add_offenders(figures.nonmanifold, harm, "non-manifold edge", "let at most two triangles share an edge");
+    add_offenders(figures.turned, harm, "flipped triangle", "orient all triangles outward");
     if (figures.flipped.count > 0 && figures.turned.count == 0)
-      tell_of(figures.flipped, harm, "inconsistently oriented edge", "orient all triangles outward");
-    tell_of(figures.duplicate, Severity::note, "duplicate triangle", "keep one of each");
-    tell_of(figures.degenerate, Severity::note, "degenerate triangle", "remove it");
+      add_offenders(figures.flipped, harm, "inconsistently oriented edge", "orient all triangles outward");
+    add_offenders(figures.duplicate, Severity::note, "duplicate triangle", "keep one of each");
+    add_offenders(figures.degenerate, Severity::note, "degenerate triangle", "remove it");
     if (line.intersections) {
       const std::int64_t count = line.intersections->count;
       if (count > 0)
-        tell(Severity::note, name, plural(count, "pair") + " of its triangles meet" + (count == 1 ? "s" : ""),
-             line.intersections->first, "voxels do not mind; mend it if a simulator will read it");
+        add_finding(Severity::note, name,
+                    plural(count, "pair") + " of its triangles meet" + (count == 1 ? "s" : ""),
+                    line.intersections->first, "voxels do not mind; mend it if a simulator will read it");
     }
     if (figures.closed() && figures.triangles > 0 && figures.volume_mm3 < 0) {
-      tell(harm, name, "is inside out: its volume is " + rounded(figures.volume_mm3 / 1000) + " ml", {},
-           "flip its triangles, or mend the frame");
+      add_finding(harm, name,
+                  "is inside out: its volume is " + text::number(figures.volume_mm3 / 1000) + " ml", {},
+                  "flip its triangles, or mend the frame");
     }
-    tell_parts(line, parts);
+    inspect_parts(line, parts);
   }
 
-  void tell_parts(const SurfaceLine& line, const SurfaceParts& parts) {
+  void inspect_parts(const SurfaceLine& line, const SurfaceParts& parts) {
     const auto first = [&](auto&& wanted) {
       std::int32_t p = 0;
       while (!wanted(p)) ++p;
       return Vector3d(parts.parts[static_cast<std::size_t>(p)].box.center());
     };
     if (line.specks > 0) {
-      tell(Severity::note, line.name,
-           plural(line.specks, "speck") + " less than " + rounded(speck_mm) + " mm across",
-           first([&](std::int32_t p) { return parts.speck(p, speck_mm); }), "ecorche repair drops them");
+      add_finding(Severity::note, line.name,
+                  plural(line.specks, "speck") + " less than " + text::number(speck_mm) + " mm across",
+                  first([&](std::int32_t p) { return parts.speck(p, speck_mm); }),
+                  "ecorche repair drops them");
     }
     if (line.inner > 0) {
-      tell(Severity::note, line.name, plural(line.inner, "closed part") + " inside another",
-           first([&](std::int32_t p) { return parts.parts[static_cast<std::size_t>(p)].inside >= 0; }),
-           "a cavity stays hollow; ecorche repair --drop-inner fills it");
+      add_finding(Severity::note, line.name, plural(line.inner, "closed part") + " inside another",
+                  first([&](std::int32_t p) { return parts.parts[static_cast<std::size_t>(p)].inside >= 0; }),
+                  "a cavity stays hollow; ecorche repair --drop-inner fills it");
     }
     const std::int64_t left = line.figures.components - line.specks - line.inner;
     if (line.group == Group::skin && left > 1)
-      tell(Severity::note, line.name, "has " + plural(left, "part"), {}, "keep the outer surface only");
+      add_finding(Severity::note, line.name, "has " + plural(left, "part"), {},
+                  "keep the outer surface only");
   }
 
   void check_skin() {
@@ -224,14 +224,14 @@ class Inspector {
     const double extent = (skin.high - skin.low).maxCoeff();
     const bool flat = (skin.high - skin.low).minCoeff() <= 1e-6 * extent;
     if (flat || (skin.closed() && !(std::abs(skin.volume_mm3) > 1e-6 * extent * extent * extent))) {
-      tell(Severity::error, patient_.skin_name, "encloses no volume", {}, "export the skin again");
+      add_finding(Severity::error, patient_.skin_name, "encloses no volume", {}, "export the skin again");
     }
     if (extent < kSmallestSkin || extent > kLargestSkin) {
       const double factor = unit_factor(extent, kLikelySkin, kLargestSkin);
-      tell(Severity::warning, patient_.skin_name, "is " + rounded(extent) + " mm long", {},
-           factor > 0 ? "mend the case's unit: with one " + larger(factor) + " it would be " +
-                            rounded(extent * factor) + " mm"
-                      : "mend the case's unit, if that is wrong");
+      add_finding(Severity::warning, patient_.skin_name, "is " + text::number(extent) + " mm long", {},
+                  factor > 0 ? "mend the case's unit: with one " + larger(factor) + " it would be " +
+                                   text::number(extent * factor) + " mm"
+                             : "mend the case's unit, if that is wrong");
     }
   }
 
@@ -243,12 +243,12 @@ class Inspector {
       const SurfaceLine& line = report_.surfaces[i];
       if (line.figures.triangles == 0 || skin.intersects(bounds(line.figures))) continue;
       bones_away += line.group == Group::bone;
-      tell(Severity::warning, line.name, "lies wholly outside the skin's bounds", line.figures.low,
-           "mend its frame or unit");
+      add_finding(Severity::warning, line.name, "lies wholly outside the skin's bounds", line.figures.low,
+                  "mend its frame or unit");
     }
     if (bones_away > 0 && bones_away == patient_.bones.size()) {
-      tell(Severity::error, "bones", "all lie outside the skin's bounds", {},
-           "mend the frame or unit of skin or bones");
+      add_finding(Severity::error, "bones", "all lie outside the skin's bounds", {},
+                  "mend the frame or unit of skin or bones");
     }
   }
 
@@ -261,11 +261,12 @@ class Inspector {
       const double extent = (figures.high - figures.low).maxCoeff();
       if (figures.triangles == 0 || (extent <= 1.5 * whole && extent >= 1e-3 * whole)) continue;
       const double factor = unit_factor(extent, 1e-2 * whole, whole);
-      tell(Severity::warning, report_.surfaces[i].name,
-           "is " + rounded(extent) + " mm long, the skin " + rounded(whole) + " mm", figures.low,
-           factor > 0 ? "mend its unit: with one " + larger(factor) + " it would be " +
-                            rounded(extent * factor) + " mm"
-                      : "mend its unit, if that is wrong");
+      add_finding(Severity::warning, report_.surfaces[i].name,
+                  "is " + text::number(extent) + " mm long, the skin " + text::number(whole) + " mm",
+                  figures.low,
+                  factor > 0 ? "mend its unit: with one " + larger(factor) + " it would be " +
+                                   text::number(extent * factor) + " mm"
+                             : "mend its unit, if that is wrong");
     }
   }
 
@@ -291,11 +292,11 @@ class Inspector {
       what += (mend.empty() ? "" : " and ") + found->size();
       mend += std::string(mend.empty() ? "" : ", and ") + "a unit " + larger(found->scale);
     }
-    tell(Severity::warning, "bones", what + ", " + rounded(100 * found->share) + " % of the bones lie inside",
-         {}, mend);
+    add_finding(Severity::warning, "bones",
+                what + ", " + text::number(100 * found->share) + " % of the bones lie inside", {}, mend);
   }
 
-  void tell_outside() {
+  void inspect_outside() {
     for (std::size_t i = 1; i < report_.surfaces.size(); ++i) {
       const SurfaceLine& line = report_.surfaces[i];
       if (!line.outside || line.outside->count == 0) continue;
@@ -303,13 +304,14 @@ class Inspector {
       const bool bone = line.group == Group::bone;
       if (!bone && out.largest_mm <= tissue_outside_share * skin_mm_) continue;
       const bool lost = !bone && out.largest_mm > tissue_lost_share * skin_mm_;
-      tell(bone || lost ? Severity::warning : Severity::note, line.name,
-           std::to_string(out.count) + (out.count == 1 ? " vertex (" : " vertices (") +
-               rounded(100 * out.share) + " %) outside the skin, by up to " + rounded(out.largest_mm) + " mm",
-           out.farthest,
-           lost   ? "mend its frame or unit: farther out than 10 % of the body's length no model is made"
-           : bone ? "the body will be skin and bones together; mend one of them if that is not meant"
-                  : "it will follow the nearest part of the body; mend it if that is not meant");
+      add_finding(bone || lost ? Severity::warning : Severity::note, line.name,
+                  std::to_string(out.count) + (out.count == 1 ? " vertex (" : " vertices (") +
+                      text::number(100 * out.share) + " %) outside the skin, by up to " +
+                      text::number(out.largest_mm) + " mm",
+                  out.farthest,
+                  lost ? "mend its frame or unit: farther out than 10 % of the body's length no model is made"
+                  : bone ? "the body will be skin and bones together; mend one of them if that is not meant"
+                         : "it will follow the nearest part of the body; mend it if that is not meant");
     }
   }
 
@@ -324,15 +326,15 @@ class Inspector {
       int ancestor = segment.parent;
       while (ancestor > 0 && !owns(segments[static_cast<std::size_t>(ancestor)]))
         ancestor = segments[static_cast<std::size_t>(ancestor)].parent;
-      tell(Severity::warning, segment.name, "no bone belongs to this segment", {},
-           "it will move with '" + segments[static_cast<std::size_t>(ancestor)].name +
-               "'; give it a bone if that is not meant");
+      add_finding(Severity::warning, segment.name, "no bone belongs to this segment", {},
+                  "it will move with '" + segments[static_cast<std::size_t>(ancestor)].name +
+                      "'; give it a bone if that is not meant");
     }
   }
 
   void check_volumes() {
     for (Misplaced& image : misplaced_images(patient_))
-      tell(Severity::warning, image.name, image.what, image.at, image.mend);
+      add_finding(Severity::warning, image.name, image.what, image.at, image.mend);
     if (patient_.skin.F.rows() > 0 && patient_.labels) check_labels(*patient_.labels);
   }
 
@@ -345,12 +347,13 @@ class Inspector {
       if (absent++ < 5) names += (names.empty() ? "" : ", ") + std::to_string(id) + " '" + name + "'";
     }
     if (absent == 1)
-      tell(Severity::warning, "labels", "no voxel has the id " + names, {}, "mend the table, or the image");
+      add_finding(Severity::warning, "labels", "no voxel has the id " + names, {},
+                  "mend the table, or the image");
     if (absent > 1)
-      tell(Severity::warning, "labels",
-           "no voxel has " + std::to_string(absent) + " of the table's " +
-               std::to_string(labels.table.size()) + " ids: " + names + (absent > 5 ? ", ..." : ""),
-           {}, "mend the table, or the image, unless they are not in this scan");
+      add_finding(Severity::warning, "labels",
+                  "no voxel has " + std::to_string(absent) + " of the table's " +
+                      std::to_string(labels.table.size()) + " ids: " + names + (absent > 5 ? ", ..." : ""),
+                  {}, "mend the table, or the image, unless they are not in this scan");
     std::int64_t unnamed = 0;
     std::string ids;
     std::optional<Vector3d> first;
@@ -360,10 +363,10 @@ class Inspector {
       if (!first) first = use.first;
     }
     if (unnamed > 0)
-      tell(Severity::note, "labels",
-           plural(unnamed, "id") + " of the image " + (unnamed == 1 ? "is" : "are") +
-               " not in the table: " + ids + (unnamed > 10 ? ", ..." : ""),
-           first, "name them in the table, if they matter");
+      add_finding(Severity::note, "labels",
+                  plural(unnamed, "id") + " of the image " + (unnamed == 1 ? "is" : "are") +
+                      " not in the table: " + ids + (unnamed > 10 ? ", ..." : ""),
+                  first, "name them in the table, if they matter");
   }
 
   const Case& patient_;

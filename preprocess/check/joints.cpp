@@ -7,9 +7,10 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <numbers>
 
 #include <ecorche/values/error.hpp>
+#include "core/values/degrees.hpp"
+#include "core/values/text.hpp"
 #include "preprocess/check/inside.hpp"
 #include "preprocess/check/joint_places.hpp"
 #include "preprocess/rig/fit_rig.hpp"
@@ -19,7 +20,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kOutside = 0.02;  // of the longer bone: surfaces of skin and bones are no truer
 // Hinges of limbs stand across the shafts of both bones: condyles 80 to 96 degrees to the femur (Paley 2002),
 // an elbow's axis 75 to 100 to the humerus (London 1981) and, by the carrying angle of up to 28 (Zampagni et
@@ -27,14 +27,8 @@ constexpr double kOutside = 0.02;  // of the longer bone: surfaces of skin and b
 constexpr double kAcross = 45;
 constexpr double kExchanged = 0.25;  // of the shorter bone's length; and what may be left of the distances
 
-std::string rounded(double x) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", x);
-  return text.data();
-}
-
 std::string millimetres(double x) {
-  return x < 1000 ? rounded(x) + " mm" : std::to_string(std::llround(x)) + " mm";
+  return x < 1000 ? text::number(x) + " mm" : std::to_string(std::llround(x)) + " mm";
 }
 
 std::string place(const Vector3d& p) {
@@ -108,13 +102,13 @@ class Joints {
     return static_cast<std::size_t>(skeleton_.segments[row].parent);
   }
 
-  void tell(std::size_t row, std::string what, std::string mend) {
+  void add_finding(std::size_t row, std::string what, std::string mend) {
     findings_.push_back({patient_.generic ? Severity::warning : Severity::error, "joint " + joint(row).name,
                          std::move(what), joint(row).center, std::move(mend)});
   }
 
   // Whether its centre was said, not found.
-  bool said(std::size_t row) const {
+  bool is_given(std::size_t row) const {
     const int at = patient_.skeleton.find_joint(joint(row).name);
     if (at < 0 || patient_.generic) return false;
     const Joint& asked = patient_.skeleton.segments[static_cast<std::size_t>(at)].joint;
@@ -161,15 +155,15 @@ class Joints {
     what += millimetres(is.own) + " from the bones of '" + segment(row) + "'";
     if (!is_root(row) && std::isfinite(is.parent))
       what += " and " + millimetres(is.parent) + " from those of '" + segment(parent(row)) + "'";
-    tell(row, what, advice(row));
+    add_finding(row, what, advice(row));
   }
 
   std::string advice(std::size_t row) const {
-    if (said(row)) {
+    if (is_given(row)) {
       for (const Change& change : changes()) {
         bool mends = possible(row, change.apply(joint(row).center)), joined = false;
         for (std::size_t other = 0; other < skeleton_.segments.size() && mends; ++other) {
-          if (!said(other) || is_root(other)) continue;
+          if (!is_given(other) || is_root(other)) continue;
           mends = possible(other, change.apply(joint(other).center));
           joined = true;
         }
@@ -179,7 +173,7 @@ class Joints {
     }
     const auto gap = is_root(row) ? std::nullopt : gap_between(bones_[row], bones_[parent(row)]);
     const std::string meet = gap ? "the bones come nearest to each other at " + place(gap->amid) : "";
-    if (said(row) && gap) return meet + ": say its center there, or give it a rule that finds it";
+    if (is_given(row) && gap) return meet + ": say its center there, or give it a rule that finds it";
     if (gap) return meet + ": mend the segments of these bones, or say its center";
     return "say where it is: its center as [x, y, z], in the case's frame and unit";
   }
@@ -210,10 +204,10 @@ class Joints {
     if (now - then <= kExchanged * std::min(bones_[a].length(), bones_[b].length()) ||
         then > kExchanged * now)
       return;
-    tell(row,
-         "the joints of '" + segment(a) + "' and '" + segment(b) + "' lie " + millimetres(now) +
-             " from their bones, and " + millimetres(then) + " were those bones exchanged",
-         "exchange the segments of their bones");
+    add_finding(row,
+                "the joints of '" + segment(a) + "' and '" + segment(b) + "' lie " + millimetres(now) +
+                    " from their bones, and " + millimetres(then) + " were those bones exchanged",
+                "exchange the segments of their bones");
   }
 
   void check_axis(std::size_t row) {
@@ -225,12 +219,13 @@ class Joints {
       // end.
       const Vector3d from = bones_[of].middle() - joint(row).center;
       if (std::abs(bones_[of].shaft->dot(from)) < 0.9 * from.norm()) continue;
-      const double angle = std::acos(std::min(1.0, std::abs(axis.dot(*bones_[of].shaft)))) * kDegrees;
+      const double angle =
+          std::acos(std::min(1.0, std::abs(axis.dot(*bones_[of].shaft)))) * degrees_per_radian;
       if (angle >= 90 - kAcross) continue;
-      tell(row,
-           "its axis stands " + rounded(angle) + " degrees to the shaft of '" + segment(of) +
-               "': no hinge that flexes turns a bone about its own shaft",
-           "give it axes that stand across both bones");
+      add_finding(row,
+                  "its axis stands " + text::number(angle) + " degrees to the shaft of '" + segment(of) +
+                      "': no hinge that flexes turns a bone about its own shaft",
+                  "give it axes that stand across both bones");
       return;
     }
   }
@@ -284,8 +279,8 @@ std::vector<Finding> size_findings(const Case& patient) {
   }
   for (const double factor : {1e-3, 1e-2, 1e-1, 1 / 25.4}) {
     if (!(factor * length >= size.whole && factor * length <= size.most)) continue;
-    out.mend = "made " + rounded(1 / factor) + " times smaller it would be " + millimetres(factor * length) +
-               ": mend unit: of the case, or of its files";
+    out.mend = "made " + text::number(1 / factor) + " times smaller it would be " +
+               millimetres(factor * length) + ": mend unit: of the case, or of its files";
     break;
   }
   return {out};

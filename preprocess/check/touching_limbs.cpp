@@ -283,7 +283,7 @@ std::string what(const Touch& touch, const Skeleton& skeleton) {
          name(touch.other);
 }
 
-std::string said(const Touch& touch, const Skeleton& skeleton) {
+std::string describe(const Touch& touch, const Skeleton& skeleton) {
   return skeleton.segments[static_cast<std::size_t>(touch.limb)].name + " " + what(touch, skeleton) +
          ", at [" + number("%.1f", touch.at.x()) + ", " + number("%.1f", touch.at.y()) + ", " +
          number("%.1f", touch.at.z()) + "]";

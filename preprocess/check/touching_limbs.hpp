@@ -37,7 +37,7 @@ std::vector<Touch> touching_limbs(const Model& model);
 /// `touches the trunk: 47 cm2 joined, most of hand_left and pelvis`.
 std::string what(const Touch& touch, const Skeleton& skeleton);
 /// `upper_arm_left touches the trunk: 47 cm2 joined, most of hand_left and pelvis, at [x, y, z]`.
-std::string said(const Touch& touch, const Skeleton& skeleton);
+std::string describe(const Touch& touch, const Skeleton& skeleton);
 
 /// The side, mm, of cubes of twelve tets: the body's volume over its tets.
 double cube_mm(const PointsF& nodes, const Tets& tets);

@@ -10,6 +10,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "core/values/text.hpp"
 #include "preprocess/label_surfaces/mask.hpp"
 #include "preprocess/label_surfaces/nearest.hpp"
 
@@ -259,24 +260,21 @@ void erase(Image& layer, const std::vector<std::size_t>& gone) {
 }
 
 std::string in_ml(std::int64_t voxels, const ImageGrid& grid) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g ml",
-                1e-3 * static_cast<double>(voxels) * grid.spacing[0] * grid.spacing[1] * grid.spacing[2]);
-  return text;
+  const double ml = 1e-3 * static_cast<double>(voxels) * grid.spacing[0] * grid.spacing[1] * grid.spacing[2];
+  return text::number(ml, 4) + " ml";
 }
 
-void tell(const Case& patient, const std::vector<TakenOut>& taken, std::int64_t labelled,
-          const Context& context) {
+void warn_of_removed(const Case& patient, const std::vector<RemovedVoxels>& taken, std::int64_t labelled,
+                     const Context& context) {
   const ImageGrid& grid = patient.labels->image.grid;
   std::int64_t all = 0;
   std::string pairs;
-  for (const TakenOut& t : taken) {
+  for (const RemovedVoxels& t : taken) {
     all += t.voxels;
     const auto name = [&](int s) { return patient.skeleton.segments[static_cast<std::size_t>(s)].name; };
     pairs += (pairs.empty() ? ": " : ", ") + in_ml(t.voxels, grid) + " of " + name(t.a) + " and " + name(t.b);
   }
-  char share[32];
-  std::snprintf(share, sizeof share, "%.3g", 100 * static_cast<double>(all) / static_cast<double>(labelled));
+  const std::string share = text::number(100 * static_cast<double>(all) / static_cast<double>(labelled));
   context.warn(patient.labels->apart->where + ": " + in_ml(all, grid) + " (" + share +
                " % of what is labelled) taken out, so that limbs are apart" + pairs +
                " (a smaller gap_mm takes less)");
@@ -284,7 +282,7 @@ void tell(const Case& patient, const std::vector<TakenOut>& taken, std::int64_t 
 
 }  // namespace
 
-std::vector<TakenOut> hold_apart(Case& patient, const Context& context) {
+std::vector<RemovedVoxels> hold_apart(Case& patient, const Context& context) {
   const Tree tree(patient.skeleton, *patient.labels->apart);
   const std::vector<std::int32_t> segment = segments_of_voxels(patient, tree, context);
   const Strangers strangers = near_strangers(patient, tree, segment, context);
@@ -301,11 +299,12 @@ std::vector<TakenOut> hold_apart(Case& patient, const Context& context) {
   }
   erase(patient.labels->image, gone);
   for (Image& layer : patient.labels->overlaps) erase(layer, gone);
-  std::vector<TakenOut> out;
+  std::vector<RemovedVoxels> out;
   out.reserve(count.size());
   for (const auto& [pair, voxels] : count) out.push_back({pair.first, pair.second, voxels});
-  tell(patient, out, std::count_if(segment.begin(), segment.end(), [](std::int32_t s) { return s >= 0; }),
-       context);
+  warn_of_removed(patient, out,
+                  std::count_if(segment.begin(), segment.end(), [](std::int32_t s) { return s >= 0; }),
+                  context);
   return out;
 }
 

@@ -11,7 +11,7 @@
 namespace ecorche::label_surfaces {
 
 /// What was taken out between two segments.
-struct TakenOut {
+struct RemovedVoxels {
   int a, b;  ///< rows of the skeleton, a < b
   std::int64_t voxels;
 };
@@ -31,6 +31,6 @@ struct TakenOut {
 /// Returns what was taken out, by pairs of segments, ascending. Leaves `apart` in place. The same for any
 /// number of threads. O(voxels). Throws Error{config} where limbs or the rest have no bone of labels,
 /// Error{interrupted}.
-std::vector<TakenOut> hold_apart(Case& patient, const Context& context);
+std::vector<RemovedVoxels> hold_apart(Case& patient, const Context& context);
 
 }  // namespace ecorche::label_surfaces

@@ -48,12 +48,12 @@ SurfaceMesh extract(const CaseLabels& labels, const LabelSource& source, const C
 
 void resolve(Case& patient, const Context& context) {
   std::vector<Job> jobs;
-  const auto want = [&](const std::optional<LabelSource>& source, SurfaceMesh& surface) {
+  const auto add = [&](const std::optional<LabelSource>& source, SurfaceMesh& surface) {
     if (source) jobs.push_back({&*source, &surface, 0});
   };
-  want(patient.skin_source, patient.skin);
-  for (CaseBone& bone : patient.bones) want(bone.source, bone.surface);
-  for (CaseTissue& tissue : patient.tissues) want(tissue.source, tissue.surface);
+  add(patient.skin_source, patient.skin);
+  for (CaseBone& bone : patient.bones) add(bone.source, bone.surface);
+  for (CaseTissue& tissue : patient.tissues) add(tissue.source, tissue.surface);
   if (jobs.empty()) return;
   if (!patient.labels) {
     throw Error(ErrorKind::config, jobs.front().source->where, "the case has no labels",

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kRounds = 4;  // the bounds take a part of each move back
+constexpr int kVolumeRounds = 4;  // the bounds take a part of each move back
 
 // Where a vertex stands on the voxels' own staircase.
 Vector3d on_staircase(const SurfaceNet::Home& home) {
@@ -77,7 +77,7 @@ void restore_volume(SurfaceNet& net) {
 
   std::vector<double> held(n), twice_area(n);
   std::vector<Vector3d> normal(n);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kVolumeRounds; ++round) {
     std::fill(held.begin(), held.end(), 0);
     std::fill(twice_area.begin(), twice_area.end(), 0);
     std::fill(normal.begin(), normal.end(), Vector3d::Zero());

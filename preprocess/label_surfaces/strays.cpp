@@ -35,7 +35,7 @@ Strays voxels_of(const CaseLabels& labels, const LabelSource& source) {
   return out;
 }
 
-std::string said(const Strays& strays) {
+std::string describe(const Strays& strays) {
   std::array<char, 160> text{};
   if (strays.voxels == 1) {
     std::snprintf(text.data(), text.size(), "its only voxel, at [%.1f, %.1f, %.1f], lies off the body",
@@ -56,7 +56,7 @@ bool gave_nothing(const std::optional<LabelSource>& source, const SurfaceMesh& s
   if (strays.voxels == 0 || source.side != Side::both || source.within)
     throw Error(ErrorKind::config, source.where, "its labels have no voxel there",
                 "check its ids, side and within");
-  throw Error(ErrorKind::config, source.where, "'" + name + "': " + said(strays),
+  throw Error(ErrorKind::config, source.where, "'" + name + "': " + describe(strays),
               "mend the label map, leave the label out, or join it to the body by the skin's close_mm");
 }
 
@@ -74,7 +74,7 @@ void drop_strays(Case& patient, const Context& context) {
     const Strays strays = voxels_of(*patient.labels, *tissue.source);
     const bool limited = tissue.source->side != Side::both || tissue.source->within;
     if (strays.voxels == 0 || strays.voxels > kStray || limited) refuse(*tissue.source, tissue.name, strays);
-    context.warn(tissue.source->where + ": '" + tissue.name + "': " + said(strays) +
+    context.warn(tissue.source->where + ": '" + tissue.name + "': " + describe(strays) +
                  "; it is left out (take the label out of the image, or say except: in the entry)");
     return true;
   });

@@ -26,7 +26,7 @@ namespace {
 
 using geometry::FaceTree;
 
-std::vector<FaceTree::Corners> corners_of(const PointsF& nodes, const std::vector<BoundaryFace>& faces) {
+std::vector<FaceTree::Corners> face_corners(const PointsF& nodes, const std::vector<BoundaryFace>& faces) {
   std::vector<FaceTree::Corners> corners(faces.size());
   for (std::size_t f = 0; f < faces.size(); ++f) {
     for (std::size_t c = 0; c < 3; ++c)
@@ -115,7 +115,7 @@ struct Locator::Impl {
         box(box_of(nodes)),
         width(mean_width(nodes, tets)),
         faces(boundary_faces(nodes.rows(), tets)),
-        tree(corners_of(nodes, faces)) {}
+        tree(face_corners(nodes, faces)) {}
 };
 
 Locator::Locator(const PointsF& nodes, const Tets& tets) {

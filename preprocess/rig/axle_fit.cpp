@@ -17,18 +17,18 @@ using Eigen::Vector3d;
 
 constexpr int kPlaces = 8;  // along the axis, each with its radius
 constexpr int kUnknowns = 4 + kPlaces;
-constexpr int kDirections = 600;                               // of a half sphere: 5 degrees apart
-constexpr int kDraws = 24;                                     // a direction
-constexpr std::size_t kTried = 8;                              // hypotheses that are refined
-constexpr Index kMost = 1200, kMostDrawn = 400, kFewest = 12;  // points
-constexpr double kBand = 0.02;                                 // of the extent: 2 mm of a knee's condyles
-constexpr double kThin = 0.03, kFat = 0.5;                     // of the extent: bounds of the radius
-constexpr double kAxial = 0.5;   // cosine: normals within 60 degrees of the axis are of its ends
-constexpr double kAway = 0.8;    // cosine, of a normal and the way from the axis
-constexpr double kSpike = 3;     // medians of area: more is a badly registered vertex
+constexpr int kAxleDirections = 600;                                   // of a half sphere: 5 degrees apart
+constexpr int kAxleDraws = 24;                                         // a direction
+constexpr std::size_t kAxleTried = 8;                                  // hypotheses_axle that are refined
+constexpr Index kAxleMost = 1200, kMostDrawn = 400, kAxleFewest = 12;  // points
+constexpr double kBand = 0.02;              // of the extent: 2 mm of a knee's condyles
+constexpr double kThin = 0.03, kFat = 0.5;  // of the extent: bounds of the radius
+constexpr double kAxial = 0.5;              // cosine: normals within 60 degrees of the axis are of its ends
+constexpr double kAway = 0.8;               // cosine, of a normal and the way from the axis
+constexpr double kSpike = 3;                // medians of area: more is a badly registered vertex
 constexpr double kStiff = 0.02;  // of the weight of all inliers: on the difference of neighbouring radii
 constexpr double kAlong = 0.5;   // cosine, of the axis and where it was expected
-constexpr int kRounds = 20;
+constexpr int kAxleRounds = 20;
 
 using Vector = Eigen::Matrix<double, kUnknowns, 1>;
 using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
@@ -39,9 +39,9 @@ struct Cloud {
   double band = 0;
 };
 
-struct Across {
+struct AxleAcross {
   Vector3d u, v;
-  explicit Across(const Vector3d& axis) : u(axis.unitOrthogonal()), v(axis.cross(u)) {}
+  explicit AxleAcross(const Vector3d& axis) : u(axis.unitOrthogonal()), v(axis.cross(u)) {}
 };
 
 struct Axle {
@@ -102,7 +102,7 @@ void set_ends(const Cloud& cloud, double band, Axle& axle) {
     const Seen seen = see(cloud, p, axle);
     if (seen.radial && std::abs(seen.distance) <= band) along.push_back(seen.along);
   }
-  if (along.size() < static_cast<std::size_t>(kFewest)) return;
+  if (along.size() < static_cast<std::size_t>(kAxleFewest)) return;
   std::sort(along.begin(), along.end());
   const std::size_t skipped = along.size() * 3 / 100;
   const double low = along[skipped], high = along[along.size() - 1 - skipped];
@@ -118,15 +118,15 @@ void set_ends(const Cloud& cloud, double band, Axle& axle) {
   axle = moved;
 }
 
-struct Normal {
+struct AxleNormal {
   Matrix A = Matrix::Zero();
   Vector b = Vector::Zero();
   double weight = 0, squares = 0;
   std::size_t count = 0;
 
   // Tukey's weights where `soft`, so that inliers at the band's edge do not come and go.
-  Normal(const Cloud& cloud, const Axle& axle, double band, bool soft) {
-    const Across across(axle.axis);
+  AxleNormal(const Cloud& cloud, const Axle& axle, double band, bool soft) {
+    const AxleAcross across(axle.axis);
     for (Index p = 0; p < cloud.at.rows(); ++p) {
       const Seen seen = see(cloud, p, axle);
       if (!seen.radial || std::abs(seen.distance) > band) continue;
@@ -158,16 +158,16 @@ struct Normal {
 };
 
 std::optional<Axle> refined(const Cloud& cloud, Axle axle, double least, double most) {
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kAxleRounds; ++round) {
     const double band = cloud.band * (round < 4 ? 2 : 1);
     set_ends(cloud, band, axle);
     if (!(axle.half > 0)) return std::nullopt;
-    const Normal normal(cloud, axle, band, true);
-    if (normal.count < static_cast<std::size_t>(kFewest)) return std::nullopt;
+    const AxleNormal normal(cloud, axle, band, true);
+    if (normal.count < static_cast<std::size_t>(kAxleFewest)) return std::nullopt;
     const Eigen::LDLT<Matrix> ldlt(normal.A);
     const Vector change = ldlt.solve(normal.b);
     if (ldlt.info() != Eigen::Success || !change.allFinite()) return std::nullopt;
-    const Across across(axle.axis);
+    const AxleAcross across(axle.axis);
     axle.point += change[0] * across.u + change[1] * across.v;
     axle.axis = (axle.axis + change[2] * across.u + change[3] * across.v).normalized();
     for (int i = 0; i < kPlaces; ++i) {
@@ -194,7 +194,7 @@ Cloud part_of(const SurfacePoints& points, Index most) {
 }
 
 Cloud prepared(const SurfacePoints& points) {
-  Cloud few = part_of(points, kMost);
+  Cloud few = part_of(points, kAxleMost);
   few.normal = local_normals({few.at, few.normal, few.weight, points.along, points.found});
   std::vector<double> sorted = few.weight;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -204,9 +204,9 @@ Cloud prepared(const SurfacePoints& points) {
   return few;
 }
 
-// The cylinder along `axis` through two points and their normals.
-std::optional<Axle> through(const Cloud& cloud, Index i, Index j, const Vector3d& axis) {
-  const Across across(axis);
+// The cylinder along `axis` through_axle two points and their normals.
+std::optional<Axle> through_axle(const Cloud& cloud, Index i, Index j, const Vector3d& axis) {
+  const AxleAcross across(axis);
   const auto flat = [&](const Eigen::RowVector3d& of) {
     return Vector2d(of.dot(across.u), of.dot(across.v));
   };
@@ -222,23 +222,23 @@ std::optional<Axle> through(const Cloud& cloud, Index i, Index j, const Vector3d
 }
 
 // The best along each direction, best first, no more than are tried.
-std::vector<Axle> hypotheses(const Cloud& cloud, const Vector3d& along, double least, double most) {
+std::vector<Axle> hypotheses_axle(const Cloud& cloud, const Vector3d& along, double least, double most) {
   robust::Draw draw(0x7fffffff);
   std::vector<std::pair<double, Axle>> best;
-  for (int k = 0; k < kDirections; ++k) {
-    const Vector3d axis = robust::half_sphere(k, kDirections);
+  for (int k = 0; k < kAxleDirections; ++k) {
+    const Vector3d axis = robust::half_sphere(k, kAxleDirections);
     if (!along.isZero() && std::abs(axis.dot(along)) < kAlong) continue;
     std::vector<Index> radial;
     for (Index p = 0; p < cloud.at.rows(); ++p) {
       if (std::abs(cloud.normal.row(p).dot(axis)) < kAxial) radial.push_back(p);
     }
-    if (radial.size() < static_cast<std::size_t>(kFewest)) continue;
+    if (radial.size() < static_cast<std::size_t>(kAxleFewest)) continue;
     const auto any = [&] { return radial[static_cast<std::size_t>(draw()) % radial.size()]; };
     std::optional<Axle> here;
     double here_cost = 0;
-    for (int d = 0; d < kDraws; ++d) {
+    for (int d = 0; d < kAxleDraws; ++d) {
       const Index i = any(), j = any();
-      const auto axle = through(cloud, i, j, axis);
+      const auto axle = through_axle(cloud, i, j, axis);
       if (!axle || !(axle->radius[0] >= least && axle->radius[0] <= most)) continue;
       const double cost = cost_of(cloud, *axle, cloud.band);
       if (here && cost >= here_cost) continue;
@@ -249,21 +249,21 @@ std::vector<Axle> hypotheses(const Cloud& cloud, const Vector3d& along, double l
   }
   std::stable_sort(best.begin(), best.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Axle> out;
-  for (std::size_t i = 0; i < std::min(best.size(), kTried); ++i) out.push_back(best[i].second);
+  for (std::size_t i = 0; i < std::min(best.size(), kAxleTried); ++i) out.push_back(best[i].second);
   return out;
 }
 
 }  // namespace
 
 std::optional<CylinderFit> fit_axle(const SurfacePoints& points) {
-  if (points.at.rows() < kFewest) return std::nullopt;
+  if (points.at.rows() < kAxleFewest) return std::nullopt;
   const Cloud cloud = prepared(points);
   const double extent = robust::extent_of(cloud.at), least = kThin * extent, most = kFat * extent;
   Cloud drawn = part_of({cloud.at, cloud.normal, cloud.weight, points.along, true}, kMostDrawn);
   drawn.band = cloud.band;
   std::optional<Axle> best;
   double best_cost = 0;
-  for (const Axle& first : hypotheses(drawn, points.along, least, most)) {
+  for (const Axle& first : hypotheses_axle(drawn, points.along, least, most)) {
     const auto axle = refined(cloud, first, least, most);
     if (!axle || (!points.along.isZero() && std::abs(axle->axis.dot(points.along)) < kAlong)) continue;
     const double cost = cost_of(cloud, *axle, cloud.band);
@@ -273,7 +273,7 @@ std::optional<CylinderFit> fit_axle(const SurfacePoints& points) {
   }
   if (!best) return std::nullopt;
   set_ends(cloud, cloud.band, *best);
-  const Normal normal(cloud, *best, cloud.band, false);
+  const AxleNormal normal(cloud, *best, cloud.band, false);
   double radial = 0, inside = 0;
   for (Index p = 0; p < cloud.at.rows(); ++p) {
     const Seen seen = see(cloud, p, *best);
@@ -281,7 +281,7 @@ std::optional<CylinderFit> fit_axle(const SurfacePoints& points) {
     radial += cloud.weight[static_cast<std::size_t>(p)];
     if (std::abs(seen.distance) <= cloud.band) inside += cloud.weight[static_cast<std::size_t>(p)];
   }
-  if (normal.count < static_cast<std::size_t>(kFewest)) return std::nullopt;
+  if (normal.count < static_cast<std::size_t>(kAxleFewest)) return std::nullopt;
   CylinderFit fit;
   fit.center = best->point;
   fit.axis = best->axis;

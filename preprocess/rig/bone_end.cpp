@@ -14,12 +14,12 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr Eigen::Index kAsked = 3000;   // vertices, whose distance from the other bone is asked
-constexpr std::size_t kFewest = 16;     // of the nearest ones
-constexpr double kNearestShare = 0.02;  // likewise, as in facing.cpp
-constexpr double kLong = 4;             // a shaft's variance, in variances across it
+constexpr Eigen::Index kSampled = 3000;    // vertices, whose distance from the other bone is asked
+constexpr std::size_t kEndFewest = 16;     // of the nearest ones
+constexpr double kEndNearestShare = 0.02;  // likewise, as in facing.cpp
+constexpr double kEndLong = 4;             // a shaft's variance, in variances across it
 constexpr double kTip = 0.005, kSide = 0.02;
-constexpr int kRounds = 6;  // of finding the width of the last width's half
+constexpr int kEndRounds = 6;  // of finding the width of the last width's half
 
 double percentile(std::vector<double> of, double share) {
   const auto rank = static_cast<std::size_t>(share * static_cast<double>(of.size() - 1));
@@ -30,7 +30,7 @@ double percentile(std::vector<double> of, double share) {
 // The middle, coordinate by coordinate, of the vertices nearest to `other`.
 Eigen::Vector3d nearest_part(const SurfaceMesh& bone, const SurfaceMesh& other) {
   const geometry::FaceTree tree(other);
-  const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kAsked);
+  const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kSampled);
   std::vector<std::pair<double, Eigen::Index>> away;
   std::int32_t hint = -1;
   for (Eigen::Index v = 0; v < bone.V.rows(); v += step) {
@@ -39,7 +39,7 @@ Eigen::Vector3d nearest_part(const SurfaceMesh& bone, const SurfaceMesh& other) 
     away.emplace_back(hit.squared, v);
   }
   const auto wanted =
-      std::max(kFewest, static_cast<std::size_t>(kNearestShare * static_cast<double>(away.size())));
+      std::max(kEndFewest, static_cast<std::size_t>(kEndNearestShare * static_cast<double>(away.size())));
   std::sort(away.begin(), away.end());
   away.resize(std::min(wanted, away.size()));
   Eigen::Vector3d middle;
@@ -59,7 +59,7 @@ std::optional<BoneEnd> bone_end(const SurfaceMesh& bone, const SurfaceMesh& othe
   const Points from = bone.V.rowwise() - mean.transpose();
   const Eigen::Matrix3d scatter = from.transpose() * from;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  const bool is_long = eigen.eigenvalues()[2] > kLong * eigen.eigenvalues()[1];
+  const bool is_long = eigen.eigenvalues()[2] > kEndLong * eigen.eigenvalues()[1];
   Eigen::Vector3d shaft = is_long ? Eigen::Vector3d(eigen.eigenvectors().col(2)) : mean - near;
   if (!(shaft.norm() > 0)) return std::nullopt;
   shaft.normalize();
@@ -85,7 +85,7 @@ std::optional<BoneEnd> bone_end(const SurfaceMesh& bone, const SurfaceMesh& othe
     end.width = (high - low).maxCoeff();
   };
   measure(std::numeric_limits<double>::infinity());
-  for (int round = 0; round < kRounds; ++round) measure(tip + 0.5 * end.width);
+  for (int round = 0; round < kEndRounds; ++round) measure(tip + 0.5 * end.width);
   if (!(end.width > 0)) return std::nullopt;
   const Eigen::Vector2d middle = 0.5 * (low + high);
   end.origin = mean + middle.x() * end.axes.col(0) + middle.y() * end.axes.col(1) + end.inward * tip * shaft;

@@ -10,13 +10,13 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr int kDirections = 300;  // of a half sphere: 7 degrees apart
-constexpr int kDraws = 24;        // a direction; a fifth outliers leave half of the draws without one
-constexpr Eigen::Index kMost = 600;
-constexpr std::size_t kTried = 12;  // hypotheses that are refined
-constexpr std::size_t kFewest = 6;  // points
-constexpr double kSurface = 0.25;   // of the radius: farther points are of another part of the bone
-constexpr double kWide = 3;         // bands, for hypotheses: their directions are up to 4 degrees off
+constexpr int kCylinderDirections = 300;  // of a half sphere: 7 degrees apart
+constexpr int kCylinderDraws = 24;        // a direction; a fifth outliers leave half of the draws without one
+constexpr Eigen::Index kCylinderMost = 600;
+constexpr std::size_t kCylinderTried = 12;  // hypotheses_cylinder that are refined
+constexpr std::size_t kCylinderFewest = 6;  // points
+constexpr double kCylinderSurface = 0.25;   // of the radius: farther points are of another part of the bone
+constexpr double kWide = 3;  // bands, for hypotheses_cylinder: their directions are up to 4 degrees off
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
@@ -27,15 +27,15 @@ struct Cylinder {
   double distance(const Eigen::Vector3d& p) const { return (p - point).cross(axis).norm() - radius; }
 };
 
-struct Across {
+struct CylinderAcross {
   Eigen::Vector3d u, v;
-  explicit Across(const Eigen::Vector3d& axis) : u(axis.unitOrthogonal()), v(axis.cross(u)) {}
+  explicit CylinderAcross(const Eigen::Vector3d& axis) : u(axis.unitOrthogonal()), v(axis.cross(u)) {}
 };
 
-// The circle through three points seen along `axis`.
-std::optional<Cylinder> through(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                                const Eigen::Vector3d& axis) {
-  const Across across(axis);
+// The circle through_cylinder three points seen along `axis`.
+std::optional<Cylinder> through_cylinder(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                         const Eigen::Vector3d& c, const Eigen::Vector3d& axis) {
+  const CylinderAcross across(axis);
   const Eigen::Vector2d ab((b - a).dot(across.u), (b - a).dot(across.v));
   const Eigen::Vector2d ac((c - a).dot(across.u), (c - a).dot(across.v));
   const double det = 2 * (ab.x() * ac.y() - ab.y() * ac.x());
@@ -58,11 +58,11 @@ void centre(const Points& points, const std::vector<Eigen::Index>& chosen, Cylin
 }
 
 // The normal equations of the distance in two shifts, two tilts and the radius.
-struct Normal {
+struct CylinderNormal {
   Matrix5 A = Matrix5::Zero();
   Vector5 b = Vector5::Zero();
-  Normal(const Points& points, const std::vector<Eigen::Index>& chosen, const Cylinder& cylinder) {
-    const Across across(cylinder.axis);
+  CylinderNormal(const Points& points, const std::vector<Eigen::Index>& chosen, const Cylinder& cylinder) {
+    const CylinderAcross across(cylinder.axis);
     for (const Eigen::Index i : chosen) {
       const Eigen::Vector3d from = points.row(i).transpose() - cylinder.point;
       const double along = from.dot(cylinder.axis);
@@ -77,15 +77,15 @@ struct Normal {
   }
 };
 
-std::optional<Cylinder> refine(const Points& points, const std::vector<Eigen::Index>& chosen,
-                               Cylinder cylinder, double extent) {
+std::optional<Cylinder> refine_cylinder(const Points& points, const std::vector<Eigen::Index>& chosen,
+                                        Cylinder cylinder, double extent) {
   for (int step = 0; step < 20; ++step) {
     centre(points, chosen, cylinder);
-    const Normal normal(points, chosen, cylinder);
+    const CylinderNormal normal(points, chosen, cylinder);
     const Eigen::LDLT<Matrix5> ldlt(normal.A);
     const Vector5 change = ldlt.solve(normal.b);
     if (ldlt.info() != Eigen::Success || !change.allFinite()) return std::nullopt;
-    const Across across(cylinder.axis);
+    const CylinderAcross across(cylinder.axis);
     cylinder.point += change[0] * across.u + change[1] * across.v;
     cylinder.axis = (cylinder.axis + change[2] * across.u + change[3] * across.v).normalized();
     cylinder.radius += change[4];
@@ -96,23 +96,24 @@ std::optional<Cylinder> refine(const Points& points, const std::vector<Eigen::In
 }
 
 Points thinned(const Points& points) {
-  if (points.rows() <= kMost) return points;
-  Points out(kMost, 3);
-  for (Eigen::Index i = 0; i < kMost; ++i) out.row(i) = points.row(i * points.rows() / kMost);
+  if (points.rows() <= kCylinderMost) return points;
+  Points out(kCylinderMost, 3);
+  for (Eigen::Index i = 0; i < kCylinderMost; ++i) out.row(i) = points.row(i * points.rows() / kCylinderMost);
   return out;
 }
 
 // The best cylinder along each direction, best first, no more than are tried.
-std::vector<Cylinder> hypotheses(const Points& points, double extent, double band) {
+std::vector<Cylinder> hypotheses_cylinder(const Points& points, double extent, double band) {
   robust::Draw draw(points.rows());
   std::vector<std::pair<double, Cylinder>> best;
-  for (int k = 0; k < kDirections; ++k) {
+  for (int k = 0; k < kCylinderDirections; ++k) {
     std::optional<Cylinder> here;
     double here_cost = 0;
-    for (int d = 0; d < kDraws; ++d) {
+    for (int d = 0; d < kCylinderDraws; ++d) {
       const std::array<Eigen::Index, 3> i{draw(), draw(), draw()};
-      const auto cylinder = through(points.row(i[0]).transpose(), points.row(i[1]).transpose(),
-                                    points.row(i[2]).transpose(), robust::half_sphere(k, kDirections));
+      const auto cylinder =
+          through_cylinder(points.row(i[0]).transpose(), points.row(i[1]).transpose(),
+                           points.row(i[2]).transpose(), robust::half_sphere(k, kCylinderDirections));
       if (!cylinder || !(cylinder->radius <= extent)) continue;
       const double cost = robust::truncated_squares(points, *cylinder, band);
       if (here && cost >= here_cost) continue;
@@ -121,7 +122,7 @@ std::vector<Cylinder> hypotheses(const Points& points, double extent, double ban
     }
     if (here) best.emplace_back(here_cost, *here);
   }
-  const std::size_t kept = std::min(best.size(), kTried);
+  const std::size_t kept = std::min(best.size(), kCylinderTried);
   const auto cheaper = [](const auto& a, const auto& b) { return a.first < b.first; };
   std::stable_sort(best.begin(), best.end(), cheaper);
   std::vector<Cylinder> out;
@@ -132,37 +133,39 @@ std::vector<Cylinder> hypotheses(const Points& points, double extent, double ban
 }  // namespace
 
 std::optional<CylinderFit> fit_cylinder(const Points& points) {
-  if (points.rows() < static_cast<Eigen::Index>(kFewest)) return std::nullopt;
+  if (points.rows() < static_cast<Eigen::Index>(kCylinderFewest)) return std::nullopt;
   const double extent = robust::extent_of(points), band = robust::kBand * extent;
   const auto again = [&](const Points& of) {
-    return [&of, extent](const auto& chosen, const Cylinder& now) { return refine(of, chosen, now, extent); };
+    return [&of, extent](const auto& chosen, const Cylinder& now) {
+      return refine_cylinder(of, chosen, now, extent);
+    };
   };
   const Points few = thinned(points);
   std::optional<Cylinder> best;
   double best_cost = 0;
-  for (const Cylinder& first : hypotheses(few, extent, kWide * band)) {
-    const auto wide = robust::settle(few, first, kWide * band, kFewest, again(few));
-    const auto narrow = robust::settle(few, wide.shape, band, kFewest, again(few));
+  for (const Cylinder& first : hypotheses_cylinder(few, extent, kWide * band)) {
+    const auto wide = robust::settle(few, first, kWide * band, kCylinderFewest, again(few));
+    const auto narrow = robust::settle(few, wide.shape, band, kCylinderFewest, again(few));
     const double cost = robust::truncated_squares(few, narrow.shape, band);
     if (best && cost >= best_cost) continue;
     best = narrow.shape;
     best_cost = cost;
   }
   if (!best) return std::nullopt;
-  auto found = robust::settle(points, *best, band, kFewest, again(points));
-  if (found.inliers.size() < kFewest) return std::nullopt;
+  auto found = robust::settle(points, *best, band, kCylinderFewest, again(points));
+  if (found.inliers.size() < kCylinderFewest) return std::nullopt;
   centre(points, found.inliers, found.shape);
 
   double squares = 0;
   for (const Eigen::Index i : found.inliers)
     squares += found.distance[static_cast<std::size_t>(i)] * found.distance[static_cast<std::size_t>(i)];
   const double variance = squares / std::max(1.0, static_cast<double>(found.inliers.size()) - 5);
-  const Matrix5 inverse = Normal(points, found.inliers, found.shape).A.inverse();
+  const Matrix5 inverse = CylinderNormal(points, found.inliers, found.shape).A.inverse();
   CylinderFit fit;
   fit.center = found.shape.point;
   fit.axis = found.shape.axis;
   fit.radius = found.shape.radius;
-  fit.residual = found.residual(kSurface * fit.radius);
+  fit.residual = found.residual(kCylinderSurface * fit.radius);
   fit.inlier_share = found.inlier_share();
   fit.confidence = robust::confidence(fit.inlier_share, fit.residual / fit.radius,
                                       std::sqrt(variance * inverse.diagonal().head<2>().sum()),

@@ -13,10 +13,10 @@ namespace ecorche::rig {
 namespace {
 
 constexpr int kSectors = 48;
-constexpr int kDraws = 400;
-constexpr std::size_t kFewest = 8;
-constexpr double kSurface = 0.25;  // of the mean half axis
-constexpr double kWidest = 2;      // half axes over the points' extent
+constexpr int kEllipseDraws = 400;
+constexpr std::size_t kEllipseFewest = 8;
+constexpr double kEllipseSurface = 0.25;  // of the mean half axis
+constexpr double kWidest = 2;             // half axes over the points' extent
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
@@ -28,7 +28,7 @@ struct Ellipse {
     const double c = std::cos(values[4]), s = std::sin(values[4]);
     const double x = p.x() - values[0], y = p.y() - values[1];
     const double rim = std::hypot((c * x + s * y) / values[2], (c * y - s * x) / values[3]);
-    // On the ray through p the rim lies at |p| / rim.
+    // On the ray through_ellipse p the rim lies at |p| / rim.
     return rim > 0 ? std::hypot(x, y) * (1 - 1 / rim) : -std::min(values[2], values[3]);
   }
   bool sound(double extent) const {
@@ -37,8 +37,8 @@ struct Ellipse {
   }
 };
 
-// a x^2 + b x y + c y^2 + d x + e y = 1 about the points' own origin, through five of them.
-std::optional<Ellipse> through(const Points& flat, const std::array<Eigen::Index, 5>& rows) {
+// a x^2 + b x y + c y^2 + d x + e y = 1 about the points' own origin, through_ellipse five of them.
+std::optional<Ellipse> through_ellipse(const Points& flat, const std::array<Eigen::Index, 5>& rows) {
   Matrix5 system;
   for (Eigen::Index r = 0; r < 5; ++r) {
     const double x = flat(rows[static_cast<std::size_t>(r)], 0),
@@ -61,10 +61,10 @@ std::optional<Ellipse> through(const Points& flat, const std::array<Eigen::Index
 }
 
 // The normal equations of the distances, their slopes by central differences.
-struct Normal {
+struct EllipseNormal {
   Matrix5 A = Matrix5::Zero();
   Vector5 b = Vector5::Zero();
-  Normal(const Points& flat, const std::vector<Eigen::Index>& chosen, const Ellipse& ellipse) {
+  EllipseNormal(const Points& flat, const std::vector<Eigen::Index>& chosen, const Ellipse& ellipse) {
     const double size = std::max(ellipse.values[2], ellipse.values[3]);
     for (const Eigen::Index i : chosen) {
       const Eigen::Vector3d p = flat.row(i).transpose();
@@ -83,10 +83,10 @@ struct Normal {
   }
 };
 
-std::optional<Ellipse> refine(const Points& flat, const std::vector<Eigen::Index>& chosen, Ellipse ellipse,
-                              double extent) {
+std::optional<Ellipse> refine_ellipse(const Points& flat, const std::vector<Eigen::Index>& chosen,
+                                      Ellipse ellipse, double extent) {
   for (int step = 0; step < 20; ++step) {
-    const Normal normal(flat, chosen, ellipse);
+    const EllipseNormal normal(flat, chosen, ellipse);
     const Vector5 change = normal.A.ldlt().solve(normal.b);
     ellipse.values += change;
     if (!ellipse.sound(extent)) return std::nullopt;
@@ -145,14 +145,14 @@ std::optional<EllipseFit> fit_ellipse(const Points& points) {
   if (!plane) return std::nullopt;
   const Flat flat(points, *plane);
   const Points rim = outline(flat.points);
-  if (rim.rows() < static_cast<Eigen::Index>(kFewest)) return std::nullopt;
+  if (rim.rows() < static_cast<Eigen::Index>(kEllipseFewest)) return std::nullopt;
   const double extent = robust::extent_of(rim), band = robust::kBand * extent;
   robust::Draw draw(rim.rows());
   std::optional<Ellipse> best;
   double best_cost = 0;
-  for (int k = 0; k < kDraws; ++k) {
+  for (int k = 0; k < kEllipseDraws; ++k) {
     const std::array<Eigen::Index, 5> rows{draw(), draw(), draw(), draw(), draw()};
-    const auto ellipse = through(rim, rows);
+    const auto ellipse = through_ellipse(rim, rows);
     if (!ellipse || !ellipse->sound(extent)) continue;
     const double cost = robust::truncated_squares(rim, *ellipse, band);
     if (best && cost >= best_cost) continue;
@@ -160,10 +160,10 @@ std::optional<EllipseFit> fit_ellipse(const Points& points) {
     best_cost = cost;
   }
   if (!best) return std::nullopt;
-  const auto found = robust::settle(rim, *best, band, kFewest, [&](const auto& chosen, const Ellipse& now) {
-    return refine(rim, chosen, now, extent);
-  });
-  if (found.inliers.size() < kFewest) return std::nullopt;
+  const auto found = robust::settle(
+      rim, *best, band, kEllipseFewest,
+      [&](const auto& chosen, const Ellipse& now) { return refine_ellipse(rim, chosen, now, extent); });
+  if (found.inliers.size() < kEllipseFewest) return std::nullopt;
   const Vector5& e = found.shape.values;
   const bool first_longer = e[2] >= e[3];
   const double turn = first_longer ? e[4] : e[4] + std::numbers::pi / 2;
@@ -174,13 +174,13 @@ std::optional<EllipseFit> fit_ellipse(const Points& points) {
   fit.long_mm = std::max(e[2], e[3]);
   fit.short_mm = std::min(e[2], e[3]);
   const double size = 0.5 * (e[2] + e[3]);
-  fit.residual = found.residual(kSurface * size);
+  fit.residual = found.residual(kEllipseSurface * size);
   fit.inlier_share = plane->inlier_share * found.inlier_share();
   double squares = 0;
   for (const Eigen::Index i : found.inliers)
     squares += found.distance[static_cast<std::size_t>(i)] * found.distance[static_cast<std::size_t>(i)];
   const double variance = squares / std::max(1.0, static_cast<double>(found.inliers.size()) - 5);
-  const Matrix5 inverse = Normal(rim, found.inliers, found.shape).A.inverse();
+  const Matrix5 inverse = EllipseNormal(rim, found.inliers, found.shape).A.inverse();
   fit.confidence = robust::confidence(fit.inlier_share, fit.residual / size,
                                       std::sqrt(variance * inverse.diagonal().head<2>().sum()));
   return fit;

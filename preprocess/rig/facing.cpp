@@ -11,8 +11,8 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr std::size_t kFewest = 16;
-constexpr double kNearestShare = 0.02;
+constexpr std::size_t kFacingFewest = 16;
+constexpr double kFacingNearestShare = 0.02;
 constexpr double kReach = 2;
 constexpr double kFacingCosine = 0.5;
 
@@ -45,7 +45,8 @@ SurfacePoints facing_points(const SurfaceMesh& bone, const SurfaceMesh& other, c
     faces[v] = (hit.point - p).dot(normal.row(static_cast<Eigen::Index>(v))) >= kFacingCosine * distance[v];
   }
   std::vector<double> sorted = distance;
-  const auto wanted = std::max(kFewest, static_cast<std::size_t>(kNearestShare * static_cast<double>(count)));
+  const auto wanted =
+      std::max(kFacingFewest, static_cast<std::size_t>(kFacingNearestShare * static_cast<double>(count)));
   const std::size_t rank = std::min(wanted, count) - 1;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank), sorted.end());
   const double reach = std::max(kReach * sorted[rank], mean_edge(bone));
@@ -62,7 +63,7 @@ SurfacePoints facing_points(const SurfaceMesh& bone, const SurfaceMesh& other, c
     return rows;
   };
   std::vector<Eigen::Index> rows = choose(true);
-  if (rows.size() < kFewest) rows = choose(false);
+  if (rows.size() < kFacingFewest) rows = choose(false);
   SurfacePoints out = surface_points(bone, rows);
   out.found = true;
   return out;

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <sstream>
 
 #include <ecorche/kinematics/angles.hpp>
+#include "core/values/degrees.hpp"
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/mirrored_joints.hpp"
@@ -19,8 +19,7 @@ namespace {
 constexpr double kBadResidual = 0.10;  // of the radius
 constexpr double kFewInliers = 0.5;
 constexpr double kRounding = 1e-9;  // radians
-constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kHalfSure = 10;  // degrees beyond a limit
+constexpr double kHalfSure = 10;    // degrees beyond a limit
 
 std::string percent(double share) {
   return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
@@ -92,9 +91,9 @@ void need_sphere(const Case& patient, const Joint& joint, const FoundPoint& foun
 
 void warn_beyond(const Joint& joint, const AngleAxis& angle, double limit, const Context& context) {
   std::ostringstream line;
-  line << "joint " << joint.name << ": " << angle.name << " rests at " << std::lround(angle.rest * kDegrees)
-       << " degrees, outside its limits: widened from " << std::lround(limit * kDegrees)
-       << ", for the scanned pose is allowed";
+  line << "joint " << joint.name << ": " << angle.name << " rests at "
+       << std::lround(angle.rest * degrees_per_radian) << " degrees, outside its limits: widened from "
+       << std::lround(limit * degrees_per_radian) << ", for the scanned pose is allowed";
   context.warn(line.str());
 }
 
@@ -111,7 +110,7 @@ void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, JointFit& fit, co
     if (angle.rest >= angle.min && angle.rest <= angle.max) continue;
     double& limit = angle.rest < angle.min ? angle.min : angle.max;
     warn_beyond(joint, angle, limit, context);
-    const double beyond = (angle.rest - limit) * kDegrees / kHalfSure;
+    const double beyond = (angle.rest - limit) * degrees_per_radian / kHalfSure;
     fit.confidence /= 1 + beyond * beyond;
     limit = angle.rest;
   }

@@ -16,80 +16,12 @@ namespace {
 
 constexpr double kLeastSine = 0.1;  // two directions closer to a line (6 degrees) say nothing of the third
 
-// An angle of 0.1 halves the confidence of a direction between points; these are off by a third of their
-// vertices' spread, or by 5 mm at half confidence.
-constexpr double kAngle = 0.1, kSpreadOff = 1.0 / 3, kOff = 5;
-
-double angle_confidence(double angle) {
-  return 1 / (1 + (angle / kAngle) * (angle / kAngle));
-}
-
-template <class Fit>
-FoundPoint of_fit(CenterRule rule, const Fit& fit, double size, const SurfacePoints& on) {
-  FoundPoint found;
-  found.at = fit.center;
-  found.fit = {"",
-               rule,
-               size,
-               fit.residual,
-               fit.inlier_share,
-               static_cast<std::int32_t>(on.at.rows()),
-               fit.confidence};
-  found.on = {&on};
-  return found;
-}
-
-FoundPoint said(const Eigen::Vector3d& at) {
-  FoundPoint found;
-  found.at = at;
-  return found;
-}
-
-// Of marked vertices each counts the same; of a part of the surface each as its area does, or a mesh that is
-// finer on one side would draw the mean there.
-FoundPoint centroid(const SurfacePoints& on) {
-  Eigen::VectorXd share = Eigen::VectorXd::Ones(on.at.rows());
-  if (on.found) share = Eigen::Map<const Eigen::VectorXd>(on.area.data(), on.at.rows());
-  if (!(share.sum() > 0)) share.setOnes();
-  share /= share.sum();
-  FoundPoint found;
-  found.at = on.at.transpose() * share;
-  const Points from = on.at.rowwise() - found.at.transpose();
-  found.scatter = from.transpose() * share.asDiagonal() * from;
-  const double spread = std::sqrt(found.scatter.trace());
-  found.fit = {"",
-               CenterRule::centroid,
-               0,
-               spread,
-               1,
-               static_cast<std::int32_t>(on.at.rows()),
-               centroid_confidence(spread)};
-  found.on = {&on};
-  return found;
-}
-
-// The middle of a plate is as sure as it is small: vertices 25 mm about it halve its confidence.
-double middle_confidence(const Points& points, const std::vector<Eigen::Index>& rows) {
-  const Points plate = points(rows, Eigen::all);
-  const double squares = (plate.rowwise() - plate.colwise().mean()).rowwise().squaredNorm().mean();
-  return 1 / (1 + squares / (25.0 * 25));
-}
-
 // All of the bones that a part was found on; nothing of a region's.
 RegionUse whole(const RegionUse& part) {
   RegionUse out;
   out.bone = part.bone;
   out.segment = part.segment;
   return out;
-}
-
-// How far off a point may be across a direction, mm.
-double off_across(const FoundPoint& point, const Eigen::Vector3d& along) {
-  if (!point.scatter.isZero()) {
-    const double across = point.scatter.trace() - along.dot(point.scatter * along);
-    return kSpreadOff * std::sqrt(std::max(0.0, across));
-  }
-  return kOff * std::sqrt(1 / std::max(point.fit.confidence, 1e-6) - 1);
 }
 
 [[noreturn]] void circle(const std::string& joint) {
@@ -207,37 +139,37 @@ std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse&
       if (auto fit = fit_sphere(points)) {
         if (surface.found) *fit = grown_sphere(bones_.of(whole(on)), *fit);
         if (!possible_radius(fit->radius)) return std::nullopt;
-        found = of_fit(rule, *fit, fit->radius, surface);
+        found = fitted_point(rule, *fit, fit->radius, surface);
       }
       return found;
     case CenterRule::cylinder_fit:
       if (const auto& fit = cylinder(surface); fit && crosses_shaft(fit->axis)) {
-        found = of_fit(rule, *fit, fit->radius, surface);
+        found = fitted_point(rule, *fit, fit->radius, surface);
         found->axis = fit->axis;
       }
       return found;
     case CenterRule::plane_fit:
       if (const auto fit = fit_plane(points)) {
-        found = of_fit(rule, *fit, 0, surface);
+        found = fitted_point(rule, *fit, 0, surface);
         found->axis = fit->normal;
-        found->fit.confidence *= middle_confidence(points, fit->rows);
+        found->fit.confidence *= plate_confidence(points, fit->rows);
       }
       return found;
     case CenterRule::ellipse_fit:
       if (const auto fit = fit_ellipse(points)) {
-        found = of_fit(rule, *fit, 0.5 * (fit->long_mm + fit->short_mm), surface);
+        found = fitted_point(rule, *fit, 0.5 * (fit->long_mm + fit->short_mm), surface);
         found->axis = fit->normal;
       }
       return found;
     default:
-      return centroid(surface);
+      return centroid_of(surface);
   }
 }
 
 std::optional<FoundPoint> JointSources::between(const PointSource& source) {
   const auto a = point(source.parts[0]), b = point(source.parts[1]);
   if (!a || !b) return std::nullopt;
-  FoundPoint out = said(a->at + source.share * (b->at - a->at));
+  FoundPoint out = said_point(a->at + source.share * (b->at - a->at));
   out.fit.rule = CenterRule::between;
   out.fit.residual_mm = std::max(a->fit.residual_mm, b->fit.residual_mm);
   out.fit.inlier_share = std::min(a->fit.inlier_share, b->fit.inlier_share);
@@ -271,7 +203,7 @@ std::vector<PointSource> JointSources::without_ends(const std::vector<PointSourc
 std::optional<FoundPoint> JointSources::point(const PointSource& source) {
   switch (source.rule) {
     case CenterRule::given:
-      return said(source.point);
+      return said_point(source.point);
     case CenterRule::between:
       return between(source);
     case CenterRule::joint: {
@@ -292,7 +224,7 @@ std::optional<FoundPoint> JointSources::point(const PointSource& source) {
 
 std::optional<FoundPoint> JointSources::by_rule(const Joint& joint) {
   if (joint.how) return point(joint.how->center);
-  if (joint.rule == CenterRule::given) return said(joint.center);
+  if (joint.rule == CenterRule::given) return said_point(joint.center);
   if (joint.rule != CenterRule::sphere_fit) return std::nullopt;
   RegionUse on;
   on.bone = joint.center_bone;

@@ -8,29 +8,9 @@
 
 #include "preprocess/rig/bone_points.hpp"
 #include "preprocess/rig/cylinder_fit.hpp"
+#include "preprocess/rig/found_point.hpp"
 
 namespace ecorche::rig {
-
-/// A point, and how well it was found.
-struct FoundPoint {
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  JointFit fit{};  ///< without its joint's name
-  /// How the vertices of a centroid lie about it, mm^2; zero of other rules.
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< unit: a cylinder's, or a plane's normal; else zero
-  std::vector<const SurfacePoints*> on{};          ///< what it was found on
-};
-
-/// Of a mean of vertices that lie `spread` mm (rms) about it: a joint's centre may be anywhere among them, so
-/// 10 mm halve it.
-inline double centroid_confidence(double spread) {
-  return 1 / (1 + (spread / 10) * (spread / 10));
-}
-
-struct FoundDirection {
-  Eigen::Vector3d along = Eigen::Vector3d::UnitX();  ///< unit
-  double confidence = 1;
-};
 
 class JointSources {
  public:

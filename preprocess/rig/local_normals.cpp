@@ -9,7 +9,7 @@ namespace ecorche::rig {
 namespace {
 
 constexpr Eigen::Index kNearest = 10;
-constexpr double kRough = 0.866;  // cosine of 30 degrees
+constexpr double kRoughPatch = 0.866;  // cosine of 30 degrees
 
 std::vector<Eigen::Index> nearest(const Points& at, Eigen::Index of) {
   std::vector<std::pair<double, Eigen::Index>> away(static_cast<std::size_t>(at.rows()));
@@ -51,7 +51,7 @@ Points local_normals(const SurfacePoints& points) {
   if (agree.empty()) return planes;
   const auto middle = agree.begin() + static_cast<std::ptrdiff_t>(agree.size() / 2);
   std::nth_element(agree.begin(), middle, agree.end());
-  return *middle >= kRough ? points.normal : planes;
+  return *middle >= kRoughPatch ? points.normal : planes;
 }
 
 }  // namespace ecorche::rig

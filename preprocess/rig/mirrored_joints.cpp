@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <sstream>
 
 #include <ecorche/kinematics/angles.hpp>
+#include "core/values/degrees.hpp"
 #include "preprocess/rig/other_side.hpp"
 
 namespace ecorche::rig {
@@ -16,13 +16,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kApart = 10, kTurned = 10;  // mm, degrees: what bench/rig_damage calls bad
 constexpr double kCut = 0.9;                 // of the other's length: sides differ by a few hundredths
 constexpr double kMirrored = 0.4, kTurnedBack = 0.3, kAssumed = 0.1;
 
 std::string degrees(double radians) {
-  return std::to_string(std::lround(radians * kDegrees));
+  return std::to_string(std::lround(radians * degrees_per_radian));
 }
 
 // One side's joint as the bones show it.
@@ -101,7 +100,7 @@ class Pairs {
     double turned = 0;
     if (!axis.isZero()) {
       off -= axis * axis.dot(off);
-      turned = std::acos(std::min(1.0, std::abs(axis.dot(worse.axis)))) * kDegrees;
+      turned = std::acos(std::min(1.0, std::abs(axis.dot(worse.axis)))) * degrees_per_radian;
     }
     const bool missing = worse.confidence <= 0;
     if (!missing && off.norm() <= kApart && turned <= kTurned) return;

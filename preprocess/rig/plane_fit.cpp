@@ -9,7 +9,7 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr int kDraws = 300;
+constexpr int kPlaneDraws = 300;
 constexpr double kNear = 0.1;   // of the extent: farther points are of another part of the bone
 constexpr double kFlat = 1e-6;  // of the extent: a triangle lower than this is a line
 
@@ -44,7 +44,7 @@ std::optional<PlaneFit> fit_plane(const Points& points) {
   robust::Draw draw(points.rows());
   std::optional<Plane> best;
   double best_cost = 0;
-  for (int k = 0; k < kDraws; ++k) {
+  for (int k = 0; k < kPlaneDraws; ++k) {
     const std::array<Eigen::Index, 3> i{draw(), draw(), draw()};
     const Eigen::Vector3d a = points.row(i[0]), b = points.row(i[1]), c = points.row(i[2]);
     const Eigen::Vector3d normal = (b - a).cross(c - a);

@@ -11,7 +11,7 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr double kLong = 4;  // a shaft's variance, in variances across it
+constexpr double kLongShaft = 4;  // a shaft's variance, in variances across it
 
 // The first place that a source looks at; nothing where it looks at none.
 const RegionUse* first_use(const PointSource& source) {
@@ -45,7 +45,7 @@ std::optional<Eigen::Vector3d> JointSources::shaft(int row) {
   const Points from = V.rowwise() - V.colwise().mean();
   const Eigen::Matrix3d scatter = from.transpose() * from;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  if (eigen.eigenvalues()[2] <= kLong * eigen.eigenvalues()[1]) return std::nullopt;
+  if (eigen.eigenvalues()[2] <= kLongShaft * eigen.eigenvalues()[1]) return std::nullopt;
   return Eigen::Vector3d(eigen.eigenvectors().col(2));
 }
 

@@ -10,8 +10,8 @@
 namespace ecorche::rig {
 namespace {
 
-constexpr int kDraws = 500;        // half outliers leave 1 - (15/16)^500 of a miss: never
-constexpr double kSurface = 0.25;  // of the radius: farther points are of another part of the bone
+constexpr int kSphereDraws = 500;        // half outliers leave 1 - (15/16)^500 of a miss: never
+constexpr double kSphereSurface = 0.25;  // of the radius: farther points are of another part of the bone
 
 constexpr int kGrowths = 8;
 constexpr double kGrown = 0.08;    // of the radius
@@ -26,8 +26,8 @@ struct Sphere {
 };
 
 // |p - c|^2 = r^2 for four points: three linear equations in c.
-std::optional<Sphere> through(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                              const Eigen::Vector3d& d) {
+std::optional<Sphere> through_sphere(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                     const Eigen::Vector3d& c, const Eigen::Vector3d& d) {
   Eigen::Matrix3d A;
   A << (b - a).transpose(), (c - a).transpose(), (d - a).transpose();
   const Eigen::Vector3d half(0.5 * (b - a).squaredNorm(), 0.5 * (c - a).squaredNorm(),
@@ -39,10 +39,10 @@ std::optional<Sphere> through(const Eigen::Vector3d& a, const Eigen::Vector3d& b
 }
 
 // The normal equations of |p - c| - r over the chosen points, in (c, r).
-struct Normal {
+struct SphereNormal {
   Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
   Eigen::Vector4d b = Eigen::Vector4d::Zero();
-  Normal(const Points& points, const std::vector<Eigen::Index>& chosen, const Sphere& sphere) {
+  SphereNormal(const Points& points, const std::vector<Eigen::Index>& chosen, const Sphere& sphere) {
     for (const Eigen::Index i : chosen) {
       const Eigen::Vector3d from = points.row(i).transpose() - sphere.center;
       const double length = from.norm();
@@ -56,9 +56,9 @@ struct Normal {
 };
 
 // Gauss-Newton on the sum of (|p - c| - r)^2 over the chosen points.
-Sphere refine(const Points& points, const std::vector<Eigen::Index>& chosen, Sphere sphere) {
+Sphere refine_sphere(const Points& points, const std::vector<Eigen::Index>& chosen, Sphere sphere) {
   for (int step = 0; step < 20; ++step) {
-    const Normal normal(points, chosen, sphere);
+    const SphereNormal normal(points, chosen, sphere);
     const Eigen::LDLT<Eigen::Matrix4d> ldlt(normal.A);
     const Eigen::Vector4d change = ldlt.solve(normal.b);
     if (ldlt.info() != Eigen::Success || !change.allFinite()) break;
@@ -75,7 +75,7 @@ double center_error(const Points& points, const robust::Settled<Sphere>& found) 
   for (const Eigen::Index i : found.inliers)
     squares += found.distance[static_cast<std::size_t>(i)] * found.distance[static_cast<std::size_t>(i)];
   const double free = std::max(1.0, static_cast<double>(found.inliers.size()) - 4);
-  const Eigen::Matrix4d inverse = Normal(points, found.inliers, found.shape).A.inverse();
+  const Eigen::Matrix4d inverse = SphereNormal(points, found.inliers, found.shape).A.inverse();
   return std::sqrt(squares / free * inverse.topLeftCorner<3, 3>().trace());
 }
 
@@ -90,10 +90,10 @@ std::optional<SphereFit> fit_sphere(const Points& points) {
   robust::Draw draw(count);
   std::optional<Sphere> best;
   double best_cost = 0;
-  for (int k = 0; k < kDraws; ++k) {
+  for (int k = 0; k < kSphereDraws; ++k) {
     const Eigen::Index i[4] = {draw(), draw(), draw(), draw()};
-    const auto sphere = through(points.row(i[0]).transpose(), points.row(i[1]).transpose(),
-                                points.row(i[2]).transpose(), points.row(i[3]).transpose());
+    const auto sphere = through_sphere(points.row(i[0]).transpose(), points.row(i[1]).transpose(),
+                                       points.row(i[2]).transpose(), points.row(i[3]).transpose());
     if (!sphere || !(sphere->radius <= extent)) continue;
     const double cost = robust::truncated_squares(points, *sphere, band);
     if (!best || cost < best_cost) {
@@ -104,14 +104,14 @@ std::optional<SphereFit> fit_sphere(const Points& points) {
   if (!best) return std::nullopt;
 
   const auto found = robust::settle(points, *best, band, 4, [&](const auto& chosen, const Sphere& now) {
-    const Sphere refined = refine(points, chosen, now);
+    const Sphere refined = refine_sphere(points, chosen, now);
     return refined.radius > 0 && refined.radius <= 2 * extent ? std::optional(refined) : std::nullopt;
   });
   SphereFit fit;
   fit.center = found.shape.center;
   fit.radius = found.shape.radius;
   fit.inlier_share = found.inlier_share();
-  fit.residual = found.residual(kSurface * fit.radius);
+  fit.residual = found.residual(kSphereSurface * fit.radius);
   fit.confidence =
       robust::confidence(fit.inlier_share, fit.residual / fit.radius, center_error(points, found));
   return fit;
@@ -135,9 +135,10 @@ SphereFit grown_sphere(const SurfacePoints& bone, const SphereFit& first) {
     near.resize(static_cast<Eigen::Index>(rows.size()), 3);
     for (std::size_t i = 0; i < rows.size(); ++i)
       near.row(static_cast<Eigen::Index>(i)) = bone.at.row(rows[i]);
-    settled = robust::settle(
-        near, sphere, kGrown * sphere.radius, 4,
-        [&](const auto& chosen, const Sphere& now) { return std::optional(refine(near, chosen, now)); });
+    settled =
+        robust::settle(near, sphere, kGrown * sphere.radius, 4, [&](const auto& chosen, const Sphere& now) {
+          return std::optional(refine_sphere(near, chosen, now));
+        });
     sphere = settled.shape;
     if (!((sphere.center - first.center).norm() < 0.25 * first.radius &&
           std::abs(sphere.radius - first.radius) < 0.2 * first.radius))
@@ -147,7 +148,7 @@ SphereFit grown_sphere(const SurfacePoints& bone, const SphereFit& first) {
   fit.center = sphere.center;
   fit.radius = sphere.radius;
   fit.inlier_share = first.inlier_share;
-  fit.residual = settled.residual(kSurface * fit.radius);
+  fit.residual = settled.residual(kSphereSurface * fit.radius);
   fit.confidence =
       robust::confidence(fit.inlier_share, fit.residual / fit.radius, center_error(near, settled));
   return fit;

@@ -76,7 +76,7 @@ class Relaxation {
       bool moved = false;
       for (const std::int32_t t : bad) {
         context.check_stop();
-        moved |= mend(t);
+        moved |= improve(t);
       }
       bad = all_beyond();
       if (!moved) break;
@@ -231,7 +231,7 @@ class Relaxation {
     return moved;
   }
 
-  bool mend(std::int32_t t) {
+  bool improve(std::int32_t t) {
     bool moved = false;
     for (int c = 0; c < 4; ++c) {
       if (!beyond(corners(t), cos_min_, cos_max_)) break;

@@ -2,8 +2,6 @@
 // One value a voxel, left as the allocator gave it: at 46 million voxels a fill costs as much as a transform.
 #pragma once
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
@@ -11,6 +9,8 @@
 #include <new>
 #include <span>
 #include <type_traits>
+
+#include "core/platform/huge_pages.hpp"
 
 namespace ecorche::thin {
 
@@ -41,7 +41,7 @@ class Field {
     const std::size_t bytes = std::max(unit, (size * sizeof(T) + unit - 1) / unit * unit);
     void* const values = std::aligned_alloc(unit, bytes);
     if (values == nullptr) throw std::bad_alloc();
-    if (unit == huge_page) ::madvise(values, bytes, MADV_HUGEPAGE);  // a wish, not a need
+    platform::advise_huge_pages(values, bytes);
     return static_cast<T*>(values);
   }
 

@@ -18,6 +18,7 @@
 #include <optional>
 #include <string>
 
+#include "core/values/text.hpp"
 #include "preprocess/geometry/face_tree.hpp"
 #include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/voxel/open_surface.hpp"
@@ -142,9 +143,7 @@ struct Solid {
 
 std::string rounded(double x) {
   if (std::abs(x) >= 1000) return std::to_string(std::llround(x));
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", x);
-  return text.data();
+  return text::number(x, 4);
 }
 
 /// Whether a closed surface holds nothing: both sides of a sheet.

@@ -17,7 +17,7 @@ std::vector<std::string_view> solver_names() {
 }
 
 std::string_view solver_for(std::int64_t unknowns) {
-  // The rows of bench/solvers: why here, and not where multigrid overtakes the factors.
+  // bench/solvers/RESULTS.md: why here, and not where multigrid overtakes the factors.
 #ifdef ECORCHE_GPL
   constexpr std::int64_t kFactored = 40'000;
 #else

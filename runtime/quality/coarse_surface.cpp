@@ -8,16 +8,13 @@
 #include <numbers>
 #include <numeric>
 #include <unordered_map>
+#include "runtime/quality/floats.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
 constexpr double kVolumeKept = 0.2;
 constexpr float kFiner = 0.7F;  // grids that are tried one after the other
-
-std::span<const float> floats(const PointsF& points) {
-  return {points.data(), static_cast<std::size_t>(points.size())};
-}
 
 CoarseSurface whole_surface(const PointsF& V, const Triangles& F) {
   CoarseSurface out;

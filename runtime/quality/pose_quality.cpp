@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <ecorche/runtime/verdict.hpp>
+#include "runtime/quality/floats.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -21,10 +22,6 @@ constexpr std::size_t kTetsPerBlock = 8192;
 Vector3d point(std::span<const float> points, std::size_t row) {
   return {static_cast<double>(points[3 * row]), static_cast<double>(points[3 * row + 1]),
           static_cast<double>(points[3 * row + 2])};
-}
-
-std::span<const float> floats(const PointsF& points) {
-  return {points.data(), static_cast<std::size_t>(points.size())};
 }
 
 double det_of(const Tets& tets, std::span<const float> nodes, std::size_t t) {

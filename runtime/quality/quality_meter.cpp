@@ -7,13 +7,14 @@
 #include <cmath>
 
 #include <ecorche/runtime/verdict.hpp>
+#include "runtime/quality/floats.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
 using Vec = std::array<float, 3>;
 
-constexpr std::size_t kTetsPerBlock = 1024;
+constexpr std::size_t kTetsPerSample = 1024;
 constexpr std::size_t kBoneVertices = 64;
 
 Vec edge(std::span<const float> points, std::size_t from, std::size_t to) {
@@ -28,10 +29,6 @@ float det(const Vec& a, const Vec& b, const Vec& c) {
 
 float det_of(std::span<const float> nodes, const std::array<std::uint32_t, 4>& t) {
   return det(edge(nodes, t[0], t[1]), edge(nodes, t[0], t[2]), edge(nodes, t[0], t[3]));
-}
-
-std::span<const float> floats(const PointsF& points) {
-  return {points.data(), static_cast<std::size_t>(points.size())};
 }
 
 // Which of `run` to take: the same for the same number, and spread evenly (a golden-ratio hash).
@@ -138,11 +135,11 @@ QualityMeter::Sums QualityMeter::sum(std::span<const float> nodes, std::size_t b
 
 PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                                   const QualityThresholds& thresholds) const {
-  std::vector<Sums> blocks((rest_.size() + kTetsPerBlock - 1) / kTetsPerBlock);
+  std::vector<Sums> blocks((rest_.size() + kTetsPerSample - 1) / kTetsPerSample);
   std::vector<Change> changes(tissues.size());
   tbb::parallel_for(std::size_t{0}, blocks.size() + tissues.size(), [&](std::size_t b) {
     if (b < blocks.size()) {
-      blocks[b] = sum(body.nodes, b * kTetsPerBlock, std::min(rest_.size(), (b + 1) * kTetsPerBlock));
+      blocks[b] = sum(body.nodes, b * kTetsPerSample, std::min(rest_.size(), (b + 1) * kTetsPerSample));
     } else {
       const std::uint32_t row = tissues[b - blocks.size()];
       changes[b - blocks.size()] = change(parts_[row], body.tissues[row]);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "runtime/server/handlers/connection.hpp"
+#include "runtime/server/listen.hpp"
 #include "runtime/server/net/tls.hpp"
 #include "runtime/server/net/web.hpp"
 #include "runtime/server/registry/test_hooks.hpp"
@@ -37,22 +38,6 @@ constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
 // served go on between them.
 constexpr Clock::duration kBetween = std::chrono::microseconds(500);
 
-tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
-  boost::system::error_code ec;
-  const net::ip::address address =
-      net::ip::make_address(where.host == "localhost" ? "127.0.0.1" : where.host, ec);
-  if (ec)
-    throw Error(ErrorKind::usage, "listen", "'" + where.host + "' is no address",
-                "use a numeric one such as 127.0.0.1:7070");
-  const bool guarded = !options.certificate.empty() && !options.token.empty();
-  if (!address.is_loopback() && !guarded && !options.insecure) {
-    throw Error(ErrorKind::refused, where.host, "is reachable by others, who could read and take part",
-                "give --tls-certificate, --tls-key and --token-file, listen on 127.0.0.1 and tunnel, or add "
-                "--insecure on a network that you trust");
-  }
-  return {address, where.port};
-}
-
 void check_options(const Options& options) {
   if (options.certificate.empty() != options.key.empty())
     throw Error(ErrorKind::usage, "TLS", "a certificate and its key go together",
@@ -63,65 +48,44 @@ void check_options(const Options& options) {
                 "use 16 to 1024 that nobody can guess, e.g. of openssl rand -hex 32");
 }
 
-void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
-  boost::system::error_code ec;
-  const std::string where = endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
-  const auto check = [&] {
-    if (!ec) return;
-    if (ec == net::error::address_in_use) {
-      throw Error(ErrorKind::temporary, where, "the address is in use",
-                  "stop the other server, or --listen on another port; 0 picks a free one");
-    }
-    throw Error(ErrorKind::usage, where, "cannot listen: " + ec.message(),
-                "use an address of this machine and a port that you may use");
-  };
-  acceptor.open(endpoint.protocol(), ec);
-  check();
-  acceptor.set_option(tcp::acceptor::reuse_address(true), ec);
-  check();
-  acceptor.bind(endpoint, ec);
-  check();
-  acceptor.listen(net::socket_base::max_listen_connections, ec);
-  check();
-}
-
 }  // namespace
 
 struct Server::Impl {
   Impl(Options options, std::vector<NamedModel> models, Workers& workers_, TestHooks hooks)
       : workers(workers_), wrap(hooks.transport) {
     check_options(options);
-    bind(acceptor, endpoint_of(options.listen, options));
+    start_listening(acceptor, endpoint_of(options.listen, options));
     port = acceptor.local_endpoint().port();
     if (options.http) {
-      bind(http_acceptor, endpoint_of(*options.http, options));
+      start_listening(http_acceptor, endpoint_of(*options.http, options));
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
-    room = {.token = options.token,
-            .origins = options.origins,
-            .header_bytes = options.limits.hello_bytes,
-            .messages_per_second = options.limits.messages_per_second,
-            .ready = [this] { return !stopping; },
-            .metrics = [this] { return metrics(); },
-            .denied = [this] { registry->metrics().denied(); },
-            .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
-            .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
-                              bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
+    web_context = {
+        .token = options.token,
+        .origins = options.origins,
+        .header_bytes = options.limits.hello_bytes,
+        .messages_per_second = options.limits.messages_per_second,
+        .ready = [this] { return !stopping; },
+        .metrics = [this] { return metrics(); },
+        .denied = [this] { registry->metrics().denied(); },
+        .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
+        .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
+                          bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
     registry = std::make_unique<SessionRegistry>(io, workers, std::move(options), std::move(models),
                                                  std::move(hooks));
   }
 
-  net::awaitable<void> accept(tcp::acceptor& at, bool web);
+  net::awaitable<void> accept(tcp::acceptor& at, bool http);
   net::awaitable<void> watch();
   net::awaitable<void> pause(net::steady_timer& timer, Clock::duration time = kTick);
   bool admit(WebKind kind, const std::string& peer);
   Clock::duration look_after(Clock::time_point now);
-  void receive(tcp::socket socket, bool web);
+  void receive(tcp::socket socket, bool http);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
-  bool room_for_request(Clock::time_point now);
-  void make_room(Clock::time_point now, Clock::duration patience);
+  bool admit_request(Clock::time_point now);
+  void drop_unread(Clock::time_point now, Clock::duration patience);
   void begin_shutdown();
   void without_memory();
   std::string metrics();
@@ -134,7 +98,7 @@ struct Server::Impl {
   std::function<std::unique_ptr<Transport>(std::unique_ptr<Transport>)> wrap;
   std::uint16_t port = 0, http_port = 0;
   std::unique_ptr<Carrier> carrier;
-  WebRoom room;
+  WebContext web_context;
   std::unique_ptr<SessionRegistry> registry;
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
@@ -190,7 +154,7 @@ void Server::reload() {
   });
 }
 
-net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
+net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool http) {
   boost::system::error_code ec;
   net::steady_timer next(io);
   while (at.is_open()) {
@@ -198,7 +162,7 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
     try {
       tcp::socket socket = co_await at.async_accept(quietly(ec));
       if (!at.is_open()) co_return;
-      if (!ec) receive(std::move(socket), web);
+      if (!ec) receive(std::move(socket), http);
       failed = static_cast<bool>(ec);
       // Out of file descriptors, or the client is gone already: neither ends the server.
       if (ec) registry->journal().line(spdlog::level::warn, "accept: " + ec.message());
@@ -214,7 +178,7 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool web) {
   }
 }
 
-void Server::Impl::receive(tcp::socket socket, bool web) {
+void Server::Impl::receive(tcp::socket socket, bool http) {
   std::string peer = peer_of(socket);
   const Clock::duration in_kernel = waited(socket);
   std::unique_ptr<Transport> transport;
@@ -223,17 +187,17 @@ void Server::Impl::receive(tcp::socket socket, bool web) {
     transport = carrier->carry(std::move(socket));
     if (wrap) transport = wrap(std::move(transport));
   }
-  if (!web) return welcome(std::move(transport), std::move(peer), false, in_kernel);
-  if (!room_for_request(Clock::now())) return registry->metrics().hit("connections");
+  if (!http) return welcome(std::move(transport), std::move(peer), false, in_kernel);
+  if (!admit_request(Clock::now())) return registry->metrics().hit("connections");
   {
     const MayFail may_fail;
-    requests.push_back(web_request(std::move(transport), std::move(peer), room));
+    requests.push_back(web_request(std::move(transport), std::move(peer), web_context));
   }
   requests.back()->start();
 }
 
 // Of requests, too, the oldest makes way.
-bool Server::Impl::room_for_request(Clock::time_point now) {
+bool Server::Impl::admit_request(Clock::time_point now) {
   std::erase_if(requests, [](const auto& request) { return request->over(); });
   if (requests.size() < registry->limits().connections) return true;
   if (now - requests.front()->born() < kTimeToGreet) return false;
@@ -284,26 +248,27 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
 
 // Of those who read nothing, whoever holds most: the longest queue is pushed out (Wei, Coyle, Hsiao 1991), if
 // it is longer than half of what each would have of the memory. One at a time: its bytes are given back soon.
-void Server::Impl::make_room(Clock::time_point now, Clock::duration patience) {
+void Server::Impl::drop_unread(Clock::time_point now, Clock::duration patience) {
   std::uint64_t most = registry->memory().limit() / (2 * std::max<std::size_t>(connections.size(), 1));
   Connection* longest = nullptr;
   for (const auto& connection : connections) {
-    const std::uint64_t bytes = connection->clogged(now, patience);
+    const std::uint64_t bytes = connection->unread(now, patience);
     if (bytes <= most) continue;
     most = bytes;
     longest = connection.get();
   }
-  if (longest) longest->make_room();
+  if (longest) longest->drop_unread();
 }
 
 // The oldest connection that had time for a hello, and sent none; with an address, the oldest of its.
 bool Server::Impl::make_way(Clock::time_point now, const std::string& address) {
   const auto silent = std::find_if(connections.begin(), connections.end(), [&](const auto& c) {
-    return c->silent() && now - c->born() >= kTimeToGreet && (address.empty() || c->address() == address);
+    return c->awaits_hello() && now - c->accepted_at() >= kTimeToGreet &&
+           (address.empty() || c->address() == address);
   });
   if (silent == connections.end()) return false;
   // Whoever is told why stays for a moment.
-  (*silent)->make_way(connections.size() + 1 < registry->limits().connections + kMostRefusals);
+  (*silent)->evict(connections.size() + 1 < registry->limits().connections + kMostRefusals);
   return true;
 }
 
@@ -345,7 +310,7 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });
   if (const auto patience = registry->patience(now)) {
-    make_room(now, *patience);
+    drop_unread(now, *patience);
     next = std::min(next, kRoomTick);
   }
   registry->sweep(now);

@@ -45,7 +45,7 @@ class Server {
 
   /// From any thread, any number of times, also before run().
   void stop();
-  /// Reads all models again, aside, as ReloadModel does; the log tells how each went. As stop().
+  /// Reads all models again, in the background, as ReloadModel does; the log tells how each went. As stop().
   void reload();
 
  protected:

@@ -5,17 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/settle/fold_energy.hpp"
+#include "runtime/settle/fold_patches.hpp"
 #include "runtime/settle/lbfgs.hpp"
 #include "runtime/settle/patch_volumes.hpp"
 
 namespace ecorche::runtime {
 namespace {
-
-using Eigen::Vector3d;
 
 constexpr int kRings[] = {2, 4, 7};  ///< of nodes about the folds, pass by pass
 constexpr int kRounds = 12;          ///< of a pass: eps is lowered between them
@@ -26,10 +24,6 @@ constexpr double kTie = 0.1;         ///< of a node to where skinning put it, ag
 constexpr double kTolerance = 1e-3;  ///< of a tissue's rest volume, by which it may come out farther from it
 constexpr double kAimed = 0.3;       ///< of the tolerance: what patches are held to
 constexpr int kMoreRounds = 8;       ///< for volumes alone
-
-Vector3d rest_of(const Model& model, std::int32_t node) {
-  return model.nodes.row(node).cast<double>().transpose();
-}
 
 /// Nodes that touch a bone: 1.
 std::vector<std::uint8_t> held_nodes(const Model& model) {
@@ -59,157 +53,6 @@ Inverted inverted(const Model& model, std::span<const float> nodes) {
   }
   return out;
 }
-
-/// Connected groups of free nodes with their tets: each relaxes on its own.
-class Patches {
- public:
-  /// The free nodes within `rings` edges of the tets `seeds`, and every tet at one of them that is not
-  /// `given_up`.
-  Patches(const Model& model, const std::vector<std::uint8_t>& held,
-          const std::vector<std::uint8_t>& given_up, const std::vector<std::size_t>& seeds, int rings,
-          std::span<const float> nodes)
-      : model_(model), group_(model.node_count(), kOutside), row_(model.node_count(), -1) {
-    mark(held, seeds, rings);
-    std::vector<std::vector<std::size_t>> tets = group(given_up);
-    patches_.resize(tets.size());
-    nodes_.resize(tets.size());
-    for (std::size_t g = 0; g < tets.size(); ++g) fill(g, tets[g], nodes);
-  }
-
-  std::size_t count() const { return patches_.size(); }
-  const FoldPatch& operator[](std::size_t g) const { return patches_[g]; }
-
-  /// Per node of the body its place among the free ones of patch `g`, -1 elsewhere.
-  std::vector<std::int32_t> free_of(std::size_t g) const {
-    std::vector<std::int32_t> out(model_.node_count(), -1);
-    for (std::size_t i = 0; i < patches_[g].free; ++i) out[nodes_[g][i]] = static_cast<std::int32_t>(i);
-    return out;
-  }
-  /// Tets a mm^3 of rest.
-  double density(std::size_t g) const { return density_[g]; }
-  /// What `write` wrote, taken back.
-  void restore(std::size_t g, std::span<const float> before, std::span<float> nodes) const {
-    for (std::size_t i = 0; i < patches_[g].free; ++i)
-      std::copy_n(&before[3 * nodes_[g][i]], 3, &nodes[3 * nodes_[g][i]]);
-  }
-
-  void write(std::size_t g, const Eigen::VectorXd& x, std::span<float> nodes) const {
-    for (std::size_t i = 0; i < patches_[g].free; ++i)
-      for (std::size_t c = 0; c < 3; ++c)
-        nodes[3 * nodes_[g][i] + c] = static_cast<float>(x[static_cast<Eigen::Index>(3 * i + c)]);
-  }
-
- private:
-  static constexpr std::int32_t kOutside = -1, kFree = -2;
-
-  std::size_t at(std::size_t t, int c) const {
-    return static_cast<std::size_t>(model_.tets(static_cast<Eigen::Index>(t), c));
-  }
-
-  template <class F>
-  bool any_corner(std::size_t t, F f) const {
-    return f(at(t, 0)) || f(at(t, 1)) || f(at(t, 2)) || f(at(t, 3));
-  }
-
-  void mark(const std::vector<std::uint8_t>& held, const std::vector<std::size_t>& seeds, int rings) {
-    std::vector<std::uint8_t> near(model_.node_count(), 0);
-    const auto take = [&](std::size_t t) {
-      for (int c = 0; c < 4; ++c) near[at(t, c)] = 1;
-    };
-    for (const std::size_t t : seeds) take(t);
-    for (int ring = 0; ring < rings; ++ring) {
-      const std::vector<std::uint8_t> before = near;
-      for (std::size_t t = 0; t < model_.tet_count(); ++t)
-        if (any_corner(t, [&](std::size_t n) { return before[n] != 0; })) take(t);
-    }
-    for (std::size_t n = 0; n < near.size(); ++n)
-      if (near[n] && !held[n]) group_[n] = kFree;
-  }
-
-  /// Numbers the groups by their lowest tets; returns the tets of each.
-  std::vector<std::vector<std::size_t>> group(const std::vector<std::uint8_t>& given_up) {
-    std::vector<std::int32_t> root(model_.node_count());
-    std::iota(root.begin(), root.end(), 0);
-    const auto find = [&](std::size_t n) {
-      while (static_cast<std::size_t>(root[n]) != n)
-        n = static_cast<std::size_t>(root[n] = root[static_cast<std::size_t>(root[n])]);
-      return n;
-    };
-    std::vector<std::size_t> tets;
-    for (std::size_t t = 0; t < model_.tet_count(); ++t) {
-      if (given_up[t] || !any_corner(t, [&](std::size_t n) { return group_[n] == kFree; })) continue;
-      tets.push_back(t);
-      std::size_t first = model_.node_count();
-      for (int c = 0; c < 4; ++c) {
-        if (group_[at(t, c)] != kFree) continue;
-        if (first == model_.node_count()) first = find(at(t, c));
-        root[find(at(t, c))] = static_cast<std::int32_t>(first);
-      }
-    }
-    std::vector<std::vector<std::size_t>> out;
-    std::vector<std::int32_t> number(model_.node_count(), -1);
-    for (const std::size_t t : tets) {
-      std::size_t free = 0;
-      for (int c = 0; c < 4; ++c)
-        if (group_[at(t, c)] != kOutside) free = at(t, c);
-      std::int32_t& g = number[find(free)];
-      if (g < 0) {
-        g = static_cast<std::int32_t>(out.size());
-        out.emplace_back();
-      }
-      out[static_cast<std::size_t>(g)].push_back(t);
-    }
-    return out;
-  }
-
-  void fill(std::size_t g, const std::vector<std::size_t>& tets, std::span<const float> nodes) {
-    FoldPatch& patch = patches_[g];
-    const auto add = [&](std::size_t n) {
-      if (row_[n] >= 0) return;
-      row_[n] = static_cast<std::int32_t>(nodes_[g].size());
-      nodes_[g].push_back(n);
-      for (std::size_t c = 0; c < 3; ++c) patch.x.push_back(static_cast<double>(nodes[3 * n + c]));
-    };
-    for (const std::size_t t : tets)
-      for (int c = 0; c < 4; ++c)
-        if (group_[at(t, c)] != kOutside) add(at(t, c));
-    patch.free = nodes_[g].size();
-    double volume = 0;
-    for (const std::size_t t : tets) {
-      for (int c = 0; c < 4; ++c) add(at(t, c));
-      patch.tets.push_back(tet_of(t));
-      volume += patch.tets.back().weight;
-    }
-    for (FoldPatch::Tet& tet : patch.tets) tet.weight *= static_cast<double>(tets.size()) / volume;
-    density_.push_back(6 * static_cast<double>(tets.size()) / volume);
-    for (const std::size_t n : nodes_[g]) row_[n] = -1;  // held nodes may lie in several groups
-  }
-
-  FoldPatch::Tet tet_of(std::size_t t) const {
-    FoldPatch::Tet tet;
-    std::array<Vector3d, 4> p;
-    for (int c = 0; c < 4; ++c) {
-      tet.node[static_cast<std::size_t>(c)] = row_[at(t, c)];
-      p[static_cast<std::size_t>(c)] = rest_of(model_, model_.tets(static_cast<Eigen::Index>(t), c));
-    }
-    Eigen::Matrix3d edges;
-    edges << p[1] - p[0], p[2] - p[0], p[3] - p[0];
-    const Eigen::Matrix3d gradients = edges.inverse();
-    Eigen::Map<Vector3d>(tet.gradient[0].data()) = -gradients.colwise().sum().transpose();
-    for (std::size_t c = 0; c < 3; ++c)
-      Eigen::Map<Vector3d>(tet.gradient[c + 1].data()) =
-          gradients.row(static_cast<Eigen::Index>(c)).transpose();
-    tet.weight = edges.determinant();
-    return tet;
-  }
-
-  const Model& model_;
-  std::vector<std::int32_t> group_;  // of every node of the body: kFree, or kOutside the patches
-  std::vector<std::int32_t> row_;    // of every node, in the patch that is being filled
-  std::vector<FoldPatch> patches_;
-  std::vector<std::vector<std::size_t>> nodes_;  // of every row, free ones first
-  std::vector<double> density_;                  // of every patch
-};
 
 /// Returns the free nodes, relaxed until no tet is flat or nothing gets better; each is tied to where
 /// skinning had put it, and tissues are held to the bounds of their volumes.
@@ -278,7 +121,7 @@ class Unfolder {
       : model_(model),
         context_(context),
         held_(held_nodes(model)),
-        given_up_(model.tet_count(), 0),
+        excluded_(model.tet_count(), 0),
         volumes_(model, skinned, kAimed * kTolerance) {}
 
   bool on_bones(std::size_t t) const {
@@ -287,13 +130,13 @@ class Unfolder {
                        [&](std::int32_t n) { return held_[static_cast<std::size_t>(n)] != 0; });
   }
 
-  /// Patches about the folds, narrow ones first. Returns what is left inverted.
+  /// FoldPatches about the folds, narrow ones first. Returns what is left inverted.
   Inverted run(std::vector<float>& nodes) const {
     Inverted now = inverted(model_, nodes);
     for (const int rings : kRings) {
-      const std::vector<std::size_t> seeds = hopeful(now);
+      const std::vector<std::size_t> seeds = unfoldable(now);
       if (seeds.empty()) break;
-      const Patches patches(model_, held_, given_up_, seeds, rings, nodes);
+      const FoldPatches patches(model_, held_, excluded_, seeds, rings, nodes);
       const double length = std::cbrt(6 * now.rest_mm3 / static_cast<double>(now.tets.size()));
       std::vector<PatchVolumes> parts = parts_of(patches, nodes);
       std::vector<float> next = nodes;
@@ -310,21 +153,21 @@ class Unfolder {
   }
 
   /// What is still inverted is no longer asked for: returns whether there is any.
-  bool give_up(const Inverted& left) {
-    const std::vector<std::size_t> hopeless = hopeful(left);
-    for (const std::size_t t : hopeless) given_up_[t] = 1;
+  bool exclude(const Inverted& left) {
+    const std::vector<std::size_t> hopeless = unfoldable(left);
+    for (const std::size_t t : hopeless) excluded_[t] = 1;
     return !hopeless.empty();
   }
 
  private:
-  std::vector<std::size_t> hopeful(const Inverted& folds) const {
+  std::vector<std::size_t> unfoldable(const Inverted& folds) const {
     std::vector<std::size_t> out;
     for (const std::size_t t : folds.tets)
-      if (!given_up_[t] && !on_bones(t)) out.push_back(t);
+      if (!excluded_[t] && !on_bones(t)) out.push_back(t);
     return out;
   }
 
-  std::vector<PatchVolumes> parts_of(const Patches& patches, std::span<const float> nodes) const {
+  std::vector<PatchVolumes> parts_of(const FoldPatches& patches, std::span<const float> nodes) const {
     const std::vector<double> now = volumes_.at(nodes);
     std::vector<PatchVolumes> parts(patches.count());
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t g) {
@@ -338,7 +181,7 @@ class Unfolder {
   }
 
   /// Takes back the patches of tissues that came out of their bounds all the same.
-  void step_back(const Patches& patches, const std::vector<PatchVolumes>& parts,
+  void step_back(const FoldPatches& patches, const std::vector<PatchVolumes>& parts,
                  std::span<const float> before, std::span<float> nodes) const {
     std::vector<std::uint8_t> back(patches.count(), 0);
     for (bool again = true; again;) {
@@ -360,7 +203,7 @@ class Unfolder {
   const Model& model_;
   const Context& context_;
   const std::vector<std::uint8_t> held_;
-  std::vector<std::uint8_t> given_up_;
+  std::vector<std::uint8_t> excluded_;
   const TissueVolumes volumes_;
 };
 
@@ -376,7 +219,7 @@ Unfolding unfold(const Model& model, PosedBody& body, const Context& context) {
   Unfolder unfolder(model, skinned, context);
   now = unfolder.run(body.nodes);
   // What cannot be unfolded pushes all about it away in vain: again without it.
-  if (unfolder.give_up(now)) {
+  if (unfolder.exclude(now)) {
     std::vector<float> nodes = skinned;
     Inverted again = unfolder.run(nodes);
     if (again.rest_mm3 <= 1.1 * now.rest_mm3 && again.tets.size() <= out.inverted_before) {

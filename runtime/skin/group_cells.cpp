@@ -8,7 +8,7 @@ namespace {
 
 // Of the groups about one node: more than a surface has there, and a bound where thousands of vertices hang
 // on one tet.
-constexpr std::size_t kMostAsked = 64;
+constexpr std::size_t kMostCandidates = 64;
 
 class Cells {
  public:
@@ -62,7 +62,7 @@ class Cells {
       ++count_;
       // What is taken at the beginning of its list stays so.
       while (next_[node] < begin_[node + 1] && taken_[about_[next_[node]]] != 0) ++next_[node];
-      const std::size_t end = std::min<std::size_t>(begin_[node + 1], next_[node] + kMostAsked);
+      const std::size_t end = std::min<std::size_t>(begin_[node + 1], next_[node] + kMostCandidates);
       for (std::size_t i = next_[node]; i < end; ++i) {
         const std::uint32_t g = about_[i];
         if (taken_[g] == 0 && shared_[g]++ == 0) near_.push_back(g);

@@ -14,7 +14,7 @@ namespace ecorche::runtime {
 namespace {
 
 constexpr float kSmallestWeight = 1e-4F;  // 0.08 mm on the reference body; below it memory traffic is wasted
-constexpr std::size_t kSize = NodeClusters::size;
+constexpr std::size_t kClusterSize = NodeClusters::size;
 constexpr std::size_t kOtherRun = 2048;  // of nodes that no tissue hangs on
 
 [[noreturn]] void unfit(const Model& model, const std::string& what) {
@@ -62,10 +62,10 @@ struct Row {
 };
 
 // `rows`: of the cluster's nodes, to be filled.
-void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, std::array<Row, kSize>& rows,
-                 NodeClusters& out) {
+void add_cluster(const Model& model, std::span<const std::uint32_t> nodes,
+                 std::array<Row, kClusterSize>& rows, NodeClusters& out) {
   const std::size_t first = out.palette.size();
-  for (std::size_t i = 0; i < kSize; ++i) {
+  for (std::size_t i = 0; i < kClusterSize; ++i) {
     Row& row = rows[i];
     row.read(model, nodes[i]);
     out.palette.insert(out.palette.end(), row.segment.begin(), row.segment.end());
@@ -76,15 +76,15 @@ void add_cluster(const Model& model, std::span<const std::uint32_t> nodes, std::
         out.palette.end());
   }
   out.begin.push_back(static_cast<std::uint32_t>(out.palette.size()));
-  out.weight.resize(kSize * out.palette.size());
-  for (std::size_t i = 0; i < kSize; ++i) {
+  out.weight.resize(kClusterSize * out.palette.size());
+  for (std::size_t i = 0; i < kClusterSize; ++i) {
     const Row& row = rows[i];
     for (std::size_t e = 0; e < row.segment.size(); ++e) {
       const auto place = std::lower_bound(out.palette.begin() + static_cast<std::ptrdiff_t>(first),
                                           out.palette.end(), row.segment[e]) -
                          out.palette.begin();
       // A row that names a segment twice is summed.
-      std::uint16_t& weight = out.weight[kSize * static_cast<std::size_t>(place) + i];
+      std::uint16_t& weight = out.weight[kClusterSize * static_cast<std::size_t>(place) + i];
       weight = static_cast<std::uint16_t>(weight + row.quantised[e]);
     }
   }
@@ -180,14 +180,14 @@ NodeClusters cluster_nodes(const Model& model, std::span<const std::uint32_t> ki
   sort_runs(model, kind, std::span(out.node).subspan(out.needed), kOtherRun);
   out.lane.resize(out.nodes);
   for (std::size_t i = 0; i < out.nodes; ++i) out.lane[out.node[i]] = static_cast<std::uint32_t>(i);
-  out.node.resize((out.nodes + kSize - 1) / kSize * kSize, out.node.back());
+  out.node.resize((out.nodes + kClusterSize - 1) / kClusterSize * kClusterSize, out.node.back());
 
   out.begin.push_back(0);
   out.rest.reserve(3 * out.node.size());
   out.centre.reserve(3 * out.node.size());
-  std::array<Row, kSize> rows;
+  std::array<Row, kClusterSize> rows;
   for (std::size_t c = 0; c < out.clusters(); ++c) {
-    add_cluster(model, std::span(out.node).subspan(kSize * c, kSize), rows, out);
+    add_cluster(model, std::span(out.node).subspan(kClusterSize * c, kClusterSize), rows, out);
   }
   return out;
 }

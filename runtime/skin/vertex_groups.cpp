@@ -12,7 +12,7 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::size_t kSize = VertexGroups::size;
+constexpr std::size_t kGroupSize = VertexGroups::size;
 constexpr float kNarrowed = 2e-4F;  // mm that narrowing may move a vertex at rest
 constexpr double kLocalEnough =
     2.5;  // nodes of groups in the own order over those in Morton's, where it is kept
@@ -100,12 +100,13 @@ class Palette {
 
 // The 16 vertices of a group, fewer in the last.
 std::span<const std::uint32_t> vertices_of(const Order& order, std::size_t group) {
-  return std::span(order).subspan(kSize * group, std::min(kSize, order.size() - kSize * group));
+  return std::span(order).subspan(kGroupSize * group,
+                                  std::min(kGroupSize, order.size() - kGroupSize * group));
 }
 
 GroupNodes nodes_of(const Order& order, Palette& palette) {
   GroupNodes out;
-  for (std::size_t g = 0; kSize * g < order.size(); ++g) {
+  for (std::size_t g = 0; kGroupSize * g < order.size(); ++g) {
     palette.clear();
     palette.gather(vertices_of(order, g));
     out.node.insert(out.node.end(), palette.lanes().begin(), palette.lanes().end());
@@ -181,14 +182,14 @@ class Builder {
       nodes = std::move(along);
     }
     out_.groups.reserve(nodes.groups());
-    out_.corners.reserve(kSize * nodes.groups());
-    out_.narrow.reserve(3 * kSize * nodes.groups());
-    out_.normal.reserve(2 * kSize * nodes.groups());
+    out_.corners.reserve(kGroupSize * nodes.groups());
+    out_.narrow.reserve(3 * kGroupSize * nodes.groups());
+    out_.normal.reserve(2 * kGroupSize * nodes.groups());
     const GroupCells cells = share_palettes(nodes, VertexGroups::most_lanes, VertexGroups::most_groups);
     for (const std::span<const std::uint32_t> groups : by_last_slab(cells, nodes)) add_cell(order, groups);
     if (!out_.in_order) {
       out_.vertex = std::move(order);
-      out_.vertex.resize(kSize * out_.groups.size(), out_.vertex.back());
+      out_.vertex.resize(kGroupSize * out_.groups.size(), out_.vertex.back());
     }
     return std::move(out_);
   }
@@ -201,11 +202,11 @@ class Builder {
     const std::vector<std::uint32_t>& lanes = palette_.lanes();
     VertexGroups::Cell cell{};
     cell.palette = static_cast<std::uint32_t>(out_.rows.size());
-    cell.count = static_cast<std::uint32_t>((lanes.size() + kSize - 1) / kSize * kSize);
+    cell.count = static_cast<std::uint32_t>((lanes.size() + kGroupSize - 1) / kGroupSize * kGroupSize);
     for (std::size_t i = 0; i < cell.count; ++i)
       out_.rows.push_back(3 * lanes[std::min(i, lanes.size() - 1)]);
     for (const std::uint32_t g : groups) {
-      add_group(static_cast<std::uint32_t>(kSize * g), vertices_of(order, g));
+      add_group(static_cast<std::uint32_t>(kGroupSize * g), vertices_of(order, g));
     }
     cell.end = static_cast<std::uint32_t>(out_.groups.size());
     out_.cells.push_back(cell);
@@ -227,9 +228,9 @@ class Builder {
     group.step = narrow ? step : 0;
     group.data = static_cast<std::uint32_t>(narrow ? out_.narrow.size() : out_.wide.size());
 
-    std::array<Turned, kSize> turned;
+    std::array<Turned, kGroupSize> turned;
     const auto at = [&](std::size_t i) { return vertices[std::min(i, vertices.size() - 1)]; };
-    for (std::size_t i = 0; i < kSize; ++i) {
+    for (std::size_t i = 0; i < kGroupSize; ++i) {
       const std::uint32_t v = at(i);
       turned[i] = turn(normal_shares(model_, tissue_.tet[v], normals_.row(static_cast<Eigen::Index>(v))));
       std::uint32_t corners = palette_.place(v, 0);
@@ -239,7 +240,7 @@ class Builder {
       out_.corners.push_back(corners);
     }
     for (std::size_t c = 0; c < 3; ++c) {
-      for (std::size_t i = 0; i < kSize; ++i) {
+      for (std::size_t i = 0; i < kGroupSize; ++i) {
         const float b = tissue_.barycentric(static_cast<Eigen::Index>(at(i)), turned[i].corner[c]);
         if (narrow) {
           out_.narrow.push_back(

@@ -11,18 +11,18 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A plane is let out by kMargin of edge x edge x distance, which covers rounding; a tet thinner than kNothing
-// is left to its neighbours, whose margin is larger.
-constexpr double kMargin = 1e-10;
+// A plane is let out by kFlatMargin of edge x edge x distance, which covers rounding; a tet thinner than
+// kNothing is left to its neighbours, whose margin is larger.
+constexpr double kFlatMargin = 1e-10;
 constexpr double kNothing = 1e-12;
 
-struct Corners {
+struct FlatCorners {
   std::array<Vector3d, 4> x;
 };
 
-Corners corners_of(const DrawTets& job, std::span<const std::int32_t> points, std::uint32_t id) {
+FlatCorners corners_of(const DrawTets& job, std::span<const std::int32_t> points, std::uint32_t id) {
   const double one = 1 << job.bits;
-  Corners out;
+  FlatCorners out;
   for (int c = 0; c < 4; ++c) {
     const std::int32_t* p = &points[3 * static_cast<std::size_t>(job.tets(id, c))];
     out.x[static_cast<std::size_t>(c)] = Vector3d(p[0] / one, p[1] / one, p[2] / one);
@@ -30,11 +30,11 @@ Corners corners_of(const DrawTets& job, std::span<const std::int32_t> points, st
   return out;
 }
 
-double det_of(const Corners& c) {
+double det_of(const FlatCorners& c) {
   return (c.x[1] - c.x[0]).cross(c.x[2] - c.x[0]).dot(c.x[3] - c.x[0]);
 }
 
-double longest_edge(const Corners& c) {
+double longest_edge(const FlatCorners& c) {
   double longest = 0;
   for (std::size_t a = 0; a < 4; ++a) {
     for (std::size_t b = a + 1; b < 4; ++b) longest = std::max(longest, (c.x[a] - c.x[b]).norm());
@@ -57,7 +57,7 @@ double posed_det(const DrawTets& job, std::uint32_t id) {
 
 void draw_flat_tet(const DrawTets& job, const VoxelRange& range, std::uint32_t id, VoxelBatch& batch,
                    const BatchSink& sink) {
-  const Corners posed = corners_of(job, job.posed, id), rest = corners_of(job, job.rest, id);
+  const FlatCorners posed = corners_of(job, job.posed, id), rest = corners_of(job, job.rest, id);
   const double det = det_of(posed), edge = longest_edge(posed);
   if (!(std::abs(det) > kNothing * edge * edge * edge)) return;
   std::array<Coordinate, 4> coordinates;
@@ -67,7 +67,7 @@ void draw_flat_tet(const DrawTets& job, const VoxelRange& range, std::uint32_t i
     const Vector3d normal = u.cross(v);
     const double height = normal.dot(posed.x[f] - a);
     coordinates[f] = {normal / height, -normal.dot(a) / height,
-                      kMargin * u.norm() * v.norm() * edge / std::abs(height)};
+                      kFlatMargin * u.norm() * v.norm() * edge / std::abs(height)};
   }
   VoxelRange box = range;
   for (std::size_t axis = 0; axis < 3; ++axis) {

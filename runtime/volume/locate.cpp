@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 constexpr double kMargin = 1e-10;
 constexpr double kFlat = 1e-12;
 constexpr std::int32_t kSlab = 8;  // slices of a task: about as high as a few tets
-constexpr double kMostVoxels = 2147483648.0;
+constexpr double kMostLocated = 2147483648.0;
 
 struct Corners {
   std::array<Vector3d, 4> x;
@@ -221,7 +221,7 @@ Bounds bounds_of(const ImageGrid& lattice, std::span<const float> nodes) {
 
 ImageGrid piece_of(const ImageGrid& lattice, const Bounds& bounds) {
   const Eigen::Array3d size = bounds.high - bounds.low + 1;
-  if (!(size.minCoeff() >= 1 && size.prod() <= kMostVoxels)) {
+  if (!(size.minCoeff() >= 1 && size.prod() <= kMostLocated)) {
     throw Error(ErrorKind::data, "posed volume",
                 "the posed body needs " + std::to_string(size.prod()) + " voxels, more than 2^31",
                 "use --grid rest, or a pose nearer to the scanned place");

@@ -14,6 +14,8 @@
 #include "runtime/volume/draw_tets.hpp"
 #include "runtime/volume/fixed_points.hpp"
 #include "runtime/volume/grid_affine.hpp"
+#include "runtime/volume/grid_bands.hpp"
+#include "runtime/volume/grid_reach.hpp"
 #include "runtime/volume/sample_batch.hpp"
 #include "runtime/volume/sampler.hpp"
 #include "runtime/volume/tet_blocks.hpp"
@@ -22,60 +24,9 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr std::int32_t kBand = 16;      // slices of a task: a few tets high
-constexpr std::int32_t kHighBand = 32;  // where there are many: fewer tets lie in two
 constexpr std::size_t kRunsPerBlock = TetBlocks::size / TetPalettes::width;
 constexpr std::size_t kStretch = 32;  // runs that are looked at together
 constexpr double kMostVoxels = 2147483648.0;
-
-// Slices of the grid in bands, along its longer one of the two slow axes: a slice plane has only one slice.
-struct Bands {
-  int axis = 2;
-  std::int32_t height = kBand;
-  std::size_t count = 0;
-
-  explicit Bands(const ImageGrid& grid) : axis(grid.size[2] >= grid.size[1] ? 2 : 1) {
-    const std::int32_t slices = grid.size[static_cast<std::size_t>(axis)];
-    height = slices < 8 * kHighBand ? kBand : kHighBand;
-    count = static_cast<std::size_t>((slices + height - 1) / height);
-  }
-  VoxelRange of(std::size_t band, const ImageGrid& grid) const {
-    VoxelRange range{{}, {grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1}};
-    const auto along = static_cast<std::size_t>(axis);
-    range.first[along] = static_cast<std::int32_t>(band) * height;
-    range.last[along] = std::min(range.first[along] + height, grid.size[along]) - 1;
-    return range;
-  }
-};
-
-// Whether the groups of a block reach into the grid: on either side of each axis, a bit each, one of them
-// must not end short of it.
-struct GridBox {
-  static constexpr std::uint8_t reaches = 0x3f;
-  Affine index;
-  Eigen::Matrix3d reach;  // |linear|
-  Eigen::Vector3d last;
-
-  explicit GridBox(const ImageGrid& grid)
-      : index(to_index(grid)),
-        reach(index.linear.cwiseAbs()),
-        last(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1) {}
-
-  // `low_high`: of a group, in LPS.
-  std::uint8_t sides(std::span<const float, 6> low_high) const {
-    const Eigen::Map<const Eigen::Vector3f> low(low_high.data()), high(low_high.data() + 3);
-    if (!low.allFinite() || !high.allFinite()) return reaches;
-    const Eigen::Vector3d middle = index * Eigen::Vector3d((0.5F * (low + high)).cast<double>());
-    const Eigen::Vector3d half = reach * Eigen::Vector3d((0.5F * (high - low)).cast<double>());
-    constexpr double rounding = 1e-2;  // of float32 metres away, in voxels of a tenth of a millimetre
-    unsigned out = 0;
-    for (int a = 0; a < 3; ++a) {
-      out |= middle[a] + half[a] >= -rounding ? 1U << static_cast<unsigned>(a) : 0U;
-      out |= middle[a] - half[a] <= last[a] + rounding ? 8U << static_cast<unsigned>(a) : 0U;
-    }
-    return static_cast<std::uint8_t>(out);
-  }
-};
 
 bool one_lattice(const ImageGrid& a, const ImageGrid& b) {
   return a.spacing == b.spacing && a.direction == b.direction;
@@ -194,7 +145,7 @@ DrawTets VolumePoser::Impl::prepare(const Job& job, Scratch& scratch) const {
   const int bits = fraction_bits(
       std::max(index_reach(job.grid, box_of(scratch.bounds)), index_reach(rest_grid, rest_box)));
 
-  const GridBox grid_box(job.grid);
+  const GridReach grid_box(job.grid);
   scratch.sides.resize(blocks.groups());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.groups(), 512), [&](const auto& range) {
     for (std::size_t g = range.begin(); g < range.end(); ++g)
@@ -207,7 +158,7 @@ DrawTets VolumePoser::Impl::prepare(const Job& job, Scratch& scratch) const {
       const std::span<const std::uint32_t> groups = blocks.groups_of(b);
       std::uint8_t sides = 0;
       for (const std::uint32_t g : groups) sides |= scratch.sides[g];
-      const bool meets = sides == GridBox::reaches;
+      const bool meets = sides == GridReach::reaches;
       scratch.block_meets[b] = meets ? 1 : 0;
       if (!meets || job.all_nodes) continue;
       for (const std::uint32_t g : groups) {
@@ -324,7 +275,7 @@ class Band {
 void draw(const Job& job, const DrawTets& drawn, Image& out, VolumePoser::Scratch& scratch) {
   const ImageGrid& grid = job.grid;
   const Context& context = job.context;
-  const Bands bands(grid);
+  const GridBands bands(grid);
 
   // Where the runs of the blocks that reach into the grid lie.
   scratch.runs.resize(drawn.palettes.runs());
@@ -351,7 +302,7 @@ void draw(const Job& job, const DrawTets& drawn, Image& out, VolumePoser::Scratc
 
   const SampleJob samples{job.volume.image, job.volume.background, out};
   const BatchSink sink = sink_for(samples, job.volume.labels ? Sampling::nearest : job.sampling);
-  tbb::parallel_for(std::size_t{0}, bands.count, [&](std::size_t number) {
+  tbb::parallel_for(std::size_t{0}, bands.count(), [&](std::size_t number) {
     if (context.stop.stop_requested()) return;
     Band(drawn, samples, sink, scratch).draw(bands.of(number, grid));
   });

@@ -18,7 +18,7 @@ def problems_of(page):
     for line, code in page.spans():
         yield from ((line, what) for what in in_code(code))
     for block in page.blocks:
-        if block.language == "sh":
+        if block.language in ("sh", "text", ""):
             text = re.sub(r"\\\n\s*", " ", block.text)
             for offset, row in enumerate(text.splitlines()):
                 for command in re.split(r"\|\|?|&&|;|\$\(", row):

@@ -60,7 +60,7 @@ def option_of(head, text):
     # TYPE:TYPE in [LOW - HIGH], or TYPE:what a check says of itself.
     kind, _, checked = kind.partition(":")
     bounds = re.search(r"\w+ in \[(.+?) - (.+?)\]", checked)
-    return Option(names.split(","), text, kind.strip(), " to ".join(bounds.groups()) if bounds else checked, default, required)
+    return Option(re.sub(r"\{[^}]*\}", "", names).split(","), text, kind.strip(), " to ".join(bounds.groups()) if bounds else checked, default, required)
 
 
 @functools.cache

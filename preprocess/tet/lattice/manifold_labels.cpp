@@ -90,9 +90,9 @@ class Star {
   std::vector<std::array<std::size_t, 3>> neighbours_;
 };
 
-class Mender {
+class ManifoldRepair {
  public:
-  Mender(const std::vector<Quad>& quads, std::size_t nodes, std::vector<std::uint16_t>& label)
+  ManifoldRepair(const std::vector<Quad>& quads, std::size_t nodes, std::vector<std::uint16_t>& label)
       : quads_(quads),
         label_(label),
         at_(quads.size(), nodes, [&](std::size_t t, std::size_t c) { return quads[t][c]; }),
@@ -197,7 +197,7 @@ class Mender {
 
 std::int64_t make_manifold(const std::vector<Quad>& tets, std::size_t nodes,
                            std::vector<std::uint16_t>& label, const Context& context) {
-  return Mender(tets, nodes, label).run(context);
+  return ManifoldRepair(tets, nodes, label).run(context);
 }
 
 }  // namespace ecorche::tet

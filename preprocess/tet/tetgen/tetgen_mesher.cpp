@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "core/platform/child_process.hpp"
 #include "preprocess/tet/mesher.hpp"
-#include "preprocess/tet/tetgen/child_process.hpp"
 #include "preprocess/tet/tetgen/complex.hpp"
 #include "preprocess/tet/tetgen/split_edges.hpp"
 #include "preprocess/voxel/voxelize.hpp"
@@ -28,6 +28,10 @@ constexpr double kFinestVolumeInVoxels = 12;
 constexpr double kLongestEdgeInVoxels = 2;
 /// A budget of tets for each vertex of the surfaces; about 7 are the least, the others fill the inside.
 constexpr std::int64_t kTetsPerSurfaceVertex = 20;
+
+platform::ChildOptions child_options(double seconds) {
+  return {.seconds = seconds, .mend = "free some memory and try again, or use another mesher"};
+}
 
 /// TetGen's result as it crosses from the child: two counts, then points, corners and regions.
 struct Raw {
@@ -232,11 +236,11 @@ class TetgenMesher : public Mesher {
                              4 * body / static_cast<double>(options.max_tets));
     for (;;) {
       const double seconds = deadline.seconds();
-      const ChildResult result =
-          run_in_child([&] { return fill_in_child(complex, volume); }, {.seconds = seconds}, context);
-      if (result.end == ChildResult::End::timed_out)
+      const platform::ChildResult result = platform::run_in_child(
+          [&] { return fill_in_child(complex, volume); }, child_options(seconds), context);
+      if (result.end == platform::ChildResult::End::timed_out)
         return {{}, "TetGen did not come back within " + std::to_string(std::lround(seconds)) + " s"};
-      if (result.end == ChildResult::End::failed)
+      if (result.end == platform::ChildResult::End::failed)
         return {{},
                 "TetGen could not fill the surfaces" + (result.said.empty() ? "" : " (" + result.said + ")")};
       std::vector<int> regions;
@@ -275,10 +279,12 @@ class TetgenMesher : public Mesher {
             options.max_tets)  // at least about 7 tets a vertex, measured
       return "skin and bones have " + std::to_string(complex.vertices()) +
              " vertices, too many for the allowed tets";
-    const ChildResult check = run_in_child([&] { return count_crossings(complex); },
-                                           {.seconds = deadline.half().seconds()}, context);
-    if (check.end == ChildResult::End::timed_out) return "looking for crossing surfaces took too long";
-    if (check.end == ChildResult::End::failed) return "skin and bones cannot be checked for crossings";
+    const platform::ChildResult check = platform::run_in_child(
+        [&] { return count_crossings(complex); }, child_options(deadline.half().seconds()), context);
+    if (check.end == platform::ChildResult::End::timed_out)
+      return "looking for crossing surfaces took too long";
+    if (check.end == platform::ChildResult::End::failed)
+      return "skin and bones cannot be checked for crossings";
     std::size_t at = 0;
     std::vector<int> crossings;
     get(check.bytes, at, crossings);

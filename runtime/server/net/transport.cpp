@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/net/transport.hpp"
 
-#include <netinet/tcp.h>
-#include <poll.h>
-
 #include <algorithm>
 #include <array>
-#include <string_view>
 #include <utility>
 
+#include "core/platform/socket_options.hpp"
 #include "runtime/server/net/write_turn.hpp"
 
 namespace ecorche::server {
@@ -16,7 +13,6 @@ namespace {
 
 // What the kernel keeps for a client that does not read, besides what is on its way: more is of no use to
 // anybody, and 32 clients that come and stop reading would have it clear 200 MB at once.
-using Unsent = net::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
 constexpr int kMostUnsent = 1 << 20;
 
 // What of `frame` has not left yet.
@@ -26,14 +22,14 @@ class Window {
 
   bool empty() const { return frame_.empty(); }
 
-  /// At most `room` bytes of it, in a few pieces; good until the next call.
-  std::span<const net::const_buffer> next(std::size_t room) {
+  /// At most `most` bytes of it, in a few pieces; good until the next call.
+  std::span<const net::const_buffer> next(std::size_t most) {
     std::size_t count = 0;
-    for (std::size_t i = 0; i < frame_.size() && count < pieces_.size() && room > 0; ++i) {
-      const net::const_buffer piece = net::buffer(frame_[i] + (i == 0 ? at_ : 0), room);
+    for (std::size_t i = 0; i < frame_.size() && count < pieces_.size() && most > 0; ++i) {
+      const net::const_buffer piece = net::buffer(frame_[i] + (i == 0 ? at_ : 0), most);
       if (piece.size() == 0) continue;
       pieces_[count++] = piece;
-      room -= piece.size();
+      most -= piece.size();
     }
     return std::span(pieces_).first(count);
   }
@@ -79,7 +75,7 @@ class TcpTransport final : public Transport {
     WriteTurn turn(socket_.get_executor());
     ec = {};
     while (!left.empty()) {
-      const std::size_t sent = socket_.write_some(left.next(WriteTurn::room()), ec);
+      const std::size_t sent = socket_.write_some(left.next(WriteTurn::allowance()), ec);
       left.advance(sent);
       if (sent > 0) moved_ = Clock::now();
       if (ec == net::error::would_block) {
@@ -119,23 +115,16 @@ std::unique_ptr<Transport> tcp_transport(tcp::socket socket) {
 // of TCP do, sends next to nothing. Where the system does not have BBR, or keeps it for itself, things stay
 // as they are.
 void prefer_bbr(tcp::socket& socket) {
-#ifdef TCP_CONGESTION
   boost::system::error_code ec;
   const tcp::endpoint peer = socket.remote_endpoint(ec);
-  if (ec || peer.address().is_loopback()) return;
-  constexpr std::string_view kBbr = "bbr";
-  static_cast<void>(setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_CONGESTION, kBbr.data(),
-                               static_cast<socklen_t>(kBbr.size())));
-#else
-  static_cast<void>(socket);
-#endif
+  if (!ec && !peer.address().is_loopback()) platform::prefer_bbr(socket.native_handle());
 }
 
 void prepare(tcp::socket& socket) {
   boost::system::error_code ec;
   prefer_bbr(socket);
   socket.set_option(tcp::no_delay(true), ec);
-  socket.set_option(Unsent(kMostUnsent), ec);
+  platform::limit_unsent(socket.native_handle(), kMostUnsent);
 }
 
 std::string peer_of(const tcp::socket& socket) {
@@ -145,23 +134,11 @@ std::string peer_of(const tcp::socket& socket) {
 }
 
 bool hung_up(tcp::socket& socket) {
-#ifdef POLLRDHUP
-  pollfd asked{.fd = socket.native_handle(), .events = POLLRDHUP, .revents = 0};
-  return ::poll(&asked, 1, 0) > 0;
-#else
-  static_cast<void>(socket);
-  return false;
-#endif
+  return platform::has_hung_up(socket.native_handle());
 }
 
 Clock::duration waited(tcp::socket& socket) {
-#ifdef __linux__
-  tcp_info info{};
-  socklen_t size = sizeof info;
-  if (getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) == 0)
-    return std::chrono::milliseconds(info.tcpi_last_data_recv);
-#endif
-  return {};
+  return platform::since_received(socket.native_handle());
 }
 
 }  // namespace ecorche::server

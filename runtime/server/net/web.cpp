@@ -184,11 +184,11 @@ bool bears(std::string_view header, const std::string& token) {
 
 class Request final : public WebRequest {
  public:
-  Request(std::unique_ptr<Transport> transport, std::string peer, const WebRoom& room)
-      : room_(room),
+  Request(std::unique_ptr<Transport> transport, std::string peer, const WebContext& context)
+      : context_(context),
         peer_(std::move(peer)),
-        stream_(std::make_unique<Stream>(std::move(transport), room.messages_per_second)) {
-    parser_.header_limit(static_cast<std::uint32_t>(room.header_bytes));
+        stream_(std::make_unique<Stream>(std::move(transport), context.messages_per_second)) {
+    parser_.header_limit(static_cast<std::uint32_t>(context.header_bytes));
     parser_.body_limit(0);
   }
 
@@ -222,41 +222,41 @@ class Request final : public WebRequest {
     const std::string_view target(request.target().data(), request.target().size());
     const bool reads = request.method() == http::verb::get || request.method() == http::verb::head;
     const bool health = reads && (target == "/healthz" || target == "/readyz");
-    if (!health && !room_.admit(kind(target), peer_))
+    if (!health && !context_.admit(kind(target), peer_))
       co_return co_await answer(http::status::too_many_requests, "try again in a second\n");
     if (target == "/v1") co_return co_await upgrade();
     if (!reads) co_return co_await answer(http::status::method_not_allowed, "GET and HEAD only\n");
     if (target == "/healthz") co_return co_await answer(http::status::ok, "alive\n");
     if (target == "/readyz") {
-      const bool ready = room_.ready();
+      const bool ready = context_.ready();
       co_return co_await answer(ready ? http::status::ok : http::status::service_unavailable,
                                 ready ? "ready\n" : "stopping\n");
     }
     if (target == "/metrics") {
       if (!proven()) co_return co_await deny();
       const auto host = request[http::field::host];
-      if (room_.token.empty() && !names_this_machine({host.data(), host.size()}))
+      if (context_.token.empty() && !names_this_machine({host.data(), host.size()}))
         co_return co_await answer(http::status::forbidden, "without a token, ask by address or localhost\n");
-      co_return co_await answer(http::status::ok, room_.metrics());
+      co_return co_await answer(http::status::ok, context_.metrics());
     }
     co_return co_await answer(http::status::not_found, "see /healthz, /readyz, /metrics and /v1\n");
   }
 
   // Who has shown the token is not kept out by those who have none, nor a viewer by who asks for pages.
   WebKind kind(std::string_view target) const {
-    if (!room_.token.empty() && proven()) return WebKind::proven;
+    if (!context_.token.empty() && proven()) return WebKind::proven;
     return target == "/v1" && websocket::is_upgrade(parser_.get()) ? WebKind::handshake : WebKind::page;
   }
 
   // Whoever needs no token has it.
   bool proven() const {
-    if (room_.token.empty()) return true;
+    if (context_.token.empty()) return true;
     const auto header = parser_.get()[http::field::authorization];
-    return bears({header.data(), header.size()}, room_.token);
+    return bears({header.data(), header.size()}, context_.token);
   }
 
   net::awaitable<void> deny() {
-    room_.denied();
+    context_.denied();
     co_await answer(http::status::unauthorized, "Authorization: Bearer TOKEN is missing or wrong\n");
   }
 
@@ -266,11 +266,11 @@ class Request final : public WebRequest {
       co_return co_await answer(http::status::upgrade_required, "/v1 speaks WebSocket\n");
     // Browsers name the page that asks; other clients name none, and could claim any.
     const auto origin = request[http::field::origin];
-    const bool foreign =
-        !origin.empty() && std::find(room_.origins.begin(), room_.origins.end(),
-                                     std::string_view(origin.data(), origin.size())) == room_.origins.end();
+    const bool foreign = !origin.empty() &&
+                         std::find(context_.origins.begin(), context_.origins.end(),
+                                   std::string_view(origin.data(), origin.size())) == context_.origins.end();
     if (foreign) {
-      room_.denied();
+      context_.denied();
       co_return co_await answer(http::status::forbidden, "pages of this origin may not connect\n");
     }
     const auto token = request[http::field::authorization];
@@ -297,7 +297,7 @@ class Request final : public WebRequest {
     // What the request brought beyond its header would be lost: no client may speak before the answer.
     if (ec || over_ || buffer_.size() > 0) co_return;
     over_ = true;
-    room_.welcome(std::make_unique<WebSocketTransport>(std::move(socket_)), peer_, known);
+    context_.welcome(std::make_unique<WebSocketTransport>(std::move(socket_)), peer_, known);
   }
 
   net::awaitable<void> answer(http::status status, std::string body) {
@@ -318,7 +318,7 @@ class Request final : public WebRequest {
     while (!ec && !over_) co_await stream_->transport().read_some(rest, ec);
   }
 
-  const WebRoom& room_;
+  const WebContext& context_;
   std::string peer_;
   std::unique_ptr<Stream> stream_;
   std::unique_ptr<Socket> socket_;
@@ -330,8 +330,8 @@ class Request final : public WebRequest {
 }  // namespace
 
 std::shared_ptr<WebRequest> web_request(std::unique_ptr<Transport> transport, std::string peer,
-                                        const WebRoom& room) {
-  return std::make_shared<Request>(std::move(transport), std::move(peer), room);
+                                        const WebContext& context) {
+  return std::make_shared<Request>(std::move(transport), std::move(peer), context);
 }
 
 }  // namespace ecorche::server

@@ -17,7 +17,7 @@ namespace ecorche::server {
 enum class WebKind : std::uint8_t { page, handshake, proven };
 
 /// What the HTTP port asks the server.
-struct WebRoom {
+struct WebContext {
   std::string token;                 ///< empty: none is asked for
   std::vector<std::string> origins;  ///< pages that may connect, as browsers name them
   std::size_t header_bytes = 4 << 10;
@@ -46,8 +46,8 @@ class WebRequest : public std::enable_shared_from_this<WebRequest> {
   Clock::time_point born_ = Clock::now();
 };
 
-/// `room` outlives it.
+/// `context` outlives it.
 std::shared_ptr<WebRequest> web_request(std::unique_ptr<Transport> transport, std::string peer,
-                                        const WebRoom& room);
+                                        const WebContext& context);
 
 }  // namespace ecorche::server

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::server {
 
 /// True for what `Host` says of an address (`127.0.0.1:9090`, `[::1]`) or of this machine itself
@@ -21,10 +23,7 @@ inline bool names_this_machine(std::string_view host) {
     host = host.substr(0, host.find(':'));
   }
   if (host.ends_with('.')) host.remove_suffix(1);
-  std::string name(host);
-  for (char& c : name) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
+  const std::string name = text::lower(host);
   if (name == "localhost" || name.ends_with(".localhost")) return true;
   boost::system::error_code ec;
   boost::asio::ip::make_address(name, ec);

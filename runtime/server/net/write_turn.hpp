@@ -24,7 +24,7 @@ class WriteTurn {
   WriteTurn& operator=(const WriteTurn&) = delete;
 
   /// Bytes that may leave now, in one go: a tenth of a millisecond or two where nobody else waits.
-  static std::size_t room() {
+  static std::size_t allowance() {
     const Line& all = line();
     return std::max(least, most / (1 + (all.taken ? 1 : 0) + all.waiting.size()));
   }

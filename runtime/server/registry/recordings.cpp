@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
 #include "runtime/server/resources/shares.hpp"
-#include "runtime/server/schedule/post_back.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -34,30 +34,23 @@ Clip read_clip(const std::filesystem::path& path, const std::string& name, std::
 
 }  // namespace
 
-Recordings::Recordings(net::io_context& io, const Options& options)
-    : io_(io),
-      options_(options),
-      begun_(options.limits.recordings_per_minute / 60, kBurst),
-      scribe_(1, giving_way) {}
+Recordings::Recordings(Executor& executor, const Options& options)
+    : executor_(executor), options_(options), begun_(options.limits.recordings_per_minute / 60, kBurst) {}
 
 Status Recordings::begin(Session& session, const std::string& name, const std::string& address) {
   std::filesystem::path path;
-  if (Status status = room(name, address, path); !status.ok()) return status;
+  if (Status status = check(name, address, path); !status.ok()) return status;
   auto recording = std::make_shared<Recording>(name, *session.model(), "ecorche " + options_.version,
                                                options_.limits.record_bytes);
   recording->put({.file = std::make_shared<RecordingFile>(path), .owner = address});
   running_.push_back(recording);
   files_[address].push_back(path);
-  session.record(std::move(recording));
+  session.recorder().start(std::move(recording));
   return {};
 }
 
-Status Recordings::room(const std::string& name, const std::string& address, std::filesystem::path& path) {
-  if (options_.record_folder.empty()) {
-    return {StatusCode::failed_precondition,
-            "record: this server keeps no recordings (serve with --record-dir)"};
-  }
-  if (!identifier(name))
+Status Recordings::check(const std::string& name, const std::string& address, std::filesystem::path& path) {
+  if (!is_identifier(name))
     return {StatusCode::invalid_argument, "record: a name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   path = options_.record_folder / (name + ".ecrec");
   std::erase_if(running_, [](const auto& one) { return one.expired(); });
@@ -87,7 +80,7 @@ Status Recordings::room(const std::string& name, const std::string& address, std
     return {StatusCode::resource_exhausted,
             "record: " + std::to_string(own) + " recordings of your address run already (end one first)"};
   }
-  if (Status status = room_in_folder(address); !status.ok()) return status;
+  if (Status status = check_folder(address); !status.ok()) return status;
   if (!address.empty() && !begun_.take(address, Clock::now())) {
     return {StatusCode::resource_exhausted,
             "record: your address begins them too fast (wait a minute, or raise --recording-rate)"};
@@ -95,7 +88,7 @@ Status Recordings::room(const std::string& name, const std::string& address, std
   return {};
 }
 
-Status Recordings::room_in_folder(const std::string& address) {
+Status Recordings::check_folder(const std::string& address) {
   const Limits& limits = options_.limits;
   std::vector<std::filesystem::path>& own = files_[address];
   // One that runs has no file before its first pose.
@@ -116,12 +109,12 @@ Status Recordings::room_in_folder(const std::string& address) {
     return {StatusCode::resource_exhausted,
             "record: your address' share of the server's folder is full (ask who runs it)"};
   }
-  if (make_room() < limits.recording_files) return {};
+  if (evict() < limits.recording_files) return {};
   return {StatusCode::resource_exhausted, "record: the server's folder is full (ask who runs it)"};
 }
 
 // Files in the folder. Where it is full, what is old makes way first, the oldest first; never what runs.
-std::size_t Recordings::make_room() const {
+std::size_t Recordings::evict() const {
   namespace fs = std::filesystem;
   std::error_code ec;
   std::size_t count = 0;
@@ -151,7 +144,7 @@ void Recordings::write_pending(Recording& recording) {
   if (bytes.empty()) return;
   file->expect(bytes.size());
   if (file->expected() > kMostWaiting) recording.stop_growing();
-  scribe_.submit([file, bytes = std::move(bytes)] { file->append(bytes); });
+  executor_.submit(Service::files, [file, bytes = std::move(bytes)] { file->append(bytes); });
 }
 
 void Recordings::tick(Clock::time_point now) {
@@ -163,31 +156,30 @@ void Recordings::tick(Clock::time_point now) {
 }
 
 void Recordings::finish(Session& session, std::function<void(const Status&)> done) {
-  session.end_recording([this, recording = session.recording(), model = session.model(),
-                         done = std::move(done)] { write(recording, *model, done); });
+  session.recorder().stop([this, recording = session.recorder().recording(), model = session.model(),
+                           done = std::move(done)] { write(recording, *model, done); });
 }
 
 void Recordings::keep(Session& session) {
-  if (!session.recording()) return;
-  finish(session, [name = session.recording()->name()](const Status& status) {
+  if (!session.recorder().running()) return;
+  finish(session, [name = session.recorder().recording()->name()](const Status& status) {
     if (!status.ok() && status.code != StatusCode::failed_precondition)
       spdlog::warn("recording {}: {}", name, status.message);
   });
 }
 
-// What the scribe did last for a recording.
+// What was written last of a recording.
 struct Recordings::Ended {
   Recordings& recordings;
   std::shared_ptr<Recording> recording;
   std::uint64_t rig_digest;
   std::size_t segments;
   std::function<void(const Status&)> done;
-  net::executor_work_guard<net::io_context::executor_type> guard;
   std::string rest = {};
   Status status = {};
   Clip clip = {};
 
-  // On the scribe's thread.
+  // On the thread of files.
   void write(std::size_t most) noexcept {
     RecordingFile& file = *recording->place().file;
     file.append(rest);
@@ -214,18 +206,16 @@ void Recordings::write(const std::shared_ptr<Recording>& recording, const Served
                  "record: no pose came while it ran, so there is no file (pose, then end it)"});
   }
   recording->finish();
-  auto ended = std::make_shared<Ended>(Ended{.recordings = *this,
-                                             .recording = recording,
-                                             .rig_digest = model.opened.rig_digest(),
-                                             .segments = model.model().segment_count(),
-                                             .done = std::move(done),
-                                             .guard = net::make_work_guard(io_)});
+  const auto ended = std::make_shared<Ended>(Ended{.recordings = *this,
+                                                   .recording = recording,
+                                                   .rig_digest = model.opened.rig_digest(),
+                                                   .segments = model.model().segment_count(),
+                                                   .done = std::move(done)});
   ended->rest = recording->take();
   recording->place().file->expect(ended->rest.size());
-  scribe_.submit([&io = io_, most = options_.limits.record_bytes, ended = std::move(ended)]() mutable {
-    ended->write(most);
-    post_back(io, [ended = std::move(ended)] { (*ended)(); });
-  });
+  executor_.run(
+      Service::files, [ended, most = options_.limits.record_bytes] { ended->write(most); },
+      [ended] { (*ended)(); });
 }
 
 std::vector<std::shared_ptr<const Clip>> Recordings::clips(std::uint64_t rig_digest) const {

@@ -11,12 +11,12 @@
 
 #include "runtime/server/resources/options.hpp"
 #include "runtime/server/resources/rates.hpp"
-#include "runtime/server/schedule/workers.hpp"
+#include "runtime/server/schedule/executor.hpp"
 #include "runtime/server/session/session.hpp"
 
 namespace ecorche::server {
 
-/// On the I/O thread; a thread of its own writes.
+/// On the I/O thread; Service::files writes.
 ///
 /// The limits are there so that no client keeps the others from recording: of what runs at once and of the
 /// folder's files one address has its share (Limits::peer_share) and begins so many a minute
@@ -30,11 +30,12 @@ class Recordings {
   /// What is recorded reaches the disk so often.
   static constexpr std::chrono::milliseconds written_every{500};
 
-  Recordings(net::io_context& io, const Options& options);
+  Recordings(Executor& executor, const Options& options);
 
-  /// Begins one in the session, which has none, for a client of this address. failed_precondition where
-  /// nothing is recorded, invalid_argument for an odd name, already_exists for one that is taken,
-  /// resource_exhausted for one too many.
+  /// This server keeps recordings; else none may begin.
+  bool enabled() const { return !options_.record_folder.empty(); }
+  /// Begins one in the session, which has none, for a client of this address. invalid_argument for an odd
+  /// name, already_exists for one that is taken, resource_exhausted for one too many.
   Status begin(Session& session, const std::string& name, const std::string& address);
   /// Ends the session's recording, which it has, with its last pose; then `done`, with how it reached the
   /// disk. failed_precondition where no pose came.
@@ -55,22 +56,21 @@ class Recordings {
     std::shared_ptr<const Clip> clip;
     std::uint64_t bytes;
   };
-  Status room(const std::string& name, const std::string& address, std::filesystem::path& path);
-  Status room_in_folder(const std::string& address);
-  std::size_t make_room() const;
+  Status check(const std::string& name, const std::string& address, std::filesystem::path& path);
+  Status check_folder(const std::string& address);
+  std::size_t evict() const;
   void write_pending(Recording& recording);
   void write(const std::shared_ptr<Recording>& recording, const ServedModel& model,
              std::function<void(const Status&)> done);
   void add(std::uint64_t rig_digest, Clip clip);
 
-  net::io_context& io_;
+  Executor& executor_;
   const Options& options_;
   Rates begun_;                                    ///< by address
   std::vector<std::weak_ptr<Recording>> running_;  ///< or wait for their last frames, or are being written
   std::map<std::string, std::vector<std::filesystem::path>> files_;  ///< that were begun, by address
   std::vector<Playable> playable_;
   Clock::time_point written_{};
-  Workers scribe_;
 };
 
 }  // namespace ecorche::server

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/registry/session_registry.hpp"
+#include "core/values/identifier.hpp"
 
 #include <spdlog/spdlog.h>
 
@@ -30,19 +31,14 @@ void warm_up(const ServedModel& model) {
 SessionRegistry::SessionRegistry(net::io_context& io, Workers& workers, Options options,
                                  std::vector<NamedModel> models, TestHooks hooks)
     : io_(io),
-      workers_(workers),
       options_(std::move(options)),
       memory_(options_.limits.queued_bytes, options_.limits.kept_bytes),
-      quality_turns_(io, TurnQueue::Order::first_come, kQualityPause, last_of_all),
-      first_frames_(io, TurnQueue::Order::least_used, 0, giving_way),
-      recordings_(io, options_),
       hooks_(std::move(hooks)),
-      journal_(options_.limits.log_lines_per_second),
-      aside_(1, giving_way),
-      bin_(1, giving_way),
-      coarsener_(1, giving_way),
-      volumes_(static_cast<int>(workers.threads())),
-      planes_(static_cast<int>(workers.threads())) {
+      executor_(io, workers),
+      quality_turns_(io, TurnQueue::Order::first_come, kQualityPause),
+      first_frames_(io, TurnQueue::Order::least_used),
+      recordings_(executor_, options_),
+      journal_(options_.limits.log_lines_per_second) {
   if (models.empty() || models.size() > options_.limits.models) {
     throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
                 "serve 1 to " + std::to_string(options_.limits.models) + ", or raise --max-models");
@@ -53,8 +49,8 @@ SessionRegistry::SessionRegistry(net::io_context& io, Workers& workers, Options 
     models_.push_back(
         std::make_shared<const ServedModel>(model.name, std::move(model.model), std::move(model.clips)));
     // The first frame of all will want it.
-    workers_.submit([served = models_.back()] { warm_up(*served); });
-    coarsen(models_.back());
+    executor_.submit(Service::frames, [served = models_.back()] { warm_up(*served); });
+    make_levels(models_.back());
   }
 }
 
@@ -77,13 +73,13 @@ void SessionRegistry::stop() {
 
 // Levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a
 // model that nobody has any more.
-void SessionRegistry::coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
+void SessionRegistry::make_levels(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
   if (leaving_ || tissue >= model->model().tissues.size() || model.use_count() == 1) return;
-  coarsener_.submit([this, model = std::move(model), tissue]() mutable {
+  executor_.submit(Service::levels, [this, model = std::move(model), tissue]() mutable {
     if (hooks_.may_coarsen && !hooks_.may_coarsen()) return;
     try {
       model->make_levels({tissue});
-      coarsen(std::move(model), tissue + 1);
+      make_levels(std::move(model), tissue + 1);
     } catch (const std::bad_alloc&) {  // who asks is told
     }
   });
@@ -105,7 +101,7 @@ Status SessionRegistry::open(const v1::OpenModel& request, const std::string& ad
   if (model == models_.end())
     return {StatusCode::not_found, "open: no model of that name (ListModels has the names)"};
   const bool named = !request.session().empty();
-  if (named && !identifier(request.session())) {
+  if (named && !is_identifier(request.session())) {
     return {StatusCode::invalid_argument,
             "open: a session's name is 1 to 64 of a-z, 0-9 and _ (mend the name)"};
   }
@@ -121,7 +117,7 @@ Status SessionRegistry::open(const v1::OpenModel& request, const std::string& ad
     return {};
   }
   sweep(Clock::now());
-  if (sessions() >= options_.limits.sessions && !make_room()) {
+  if (sessions() >= options_.limits.sessions && !evict()) {
     metrics_.hit("sessions");
     return {StatusCode::resource_exhausted,
             "open: " + std::to_string(sessions()) + " sessions are open (try again when one has ended)"};
@@ -131,28 +127,30 @@ Status SessionRegistry::open(const v1::OpenModel& request, const std::string& ad
       std::count_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return own(*s.second); }) +
       std::count_if(retired_.begin(), retired_.end(), [&](const auto& s) { return own(*s); });
   const std::uint64_t most = portion(options_.limits.sessions, options_.limits.peer_share);
-  if (!address.empty() && static_cast<std::uint64_t>(count) >= most && !make_room(address)) {
+  if (!address.empty() && static_cast<std::uint64_t>(count) >= most && !evict(address)) {
     metrics_.hit("sessions");
     return {StatusCode::resource_exhausted, "open: " + std::to_string(count) +
                                                 " sessions of your address are open (leave one, or ask for "
                                                 "a larger --peer-share)"};
   }
-  const Services services{io_,
-                          workers_,
-                          volumes_.workers(),
-                          planes_.workers(),
-                          memory_,
-                          quality_turns_,
-                          first_frames_,
-                          activity_,
-                          metrics_,
-                          [this](std::shared_ptr<const void> what) { destroy_later(std::move(what)); },
-                          &journal_};
-  out = std::make_shared<Session>(services, *model, name, named, options_.limits);
-  const auto before = [&](const auto& session) { return session->name() == name && session->controlled(); };
-  if (std::any_of(retired_.begin(), retired_.end(), before)) out->await_heir();
+  const Services services{
+      .io = io_,
+      .executor = executor_,
+      .memory = memory_,
+      .quality_turns = quality_turns_,
+      .first_frames = first_frames_,
+      .activity = activity_,
+      .metrics = metrics_,
+      .destroy_later = [this](std::shared_ptr<const void> what) { executor_.destroy_later(std::move(what)); },
+      .journal = &journal_};
   const std::shared_ptr<const ClientShare> of = share_of(address);
-  out->belong(address, of->kept, of->account);
+  out = std::make_shared<Session>(services, *model, name, named, options_.limits,
+                                  SessionOwner{.address = address, .kept = of->kept, .account = of->account});
+  const auto now = Clock::now();
+  const auto before = [&](const auto& session) {
+    return session->name() == name && session->control().taken(now);
+  };
+  if (std::any_of(retired_.begin(), retired_.end(), before)) out->control().await_heir(now);
   sessions_.emplace(name, out);
   return {};
 }
@@ -175,7 +173,7 @@ std::shared_ptr<const SessionRegistry::ClientShare> SessionRegistry::share_of(co
 // The one that waits for longest, of those that only wait for a client to come back, goes; those without a
 // name first; with an address, of those of its clients. Otherwise one client that makes sessions and leaves
 // them would keep all others out.
-bool SessionRegistry::make_room(const std::string& address) {
+bool SessionRegistry::evict(const std::string& address) {
   const auto rank = [&](const Session& session) {
     const bool other = !address.empty() && session.owner() != address;
     const auto since = other ? std::nullopt : session.waiting();
@@ -196,7 +194,7 @@ void SessionRegistry::sweep(Clock::time_point now) {
   old.reserve(retired_.size());
   const auto ends = [&](const std::shared_ptr<Session>& session) {
     session->forget_probes(now);
-    session->free_control(now);
+    session->control().expire(now);
     const bool over = session->over(now);
     const auto since = session->abandoned();
     if (over || (since && now - *since >= Recordings::abandoned_after)) recordings_.keep(*session);
@@ -205,7 +203,7 @@ void SessionRegistry::sweep(Clock::time_point now) {
   };
   std::erase_if(sessions_, [&](const auto& entry) { return ends(entry.second); });
   std::erase_if(retired_, ends);
-  for (auto& model : old) destroy_later(std::move(model));
+  for (auto& model : old) executor_.destroy_later(std::move(model));
   const auto linger = duration(options_.limits.linger_seconds);
   std::erase_if(places_, [&](const auto& entry) {
     return now - entry.second.since >= linger || entry.second.session.expired();
@@ -285,10 +283,10 @@ void SessionRegistry::reload(const std::string& name, std::function<void(const S
     }
   };
   // Beside all else: nobody waits for it but who asked.
-  run_in_background(work, [this, reading, done = std::move(done)] {
+  executor_.run(Service::background, work, [this, reading, done = std::move(done)] {
     reloading_ = false;
     if (reading->status.ok()) replace(reading->model);
-    destroy_later(std::exchange(reading->model, nullptr));
+    executor_.destroy_later(std::exchange(reading->model, nullptr));
     done(reading->status);
   });
 }
@@ -330,67 +328,11 @@ void SessionRegistry::replace(std::shared_ptr<const ServedModel> model) {
     it = sessions_.erase(it);
   }
   std::swap(*old, model);
-  destroy_later(std::move(model));
+  executor_.destroy_later(std::move(model));
   try {
-    coarsen(*old);
+    make_levels(*old);
   } catch (const std::bad_alloc&) {  // who asks for levels has them made
   }
-}
-
-void SessionRegistry::run_on_worker(std::function<void()> work, std::function<void()> then,
-                                    std::shared_ptr<Account> by) {
-  queued_tasks_.push_back({std::move(work), std::move(then), std::move(by)});
-  start_queued();
-}
-
-// Without memory nothing is lost: what could not be handed over waits for the next time.
-void SessionRegistry::start_queued() {
-  const std::size_t most = std::max<std::size_t>(workers_.threads(), 2) - 1;
-  while (on_workers_ < most && !queued_tasks_.empty()) {
-    const auto first = std::min_element(queued_tasks_.begin(), queued_tasks_.end(),
-                                        [](const QueuedTask& a, const QueuedTask& b) {
-                                          if (!a.by || !b.by) return !a.by && b.by;
-                                          return a.by->used() < b.by->used();
-                                        });
-    const auto charged = [work = first->work, by = first->by] {
-      const auto begun = Clock::now();
-      work();
-      if (by) by->use(seconds(Clock::now() - begun));
-    };
-    submit_to(workers_, charged, [this, then = first->then] {
-      --on_workers_;
-      try {
-        start_queued();
-      } catch (const std::bad_alloc&) {
-      }
-      then();
-    });
-    ++on_workers_;
-    queued_tasks_.erase(first);
-  }
-}
-
-void SessionRegistry::run_in_background(std::function<void()> work, std::function<void()> then,
-                                        std::shared_ptr<Account> by) {
-  submit_to(aside_, std::move(work), std::move(then), std::move(by));
-}
-
-void SessionRegistry::destroy_later(std::shared_ptr<const void> what) noexcept {
-  try {
-    bin_.submit([what = std::move(what)]() mutable { what = nullptr; });
-  } catch (const std::exception&) {  // no memory to say so: it goes here
-  }
-}
-
-void SessionRegistry::submit_to(Workers& to, std::function<void()> work, std::function<void()> then,
-                                std::shared_ptr<Account> by) {
-  Job job = [&io = io_, work = std::move(work), then = std::move(then),
-             guard = net::make_work_guard(io_)]() mutable {
-    work();
-    // What both hold ends on the I/O thread.
-    post_back(io, [work = std::move(work), then = std::move(then), guard = std::move(guard)] { then(); });
-  };
-  to.submit(std::move(job), std::move(by));
 }
 
 }  // namespace ecorche::server

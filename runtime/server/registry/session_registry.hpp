@@ -3,7 +3,6 @@
 #pragma once
 
 #include <atomic>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -18,10 +17,9 @@
 #include "runtime/server/resources/journal.hpp"
 #include "runtime/server/resources/memory_budget.hpp"
 #include "runtime/server/resources/metrics.hpp"
+#include "runtime/server/schedule/executor.hpp"
 #include "runtime/server/schedule/stream_activity.hpp"
 #include "runtime/server/schedule/turn_queue.hpp"
-#include "runtime/server/schedule/volume_workers.hpp"
-#include "runtime/server/schedule/workers.hpp"
 #include "runtime/server/session/session.hpp"
 
 namespace ecorche::server {
@@ -76,23 +74,12 @@ class SessionRegistry {
   Recordings& recordings() { return recordings_; }
   /// Ends those of all sessions, whose end is the server's.
   void end_recordings();
-  /// Reads a model again, aside, and calls `done` on the I/O thread.
+  /// Reads a model again, in the background, and calls `done` on the I/O thread.
   void reload(const std::string& name, std::function<void(const Status&)> done);
   /// All of them, one after the other; the log tells how each went.
   void reload_all();
 
-  /// `work` on a worker, then `then` on the I/O thread. Neither may throw. One worker is left for poses
-  /// (where there are two): what else is asked, however much, waits for the others. `by`: for whom; who had
-  /// least comes first.
-  void run_on_worker(std::function<void()> work, std::function<void()> then,
-                     std::shared_ptr<Account> by = nullptr);
-  /// As offload, but on one thread that gives way to all others.
-  void run_in_background(std::function<void()> work, std::function<void()> then,
-                         std::shared_ptr<Account> by = nullptr);
-
-  /// Lets go of what a client had to be sent, on that thread: giving back a GiB takes longer than a frame.
-  void destroy_later(std::shared_ptr<const void> what) noexcept;
-
+  Executor& executor() { return executor_; }
   Metrics& metrics() { return metrics_; }
   Journal& journal() { return journal_; }
   const MemoryBudget& memory() const { return memory_; }
@@ -113,44 +100,32 @@ class SessionRegistry {
   void sweep(Clock::time_point now);
 
  private:
-  net::io_context& io_;
-  Workers& workers_;
-  void submit_to(Workers& to, std::function<void()> work, std::function<void()> then,
-                 std::shared_ptr<Account> by = nullptr);
-  void start_queued();
-  void coarsen(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
+  void make_levels(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
   void replace(std::shared_ptr<const ServedModel> model);
   void reload_from(std::size_t row);
-  bool make_room(const std::string& address = {});
+  bool evict(const std::string& address = {});
 
+  net::io_context& io_;
   Options options_;
   MemoryBudget memory_;
+  TestHooks hooks_;
+  std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
+  std::vector<std::shared_ptr<const ServedModel>> models_;
+  Executor executor_;  ///< its threads read what is above, and end before
   TurnQueue quality_turns_, first_frames_;
   StreamActivity activity_;
-  std::vector<std::shared_ptr<const ServedModel>> models_;
   std::map<std::string, std::function<ModelParts()>> sources_;
   bool reloading_ = false;
   std::map<std::string, std::function<void()>> live_;
   std::map<std::string, SavedPlace> places_;
   std::vector<std::shared_ptr<Session>> retired_;
   Recordings recordings_;
-  TestHooks hooks_;
   Metrics metrics_;
   Journal journal_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
   std::uint64_t connections_seen_ = 0;
   std::map<std::string, std::shared_ptr<const ClientShare>> client_shares_;  ///< by address
   std::optional<Clock::time_point> crowded_;                                 ///< when it was last
-  struct QueuedTask {
-    std::function<void()> work, then;
-    std::shared_ptr<Account> by;
-  };
-  std::deque<QueuedTask> queued_tasks_;  ///< wait for a worker
-  std::size_t on_workers_ = 0;           ///< have one
-  std::atomic<bool> leaving_ = false;    ///< no more levels of detail are made before somebody asks
-  Workers aside_;                        ///< for what clients ask for, and models that are read again
-  Workers bin_, coarsener_;  ///< lets go of what is large; makes levels of detail that nobody waits for yet
-  VolumeWorkers volumes_, planes_;
 };
 
 }  // namespace ecorche::server

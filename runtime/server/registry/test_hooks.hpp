@@ -26,13 +26,13 @@ struct TestHooks {
 /// Tells TestHooks::handling while it lives.
 class HandlingScope {
  public:
-  explicit HandlingScope(const TestHooks& hooks) : hooks_(hooks) { tell(true); }
-  ~HandlingScope() { tell(false); }
+  explicit HandlingScope(const TestHooks& hooks) : hooks_(hooks) { notify(true); }
+  ~HandlingScope() { notify(false); }
   HandlingScope(const HandlingScope&) = delete;
   HandlingScope& operator=(const HandlingScope&) = delete;
 
  private:
-  void tell(bool begins) const {
+  void notify(bool begins) const {
     if (hooks_.handling) hooks_.handling(begins);
   }
   const TestHooks& hooks_;

@@ -5,9 +5,6 @@
 
 namespace ecorche::server {
 
-TurnQueue::TurnQueue(net::io_context& io, Order order, int pause, std::function<void(const Job&)> within)
-    : timer_(io), order_(order), pause_(pause), worker_(1, std::move(within)) {}
-
 void TurnQueue::ask(const std::shared_ptr<Turn>& turn) {
   waiting_.push_back(turn);  // before it is taken for awaited: there may be no memory
   if (std::exchange(turn->awaited_, true)) waiting_.pop_back();

@@ -19,8 +19,8 @@ class Turn {
  public:
   /// `begin`: has the turn's work done, and TurnQueue::done() called then; false where there is none any
   /// more. `account`: for whom; read when turns are compared.
-  Turn(std::function<bool()> begin, const std::shared_ptr<Account>& account)
-      : begin_(std::move(begin)), account_(account) {}
+  Turn(std::function<bool()> begin, std::shared_ptr<Account> account)
+      : begin_(std::move(begin)), account_(std::move(account)) {}
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
 
@@ -29,11 +29,11 @@ class Turn {
  private:
   friend class TurnQueue;
   std::function<bool()> begin_;
-  const std::shared_ptr<Account>& account_;
+  std::shared_ptr<Account> account_;
   bool awaited_ = false;
 };
 
-/// One turn at a time, on a thread of its own that is below all who make frames. On the I/O thread.
+/// One turn at a time, wherever its work is done. On the I/O thread.
 class TurnQueue {
  public:
   enum class Order : std::uint8_t {
@@ -41,15 +41,11 @@ class TurnQueue {
     least_used,  ///< whoever had least of the threads is next
   };
 
-  /// `pause`: after a turn there is none for so many times as long as it cost. `within` as of Workers.
-  TurnQueue(net::io_context& io, Order order, int pause, std::function<void(const Job&)> within);
+  /// `pause`: after a turn there is none for so many times as long as it cost.
+  TurnQueue(net::io_context& io, Order order, int pause = 0) : timer_(io), order_(order), pause_(pause) {}
 
   /// Its turn comes; once, however often it asks.
   void ask(const std::shared_ptr<Turn>& turn);
-  /// Has the turn's work done; it must not throw.
-  void submit(Job work, std::shared_ptr<Account> by = nullptr) {
-    worker_.submit(std::move(work), std::move(by));
-  }
   /// The turn is over; it took so much of a processor.
   void done(Clock::duration cost = {});
   /// No more turns.
@@ -66,7 +62,6 @@ class TurnQueue {
   bool busy_ = false;     ///< a turn is taken
   bool resting_ = false;  ///< the timer runs
   bool stopped_ = false;
-  Workers worker_;
 };
 
 }  // namespace ecorche::server

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/schedule/workers.hpp"
 
-#ifdef __linux__
-#include <sched.h>
-#include <sys/resource.h>
-#include <unistd.h>
-#endif
-
 #include <algorithm>
 #include <chrono>
 #include <utility>
+
+#include "core/platform/thread_priority.hpp"
 
 namespace ecorche::server {
 
@@ -75,35 +71,23 @@ void Workers::work() {
   }
 }
 
-// On Linux a thread may have a priority of its own; anybody may lower it. Not to the least: who waits for a
-// lock of this thread's then waits for all others.
+// Not to the least: who waits for a lock of this thread's then waits for all others.
 void giving_way(const Job& job) {
-#ifdef __linux__
-  constexpr int kNice = 10;
-  thread_local const int lowered = setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
+  thread_local const bool lowered = platform::set_thread_priority(platform::Priority::low);
   static_cast<void>(lowered);  // where it may not, it does not
-#endif
   job();
 }
 
 // To what wakes, a core that runs only such a thread is an idle one; with another priority it is not, and
 // what wakes may wait for as long as a turn takes (3 ms).
 void last_of_all(const Job& job) {
-#ifdef __linux__
-  constexpr sched_param kNone{};
-  thread_local const int lowered = sched_setscheduler(0, SCHED_IDLE, &kNone);
+  thread_local const bool lowered = platform::set_thread_priority(platform::Priority::idle);
   static_cast<void>(lowered);
-#endif
   job();
 }
 
 bool going_first() {
-#ifdef __linux__
-  constexpr sched_param kLeast{.sched_priority = 1};
-  return sched_setscheduler(0, SCHED_RR | SCHED_RESET_ON_FORK, &kLeast) == 0;
-#else
-  return false;
-#endif
+  return platform::set_thread_priority(platform::Priority::real_time);
 }
 
 }  // namespace ecorche::server

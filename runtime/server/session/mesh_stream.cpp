@@ -46,8 +46,8 @@ bool inside(std::span<const std::uint16_t> numbers) {
 
 MeshStream::MeshStream(MeshSpec spec, std::uint32_t level, std::shared_ptr<const MeshParts> parts,
                        std::vector<std::uint32_t> nodes)
-    : want_(std::move(spec)), level_(level), parts_(std::move(parts)), nodes_(std::move(nodes)) {
-  if (parts_) gathered_.resize(want_.tissues.size());
+    : spec_(std::move(spec)), level_(level), parts_(std::move(parts)), nodes_(std::move(nodes)) {
+  if (parts_) gathered_.resize(spec_.tissues.size());
 }
 
 void MeshStream::gather(const runtime::PosedBody& body) {
@@ -55,7 +55,7 @@ void MeshStream::gather(const runtime::PosedBody& body) {
   tbb::parallel_for(std::size_t{0}, gathered_.size(), [&](std::size_t t) {
     const MeshRows& part = (*parts_)[t];
     gathered_[t].resize(3 * part.vertices.size());
-    const std::vector<std::uint16_t>& all = body.quantised[want_.tissues[t]];
+    const std::vector<std::uint16_t>& all = body.quantised[spec_.tissues[t]];
     for (std::size_t i = 0; i < part.vertices.size(); ++i)
       std::copy_n(&all[3 * std::size_t{part.vertices[i]}], 3, &gathered_[t][3 * i]);
   });
@@ -63,12 +63,12 @@ void MeshStream::gather(const runtime::PosedBody& body) {
 
 std::span<const std::uint16_t> MeshStream::numbers(const runtime::PosedBody& body, std::size_t t) const {
   if (parts_) return gathered_[t];
-  return body.quantised[want_.tissues[t]];
+  return body.quantised[spec_.tissues[t]];
 }
 
 bool MeshStream::fits_box(const runtime::PosedBody& body) const {
   std::atomic<bool> good = true;
-  tbb::parallel_for(std::size_t{0}, want_.tissues.size(), [&](std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, spec_.tissues.size(), [&](std::size_t t) {
     const std::span<const std::uint16_t> all = numbers(body, t);
     const std::size_t pieces = (all.size() + kNumbersPerPiece - 1) / kNumbersPerPiece;
     tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t p) {
@@ -82,7 +82,7 @@ bool MeshStream::fits_box(const runtime::PosedBody& body) const {
 // oct16, into `packed`.
 void MeshStream::pack_normals(const runtime::PosedBody& body, std::size_t t,
                               std::vector<std::int8_t>& packed) const {
-  const std::uint32_t tissue = want_.tissues[t];
+  const std::uint32_t tissue = spec_.tissues[t];
   const auto pack = [&](std::span<const std::int16_t> unit) {
     packed.resize(unit.size() / 3 * 2);
     wire::to_oct16(unit, packed);
@@ -98,14 +98,14 @@ void MeshStream::pack_normals(const runtime::PosedBody& body, std::size_t t,
 template <class Add>
 void MeshStream::lay_out(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload,
                          Add&& add) {
-  std::vector<std::vector<std::int8_t>> normals(want_.normals ? want_.tissues.size() : 0);
+  std::vector<std::vector<std::int8_t>> normals(spec_.normals ? spec_.tissues.size() : 0);
   tbb::parallel_for(std::size_t{0}, normals.size(),
                     [&](std::size_t t) { pack_normals(body, t, normals[t]); });
   PayloadLayout layout;
-  for (std::size_t t = 0; t < want_.tissues.size(); ++t) {
-    add(layout, t, *add_array(frame, want_.tissues[t], v1::MeshArray::KIND_POSITIONS).mutable_array());
-    if (!want_.normals) continue;
-    layout.append(*add_array(frame, want_.tissues[t], v1::MeshArray::KIND_NORMALS).mutable_array(),
+  for (std::size_t t = 0; t < spec_.tissues.size(); ++t) {
+    add(layout, t, *add_array(frame, spec_.tissues[t], v1::MeshArray::KIND_POSITIONS).mutable_array());
+    if (!spec_.normals) continue;
+    layout.append(*add_array(frame, spec_.tissues[t], v1::MeshArray::KIND_NORMALS).mutable_array(),
                   v1::SCALAR_TYPE_I8, 2, std::span<const std::int8_t>(normals[t]));
   }
   layout.fill(payload);
@@ -142,10 +142,10 @@ bool MeshStream::keyframe_due(std::uint64_t frame) const {
 
 bool MeshStream::write(const runtime::PosedBody& body, bool boxed, bool keyframe, v1::MeshFrame& frame,
                        wire::Payload& payload) {
-  const v1::Encoding encoding = boxed ? want_.encoding : v1::ENCODING_F32;
+  const v1::Encoding encoding = boxed ? spec_.encoding : v1::ENCODING_F32;
   frame.set_encoding(encoding);
   frame.set_level(level_);
-  if (want_.control_nodes) {
+  if (spec_.control_nodes) {
     write_nodes(body, frame, payload);
     return true;
   }
@@ -163,9 +163,9 @@ bool MeshStream::write(const runtime::PosedBody& body, bool boxed, bool keyframe
     return write_deltas(body, frame, payload);
   if (encoding != v1::ENCODING_F32 && !fits_box(body)) return false;
 
-  std::vector<std::vector<float>> some(parts_ && encoding == v1::ENCODING_F32 ? want_.tissues.size() : 0);
+  std::vector<std::vector<float>> some(parts_ && encoding == v1::ENCODING_F32 ? spec_.tissues.size() : 0);
   lay_out(body, frame, payload, [&](PayloadLayout& layout, std::size_t t, v1::Array& array) {
-    const std::vector<float>& positions = body.tissues[want_.tissues[t]];
+    const std::vector<float>& positions = body.tissues[spec_.tissues[t]];
     if (encoding != v1::ENCODING_F32) {
       layout.append(array, v1::SCALAR_TYPE_U16, 3, numbers(body, t));
     } else if (parts_) {
@@ -188,7 +188,7 @@ wire::Pieces MeshStream::show(const std::shared_ptr<const Positions>& positions,
   frame.set_encoding(v1::ENCODING_F32);
   frame.set_level(level_);
   PayloadLayout layout;
-  for (const std::uint32_t tissue : want_.tissues) {
+  for (const std::uint32_t tissue : spec_.tissues) {
     layout.append(*add_array(frame, tissue, v1::MeshArray::KIND_POSITIONS).mutable_array(),
                   v1::SCALAR_TYPE_F32, 3, std::span<const float>((*positions)[tissue]));
   }
@@ -200,16 +200,16 @@ void MeshStream::settle(const runtime::PosedBody& body) {
   if (keys_.empty()) {
     std::vector<wire::DeltaKey> keys;
     runs_.clear();
-    for (std::uint32_t t = 0; t < want_.tissues.size(); ++t) {
+    for (std::uint32_t t = 0; t < spec_.tissues.size(); ++t) {
       keys.emplace_back(numbers(body, t).size() / 3);
       for (std::size_t b = 0; b < keys[t].blocks(); b += kBlocksPerRun) {
         const std::size_t end = std::min(keys[t].blocks(), b + kBlocksPerRun);
-        const std::size_t room = wire::delta::most_bytes(end - b);
+        const std::size_t capacity = wire::delta::most_bytes(end - b);
         runs_.push_back({.tissue = t,
                          .first = static_cast<std::uint32_t>(b),
                          .end = static_cast<std::uint32_t>(end),
-                         .room = room,
-                         .bytes = std::make_unique_for_overwrite<std::byte[]>(room)});
+                         .capacity = capacity,
+                         .bytes = std::make_unique_for_overwrite<std::byte[]>(capacity)});
       }
     }
     keys_ = std::move(keys);
@@ -226,8 +226,8 @@ bool MeshStream::write_deltas(const runtime::PosedBody& body, v1::MeshFrame& fra
   tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t r) {
     Run& run = runs_[r];
     // A number on the side of the box stands for anything beyond it too.
-    const wire::EncodedDelta made =
-        keys_[run.tissue].encode(numbers(body, run.tissue), run.first, run.end, {run.bytes.get(), run.room});
+    const wire::EncodedDelta made = keys_[run.tissue].encode(numbers(body, run.tissue), run.first, run.end,
+                                                             {run.bytes.get(), run.capacity});
     if (made.on_side) good = false;
     run.size = made.bytes;
   });

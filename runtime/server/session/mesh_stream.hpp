@@ -30,17 +30,17 @@ class MeshStream {
   MeshStream(MeshSpec spec, std::uint32_t level, std::shared_ptr<const MeshParts> parts,
              std::vector<std::uint32_t> nodes = {});
 
-  const MeshSpec& spec() const { return want_; }
+  const MeshSpec& spec() const { return spec_; }
   std::uint32_t level() const { return level_; }
   const MeshParts* parts() const { return parts_.get(); }
   const std::vector<std::uint32_t>& nodes() const { return nodes_; }
 
   /// What the frame needs of the posed body.
-  bool needs_numbers() const { return want_.encoding != v1::ENCODING_F32; }
-  bool needs_positions() const { return want_.encoding == v1::ENCODING_F32 && !want_.control_nodes; }
+  bool needs_numbers() const { return spec_.encoding != v1::ENCODING_F32; }
+  bool needs_positions() const { return spec_.encoding == v1::ENCODING_F32 && !spec_.control_nodes; }
 
   /// Whether its frames' payload is positions just as they are posed.
-  bool plain() const { return needs_positions() && !parts_ && !want_.normals; }
+  bool plain() const { return needs_positions() && !parts_ && !spec_.normals; }
   /// Of a plain one: as write(), without a copy. `positions`: per tissue of the model.
   wire::Pieces show(const std::shared_ptr<const Positions>& positions, v1::MeshFrame& frame) const;
 
@@ -66,13 +66,13 @@ class MeshStream {
   bool keyframe_due(std::uint64_t frame) const;
 
   struct Run {
-    std::uint32_t tissue, first, end;  // row of `want_.tissues`, blocks
-    std::size_t room;
+    std::uint32_t tissue, first, end;  // row of `spec_.tissues`, blocks
+    std::size_t capacity;
     std::unique_ptr<std::byte[]> bytes;  // of the present deltas; left as it is made, which touches nothing
     std::size_t size = 0;
   };
 
-  MeshSpec want_;
+  MeshSpec spec_;
   std::uint32_t level_;
   std::shared_ptr<const MeshParts> parts_;
   std::vector<std::uint32_t> nodes_;

@@ -301,7 +301,7 @@ Status run(const PoseJob& job) {
   BodyPool::Lease body;
   const auto pose_all = [&] {
     outcome.status = guarded("pose", [&] {
-      body = (job.aside ? job.model->bodies_aside : job.model->bodies).take();
+      body = (job.background ? job.model->background_bodies : job.model->bodies).take();
       return pose(job, *body);
     });
     outcome.timings.set_posed(microseconds(Clock::now() - start));
@@ -317,7 +317,7 @@ Status run(const PoseJob& job) {
       return posed ? show(job, *body, timings) : Status{};
     });
   };
-  if (job.alone || small(job)) {
+  if (job.serial || small(job)) {
     serially(all);
   } else {
     all();

@@ -54,6 +54,13 @@ struct ProbeFrame {
   MemoryBudget::Reservation kept;  ///< its memory, counted
 };
 
+/// What a job shows.
+struct ShownPose {
+  PoseRequest request;
+  std::uint64_t number = 0;  ///< of the frames
+  bool volumes = false;      ///< the session's volumes, too
+};
+
 struct PoseJob {
   std::shared_ptr<const ServedModel> model;
   PoseRequest request;
@@ -63,13 +70,13 @@ struct PoseJob {
   runtime::QualityThresholds thresholds;
   bool judge = false;  ///< every frame with its own pose's quality; else Subscription::quality may be told
   bool digests = false;
-  bool aside = false;    ///< in a body of those that streams do not use
-  bool alone = false;    ///< keeps to the calling thread, however large: the others are for streams
-  bool volumes = false;  ///< the session's volumes are shown by this job, too
-  std::stop_token stop;  ///< nobody wants its volumes any more
-  const MemoryBudget* memory = nullptr;  ///< counts the frames
-  MemoryBudget::Reservation room;        ///< about what they will take
-  std::shared_ptr<ProbeFrame> probe;     ///< to be filled; null where nobody probes
+  bool background = false;  ///< in a body of those that streams do not use
+  bool serial = false;      ///< keeps to the calling thread, however large: the others are for streams
+  bool volumes = false;     ///< the session's volumes are shown by this job, too
+  std::stop_token stop;     ///< nobody wants its volumes any more
+  const MemoryBudget* memory = nullptr;   ///< counts the frames
+  MemoryBudget::Reservation reservation;  ///< about what they will take
+  std::shared_ptr<ProbeFrame> probe;      ///< to be filled; null where nobody probes
   bool probe_many = false;  ///< points: the first must not wait until all is fitted that they see
   /// Called on the worker, in this order: the outcome once, `probe` once it is filled, then every frame,
   /// meshes before volumes (which take longer).

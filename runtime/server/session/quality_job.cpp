@@ -74,7 +74,7 @@ v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<
 
 BodyPool::Lease pose_still(const ServedModel& model, const PoseRequest& request,
                            const std::vector<std::uint32_t>& tissues) {
-  BodyPool::Lease body = model.bodies_aside.take();
+  BodyPool::Lease body = model.background_bodies.take();
   for (std::uint32_t t = 0; t < body->tissues.size(); ++t) {
     const bool shown = std::binary_search(tissues.begin(), tissues.end(), t);
     body->tissues[t].resize(shown ? static_cast<std::size_t>(model.model().tissues[t].V.size()) : 0);

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include <ecorche/values/error.hpp>
+#include "core/platform/file.hpp"
 
 namespace ecorche::server {
 
@@ -18,7 +19,6 @@ class RecordingFile {
  public:
   /// Of the whole recording's `path`.
   explicit RecordingFile(std::filesystem::path path);
-  ~RecordingFile();
   RecordingFile(const RecordingFile&) = delete;
   RecordingFile& operator=(const RecordingFile&) = delete;
 
@@ -36,10 +36,10 @@ class RecordingFile {
   Status commit() noexcept;
 
  private:
-  void fail(const char* what) noexcept;
+  void fail(const char* what, const std::error_code& error) noexcept;
 
   std::filesystem::path path_, part_;
-  int file_ = -1;
+  platform::File file_;
   Status status_;
   std::atomic<std::size_t> expected_ = 0;
 };

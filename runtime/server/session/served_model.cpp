@@ -106,7 +106,7 @@ ServedModel::ServedModel(Made made)
       topology(std::move(made.topology)),
       poser_(std::move(made.poser)),
       bodies(*poser_),
-      bodies_aside(*poser_),
+      background_bodies(*poser_),
       levels_(model().tissues.size()),
       balls_(model().volumes.size()) {
   for (Clip& clip : made.clips) clips.push_back(std::make_shared<const Clip>(std::move(clip)));

@@ -65,8 +65,9 @@ struct ServedModel {
   std::unique_ptr<const runtime::BodyPoser> poser_;
 
  public:
-  mutable BodyPool bodies;        ///< for jobs to pose into
-  mutable BodyPool bodies_aside;  ///< for those beside streams, which then never wait for a body to be made
+  mutable BodyPool bodies;  ///< for jobs to pose into
+  mutable BodyPool
+      background_bodies;  ///< for those beside streams, which then never wait for a body to be made
   mutable RestPose rest_pose;
   /// For the frames of meshes.
   std::shared_ptr<PayloadPool> payloads = std::make_shared<PayloadPool>(4);

@@ -145,7 +145,7 @@ Status read_volume(const v1::VolumeSelection& volume, const Model& model, Volume
 
 }  // namespace
 
-Status read_want(const v1::Subscribe& request, const Model& model, StreamSpec& out) {
+Status read_spec(const v1::Subscribe& request, const Model& model, StreamSpec& out) {
   const double rate = request.max_rate();
   if (!(rate >= 0 && std::isfinite(rate)))
     return {StatusCode::invalid_argument, "subscribe: max_rate is no rate (0, or frames per second)"};

@@ -47,7 +47,7 @@ using StreamSpec = std::variant<MeshSpec, VolumeSpec>;
 class MeshStream;
 class VolumeStream;
 
-/// Equal wants share one number within a session, and so one encoding of every frame.
+/// Equal specs share one number within a session, and so one encoding of every frame.
 struct Subscription {
   std::uint32_t id = 0;
   StreamSpec spec;
@@ -61,6 +61,6 @@ struct Subscription {
 
 /// Reads a request against a model: not_found for names it lacks, unimplemented for what this server cannot
 /// do.
-Status read_want(const v1::Subscribe& request, const Model& model, StreamSpec& out);
+Status read_spec(const v1::Subscribe& request, const Model& model, StreamSpec& out);
 
 }  // namespace ecorche::server

@@ -39,16 +39,16 @@ Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& 
   payload.clear();
   // Until it is whole: what moved meanwhile would be forgotten.
   const std::uint64_t last_keyframe = std::exchange(keyframe_, 0);
-  if (!want_.slices.empty()) {
+  if (!spec_.slices.empty()) {
     write_slices(served, body, frame, payload, context);
     return {};
   }
-  const Capacity room{most_voxels, context};
-  if (Status status = want_.by_spheres ? by_spheres(served, body, room) : by_tets(served, body, room);
+  const Bounds bounds{most_voxels, context};
+  if (Status status = spec_.by_spheres ? by_spheres(served, body, bounds) : by_tets(served, body, bounds);
       !status.ok())
     return status;
   wire::to_proto(posed_.image->grid, *frame.mutable_grid());
-  if (want_.changed_bricks) {
+  if (spec_.changed_bricks) {
     write_bricks(keyframe, last_keyframe, frame, payload);
   } else {
     put(posed_.image->bytes, *posed_.image, frame, payload);
@@ -58,15 +58,15 @@ Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& 
 
 // A body that is carried far away makes the lattice of every stream grow: what they grew by is
 // counted.
-Status VolumeStream::find_capacity(const Model& model, const ImageGrid& grid, const Capacity& room) {
+Status VolumeStream::reserve(const Model& model, const ImageGrid& grid, const Bounds& bounds) {
   const std::uint64_t voxels = grid.voxels();
-  if (voxels > room.most_voxels) {
+  if (voxels > bounds.most_voxels) {
     return {StatusCode::resource_exhausted, "volume: the posed grid has " + std::to_string(voxels) +
-                                                " voxels (at most " + std::to_string(room.most_voxels) +
+                                                " voxels (at most " + std::to_string(bounds.most_voxels) +
                                                 "; keep the body nearer to the scan)"};
   }
   const std::uint64_t beyond =
-      kept_by(model, want_, std::max(voxels, at_rest_)) - kept_by(model, want_, at_rest_);
+      kept_by(model, spec_, std::max(voxels, at_rest_)) - kept_by(model, spec_, at_rest_);
   if (pool_ && beyond > beyond_ && pool_->full(beyond - beyond_)) {
     return {StatusCode::resource_exhausted,
             "volume: posed grids fill the server's memory for streams (keep the body nearer to the scan)"};
@@ -77,66 +77,65 @@ Status VolumeStream::find_capacity(const Model& model, const ImageGrid& grid, co
 }
 
 Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody& body,
-                             const Capacity& room) {
-  const ModelVolume& volume = served.model().volumes[want_.volume];
+                             const Bounds& bounds) {
+  const ModelVolume& volume = served.model().volumes[spec_.volume];
   const ImageGrid& rest = volume.image.grid;
-  const ImageGrid grid = want_.region
-                             ? grid_of(rest, runtime::box_within(rest, want_.region->low, want_.region->high))
+  const ImageGrid grid = spec_.region
+                             ? grid_of(rest, runtime::box_within(rest, spec_.region->low, spec_.region->high))
                              : runtime::grow_to(rest, body.nodes);
-  if (Status status = find_capacity(served.model(), grid, room); !status.ok()) return status;
-  served.volumes().follow(body.nodes, volume, want_.sampling, grid, kept_,
-                          served.volume_scratch->take()->tets, room.context);
+  if (Status status = reserve(served.model(), grid, bounds); !status.ok()) return status;
+  served.volumes().follow(body.nodes, volume, spec_.sampling, grid, kept_,
+                          served.volume_scratch->take()->tets, bounds.context);
   posed_ = {&kept_.image, &kept_.bricks, &kept_.moved};
   return {};
 }
 
 Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedBody& body,
-                                const Capacity& room) {
-  const ModelVolume& volume = served.model().volumes[want_.volume];
-  runtime::BallSet set = served.balls(want_.volume).at(body.segments);
-  const runtime::LatticeBox box = runtime::box_for(set, want_.region);
-  if (Status status = find_capacity(served.model(), grid_of(set.lattice, box), room); !status.ok())
-    return status;
-  runtime::follow(std::move(set), box, volume, want_.sampling, refilled_, room.context);
+                                const Bounds& bounds) {
+  const ModelVolume& volume = served.model().volumes[spec_.volume];
+  runtime::BallSet set = served.balls(spec_.volume).at(body.segments);
+  const runtime::LatticeBox box = runtime::box_for(set, spec_.region);
+  if (Status status = reserve(served.model(), grid_of(set.lattice, box), bounds); !status.ok()) return status;
+  runtime::follow(std::move(set), box, volume, spec_.sampling, refilled_, bounds.context);
   posed_ = {&refilled_.image, &refilled_.bricks, &refilled_.moved};
   return {};
 }
 
 void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedBody& body,
                                 v1::VolumeFrame& frame, wire::Payload& payload, const Context& context) {
-  const ModelVolume& volume = served.model().volumes[want_.volume];
+  const ModelVolume& volume = served.model().volumes[spec_.volume];
   std::optional<runtime::BallSet> set;
-  if (want_.by_spheres) set = served.balls(want_.volume).at(body.segments);
+  if (spec_.by_spheres) set = served.balls(spec_.volume).at(body.segments);
   const std::shared_ptr<VolumeScratch> scratch = served.volume_scratch->take();
   Image& slice = scratch->slice;
   const std::size_t pixel =
       scalar_bytes(volume.image.type) * static_cast<std::size_t>(volume.image.components);
   std::size_t pixels = 0;
-  for (const ImageGrid& plane : want_.slices) pixels += plane.voxels();
+  for (const ImageGrid& plane : spec_.slices) pixels += plane.voxels();
   // Where they stay: grown, or copied once more, hundreds of MiB would be there twice.
   std::vector<std::byte> packed;
-  if (want_.compressed) packed.reserve(pixels * pixel);
+  if (spec_.compressed) packed.reserve(pixels * pixel);
   const auto components = static_cast<std::uint32_t>(volume.image.components);
   v1::Array& array = *frame.mutable_voxels();
-  if (!want_.compressed) {
+  if (!spec_.compressed) {
     payload.reserve((pixels * pixel + 15) / 16 * 16);
     array = wire::append(payload, std::span<const std::byte>(), volume.image.type, components);
     array.set_count(pixels);
   }
-  for (const ImageGrid& plane : want_.slices) {
+  for (const ImageGrid& plane : spec_.slices) {
     if (set) {
       slice = Image(plane, volume.image.type, volume.image.components);
-      runtime::refill_slice(*set, volume.image, volume.background, want_.sampling, slice, context);
+      runtime::refill_slice(*set, volume.image, volume.background, spec_.sampling, slice, context);
     } else {
-      served.volumes().pose(body.nodes, volume, want_.sampling, plane, slice, scratch->tets, context);
+      served.volumes().pose(body.nodes, volume, spec_.sampling, plane, slice, scratch->tets, context);
     }
-    if (want_.compressed) {
+    if (spec_.compressed) {
       packed.insert(packed.end(), slice.bytes.begin(), slice.bytes.end());
     } else {
       payload.insert(payload.end(), slice.bytes.begin(), slice.bytes.end());
     }
   }
-  if (want_.compressed) return put(packed, slice, frame, payload);
+  if (spec_.compressed) return put(packed, slice, frame, payload);
   payload.resize((payload.size() + 15) / 16 * 16);
 }
 
@@ -175,7 +174,7 @@ void VolumeStream::write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::
 void VolumeStream::put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,
                        wire::Payload& payload) const {
   const auto components = static_cast<std::uint32_t>(like.components);
-  if (!want_.compressed) {
+  if (!spec_.compressed) {
     *frame.mutable_voxels() = wire::append(payload, voxels, like.type, components);
     return;
   }

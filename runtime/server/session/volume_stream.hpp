@@ -27,13 +27,13 @@ class VolumeStream {
   /// `voxels`: as rest_voxels() has them, which whoever makes it counts as kept. `pool`: what it grows beyond
   /// them is counted there; null: it is not.
   VolumeStream(VolumeSpec spec, std::uint64_t voxels, std::shared_ptr<const Pool> pool = nullptr)
-      : want_(std::move(spec)),
+      : spec_(std::move(spec)),
         at_rest_(voxels),
         pool_(std::move(pool)),
-        payloads_(want_.slices.empty() ? std::make_shared<PayloadPool>() : std::make_shared<PayloadPool>(0)) {
+        payloads_(spec_.slices.empty() ? std::make_shared<PayloadPool>() : std::make_shared<PayloadPool>(0)) {
   }
 
-  const VolumeSpec& spec() const { return want_; }
+  const VolumeSpec& spec() const { return spec_; }
   /// To write() into.
   std::shared_ptr<wire::Payload> payload() const { return payloads_->take(); }
 
@@ -45,14 +45,14 @@ class VolumeStream {
                bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload, const Context& context = {});
 
  private:
-  struct Capacity {
+  struct Bounds {
     std::uint64_t most_voxels;
     const Context& context;
   };
   // The whole posed volume, or its region, into posed_.
-  Status by_tets(const ServedModel& model, const runtime::PosedBody& body, const Capacity& room);
-  Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, const Capacity& room);
-  Status find_capacity(const Model& model, const ImageGrid& grid, const Capacity& room);
+  Status by_tets(const ServedModel& model, const runtime::PosedBody& body, const Bounds& bounds);
+  Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, const Bounds& bounds);
+  Status reserve(const Model& model, const ImageGrid& grid, const Bounds& bounds);
   void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
                     wire::Payload& payload, const Context& context);
   void write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,
@@ -60,7 +60,7 @@ class VolumeStream {
   void put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,
            wire::Payload& payload) const;
 
-  VolumeSpec want_;
+  VolumeSpec spec_;
   std::uint64_t at_rest_;  // voxels
   std::shared_ptr<const Pool> pool_;
   // Planes, which may hold far more than a volume, leave nothing behind that is not counted.

@@ -12,11 +12,11 @@ import numpy as np
 
 from posed_files import ECORCHE, MODEL
 
-BENCH = pathlib.Path(__file__).resolve().parents[3] / "bench" / "agreement"
+BENCH = pathlib.Path(__file__).resolve().parents[3] / "bench" / "agreement" / "run"
 LOADER = importlib.machinery.SourceFileLoader("agreement", str(BENCH))
 agreement = importlib.util.module_from_spec(importlib.util.spec_from_loader("agreement", LOADER))
 LOADER.exec_module(agreement)
-agreement.ECORCHE = ECORCHE
+agreement.programs.ECORCHE = ECORCHE
 agreement.MOST_POINTS = 2000
 
 HEAD = "ecorche_pose: 1\nskeleton: phantom\n"

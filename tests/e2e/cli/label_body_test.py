@@ -14,7 +14,7 @@ import yaml
 
 from posed_files import CASE, corners, run
 
-BENCH = pathlib.Path(__file__).resolve().parents[3] / "bench" / "label_surfaces"
+BENCH = pathlib.Path(__file__).resolve().parents[3] / "bench" / "label_surfaces" / "run"
 LOADER = importlib.machinery.SourceFileLoader("label_surfaces", str(BENCH))
 label_surfaces = importlib.util.module_from_spec(importlib.util.spec_from_loader("label_surfaces", LOADER))
 LOADER.exec_module(label_surfaces)
@@ -72,7 +72,7 @@ class LabelBody(unittest.TestCase):
         return file
 
     def test_surfaces_keep_to_their_voxels(self):
-        self.assertEqual(label_surfaces.measure(self.model, self.case, None), [])
+        self.assertEqual(label_surfaces.measure(self.model, self.case, None, label_surfaces.head()), [])
 
     def test_what_leaves_its_voxels_is_seen(self):
         case = self.folder / "other"
@@ -80,7 +80,7 @@ class LabelBody(unittest.TestCase):
         text = (self.case / "case.yaml").read_text()
         self.assertIn("- femora\n  side: left", text)
         (case / "case.yaml").write_text(text.replace("- femora\n  side: left", "- tibia_left", 1))
-        wrong = label_surfaces.measure(self.model, case, None, only=["femur_left", "tibia_right"])
+        wrong = label_surfaces.measure(self.model, case, None, label_surfaces.head(), only=["femur_left", "tibia_right"])
         self.assertEqual([line.split(" lies")[0] for line in wrong], ["femur_left"] * 2)
 
     def test_open_edges_are_counted(self):

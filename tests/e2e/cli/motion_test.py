@@ -241,20 +241,21 @@ class Motion(unittest.TestCase):
         loader = importlib.machinery.SourceFileLoader("clips", str(bench))
         clips = importlib.util.module_from_spec(importlib.util.spec_from_loader("clips", loader))
         loader.exec_module(clips)
-        clips.ECORCHE = ECORCHE
+        clips.programs.ECORCHE = ECORCHE
+        columns = clips.Table(*12 * [""])
         (self.folder / "cmu_31joint").mkdir()
         file = self.folder / "cmu_31joint" / WALK.name
         shutil.copy(WALK, file)
         said = io.StringIO()
         with contextlib.redirect_stdout(said):
-            clips.played(file, MODEL)
-            self.assertTrue(clips.agree(file, file, MODEL))
-        self.assertRegex(said.getvalue(), r"walk.bvh +72 +\d+/\d+ .* mm/s")
-        self.assertRegex(said.getvalue(), r"most of all at frame \d+: \w+ 0\.0 .*in the files: \w+ 0\.0")
+            clips.played(file, MODEL, columns)
+            self.assertTrue(clips.agree(file, file, MODEL, columns))
+        self.assertRegex(said.getvalue(), r"walk.bvh +\| +72 \| \d+/\d+ .*\| +\d+ \|")
+        self.assertRegex(said.getvalue(), r"most of all at frame \d+ \| \w+ 0\.0 .*\| \w+ 0\.0 \|")
         other = self.folder / "cmu_31joint" / "bend.bvh"
         shutil.copy(CASE / "motion" / "bend.bvh", other)
         with contextlib.redirect_stdout(said):
-            self.assertFalse(clips.agree(file, other, MODEL))
+            self.assertFalse(clips.agree(file, other, MODEL, columns))
 
     # What a clip takes in memory does not grow with it: a hundred times as long, 9 MiB on the disk.
     def test_long_clips_stay_on_the_disk(self):

@@ -22,10 +22,10 @@ sys.path.insert(0, str(BENCH))
 import stated_poses  # noqa: E402
 import voxels  # noqa: E402
 
-LOADER = importlib.machinery.SourceFileLoader("unpose", str(BENCH / "unpose"))
+LOADER = importlib.machinery.SourceFileLoader("unpose", str(BENCH / "unpose" / "run"))
 unpose = importlib.util.module_from_spec(importlib.util.spec_from_loader("unpose", LOADER))
 LOADER.exec_module(unpose)
-unpose.ECORCHE = stated_poses.ECORCHE = ECORCHE
+unpose.programs.ECORCHE = ECORCHE
 
 AWAY = "ecorche_pose: 1\nskeleton: phantom\nroot: {translation_mm: [40, -3, 7], rotation: [0.9, 0.1, 0.3, 0.3]}\n" \
        "joints:\n  knee_right: {flexion_deg: 50}\n  hip_right: {flexion_deg: 30}\n  elbow_left: {flexion_deg: 60}\n"

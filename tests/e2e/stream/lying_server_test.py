@@ -10,7 +10,7 @@ import threading
 import unittest
 
 from ecorche.v1 import envelope_pb2
-from ecorche_client import aligned, encode
+from ecorche_frames import aligned, encode
 from serving import ECORCHE, Server
 
 MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])

@@ -10,7 +10,8 @@ import unittest
 
 import numpy as np
 
-from ecorche_client import ENCODINGS, Client
+from ecorche_client import Client
+from ecorche_frames import ENCODINGS
 from python_parts import bent, frames_of
 from serving import Server
 

@@ -4,6 +4,7 @@
 
 usage: check_house.py SOURCE_FOLDER [BUILD_FOLDER_OF_THE_APACHE_BUILD]
 """
+import functools
 import pathlib
 import re
 import subprocess
@@ -12,6 +13,7 @@ import sys
 # What a folder may include. The longest matching prefix of a file's path decides; its own folder is always allowed.
 ARROWS = {
     "core/values": [],
+    "core/platform": ["core/values"],
     "core/files": ["core/values"],
     "core/kinematics": ["core/values"],
     "core/solve": ["core/values"],
@@ -39,6 +41,12 @@ ARROWS = {
     "clients/cpp": ["proto", "core/values"],
     "app": ["core", "io", "phantom", "preprocess", "runtime", "proto", "clients"],
 }
+# What systems do each in their own way; its headers name nothing of any system. core/values needs none of it.
+PLATFORM = "core/platform"
+POSIX = re.compile(r"#include <((arpa|linux|net|netinet|sys)/\S+|(aio|alloca|dirent|dlfcn|execinfo|fcntl|fnmatch|ftw|glob|grp|ifaddrs|"
+                   r"link|malloc|mqueue|netdb|poll|pthread|pwd|sched|semaphore|signal|spawn|strings|syslog|termios|ucontext|unistd|"
+                   r"wordexp)\.h|csignal)>|\"/(proc|dev)/")
+POSIX_ALLOWED = (PLATFORM + "/", "tests/", "bench/")
 # core/values knows the standard library and Eigen only; three of its headers not even Eigen (ITK brings its own).
 PLAIN_HEADERS = {f"core/include/ecorche/values/{name}.hpp" for name in ("image", "error", "context")}
 # Where public headers belong: <ecorche/wire/framing.hpp> is of proto.
@@ -52,8 +60,11 @@ GPL_UNITS = ("preprocess/tet/cgal/", "preprocess/tet/tetgen/", "preprocess/weigh
 GPL_INCLUDE = re.compile(r'#include [<"](CGAL/|tetgen|suitesparse/|cholmod)')
 GPL_LIBRARIES = re.compile(r"lib(tet|cholmod|CGAL|gmp|mpfr)[.\-]", re.I)
 SPDX = re.compile(r"SPDX-License-Identifier: (Apache-2\.0|AGPL-3\.0-or-later)")
+# Papers are cited in comments, by one or two authors and two digits of the year; CONVENTIONS.md says which they are.
+COMMENT = re.compile(r"//.*|#[^!i].*|\"\"\".*")
+CITED = re.compile(r"\b(?!Int|UInt|Float|Oct|Bip|Split)[A-Z][a-z]{2,}(?:[A-Z][a-z]{2,})?\d\d\b")
 CODE = {".hpp", ".cpp", ".h", ".ts", ".py", ".proto", ".cmake", ".sh"}
-MAX_LINES = 500
+MAX_LINES = 420
 
 
 def tracked(root):
@@ -87,7 +98,7 @@ def check_arrows(path, text):
                 yield f"{path}:{number}: {target} belongs to no folder that PUBLIC names"
                 continue
             target = own + "/"
-        allowed = own == folder or any(target.startswith(to + "/") for to in ARROWS[folder])
+        allowed = own == folder or (own == PLATFORM and folder != "core/values") or any(target.startswith(to + "/") for to in ARROWS[folder])
         # `runtime` -> `runtime/server` would turn the arrow round, although the path starts alike; and who may
         # include `runtime` may not for that include the server's folders, which are named one by one.
         if allowed and own and own != folder and own not in ARROWS[folder]:
@@ -95,6 +106,12 @@ def check_arrows(path, text):
                 allowed = False
         if not allowed:
             yield f"{path}:{number}: {folder} may not include {target}"
+
+
+@functools.cache
+def conventions(root):
+    path = root / "CONVENTIONS.md"
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
 def check_file(root, path):
@@ -115,10 +132,16 @@ def check_file(root, path):
             yield f"{path}: includes a GPL or AGPL library outside of {', '.join(GPL_UNITS)}"
         if gpl_unit and GPL_INCLUDE.search(text) and spdx and spdx.group(1) != "AGPL-3.0-or-later":
             yield f"{path}:1: uses a GPL or AGPL library: AGPL-3.0-or-later"
+        if not path.startswith(POSIX_ALLOWED) and (posix := POSIX.search(text)):
+            yield f"{path}: {posix.group(0)} is of POSIX systems: only {PLATFORM} knows them"
         if folder_of(path) == "core/values" and FOREIGN_IN_VALUES.search(text):
             yield f"{path}: core/values is plain data: no files, threads, HDF5, YAML or logs"
         if path in PLAIN_HEADERS and "<Eigen" in text:
             yield f"{path}: is seen by ITK, which brings its own Eigen: std::array and std::span only"
+    papers = conventions(root)
+    for cited in {name for comment in COMMENT.findall(text) for name in CITED.findall(comment)}:
+        if f"| {cited} |" not in papers:
+            yield f"{path}: cites {cited}, which CONVENTIONS.md does not name"
     lines = text.count("\n")
     if lines > MAX_LINES and suffix in {".hpp", ".cpp", ".py", ".ts"}:
         yield f"{path}: {lines} lines, more than {MAX_LINES}: one idea a file"

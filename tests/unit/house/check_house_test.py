@@ -69,6 +69,25 @@ class House(unittest.TestCase):
         self.assert_refused("core/values/a.cpp", SPDX + "#include <fstream>\n", "plain data")
         self.assert_refused("core/include/ecorche/values/image.hpp", SPDX + "#include <Eigen/Core>\n", "brings its own Eigen")
 
+    def test_platform(self):
+        for include in ["#include <unistd.h>\n", "#include <sys/stat.h>\n", "#include <netinet/tcp.h>\n", "#include <csignal>\n",
+                        '#ifdef __linux__\n#include <sched.h>\n#endif\n', 'const char* a = "/proc/self/exe";\n']:
+            self.assert_refused("core/files/a.cpp", SPDX + include, "only core/platform knows them")
+            self.assert_refused("runtime/server/net/a.cpp", SPDX + include, "only core/platform knows them")
+            for allowed in ["core/platform/a.cpp", "tests/unit/files/a.cpp", "bench/server/a.cpp"]:
+                self.assertEqual(problems({allowed: SPDX + include}), [""])
+        self.assert_refused("core/platform/a.cpp", SPDX + '#include "core/files/atomic_file.hpp"\n', "may not include")
+        self.assert_refused("core/values/a.cpp", SPDX + '#include "core/platform/file.hpp"\n', "may not include")
+        for path in ["runtime/skin/a.cpp", "io/image/a.cpp", "clients/cpp/a.cpp", "core/model_file/a.cpp", "runtime/server/net/a.cpp"]:
+            self.assertEqual(problems({path: SPDX + '#include "core/platform/file.hpp"\n'}), [""])
+
+    def test_papers(self):
+        paper = "Nobody" + "99"
+        for path, comment in [("preprocess/cor/a.cpp", f"// As {paper} has it."), ("tests/a.py", f"# As {paper} has it.")]:
+            spdx = SPDX if path.endswith("cpp") else SPDX.replace("//", "#")
+            self.assert_refused(path, f"{spdx}{comment}\n", f"cites {paper}")
+            self.assertEqual(problems({path: f"{spdx}{comment}\n", "CONVENTIONS.md": f"| {paper} | a paper |\n"}), [""])
+
     def test_large_rooms(self):
         self.assert_refused("app/a.cpp", SPDX + "int a;\n" * 501, "one idea a file")
 

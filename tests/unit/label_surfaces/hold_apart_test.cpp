@@ -70,7 +70,7 @@ TEST(HoldApart, AHandOnAHipGivesWayFromTheMiddle) {
       EXPECT_EQ(level, LogLevel::warning);
       said = line;
     };
-    const std::vector<TakenOut> taken = hold_apart(patient, context);
+    const std::vector<RemovedVoxels> taken = hold_apart(patient, context);
     // 6 mm between centres are five voxels of air: `air` was there. Rounded up for each side.
     const int each = air == 0 ? 3 : 2;
     const auto voxels = patient.labels->image.scalars<std::uint8_t>();
@@ -119,9 +119,9 @@ TEST(HoldApart, ALimbIsNoStrangerToItself) {
     v = v == fore_bone || v == hand_bone ? static_cast<std::uint8_t>(fore_bone + hand_bone - v) : v;
   Case patient = limbed(std::move(folded), 6);
   patient.labels->apart->limbs[0].joints = 1;
-  const std::vector<TakenOut> taken = hold_apart(patient, {});
+  const std::vector<RemovedVoxels> taken = hold_apart(patient, {});
   ASSERT_FALSE(taken.empty());
-  for (const TakenOut& t : taken) EXPECT_EQ(t.a, 0);
+  for (const RemovedVoxels& t : taken) EXPECT_EQ(t.a, 0);
 }
 
 TEST(HoldApart, WhatIsThatFarApartStays) {
@@ -138,7 +138,7 @@ TEST(HoldApart, LabelsWithoutSegmentsTakeNoPart) {
   for (int j = 1; j <= 10; ++j)
     for (int k = 1; k < 16; ++k) voxels[grid.offset(12, j, k)] = 9;  // a film on the hand's side
   patient.labels->apart->limbs.push_back({{9}, {}});
-  const std::vector<TakenOut> taken = hold_apart(patient, {});
+  const std::vector<RemovedVoxels> taken = hold_apart(patient, {});
   ASSERT_EQ(taken.size(), 1u);  // 1 voxel lies between: two more each
   EXPECT_EQ(voxels[grid.offset(12, 4, 8)], 9);
   EXPECT_EQ(voxels[grid.offset(11, 4, 8)], 0);

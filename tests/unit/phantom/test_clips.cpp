@@ -26,16 +26,16 @@ TEST(Clips, LastLongEnoughAndLoop) {
     EXPECT_GE(static_cast<double>(clip.frames()) * clip.frame_seconds, 2.0);
     EXPECT_EQ(clip.rotation.size(), clip.frames() * clip.joints.size());
     // The step from the last frame to the first is as small as those between.
-    double largest = 0, seam = 0;
+    double largest = 0, around = 0;
     for (std::size_t j = 0; j < clip.joints.size(); ++j) {
       for (std::size_t f = 0; f + 1 < clip.frames(); ++f) {
         largest = std::max(largest, clip.rotation[f * clip.joints.size() + j].angularDistance(
                                         clip.rotation[(f + 1) * clip.joints.size() + j]));
       }
-      seam = std::max(seam, clip.rotation[(clip.frames() - 1) * clip.joints.size() + j].angularDistance(
-                                clip.rotation[j]));
+      around = std::max(around, clip.rotation[(clip.frames() - 1) * clip.joints.size() + j].angularDistance(
+                                    clip.rotation[j]));
     }
-    EXPECT_LE(seam, largest) << clip.name;
+    EXPECT_LE(around, largest) << clip.name;
     EXPECT_LT(largest, 0.35) << clip.name;
   }
 }

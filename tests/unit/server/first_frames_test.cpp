@@ -35,7 +35,7 @@ TEST(FirstFrames, TakeTurns) {
   stage.activity.streamed(Clock::now() + std::chrono::hours(1));
   Gate gate;
   gate.close();
-  stage.first_frames.submit([&] { gate.pass(); });  // the thread is busy for as long
+  stage.executor.submit(Service::first_frames, [&] { gate.pass(); });  // the thread is busy for as long
   Guest first(stage), second(stage);
   stage.wait(kShort);
   EXPECT_TRUE(second.session->first_frame_turn()->awaited()) << "it waits for its turn";

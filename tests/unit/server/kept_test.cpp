@@ -193,7 +193,7 @@ TEST(Kept, ProbesFindRoomOrAreTold) {
     EXPECT_EQ(stage.memory.kept(), tree);
     // The only tree is still being asked: another pose has none, and the old one is not taken for it.
     stage.pose(1);
-    stage.run_until([&] { return stage.session->present().sequence == 1; });
+    stage.run_until([&] { return stage.session->poses().present().sequence == 1; });
     const Asking second(stage);
     EXPECT_FALSE(second.frame);
     EXPECT_EQ(second.status.code, StatusCode::resource_exhausted);

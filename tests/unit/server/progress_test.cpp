@@ -315,12 +315,12 @@ TEST(Movement, OfAWebSocketIsItsCarriers) {
   net::io_context io{1};
   Sockets sockets(io);
   std::unique_ptr<Transport> transport;
-  WebRoom room;
-  room.admit = [](auto&&...) { return true; };
-  room.welcome = [&](std::unique_ptr<Transport> welcomed, const std::string&, bool) {
+  WebContext context;
+  context.admit = [](auto&&...) { return true; };
+  context.welcome = [&](std::unique_ptr<Transport> welcomed, const std::string&, bool) {
     transport = std::move(welcomed);
   };
-  const auto request = web_request(tcp_transport(std::move(sockets.server)), "test", room);
+  const auto request = web_request(tcp_transport(std::move(sockets.server)), "test", context);
   request->start();
   net::write(sockets.client, net::buffer(std::string(
                                  "GET /v1 HTTP/1.1\r\nHost: test\r\nUpgrade: websocket\r\n"

@@ -64,24 +64,24 @@ TEST(RecordedFrames, OfTheLastPoseCome) {
     SCOPED_TRACE(leaves);
     RecordedStage stage;
     const auto first = stage.recording(), second = stage.recording();
-    stage.session->record(first);
+    stage.session->recorder().start(first);
     stage.pose(1);
     stage.show_mesh(1);
     ASSERT_FALSE(stage.shows(stage.volume, 1));
     bool ended = false;
     if (leaves) stage.session->leave(stage.watcher, true);
-    stage.session->end_recording([&] { ended = true; });
+    stage.session->recorder().stop([&] { ended = true; });
     EXPECT_FALSE(ended);
-    stage.session->record(second);
+    stage.session->recorder().start(second);
     stage.pose(2);
     stage.run_until([&] { return ended; });
     ASSERT_TRUE(ended);
-    stage.run_until([&] { return stage.session->present().sequence == 2; });
+    stage.run_until([&] { return stage.session->poses().present().sequence == 2; });
     stage.workers.drain();
     stage.volume_workers.drain();  // where there is a volume
     stage.wait(milliseconds(20));
     ended = false;
-    stage.session->end_recording([&] { ended = true; });
+    stage.session->recorder().stop([&] { ended = true; });
     EXPECT_TRUE(ended) << "nothing is under way";
     for (std::uint64_t pose = 1; pose <= 2; ++pose) {
       const wire::RecordedSession session = whole(pose == 1 ? *first : *second);
@@ -98,13 +98,13 @@ TEST(RecordedFrames, BeginWithTheNextPose) {
   stage.gate.close();
   stage.pose(1);
   const auto recording = stage.recording();
-  stage.session->record(recording);
+  stage.session->recorder().start(recording);
   stage.gate.open();
   stage.run_until([&] { return stage.shows(stage.mesh, 1); });
   stage.pose(2);
   stage.run_until([&] { return stage.shows(stage.volume, 2); });
   bool ended = false;
-  stage.session->end_recording([&] { ended = true; });
+  stage.session->recorder().stop([&] { ended = true; });
   stage.run_until([&] { return ended; });
   const wire::RecordedSession session = whole(*recording);
   ASSERT_EQ(session.steps.size(), 1U);

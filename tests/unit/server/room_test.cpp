@@ -32,7 +32,7 @@ TEST(Room, FramesAreMadeForThoseWhoRead) {
   const std::size_t before = stage.watcher.numbers().size();
   for (std::uint64_t pose = 2; pose <= 5; ++pose) {
     stage.pose(pose);
-    stage.run_until([&] { return stage.session->present().sequence == pose; });
+    stage.run_until([&] { return stage.session->poses().present().sequence == pose; });
   }
   Watcher newcomer;
   stage.session->join(newcomer);

@@ -171,7 +171,7 @@ TEST(SessionRegistry, ARecordingsNameIsTakenUntilItIsWritten) {
     PoseRequest pose;
     pose.sequence = 1;
     pose.pose = Pose::rest(session->model()->model().segment_count());
-    session->recording()->add(pose);
+    session->recorder().recording()->add(pose);
     bool written = false;
     recordings.finish(*session, [&](const Status& status) { written = status.ok(); });
     EXPECT_EQ(recordings.begin(*other, "bow", {}).code, StatusCode::already_exists);
@@ -195,7 +195,7 @@ TEST(SessionRegistry, WhatIsAskedBesideLeavesAWorkerToPoses) {
     int done = 0;
     constexpr int kAsked = 7;
     for (int i = 0; i < kAsked; ++i) {
-      open.registry.run_on_worker(
+      open.registry.executor().run_request(
           [&] {
             ++begun;
             while (!go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -130,16 +130,12 @@ struct Stage {
                   gate.pass();
                   job();
                 }),
-        volume_workers(1,
-                       [this](const Job& job) {
-                         volume_gate.pass();
-                         job();
-                       }),
-        plane_workers(1,
-                      [this](const Job& job) {
-                        plane_gate.pass();
-                        job();
-                      }),
+        executor(io, workers,
+                 [this](Service service, const Job& job) {
+                   if (service == Service::volumes) volume_gate.pass();
+                   if (service == Service::planes) plane_gate.pass();
+                   job();
+                 }),
         session(open("a", true)) {
     session->join(watcher);
     spec.tissues = {0};
@@ -173,16 +169,15 @@ struct Stage {
   }
 
   std::shared_ptr<Session> open(const std::string& name, bool named = false) {
-    const Services services{io,
-                            workers,
-                            volume_workers,
-                            plane_workers,
-                            memory,
-                            quality_turns,
-                            first_frames,
-                            activity,
-                            metrics,
-                            [this](std::shared_ptr<const void> what) { gone.push_back(std::move(what)); }};
+    const Services services{
+        .io = io,
+        .executor = executor,
+        .memory = memory,
+        .quality_turns = quality_turns,
+        .first_frames = first_frames,
+        .activity = activity,
+        .metrics = metrics,
+        .destroy_later = [this](std::shared_ptr<const void> what) { gone.push_back(std::move(what)); }};
     return std::make_shared<Session>(services, model, name, named, limits);
   }
   void pose(std::uint64_t sequence) {
@@ -216,14 +211,15 @@ struct Stage {
   net::io_context io;
   Limits limits;
   MemoryBudget memory;
-  TurnQueue quality_turns{io, TurnQueue::Order::first_come, kQualityPause, last_of_all};
-  TurnQueue first_frames{io, TurnQueue::Order::least_used, 0, giving_way};
+  TurnQueue quality_turns{io, TurnQueue::Order::first_come, kQualityPause};
+  TurnQueue first_frames{io, TurnQueue::Order::least_used};
   StreamActivity activity;
   Metrics metrics;
   std::vector<std::shared_ptr<const void>> gone;  // let go of, as a server would elsewhere
   Gate gate, volume_gate, plane_gate;
   std::shared_ptr<const ServedModel> model;
-  Workers workers, volume_workers, plane_workers;
+  Workers workers;
+  Executor executor;
   MeshSpec spec;
   Watcher watcher;
   std::size_t seen = 0;  // of its frames

@@ -209,7 +209,7 @@ TEST(Session, JudgingTakesOneAfterTheOther) {
 // A long rest does not hold up the server's end.
 TEST(Session, NobodyRestsWhereNothingIsJudgedAnyMore) {
   net::io_context io;
-  TurnQueue turns(io, TurnQueue::Order::first_come, kQualityPause, last_of_all);
+  TurnQueue turns(io, TurnQueue::Order::first_come, kQualityPause);
   turns.stop();
   turns.done(std::chrono::hours(1));
   io.run_for(milliseconds(20));

@@ -155,10 +155,10 @@ TEST(SpheresStream, TetsStayWhatIsMeantWithoutAWord) {
   v1::Subscribe request;
   request.mutable_volume()->set_volume("ct");
   StreamSpec spec;
-  ASSERT_TRUE(read_want(request, model, spec).ok());
+  ASSERT_TRUE(read_spec(request, model, spec).ok());
   EXPECT_FALSE(std::get<VolumeSpec>(spec).by_spheres);
   request.mutable_volume()->set_deformer(v1::DEFORMER_TETS);
-  ASSERT_TRUE(read_want(request, model, spec).ok());
+  ASSERT_TRUE(read_spec(request, model, spec).ok());
   EXPECT_FALSE(std::get<VolumeSpec>(spec).by_spheres);
 }
 
@@ -166,7 +166,7 @@ TEST(SpheresStream, WhatCannotBeRefilledIsRefused) {
   const TestServer server;
   StreamSpec spec;
   const auto code = [&](const v1::Envelope& request, const Model& model) {
-    return read_want(request.subscribe(), model, spec).code;
+    return read_spec(request.subscribe(), model, spec).code;
   };
   v1::Envelope request = request_for("ct");
   EXPECT_EQ(code(request, server.model()), StatusCode::ok);

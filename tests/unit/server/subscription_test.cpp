@@ -15,16 +15,16 @@ TEST(Subscription, NoNamesAreAllTissuesAndOrderDoesNotMatter) {
   v1::Subscribe request;
   request.mutable_mesh();
   StreamSpec all;
-  ASSERT_TRUE(read_want(request, model, all).ok());
+  ASSERT_TRUE(read_spec(request, model, all).ok());
   EXPECT_EQ(std::get<MeshSpec>(all).tissues.size(), model.tissues.size());
   for (auto tissue = model.tissues.rbegin(); tissue != model.tissues.rend(); ++tissue)
     request.mutable_mesh()->add_tissues(tissue->name);
   request.mutable_mesh()->add_tissues(model.tissues[0].name);
   StreamSpec named;
-  ASSERT_TRUE(read_want(request, model, named).ok());
+  ASSERT_TRUE(read_spec(request, model, named).ok());
   EXPECT_EQ(all, named);
   request.mutable_mesh()->set_quality(true);
-  ASSERT_TRUE(read_want(request, model, named = StreamSpec()).ok());
+  ASSERT_TRUE(read_spec(request, model, named = StreamSpec()).ok());
   EXPECT_NE(all, named);
 }
 
@@ -34,7 +34,7 @@ TEST(Subscription, LabelsAreAlwaysNearest) {
     v1::Subscribe request;
     request.mutable_volume()->set_volume(volume.name);
     StreamSpec spec;
-    ASSERT_TRUE(read_want(request, model, spec).ok());
+    ASSERT_TRUE(read_spec(request, model, spec).ok());
     const auto expected = volume.labels ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
     EXPECT_EQ(std::get<VolumeSpec>(spec).sampling, expected) << volume.name;
   }
@@ -109,7 +109,7 @@ TEST(Subscription, WhatCannotBeDoneSaysSo) {
     v1::Subscribe request;
     c.ask(request);
     StreamSpec spec;
-    const Status status = read_want(request, model, spec);
+    const Status status = read_spec(request, model, spec);
     EXPECT_EQ(status.code, c.code) << c.what;
     EXPECT_NE(status.message.find("subscribe: "), std::string::npos) << status.message;
   }
@@ -128,7 +128,7 @@ TEST(Subscription, PlanesLieWhereNumbersReach) {
     slice.set_size_u(5);
     slice.set_size_v(5);
     StreamSpec spec;
-    return read_want(request, model, spec);
+    return read_spec(request, model, spec);
   };
   for (const double at : {0.0, -1e9, 1e9}) EXPECT_TRUE(read(at, 1, -2).ok()) << at;
   for (const double step : {2e-9, -5e8}) EXPECT_TRUE(read(0, step, 1).ok() && read(0, 1, step).ok()) << step;

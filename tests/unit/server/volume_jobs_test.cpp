@@ -70,7 +70,7 @@ TEST(VolumeJobs, AloneShowTheNewestPoseToo) {
   ASSERT_TRUE(stage.shows(volume, 0));
   for (std::uint64_t pose = 1; pose <= 3; ++pose) stage.pose(pose);
   ASSERT_TRUE(stage.shows(volume, 3));
-  EXPECT_EQ(stage.session->present().sequence, 3U);
+  EXPECT_EQ(stage.session->poses().present().sequence, 3U);
 }
 
 TEST(VolumeJobs, KeepTheirRate) {
@@ -136,8 +136,8 @@ TEST(VolumeJobs, EndWithTheServer) {
   stage.session->stop_volumes();
   stage.volume_gate.open();
   stage.plane_gate.open();
-  stage.volume_workers.drain();
-  stage.plane_workers.drain();
+  stage.executor.drain(Service::volumes);
+  stage.executor.drain(Service::planes);
   stage.pose(2);
   ASSERT_TRUE(stage.shows(stage.mesh, 2));
   stage.wait(milliseconds(150));
@@ -156,7 +156,7 @@ TEST(VolumeJobs, EndWhereNobodyWatches) {
   const std::string figures = stage.metrics.text();
   stage.session->unsubscribe(stage.watcher, volume);
   stage.volume_gate.open();
-  stage.volume_workers.drain();
+  stage.executor.drain(Service::volumes);
   stage.wait(milliseconds(20));
   EXPECT_EQ(stage.metrics.text(), figures) << "a frame was made";
 }
@@ -228,7 +228,8 @@ TEST(VolumeJobs, RecordedPosesKeepTheirVolumes) {
   stage.volume_gate.close();
   stage.pose(1);
   ASSERT_TRUE(stage.shows(stage.mesh, 1));
-  stage.session->record(std::make_shared<Recording>("bow", *stage.model, "test", std::size_t{1} << 20));
+  stage.session->recorder().start(
+      std::make_shared<Recording>("bow", *stage.model, "test", std::size_t{1} << 20));
   stage.pose(2);
   stage.wait(milliseconds(50));
   EXPECT_EQ(stage.watcher.poses(stage.mesh).back(), 1U) << "it waits for the volume that is being made";
@@ -240,7 +241,7 @@ TEST(VolumeJobs, RecordedPosesKeepTheirVolumes) {
   }
   ASSERT_TRUE(stage.shows(volume, 5));
   EXPECT_EQ(stage.watcher.poses(volume), Poses({0, 1, 2, 3, 4, 5}));
-  stage.session->record(nullptr);
+  stage.session->recorder().start(nullptr);
   stage.pose(6);
   EXPECT_TRUE(stage.shows(volume, 6));
 }

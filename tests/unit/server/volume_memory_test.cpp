@@ -52,7 +52,7 @@ TEST(MemoryTest, TheNthAllocationBesideVolumes) {
     }
     struck = allocations.spent();
     allocations.off();
-    if (stage.session->present().sequence == 1) wait_for(1, {volume, plane});
+    if (stage.session->poses().present().sequence == 1) wait_for(1, {volume, plane});
     stage.pose(2);
     wait_for(2, {mesh, volume, plane});
     if (HasFatalFailure()) return;

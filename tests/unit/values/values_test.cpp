@@ -27,7 +27,7 @@ TEST(Image, OnlyWholeNumbersAreCounted) {
   }
 }
 
-TEST(Error, KindsHaveTheExitCodesOfDesign4) {
+TEST(Error, KindsHaveTheirExitCodes) {
   const std::pair<ErrorKind, int> expected[] = {
       {ErrorKind::usage, 64},     {ErrorKind::data, 65},          {ErrorKind::missing_input, 66},
       {ErrorKind::internal, 70},  {ErrorKind::cannot_create, 73}, {ErrorKind::io, 74},

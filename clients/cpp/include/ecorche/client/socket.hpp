@@ -11,6 +11,10 @@
 #include <ecorche/client/tls.hpp>
 #include <ecorche/wire/address.hpp>
 
+namespace ecorche::platform {
+class TcpClient;
+}
+
 namespace ecorche::client {
 
 using Clock = std::chrono::steady_clock;
@@ -34,14 +38,11 @@ class Socket {
 
  private:
   std::size_t read_plain(std::span<std::byte> out, Clock::time_point until, std::size_t enough = 1);
-  void wake_at(std::size_t bytes);
   void write_plain(std::span<const std::byte> bytes, Clock::time_point until);
-  bool wait(short events, Clock::time_point until) const;
   [[noreturn]] void fail(const std::string& what) const;
 
-  int fd_ = -1;
-  std::size_t wakes_at_ = 1;  ///< bytes that must have come before a wait for them ends
   std::string where_;
+  std::unique_ptr<platform::TcpClient> plain_;
   std::unique_ptr<Tls> tls_;
 };
 

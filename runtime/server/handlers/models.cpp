@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which bodies there are, and the one that a client opens.
+#include <utility>
+
+#include "runtime/server/handlers/handlers.hpp"
+
+namespace ecorche::server {
+
+Status handle_list_models(Client& client, const v1::ListModels&, const Request& request) {
+  v1::Envelope envelope;
+  v1::ModelList& list = *envelope.mutable_model_list();
+  for (const auto& model : client.registry().models()) *list.add_models() = model->summary;
+  client.answer(request.id(), std::move(envelope));
+  return {};
+}
+
+Status handle_open_model(Client& client, const v1::OpenModel& open, const Request& request) {
+  if (client.session() && !client.session()->retired()) {
+    return {StatusCode::failed_precondition, "open: this connection has a model (open another connection)"};
+  }
+  std::shared_ptr<Session> session;
+  if (Status status = client.registry().open(open, client.address(), session); !status.ok()) return status;
+  client.join(std::move(session));
+  const ServedModel& model = *client.session()->model();
+  v1::Envelope envelope;
+  v1::ModelOpened& opened = *envelope.mutable_model_opened();
+  opened = model.opened;
+  opened.set_session(client.session()->name());
+  opened.set_role(client.role());
+  if (open.without_triangles()) {
+    client.answer(request.id(), std::move(envelope));
+    return {};
+  }
+  for (int i = 0; i < opened.tissues_size(); ++i) {
+    *opened.mutable_tissues(i)->mutable_triangles() = model.triangles[static_cast<std::size_t>(i)];
+  }
+  client.answer(request.id(), std::move(envelope), model.topology);
+  return {};
+}
+
+Status handle_reload_model(Client& client, const v1::ReloadModel& reload, const Request& request) {
+  client.registry().reload(reload.model(),
+                           client.callback([id = request.id()](Client& asking, const Status& status) {
+                             asking.answer_status(id, status);
+                           }));
+  return {};
+}
+
+}  // namespace ecorche::server

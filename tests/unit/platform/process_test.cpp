@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/platform/process.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <stop_token>
+#include <vector>
+
+#include <ecorche/values/error.hpp>
+#include "core/platform/child_process.hpp"
+
+namespace ecorche::platform {
+namespace {
+
+TEST(Process, ExistsUntilItHasEnded) {
+  EXPECT_TRUE(process_exists(process_id()));
+  EXPECT_TRUE(process_exists(1));  // somebody else's
+  const pid_t child = fork();
+  if (child == 0) _exit(0);
+  ASSERT_EQ(waitpid(child, nullptr, 0), child);
+  EXPECT_FALSE(process_exists(child));
+}
+
+TEST(Process, HasHeldWhatItWrote) {
+  EXPECT_GT(peak_memory_bytes(), std::uint64_t{1} << 20);
+  constexpr std::uint64_t some = std::uint64_t{64} << 20;
+  const std::vector<char> written(peak_memory_bytes() + some, 1);
+  EXPECT_GE(peak_memory_bytes(), written.size());
+}
+
+TEST(Process, CanReadItsOwnProgram) {
+  std::ifstream program(own_program(), std::ios::binary);
+  std::array<char, 4> magic{};
+  program.read(magic.data(), magic.size());
+  EXPECT_EQ(std::string_view(magic.data(), magic.size()),
+            "\x7f"
+            "ELF");
+}
+
+TEST(Random, DiffersEveryTime) {
+  std::array<std::byte, 16> one{}, other{};
+  EXPECT_FALSE(fill_random(one));
+  EXPECT_FALSE(fill_random(other));
+  EXPECT_NE(one, other);
+}
+
+TEST(ChildProcess, HandsBackWhatItsWorkReturns) {
+  const ChildResult result =
+      run_in_child([] { return std::vector<std::byte>(100000, std::byte{7}); }, {}, Context{});
+  EXPECT_EQ(result.end, ChildResult::End::done);
+  EXPECT_EQ(result.bytes, std::vector<std::byte>(100000, std::byte{7}));
+}
+
+TEST(ChildProcess, SaysHowItFailed) {
+  const auto exits = []() -> std::vector<std::byte> {
+    std::puts("first\nthe reason\n");
+    std::exit(3);
+  };
+  ChildResult result = run_in_child(exits, {}, Context{});
+  EXPECT_EQ(result.end, ChildResult::End::failed);
+  EXPECT_EQ(result.said, "the reason");
+  result = run_in_child([]() -> std::vector<std::byte> { throw 1; }, {}, Context{});
+  EXPECT_EQ(result.end, ChildResult::End::failed);
+  result = run_in_child([]() -> std::vector<std::byte> { _exit(0 * std::raise(SIGKILL)); }, {}, Context{});
+  EXPECT_EQ(result.end, ChildResult::End::failed);
+  EXPECT_EQ(result.said, "Killed");
+}
+
+TEST(ChildProcess, EndsWhenItsTimeIsOver) {
+  const auto forever = []() -> std::vector<std::byte> {
+    for (;;) pause();
+  };
+  EXPECT_EQ(run_in_child(forever, {.seconds = 0.05}, Context{}).end, ChildResult::End::timed_out);
+  std::stop_source stop;
+  stop.request_stop();
+  Context context;
+  context.stop = stop.get_token();
+  try {
+    run_in_child(forever, {}, context);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::interrupted);
+  }
+}
+
+}  // namespace
+}  // namespace ecorche::platform
