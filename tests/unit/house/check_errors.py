@@ -18,7 +18,7 @@ import sys
 FOLDERS = ("app", "core", "io", "preprocess", "runtime", "phantom", "proto", "clients/cpp")
 SHORTEST = 9
 START = 5
-CALL = re.compile(r"\b(?:Error\((?:ErrorKind|[a-z_:]*kind\b)|(?:throw|return) Error\(|(?:refuse|fail|usage|usage_error|refuse_track|unfit|unexpected|refuse_size|fail_unknown|fail_count)\()")
+CALL = re.compile(r"\b(?:Error\((?:ErrorKind|[a-z_:]*kind\b)|(?:throw|return) Error\(|(?:refuse|refuse_track|fail|usage|usage_error|unfit|unexpected|refuse_size|fail_unknown|fail_count)\()")
 LITERAL = re.compile(r'"((?:[^"\\]|\\.)*)"')
 
 # file: {piece of the message: why no test raises it}

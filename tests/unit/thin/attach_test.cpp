@@ -212,18 +212,23 @@ TEST(Attach, ByHandAndByTheRuleOfAPlane) {
     EXPECT_EQ(segment[v], way.norm() <= 14 && way.dot(normal) > 0 ? 2 : 0);
   }
 
-  const auto refuses = [&](const Reassignment& bad, const std::string& part) {
+  const auto refuses = [&](const Reassignment& bad, const std::string& part, const Skeleton& of) {
     try {
-      reassign(s, r, bad, segment);
+      reassign(s, of, bad, segment);
       ADD_FAILURE() << part;
     } catch (const Error& e) {
       EXPECT_EQ(e.kind(), ErrorKind::config);
       EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
     }
   };
-  refuses({{{"knee", 5}}, {}}, "no joint 'knee'");
-  refuses({{{"left_joint", 5}}, {}}, "is the root's");
-  refuses({{}, {{"leg", "", {}, std::array<double, 3>{0, 0, 0}, 1}}}, "no segment 'leg'");
+  refuses({{{"knee", 5}}, {}}, "no joint 'knee'", r);
+  refuses({{{"left_joint", 5}}, {}}, "is the root's", r);
+  refuses({{}, {{"leg", "", {}, std::array<double, 3>{0, 0, 0}, 1}}}, "no segment 'leg'", r);
+  // The way out goes back where the way in came from.
+  Skeleton doubled_back = r;
+  doubled_back.segments[3].joint.center = r.segments[0].joint.center;
+  refuses({{{"arm_joint", 14}}, {}},
+          "the bones at joint 'arm_joint' give no plane to split by (use a region instead)", doubled_back);
 }
 
 TEST(Attach, ABoneThatComesBackOnItselfGivesNoPlane) {
