@@ -231,17 +231,5 @@ TEST(Attach, ByHandAndByTheRuleOfAPlane) {
           "the bones at joint 'arm_joint' give no plane to split by (use a region instead)", doubled_back);
 }
 
-TEST(Attach, ABoneThatComesBackOnItselfGivesNoPlane) {
-  const VolumetricSkeleton s = body().skeleton;
-  Skeleton folded = rig();
-  folded.segments[3].joint.center = folded.segments[0].joint.center;  // the way out of the arm is the way in
-  std::vector<std::int32_t> segment(s.size(), 0);
-  Reassignment by_hand;
-  by_hand.splits.push_back({"arm_joint", 14});
-  expect_error(ErrorKind::config,
-               "--reassign: the bones at joint 'arm_joint' give no plane to split by (use a region instead)",
-               [&] { reassign(s, folded, by_hand, segment); });
-}
-
 }  // namespace
 }  // namespace ecorche::thin
