@@ -24,11 +24,15 @@ def metrics():
     return "\n".join(out)
 
 
+def cpp_under(*folders):
+    """The text of every source and header there."""
+    paths = [path for folder in folders for kind in ("*.cpp", "*.hpp") for path in (ROOT / folder).rglob(kind)]
+    return "\n".join(path.read_text(encoding="utf-8") for path in sorted(paths))
+
+
 def limits_hit():
-    names = set()
-    for path in (ROOT / "runtime" / "server").rglob("*.cpp"):
-        names |= set(re.findall(r'\bhit\(\s*"(\w+)"', path.read_text(encoding="utf-8")))
-    return ", ".join(f"`{name}`" for name in sorted(names)) + "."
+    names = re.findall(r'\b(?:hit|end_at)\(\s*"(\w+)"', cpp_under("runtime/server"))
+    return ", ".join(f"`{name}`" for name in sorted(set(names))) + "."
 
 
 def exit_codes():
@@ -65,10 +69,7 @@ STATUS_MEANS = {
 
 def status_codes():
     header = source("core/include/ecorche/values/error.hpp")
-    used = set()
-    for folder in ("runtime/server", "core", "proto", "runtime/probe", "app"):
-        for path in (ROOT / folder).rglob("*.cpp"):
-            used |= set(re.findall(r"StatusCode::(\w+)", path.read_text(encoding="utf-8")))
+    used = set(re.findall(r"StatusCode::(\w+)", cpp_under("runtime/server", "core", "proto", "runtime/probe")))
     numbers = re.findall(r"^\s*(\w+) = (\d+),", header[header.index("enum class StatusCode"):], re.M)
     out = ["| code | name | meaning |", "|---|---|---|"]
     out += [f"| {number} | `{name.upper()}` | {STATUS_MEANS[name] if name in used or name == 'unknown' else 'not sent by this server'} |" for name, number in numbers]

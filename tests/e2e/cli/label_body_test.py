@@ -81,7 +81,7 @@ class LabelBody(unittest.TestCase):
         self.assertIn("- femora\n  side: left", text)
         (case / "case.yaml").write_text(text.replace("- femora\n  side: left", "- tibia_left", 1))
         wrong = label_surfaces.measure(self.model, case, None, label_surfaces.head(), only=["femur_left", "tibia_right"])
-        self.assertEqual([line.split(" lies")[0] for line in wrong], ["femur_left"] * 2)
+        self.assertEqual([line.split(" lies")[0] for line in wrong], ["other: femur_left"] * 2)
 
     def test_open_edges_are_counted(self):
         tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])

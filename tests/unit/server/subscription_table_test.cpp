@@ -125,6 +125,8 @@ TEST(SubscriptionTableTest, ARateHoldsFramesBackUntilTheyAreDue) {
   SubscriptionRow& row = seats.row(seats.add(seats.first, mesh_of_skin(10)));
   EXPECT_FALSE(row.held_back(seats.now));
   row.begin_frame(seats.now);
+  EXPECT_FALSE(row.held_back(seats.now)) << "the first was late";
+  row.begin_frame(seats.now);
   seats.now += milliseconds(99);
   EXPECT_TRUE(row.held_back(seats.now));
   ASSERT_TRUE(seats.table.next_due());
