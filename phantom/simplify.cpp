@@ -14,15 +14,15 @@ namespace ecorche::phantom {
 
 namespace {
 
-using Vec = Eigen::Vector3d;
+using Eigen::Vector3d;
 
 /// Squared distance to a set of planes: x'Ax - 2b'x + c.
 struct Quadric {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Vec b = Vec::Zero();
+  Vector3d b = Vector3d::Zero();
   double c = 0;
 
-  void add_plane(const Vec& normal, double offset, double weight) {
+  void add_plane(const Vector3d& normal, double offset, double weight) {
     A += weight * normal * normal.transpose();
     b += weight * offset * normal;
     c += weight * offset * offset;
@@ -33,7 +33,7 @@ struct Quadric {
     c += o.c;
     return *this;
   }
-  double operator()(const Vec& x) const { return x.dot(A * x) - 2 * b.dot(x) + c; }
+  double operator()(const Vector3d& x) const { return x.dot(A * x) - 2 * b.dot(x) + c; }
 };
 
 class Collapser {
@@ -49,15 +49,15 @@ class Collapser {
       for (const int v : faces_.back()) faces_of_[index(v)].push_back(static_cast<int>(f));
     }
     for (const auto& face : faces_) {
-      const Vec n = normal(face);
+      const Vector3d n = normal(face);
       const double area = n.norm() / 2;
       if (area <= 0) continue;
-      const Vec unit = n.normalized();
+      const Vector3d unit = n.normalized();
       for (const int v : face) {
         quadric_[index(v)].add_plane(unit, unit.dot(position_[index(face[0])]), area);
         // A little pull towards where the vertex was keeps flat regions from crumpling.
         for (int a = 0; a < 3; ++a)
-          quadric_[index(v)].add_plane(Vec::Unit(a), position_[index(v)][a], 1e-3 * area);
+          quadric_[index(v)].add_plane(Vector3d::Unit(a), position_[index(v)][a], 1e-3 * area);
       }
     }
     for (const auto& face : faces_) {
@@ -103,14 +103,14 @@ class Collapser {
     double cost;
     int a, b;
     std::uint32_t stamp;
-    Vec position;
+    Vector3d position;
     bool operator<(const Candidate& o) const { return std::tie(o.cost, o.a, o.b) < std::tie(cost, a, b); }
   };
 
   static std::size_t index(int v) { return static_cast<std::size_t>(v); }
   bool removed(int v) const { return faces_of_[index(v)].empty(); }
-  Vec normal(const Face& f) const {
-    const Vec& a = position_[index(f[0])];
+  Vector3d normal(const Face& f) const {
+    const Vector3d& a = position_[index(f[0])];
     return (position_[index(f[1])] - a).cross(position_[index(f[2])] - a);
   }
 
@@ -131,7 +131,7 @@ class Collapser {
     Quadric q = quadric_[index(a)];
     q += quadric_[index(b)];
     // The pull above makes A regular.
-    const Vec x = q.A.ldlt().solve(q.b);
+    const Vector3d x = q.A.ldlt().solve(q.b);
     heap_.push({std::max(q(x), 0.0), a, b, stamp_[index(a)] + stamp_[index(b)], x});
   }
 
@@ -148,13 +148,13 @@ class Collapser {
   }
 
   /// Whether the triangles of `v` that stay keep their side and do not become slivers when `v` moves to `x`.
-  bool keeps_shape(int v, int other, const Vec& x) const {
+  bool keeps_shape(int v, int other, const Vector3d& x) const {
     for (const int f : faces_of_[index(v)]) {
       const Face& face = faces_[index(f)];
       if (std::find(face.begin(), face.end(), other) != face.end()) continue;
-      std::array<Vec, 3> p;
+      std::array<Vector3d, 3> p;
       for (std::size_t i = 0; i < 3; ++i) p[i] = face[i] == v ? x : position_[index(face[i])];
-      const Vec before = normal(face), after = (p[1] - p[0]).cross(p[2] - p[0]);
+      const Vector3d before = normal(face), after = (p[1] - p[0]).cross(p[2] - p[0]);
       const double longest =
           std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm()});
       if (after.norm() < 0.12 * longest || after.dot(before) < 0.5 * after.norm() * before.norm())
@@ -184,7 +184,7 @@ class Collapser {
     for (const int u : neighbours(c.a)) push(c.a, u);
   }
 
-  std::vector<Vec> position_;
+  std::vector<Vector3d> position_;
   std::vector<Face> faces_;
   std::vector<std::vector<int>> faces_of_;
   std::vector<Quadric> quadric_;

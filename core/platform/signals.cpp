@@ -10,13 +10,13 @@
 namespace ecorche::platform {
 namespace {
 
-int ends[2];  // of a pipe: written by the handler, read by the waiting thread
-pid_t owner;  // a forked child inherits the handler, not the right to write
+int ends[2];          // of a pipe: written by the handler, read by the waiting thread
+pid_t handler_owner;  // a forked child inherits the handler, not the right to write
 
 // A terminal that is gone, as the kernel tells, ends the process; who sends SIGHUP asks for something.
 extern "C" void tell(int signal, siginfo_t* info, void*) {
   const int saved = errno;
-  if (getpid() == owner) {
+  if (getpid() == handler_owner) {
     const bool asked = signal == SIGHUP && info->si_code != SI_KERNEL;
     const char byte = static_cast<char>(asked ? Signal::hangup : Signal::stop);
     [[maybe_unused]] const auto ignored = write(ends[1], &byte, 1);
@@ -38,14 +38,14 @@ void handle(int signal) {
 
 bool catch_stops() {
   if (pipe2(ends, O_CLOEXEC) != 0) return false;
-  owner = getpid();
+  handler_owner = getpid();
   handle(SIGINT);
   handle(SIGTERM);
   return true;
 }
 
 void catch_hangups() {
-  if (owner != 0) handle(SIGHUP);
+  if (handler_owner != 0) handle(SIGHUP);
 }
 
 bool wait_for_signal(Signal& which) {

@@ -55,7 +55,7 @@ TcpClient::TcpClient(const std::string& host, std::uint16_t port, Clock::time_po
     problem = {error, lookup_category()};
     return;
   }
-  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owner(list, freeaddrinfo);
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(list, freeaddrinfo);
   int error = EADDRNOTAVAIL;
   for (const addrinfo* a = list; a && error != 0; a = a->ai_next) {
     if (socket_ >= 0) close(socket_);

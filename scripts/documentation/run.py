@@ -25,7 +25,7 @@ import time
 from documentation import program
 from documentation.pages import ROOT
 
-SECONDS = 110  # a page's commands, all together; on an idle machine none needs half a minute
+SECONDS = 280  # a page's commands, all together; on an idle machine none needs half a minute
 
 
 def put_phantom(folder):
