@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kSmallest = 1e-4F;  // as node_clusters.hpp keeps them
 constexpr int kFrames = 20;
-constexpr std::size_t kBlenderFrames = 8;
+[[maybe_unused]] constexpr std::size_t kBlenderFrames = 8;  // where there is a Blender
 
 HungPoints hung_points(const Model& model, const runtime::NodeClusters& clusters) {
   HungPoints out;

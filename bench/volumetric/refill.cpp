@@ -72,7 +72,7 @@ json refilling(const VolumetricSkeleton& thick, const Rig& rig, Pose pose, const
   out["posed_size"] = box.size;
   for (const auto& [name, sampling] :
        {std::pair{"nearest_s", runtime::Sampling::nearest}, {"trilinear_s", runtime::Sampling::trilinear}}) {
-    out[name] = median_of(7, [&] {
+    out[name] = median_of(7, [&, sampling = sampling] {
       pose_it();
       runtime::refill_into(set, box, volume, -1000, sampling, posed);
     });
