@@ -34,6 +34,7 @@ double seconds_of(const std::function<void()>& work) {
 
 double median_of(int times, const std::function<void()>& work) {
   std::vector<double> all;
+  all.reserve(static_cast<std::size_t>(times));
   for (int t = 0; t < times; ++t) all.push_back(seconds_of(work));
   std::nth_element(all.begin(), all.begin() + times / 2, all.end());
   return all[static_cast<std::size_t>(times / 2)];
