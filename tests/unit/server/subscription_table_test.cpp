@@ -87,7 +87,8 @@ TEST(SubscriptionTableTest, ANewRowHasTheNumberThatWasAskedFor) {
 TEST(SubscriptionTableTest, WhatStreamsKeepIsCountedOfTheMembersShare) {
   Seats seats;
   const Model& model = seats.model->model();
-  const auto& whole = std::get<VolumeSpec>(scan_request().spec);
+  const SubscriptionRequest request = scan_request();
+  const auto& whole = std::get<VolumeSpec>(request.spec);
   const std::uint64_t bytes = kept_by(model, whole, rest_voxels(model, whole));
   const auto share = std::make_shared<const Pool>(bytes, seats.kept);
   seats.first.share = share;
