@@ -8,6 +8,7 @@
 #include <ecorche/io/case_file.hpp>
 #include "core/files/atomic_file.hpp"
 #include "io/case/digest.hpp"
+#include "io/surface/surface_file.hpp"
 #include "io/surface/tied_surfaces.hpp"
 
 namespace ecorche::app {
@@ -15,7 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::set<std::string> kSurfaceEndings{".stl", ".obj", ".ply", ".off", ".vtp", ".glb"};
 const std::set<std::string> kImageEndings{".nrrd", ".mha", ".gz"};
 
 // What of `target` an earlier pose wrote, all of it; refuses what it did not.
@@ -52,7 +52,7 @@ class Naming {
       for (const std::string& bone : model_.bone_names) out.labels.emplace(out.labels.size(), bone);
     }
     if (name == kScanSurfaces) out.kind = PosedKind::scan;
-    if (const Tissue* tissue = kSurfaceEndings.contains(ending) ? tissue_of(stem) : nullptr) {
+    if (const Tissue* tissue = io::writes_surface(file) ? tissue_of(stem) : nullptr) {
       out.kind = PosedKind::surface;
       out.of = tissue->name;
     }

@@ -47,12 +47,6 @@ struct RefillSettings {
   }
 };
 
-bool is_surface(const fs::path& path) {
-  const std::string ending = path.extension().string();
-  return ending == ".glb" || ending == ".vtp" || ending == ".stl" || ending == ".ply" || ending == ".obj" ||
-         ending == ".off";
-}
-
 void check(const RefillSettings& s) {
   const bool rigged = !s.rig.empty() || s.skeleton.extension() == ".hdf";
   if (s.poses() && !rigged)
@@ -61,7 +55,7 @@ void check(const RefillSettings& s) {
     usage_error("--rig", "nothing is posed", "add --pose FILE or --motion CLIP --frames A:B");
   if (s.back && !s.poses()) usage_error("--back", "no pose to come back from", "add --rig and --pose");
   if (s.bulge != 0 && !rigged) usage_error("--bulge", "joints are needed", "add --rig and --pose");
-  if (is_surface(s.output) && (!s.region.empty() || !s.volume.empty()))
+  if (io::writes_surface(s.output) && (!s.region.empty() || !s.volume.empty()))
     usage_error("--output", "a preview shows no values", "leave out VOLUME and --region, or name an image");
   if (!s.morph.empty() && (s.volume.empty() || s.poses() || !s.region.empty() || s.voxel_mm > 0))
     usage_error("--morph", "two objects at rest become each other",
@@ -105,7 +99,7 @@ json write_frame(const RefillSettings& s, const runtime::BallSet& set, const Ima
                  const fs::path& path, const Context& context) {
   const auto start = std::chrono::steady_clock::now();
   json out{{"file", path.string()}, {"balls", set.balls.size()}};
-  if (is_surface(s.output)) {
+  if (io::writes_surface(s.output)) {
     const SurfaceMesh mesh = runtime::preview(set);
     out["seconds"] = seconds_since(start);
     out["triangles"] = mesh.F.rows();

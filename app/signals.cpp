@@ -11,7 +11,7 @@ namespace ecorche::app {
 namespace {
 
 std::mutex guard;
-std::function<void()> on_hangup;
+std::function<void()> hangup_call;
 
 void listen(std::stop_source& source) {
   platform::Signal which{};
@@ -19,7 +19,7 @@ void listen(std::stop_source& source) {
   while (platform::wait_for_signal(which)) {
     if (which == platform::Signal::hangup) {
       const std::lock_guard lock(guard);
-      if (on_hangup) on_hangup();
+      if (hangup_call) hangup_call();
       continue;
     }
     if (std::exchange(again, true)) platform::end_process(130);
@@ -39,13 +39,13 @@ std::stop_token stop_on_signals() {
 
 OnHangup::OnHangup(std::function<void()> call) {
   const std::lock_guard lock(guard);
-  on_hangup = std::move(call);
+  hangup_call = std::move(call);
   platform::catch_hangups();
 }
 
 OnHangup::~OnHangup() {
   const std::lock_guard lock(guard);
-  on_hangup = nullptr;
+  hangup_call = nullptr;
 }
 
 }  // namespace ecorche::app

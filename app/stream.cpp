@@ -281,7 +281,7 @@ class Stream {
     const StreamCheck::Result checked = check_ ? check_->finish() : StreamCheck::Result{};
     const double seconds = std::max(1e-9, milliseconds(last_frame_ - started_) / 1000);
     const double fps = static_cast<double>(meshes_.frames) / seconds;
-    nlohmann::json json{{"server", client_.server().server()},
+    nlohmann::json figures{{"server", client_.server().server()},
                         {"model", opened_.model()},
                         {"poses", sequence_},
                         {"skipped", skipped_},
@@ -292,15 +292,15 @@ class Stream {
                         {"latency_ms", meshes_.percentiles()},
                         {"volume_frames", volumes_.frames},
                         {"bytes", client_.bytes_received()}};
-    if (!settings_.volume.empty()) json["volume_latency_ms"] = volumes_.percentiles();
-    if (settings_.quality) json["frames_with_warning"] = warned_;
+    if (!settings_.volume.empty()) figures["volume_latency_ms"] = volumes_.percentiles();
+    if (settings_.quality) figures["frames_with_warning"] = warned_;
     if (warned_ > 0) program_.warn();
     if (check_) {
-      json["same_model"] = same_model_;
-      json["checked"] = checked.checked;
-      json["mismatches"] = checked.mismatches;
+      figures["same_model"] = same_model_;
+      figures["checked"] = checked.checked;
+      figures["mismatches"] = checked.mismatches;
     }
-    program_.result(stream_text(json, settings_.model), json);
+    program_.result(stream_text(figures, settings_.model), figures);
     if (meshes_.frames == 0)
       throw Error(ErrorKind::protocol, settings_.address, "no frame came", "see the server's log");
     return checked.mismatches > 0 || !same_model_ ? 1 : 0;

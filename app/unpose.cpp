@@ -33,15 +33,10 @@ struct UnposeSettings {
   std::string sampling = "trilinear";
 };
 
-const std::set<std::string> kSurfaces{".stl", ".obj", ".ply", ".off", ".vtp", ".glb"};
 const std::set<std::string> kImages{".nrrd", ".mha", ".gz"};
 
-bool is_surface(const fs::path& file) {
-  return kSurfaces.contains(file.extension().string());
-}
-
 bool is_body(const fs::path& file) {
-  return is_surface(file) || kImages.contains(file.extension().string());
+  return io::writes_surface(file) || kImages.contains(file.extension().string());
 }
 
 // `labels`, `labels_2`, ... and what the user names.
@@ -153,7 +148,7 @@ class WayBack {
 
   void bring(const Item& item) {
     files::make_folder(item.to.parent_path());
-    if (!is_surface(item.from)) {
+    if (!io::writes_surface(item.from)) {
       image(item);
     } else if (item.known != nullptr && item.known->kind == PosedKind::surface) {
       known_surface(item);

@@ -63,6 +63,12 @@ SurfaceMesh read_surface(const std::filesystem::path& path, const files::ReadLim
   return read_tagged_surface(path, limits).mesh;
 }
 
+bool writes_surface(const std::filesystem::path& path) {
+  static constexpr std::array<std::string_view, 6> kFormats{".stl", ".obj", ".ply", ".off", ".vtp", ".glb"};
+  const std::string extension = text::lower(path.extension().string());
+  return std::find(kFormats.begin(), kFormats.end(), extension) != kFormats.end();
+}
+
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
                    const std::vector<GridArray>& point_data) {
   const std::string extension = text::lower(path.extension().string());
@@ -75,7 +81,7 @@ void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
     const NamedSurface named{path.stem().string(), Group::other, mesh};
     return write_surfaces(path, {&named, 1});
   }
-  if (extension != ".ply" && extension != ".vtp") {
+  if (!writes_surface(path)) {
     throw Error(ErrorKind::usage, path.string(), "cannot write '" + extension + "' surfaces",
                 "use .stl, .obj, .ply, .off, .vtp or .glb");
   }

@@ -59,6 +59,9 @@ struct GridArray {
 void write_surface(const std::filesystem::path& path, const SurfaceMesh& mesh,
                    const std::vector<GridArray>& point_data = {});
 
+/// Whether `write_surface` knows the format that the name ends in.
+bool writes_surface(const std::filesystem::path& path);
+
 /// Tets out of a file, with what it holds of each node and of each tet. Nothing is said of the tets' volumes:
 /// posed ones may be inverted.
 struct TetFile {
