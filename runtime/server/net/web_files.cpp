@@ -51,17 +51,19 @@ const char* type_of(std::string_view name) {
   return "application/octet-stream";
 }
 
-// As the bundler writes a hash: eight of A to Z and 2 to 7 after a dash. A word might look like that, but for
-// the digit.
+// As the bundler writes a hash: eight of A to Z and 2 to 7 after a dash. So might a person in the name of a
+// text.
 bool holds_hash(std::string_view name) {
   name = name.substr(name.rfind('/') + 1);
   const std::size_t dot = name.find('.');
   constexpr std::size_t length = 8;
   if (dot == std::string_view::npos || dot <= length || name[dot - length - 1] != '-') return false;
+  for (const std::string_view text : {".html", ".txt", ".md"}) {
+    if (name.ends_with(text)) return false;
+  }
   const std::string_view hash = name.substr(dot - length, length);
-  const auto digit = [](char c) { return c >= '2' && c <= '7'; };
-  return std::any_of(hash.begin(), hash.end(), digit) &&
-         std::all_of(hash.begin(), hash.end(), [&](char c) { return digit(c) || (c >= 'A' && c <= 'Z'); });
+  return std::all_of(hash.begin(), hash.end(),
+                     [](char c) { return (c >= '2' && c <= '7') || (c >= 'A' && c <= 'Z'); });
 }
 
 // The next item of a list between commas, cut off it.

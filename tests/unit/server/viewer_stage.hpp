@@ -58,6 +58,8 @@ class TestViewer {
                                    gzipped_page.size(), page.size(), "page1", true},
                                   file("a/dot.png", picture, "dot1"),
                                   file("app-QX3ZK7A2.js", script, "app1"),
+                                  file("main-QXYZKABC.css", script, "style1"),
+                                  file("deep-QX3ZK7A.js", script, "short"),
                                   file("viewer-LICENSES.txt", licences, "text1")};
   std::shared_ptr<const WebFiles> files_ = embedded_files(rows_);
 };

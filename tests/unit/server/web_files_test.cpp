@@ -66,6 +66,9 @@ TEST(WebFilesTest, AreKeptForEverOnlyWhereTheirNameHoldsAHash) {
         .caching;
   };
   EXPECT_EQ(caching("/app-QX3ZK7A2.js"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(caching("/main-QXYZKABC.css"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(caching("/deep-QX3ZK7A.js"), "no-cache") << "seven";
+  EXPECT_EQ(caching("/a/dot.png"), "no-cache");
   EXPECT_EQ(caching("/viewer-LICENSES.txt"), "no-cache") << "a word is no hash";
   EXPECT_EQ(caching("/index.html"), "no-cache");
 }
