@@ -174,7 +174,7 @@ Seen look(const Served& served, double seconds) {
     });
     note(seen.socket_ms, [&] {
       return asked(served.http(),
-                   "GET /v1 HTTP/1.1\r\nHost: bench\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                   "GET /v1 HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
                    "Sec-WebSocket-Protocol: ecorche.v1\r\n\r\n",
                    "HTTP/1.1 101");

@@ -51,7 +51,7 @@ class Attacks(unittest.TestCase):
                 with urllib.request.urlopen(f"http://127.0.0.1:{server.http_port}/healthz", timeout=10) as answer:
                     self.assertEqual(answer.status, 200)
                 with socket.create_connection(("127.0.0.1", server.http_port), timeout=10) as web:
-                    web.sendall(b"GET /v1 HTTP/1.1\r\nHost: test\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                    web.sendall(b"GET /v1 HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                                 b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
                                 b"Sec-WebSocket-Protocol: ecorche.v1\r\n\r\n")
                     self.assertIn(b" 101 ", web.recv(64))
