@@ -92,6 +92,7 @@ std::vector<float> line_integrals(const Model& model, const PosedBody& body, con
 
 /// How integrals become grey values of 16 bits, dense is bright.
 struct Exposure {
+  /// Of brightness.
   enum class Scale : std::uint8_t {
     log,     ///< grey grows with the integral, as processed detectors show it
     linear,  ///< grey falls with the share of photons that comes through, as on film
