@@ -144,8 +144,6 @@ void check_setup(const SetupChoice& choice) {
     refuse_beside(!choice.target.empty(), "--target", "--source");
     refuse_beside(choice.sid_mm.has_value(), "--sid", "--source");
     refuse_beside(choice.oid_mm.has_value(), "--oid", "--source");
-    if (choice.source.size() != 3)
-      usage_error("--source", std::to_string(choice.source.size()) + " numbers", "give x,y,z");
     if (choice.detector.size() != 3 && choice.detector.size() != 9)
       usage_error("--detector", std::to_string(choice.detector.size()) + " numbers",
                   "give three (its middle) or nine (with the directions of its rows and columns)");
