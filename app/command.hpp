@@ -67,6 +67,7 @@ void declare_rig(CLI::App& app, Program& program, Run& chosen);
 void declare_tears(CLI::App& app, Program& program, Run& chosen);
 void declare_deformers(CLI::App& app, Program& program, Run& chosen);
 void declare_path(CLI::App& app, Program& program, Run& chosen);
+void declare_radiograph(CLI::App& app, Program& program, Run& chosen);
 void declare_contact(CLI::App& app, Program& program, Run& chosen);
 
 }  // namespace ecorche::app

@@ -31,6 +31,8 @@ const std::vector<std::pair<std::string, std::string>> kExamples{
     {"path", "ecorche path body.vtp --from -88,0,300 --to 0,0,900 -o way.csv"},
     {"deformers", "ecorche deformers patient.hdf --volume labels --pose lib:sitting -o compared"},
     {"tears", "ecorche tears patient.hdf --motion patient/motion/walk.bvh --frames 0:30:10"},
+    {"radiograph",
+     "ecorche radiograph patient.hdf -o knee.png --view lateral_left --target knee_left --size 300,300"},
     {"contact", "ecorche contact patient.hdf patient.hdf --other-pose lib:sitting"},
 };
 
