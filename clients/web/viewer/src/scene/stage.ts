@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// The renderer, the camera and what stands in the scene. Metres, y up; `patient` takes children in the patient's LPS millimetres.
+// A picture is drawn when something asked for one, and at no other time.
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { backdrop, ground } from "./ground.js";
+
+export interface Surroundings {
+  readonly above: number;
+  readonly below: number;
+  readonly shadow: number;
+  /** Of selections. */
+  readonly accent: number;
+}
+
+export class Stage {
+  readonly renderer: THREE.WebGLRenderer;
+  readonly scene = new THREE.Scene();
+  readonly camera = new THREE.PerspectiveCamera(30, 1, 0.05, 60);
+  readonly controls: OrbitControls;
+  /** LPS in mm: x to the patient's left, y to the back, z to the head. */
+  readonly patient = new THREE.Group();
+  readonly #backdrop = backdrop();
+  readonly #ground = ground();
+  #wanted = 0;
+  #before = new Set<(seconds: number) => void>();
+  #after = new Set<() => void>();
+  #last = 0;
+
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
+    this.renderer.toneMappingExposure = 1;
+    this.renderer.info.autoReset = true;
+    // The front of the patient looks along +z, his head along +y.
+    this.patient.matrixAutoUpdate = false;
+    this.patient.matrix.makeRotationX(-Math.PI / 2).scale(new THREE.Vector3(0.001, 0.001, 0.001));
+    this.patient.matrixWorldNeedsUpdate = true;
+    this.scene.add(this.#backdrop.mesh, this.#ground.mesh, this.patient);
+    this.camera.position.set(0.6, 0.3, 4);
+    this.controls = new OrbitControls(this.camera, canvas);
+    Object.assign(this.controls, {
+      enableDamping: !matchMedia("(prefers-reduced-motion: reduce)").matches, dampingFactor: 0.12,
+      minDistance: 0.08, maxDistance: 20, zoomToCursor: true, zoomSpeed: 1.2, rotateSpeed: 0.9,
+    });
+    this.controls.addEventListener("change", () => this.invalidate());
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    this.resize();
+  }
+
+  /** Draws a picture at the next turn of the screen. */
+  invalidate(): void {
+    if (this.#wanted || document.hidden) return;
+    this.#wanted = requestAnimationFrame((time) => this.#draw(time));
+  }
+
+  /** Called before every picture, with the seconds since the last one (at most 0.1). */
+  onBeforeDraw(listener: (seconds: number) => void): () => void {
+    this.#before.add(listener);
+    return () => this.#before.delete(listener);
+  }
+
+  /** Called after every picture. */
+  onAfterDraw(listener: () => void): () => void {
+    this.#after.add(listener);
+    return () => this.#after.delete(listener);
+  }
+
+  surround(colors: Surroundings): void {
+    this.#backdrop.setColors(colors.above, colors.below);
+    this.#ground.setColor(colors.shadow);
+    this.invalidate();
+  }
+
+  /** Puts the ground under the body: `floor` is its lowest point, the radius that of its trunk, m. */
+  placeGround(x: number, floor: number, z: number, radius: number): void {
+    this.#ground.place(x, floor, z, radius);
+  }
+
+  resize(): void {
+    const parent = this.canvas.parentElement!;
+    const width = Math.max(1, parent.clientWidth), height = Math.max(1, parent.clientHeight);
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.invalidate();
+  }
+
+  /** The picture as it is now, as a PNG. */
+  png(): Promise<Blob> {
+    this.render();
+    return new Promise((resolve, reject) => {
+      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("the browser made no picture"))), "image/png");
+    });
+  }
+
+  render(): void {
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  #draw(time: number): void {
+    this.#wanted = 0;
+    const seconds = Math.min(0.1, (time - this.#last) / 1000);
+    this.#last = time;
+    for (const listener of [...this.#before]) listener(seconds);
+    this.controls.update();
+    this.render();
+    for (const listener of [...this.#after]) listener();
+  }
+}
