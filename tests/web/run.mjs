@@ -17,7 +17,7 @@ process.on("exit", () => fs.rmSync(out, { recursive: true, force: true }));
 await build({
   absWorkingDir: here, entryPoints: process.argv.slice(2), outdir: out, outExtension: { ".js": ".mjs" }, outbase: here,
   bundle: true, platform: "node", format: "esm", target: "node18", external: ["ws", "playwright-core", "axe-core", "esbuild"], sourcemap: "inline",
-  nodePaths: [path.join(web, "node_modules")], define: { ROOT: JSON.stringify(root) },
+  nodePaths: [path.join(web, "node_modules")], loader: { ".yaml": "text" }, define: { ROOT: JSON.stringify(root) },
 });
 const files = process.argv.slice(2).map((file) => path.join(out, file.replace(/\.ts$/, ".mjs")));
 const { status } = spawnSync(process.execPath, ["--enable-source-maps", "--test", ...files], { stdio: "inherit", timeout: 280_000 });

@@ -11,11 +11,11 @@ import { retryDelay } from "./backoff.js";
 import type { FrameNote, Post, Statistics, ToClient, ToLink } from "./channel.js";
 import { Emitter } from "./emitter.js";
 import { Code, ConnectionError, ServerError } from "./errors.js";
-import { Encoding } from "./gen/ecorche/v1/common_pb.js";
-import type { ClipSummary, IkSolved } from "./gen/ecorche/v1/command_pb.js";
-import { IkTargetSchema, SolveIkSchema } from "./gen/ecorche/v1/command_pb.js";
+import { Encoding, type PoseState } from "./gen/ecorche/v1/common_pb.js";
+import type { ClipState, ClipSummary, ControlGranted, IkSolved, Members } from "./gen/ecorche/v1/command_pb.js";
+import { AskControlSchema, GiveControlSchema, IkTargetSchema, PlayClipSchema, SolveIkSchema, SteerClipSchema } from "./gen/ecorche/v1/command_pb.js";
 import { EnvelopeSchema, type Envelope } from "./gen/ecorche/v1/envelope_pb.js";
-import { ClientHelloSchema, type ServerHello } from "./gen/ecorche/v1/hello_pb.js";
+import { ClientHelloSchema, Feature, type ServerHello } from "./gen/ecorche/v1/hello_pb.js";
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
 import { SubscribeSchema, type PoseAck, type VolumeFrame } from "./gen/ecorche/v1/stream_pb.js";
 import { Link } from "./link.js";
@@ -47,6 +47,12 @@ export interface ClientEvents {
   /** A pose of this session was taken up or refused: clamped joints, skipped poses. */
   pose: PoseAck;
   control: ControlState;
+  /** The pose that the session shows, where this client did not set it: of a newcomer, an observer, a clip. */
+  shown: PoseState;
+  /** Who is in the session. */
+  members: Members;
+  /** What the server plays. */
+  clip: ClipState;
   state: StateChange;
   statistics: Statistics;
   /** The model was read anew: open() again for it. */
@@ -60,6 +66,8 @@ export interface ClientOptions {
   token?: string;
   /** For the server's log. */
   name?: string;
+  /** What others in the session call who uses this client. */
+  person?: string;
   onState?: (change: StateChange) => void;
 }
 
@@ -130,9 +138,10 @@ export class Client extends Emitter<ClientEvents> {
   async open(model = "", session = ""): Promise<ModelOpened> {
     const { value } = await this.ask({ case: "openModel", value: create(OpenModelSchema, { model, session }) }, "modelOpened");
     this.model = value;
-    this.poses.restart(0n);
+    this.poses.restart(value.lastSequence);
     this.setControl({ role: value.role, vacant: false, reservedSeconds: 0 });
     this.emit("opened", value);
+    this.tellShown(value.pose);
     for (const stream of this.streams.values()) await this.subscribe(stream);
     return value;
   }
@@ -183,15 +192,36 @@ export class Client extends Emitter<ClientEvents> {
   }
 
   async solveIk(targets: IkTargetInit[], { from, apply, moveRoot }: IkOptions = {}): Promise<IkSolved> {
-    const applyAs = apply ? ++this.poses.sequence : 0n;
+    const applyAs = apply ? this.poses.take() : 0n;
     const value = create(SolveIkSchema, { targets, rotation: from ? Array.from(from) : [], applyAs, moveRoot: moveRoot ?? false });
     return (await this.ask({ case: "solveIk", value }, "ikSolved")).value;
   }
 
   async claimControl(): Promise<void> {
     const { value } = await this.ask({ case: "claimControl", value: { $typeName: "ecorche.v1.ClaimControl" } }, "controlGranted");
-    this.poses.restart(value.lastSequence);
-    this.setControl({ role: Role.CONTROLLER, vacant: false, reservedSeconds: 0 });
+    this.granted(value);
+  }
+
+  /** Asks whoever holds control for it, too. True where it was granted at once; else "control" tells when it is. */
+  async askControl(): Promise<boolean> {
+    try {
+      this.granted((await this.ask({ case: "askControl", value: create(AskControlSchema) }, "controlGranted")).value);
+      return true;
+    } catch (error) {
+      // An OK in place of the control: its holder has been told.
+      if (error instanceof ServerError && error.code === 0) return false;
+      throw error;
+    }
+  }
+
+  /** Asks no more. */
+  async withdrawAsk(): Promise<void> {
+    await this.ask({ case: "askControl", value: create(AskControlSchema, { withdraw: true }) }, "status");
+  }
+
+  /** Gives control to another connection of the session: SessionMember.connection. */
+  async giveControl(connection: bigint): Promise<void> {
+    await this.ask({ case: "giveControl", value: create(GiveControlSchema, { connection }) }, "status");
   }
 
   async releaseControl(): Promise<void> {
@@ -204,8 +234,13 @@ export class Client extends Emitter<ClientEvents> {
   }
 
   /** No name: stop. */
-  async playClip(name: string, { speed = 1, loop = false } = {}): Promise<void> {
-    await this.ask({ case: "playClip", value: { $typeName: "ecorche.v1.PlayClip", name, speed, loop } }, "status");
+  async playClip(name: string, options: { speed?: number; loop?: boolean; position?: number; paused?: boolean } = {}): Promise<void> {
+    await this.ask({ case: "playClip", value: create(PlayClipSchema, { name, speed: 1, ...options }) }, "status");
+  }
+
+  /** The clip that plays or is paused; what is left out stays. `step`: so many poses on, or back. */
+  async steerClip(change: { paused?: boolean; position?: number; step?: number; speed?: number; loop?: boolean }): Promise<void> {
+    await this.ask({ case: "steerClip", value: create(SteerClipSchema, change) }, "status");
   }
 
   /** Begins a recording on the server under this name; none: ends it, once its file is whole. */
@@ -240,7 +275,7 @@ export class Client extends Emitter<ClientEvents> {
   private async subscribe(stream: MeshStream): Promise<void> {
     const { tissues = [], level = 0, adaptive = false, encoding = Encoding.U16_DELTA, normals = false, quality = false, maxRate = 0 } = stream.options;
     const value = create(SubscribeSchema, {
-      what: { case: "mesh", value: { tissues, level, adaptive, encoding, normals, quality } }, maxRate,
+      what: { case: "mesh", value: { tissues, level, adaptive, encoding, normals, quality, pose: true } }, maxRate,
     });
     const answer = await this.ask({ case: "subscribe", value }, "subscribed", undefined, stream.handle);
     stream.subscription = answer.value.subscription;
@@ -253,9 +288,10 @@ export class Client extends Emitter<ClientEvents> {
   }
 
   private async dial(): Promise<ServerHello> {
-    const { token, name = "ecorche web" } = this.options;
+    const { token, name = "ecorche web", person = "" } = this.options;
     const hello = create(ClientHelloSchema, {
-      protocolMin: 1, protocolMax: 1, client: name,
+      protocolMin: 1, protocolMax: 1, client: name, name: person,
+      features: [Feature.POSE, Feature.CLIP_STATE, Feature.PRESENCE],
       encodings: [Encoding.F32, Encoding.U16, Encoding.U16_DELTA],
       token: new TextEncoder().encode(token ?? ""),
       resumeToken: this.hello?.resumeToken ?? new Uint8Array(),
@@ -288,6 +324,9 @@ export class Client extends Emitter<ClientEvents> {
         const { role, vacant, reservedSeconds } = message.value;
         return this.setControl({ role, vacant, reservedSeconds });
       }
+      case "controlGranted": return this.granted(message.value);
+      case "members": return this.emit("members", message.value);
+      case "clipState": return this.emit("clip", message.value);
       case "modelChanged": return this.emit("modelChanged", { identity: message.value.identity });
       case "volumeFrame": return this.emit("volume", { frame: message.value, payload });
       case "goodbye":
@@ -304,7 +343,19 @@ export class Client extends Emitter<ClientEvents> {
   private show(note: FrameNote): void {
     const { message } = fromBinary(EnvelopeSchema, note.envelope);
     const frame = message.case === "meshFrame" ? this.streams.get(note.stream)?.show(note, message.value) : undefined;
-    if (frame) this.emit("frame", frame);
+    if (!frame) return;
+    if (message.case === "meshFrame") this.tellShown(message.value.pose);
+    this.emit("frame", frame);
+  }
+
+  private tellShown(pose: PoseState | undefined): void {
+    if (pose && (this.poses.own === 0n || pose.sequence > this.poses.own)) this.emit("shown", pose);
+  }
+
+  private granted({ lastSequence, pose }: ControlGranted): void {
+    this.poses.restart(lastSequence);
+    this.setControl({ role: Role.CONTROLLER, vacant: false, reservedSeconds: 0 });
+    this.tellShown(pose);
   }
 
   private lost(error: Error): void {
@@ -334,6 +385,7 @@ export class Client extends Emitter<ClientEvents> {
       if (resumed) {
         this.poses.restart(resumed.lastSequence);
         this.setControl({ role: resumed.role, vacant: false, reservedSeconds: 0 });
+        this.tellShown(resumed.pose);
         await this.subscribeMissing(resumed.subscriptions);
       } else if (this.model) {
         await this.open(this.model.model, this.model.session);

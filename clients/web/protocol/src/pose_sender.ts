@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Poses on their way: few at a time, and of those that wait only the newest. A queue would show what the user did long ago.
-import type { JointTranslation, PoseUpdate } from "./gen/ecorche/v1/stream_pb.js";
-import { Skinning } from "./gen/ecorche/v1/common_pb.js";
+import type { PoseUpdate } from "./gen/ecorche/v1/stream_pb.js";
+import { Skinning, type JointTranslation } from "./gen/ecorche/v1/common_pb.js";
 import type { Message } from "./requests.js";
 
 /** A whole pose; docs/reference/protocol.md, "Poses" and "Angles". */
@@ -21,6 +21,8 @@ const IN_FLIGHT = 8;
 export class PoseSender {
   /** The session's last: the next pose has a larger one. */
   sequence = 0n;
+  /** The last that came from here: what the session shows up to it is no news. */
+  own = 0n;
   /** The newest pose that was set. */
   newest: Pose | undefined;
   private waits = false;
@@ -45,6 +47,12 @@ export class PoseSender {
   restart(sequence: bigint): void {
     this.flying.clear();
     this.sequence = sequence;
+    this.own = 0n;
+  }
+
+  /** A sequence for a pose that the server finds. */
+  take(): bigint {
+    return (this.own = ++this.sequence);
   }
 
   private flush(rigDigest: bigint): void {
@@ -52,7 +60,7 @@ export class PoseSender {
     const sequence = this.sequence + 1n;
     if (!this.send({ case: "poseUpdate", value: updateOf(this.newest, sequence, rigDigest) })) return;
     this.waits = false;
-    this.sequence = sequence;
+    this.sequence = this.own = sequence;
     this.flying.add(sequence);
   }
 }

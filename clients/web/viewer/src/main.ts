@@ -3,9 +3,10 @@
 import { App } from "./app.js";
 import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
+import { addPosing } from "./posing/index.js";
 
 /** Parts that hook into the viewer by what App makes public. */
-const PARTS: readonly ((app: App) => void)[] = [addPanels];
+const PARTS: readonly ((app: App) => void)[] = [addPanels, addPosing];
 
 try {
   const root = document.querySelector<HTMLElement>("#viewer")!;
