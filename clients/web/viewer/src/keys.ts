@@ -39,7 +39,8 @@ export class Keys {
     if (event.key.length > 1 && event.key !== "Escape" && focused?.closest("button, a, input, [role=tree], [role=tablist], [role=slider]")) return;
     const plain = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const named = `${command ? "Ctrl+" : ""}${event.shiftKey && (plain.length > 1 || /[a-z]/.test(plain)) ? "Shift+" : ""}${plain}`;
-    const binding = this.#bindings.find((each) => each.keys.includes(named) && (each.when?.() ?? true));
+    // The last one added is asked first, as with tools.
+    const binding = [...this.#bindings].reverse().find((each) => each.keys.includes(named) && (each.when?.() ?? true));
     if (!binding) return;
     event.preventDefault();
     binding.run();

@@ -85,7 +85,7 @@ export class Live {
 
   async #connect(): Promise<void> {
     const client = await Client.connect(address(), {
-      token: this.#token, name: "ecorche viewer",
+      token: this.#token, name: "ecorche viewer", person: localStorage.getItem("ecorche.name") ?? "",
       onState: ({ state, reason, retryMs }) => {
         if (state !== "closed" || this.client) this.store.set({ link: { state, reason, mends: state !== "closed", ...(retryMs === undefined ? {} : { retryAt: Date.now() + retryMs }) } });
       },

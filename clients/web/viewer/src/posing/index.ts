@@ -14,6 +14,10 @@ import { Poser } from "./poser.js";
 import { poseOf, samePose, restPose } from "./pose.js";
 import { rigOf } from "./rig.js";
 import { copyLink, restoreLink } from "./share.js";
+import { Clips } from "./clips.js";
+import { addClipsPanel } from "./clips_panel.js";
+import { addPeoplePanel, fillStrip } from "./people_panel.js";
+import { Together } from "./together.js";
 import { h } from "../panels/dom.js";
 
 export function addPosing(app: App): Poser {
@@ -30,7 +34,9 @@ export function addPosing(app: App): Poser {
     const tissues = app.store.state.model?.tissues ?? [];
     return segmentAt(tissues[row], point, tissues, app.body, poser.state.rig!, poser.state.motions);
   };
+  const together = new Together(say), clips = new Clips(say);
   const strip = h("div", { class: "control-strip" });
+  fillStrip(together, strip);
   const tool = new PoseTool(poser, scene, drag, under, () => app.panels.open("pose"));
   app.tools.add(tool);
   options.watch((state) => state.joints, (on) => {
@@ -39,17 +45,23 @@ export function addPosing(app: App): Poser {
   });
   addPosePanel(app, poser, drag, options, tool, strip);
   addLibraryPanel(app, poser, () => copyLink(app, poser));
+  addClipsPanel(app, poser, clips);
+  addPeoplePanel(app, together);
   addPoseKeys(app, poser, options, () => downloadPose(app, poser));
-  follow(app, poser);
+  follow(app, poser, together, clips);
   return poser;
 }
 
 /** What the server tells of the pose, and what is chosen elsewhere in the viewer. */
-function follow(app: App, poser: Poser): void {
+function follow(app: App, poser: Poser, together: Together, clips: Clips): void {
   let digest = 0n;
   let seen: Client | null = null;
   app.live.onOpened(({ client, model }) => {
-    if (client !== seen) listen(client, poser);
+    if (client !== seen) {
+      listen(client, poser);
+      together.follow(client);
+      clips.follow(client);
+    }
     seen = client;
     opened(poser, model, model.rigDigest === digest);
     digest = model.rigDigest;
