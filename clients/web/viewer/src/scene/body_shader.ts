@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// GLSL of the body. Positions come as u16 and are placed by the matrix of their group; the normal stands beside them as two signed bytes.
+// GLSL of the body. Positions come as u16 and are placed by the matrix of their group; the normal stands beside them in two bytes.
 
-/** Of a vertex: `packedNormal` holds an "oct16" normal, u in its low byte. */
+/** Of a vertex: `packedNormal` holds an "oct16" normal, u + 128 in its low byte and v + 128 in its high one, in 127ths. */
 export const DECODE_NORMAL = /* glsl */ `
 attribute float packedNormal;
 
 vec3 bodyNormal() {
   float high = floor(packedNormal / 256.0);
-  vec2 uv = vec2(packedNormal - high * 256.0, high);
-  uv = (uv - step(127.5, uv) * 256.0) / 127.0;
+  vec2 uv = (vec2(packedNormal - high * 256.0, high) - 128.0) / 127.0;
   vec3 normal = vec3(uv, 1.0 - abs(uv.x) - abs(uv.y));
   if (normal.z < 0.0) {
     vec2 signs = vec2(uv.x < 0.0 ? -1.0 : 1.0, uv.y < 0.0 ? -1.0 : 1.0);
@@ -120,7 +119,7 @@ void main() {
   // Creases are darker, ridges lighter: how the normal turns over the surface, from pixel to pixel.
   vec3 dpx = dFdx(vView), dpy = dFdy(vView);
   float bend = dot(dFdx(n), dpx) / max(dot(dpx, dpx), 1e-12) + dot(dFdy(n), dpy) / max(dot(dpy, dpy), 1e-12);
-  float crease = clamp(bend * 0.006, -0.35, 0.18);
+  float crease = clamp(bend * 0.004, -0.2, 0.1);
   diffuse *= 1.0 + crease;
 
   vec3 lit = base * diffuse * RECIPROCAL_PI * 1.65;

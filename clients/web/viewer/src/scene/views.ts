@@ -80,13 +80,14 @@ export class Views {
     const up = Math.abs(direction.y) > 0.99 ? new THREE.Vector3(0, 0, -1) : new THREE.Vector3(0, 1, 0);
     const right = new THREE.Vector3().crossVectors(up, direction).normalize();
     const above = new THREE.Vector3().crossVectors(direction, right);
-    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2));
+    const { height, freeWidth, freeHeight } = this.stage.size;
+    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2)) / height;
     let most = 0.1;
     for (let corner = 0; corner < 8; corner++) {
       const at = new THREE.Vector3(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y, corner & 4 ? box.max.z : box.min.z)
         .applyMatrix4(patient.matrix).sub(center);
-      const half = Math.max(Math.abs(at.dot(above)) / tangent, Math.abs(at.dot(right)) / (tangent * camera.aspect));
-      most = Math.max(most, half * 1.14 + at.dot(direction));
+      const half = Math.max(Math.abs(at.dot(above)) / (tangent * freeHeight), Math.abs(at.dot(right)) / (tangent * freeWidth));
+      most = Math.max(most, half * 1.06 + at.dot(direction));
     }
     return most;
   }
