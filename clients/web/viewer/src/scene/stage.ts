@@ -32,6 +32,7 @@ export class Stage {
   #wanted = 0;
   #before = new Set<(seconds: number) => void>();
   #after = new Set<() => void>();
+  #resized = new Set<() => void>();
   #last = 0;
   #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
 
@@ -74,6 +75,12 @@ export class Stage {
     return () => this.#after.delete(listener);
   }
 
+  /** Called after the picture, or what panels leave of it, has another size. */
+  onResize(listener: () => void): () => void {
+    this.#resized.add(listener);
+    return () => this.#resized.delete(listener);
+  }
+
   surround(colors: Surroundings): void {
     this.#backdrop.setColors(colors.above, colors.below);
     this.#ground.setColor(colors.shadow);
@@ -113,6 +120,7 @@ export class Stage {
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.window();
+    for (const listener of [...this.#resized]) listener();
     this.invalidate();
   }
 

@@ -18,10 +18,13 @@ export interface CameraPlace {
 
 export class Views {
   #flight: { from: CameraPlace; to: CameraPlace; at: number } | null = null;
+  #fitted: { box: THREE.Box3; side: Side | undefined } | null = null;
 
   constructor(private readonly stage: Stage) {
     stage.onBeforeDraw((seconds) => this.#fly(seconds));
-    stage.controls.addEventListener("start", () => (this.#flight = null));
+    stage.controls.addEventListener("start", () => (this.#flight = this.#fitted = null));
+    // Until somebody moves the camera, what was fitted stays fitted when the window or the panels change.
+    stage.onResize(() => this.#fitted && this.fit(this.#fitted.box, this.#fitted.side, true));
   }
 
   get place(): CameraPlace {
@@ -29,7 +32,7 @@ export class Views {
   }
 
   set place(place: CameraPlace) {
-    this.#flight = null;
+    this.#flight = this.#fitted = null;
     this.stage.camera.position.fromArray(place.position);
     this.stage.controls.target.fromArray(place.target);
     this.stage.controls.update();
@@ -46,6 +49,7 @@ export class Views {
     direction.normalize();
     const away = this.#distance(box, center, direction);
     this.#go({ position: center.clone().addScaledVector(direction, away).toArray(), target: center.toArray() }, now);
+    this.#fitted = { box: box.clone(), side };
   }
 
   /** Turns the camera about its target, degrees. */
