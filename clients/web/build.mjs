@@ -17,7 +17,7 @@ const page = path.join(here, "viewer/index.html");
 async function bundle(entryPoints, define) {
   const { metafile } = await build({
     absWorkingDir: here, entryPoints, define, outdir: out, entryNames: "[name]-[hash]", assetNames: "[name]-[hash]",
-    bundle: true, minify: true, format: "esm", target: "es2022", metafile: true, legalComments: "none", logLevel: "warning",
+    bundle: true, splitting: true, chunkNames: "[name]-[hash]", minify: true, format: "esm", target: "es2022", metafile: true, legalComments: "none", logLevel: "warning",
     loader: { ".svg": "file", ".png": "file", ".woff2": "file" },
   });
   const outputs = Object.entries(metafile.outputs);
