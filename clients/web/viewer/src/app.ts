@@ -164,5 +164,11 @@ export class App {
       this.stage.placeGround(center.x, center.y, center.z, (Math.max(size.x, size.y) / 1000) * 0.9);
     }
     this.stage.invalidate();
+    if (first) {
+      const stop = this.stage.onAfterDraw(() => {
+        performance.mark("ecorche body");
+        stop();
+      });
+    }
   }
 }

@@ -102,6 +102,7 @@ export class Live {
     const asked = hashParameters();
     const models = await client.listModels();
     if (models.length === 0) throw new Error("the server holds no model (give `ecorche serve` one)");
+    performance.mark("ecorche connected");
     await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? "");
     const stream = await client.subscribeMesh({ normals: true, adaptive: true });
     this.stream = stream;
