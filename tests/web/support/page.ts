@@ -70,8 +70,8 @@ export interface Viewed {
   readonly page: Page;
   /** What went wrong in the page so far: errors of the console, of scripts, of its policy, and requests to other hosts. */
   readonly faults: string[];
-  /** Bytes of every file that was fetched, as they came over the line, by name. */
-  readonly files: Map<string, number>;
+  /** Names of the files that were fetched. */
+  readonly files: Set<string>;
 }
 
 /** A page of the site, not yet loaded. Its small picture keeps software GL quick. */
@@ -79,14 +79,15 @@ export async function newPage(browser: Browser, site: Site, options: BrowserCont
   const context = await browser.newContext({ viewport: { width: 900, height: 640 }, reducedMotion: "reduce", acceptDownloads: true, ...options });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
-  const faults: string[] = [], files = new Map<string, number>();
+  const faults: string[] = [], files = new Set<string>();
   page.on("console", (message) => message.type() === "error" && faults.push(`console: ${message.text()}`));
   page.on("pageerror", (error) => faults.push(`script: ${error.stack ?? error.message}`));
   page.on("request", (request) => {
     const url = new URL(request.url());
     if (/^(https?|wss?):$/.test(url.protocol) && url.host !== new URL(site.origin).host) faults.push(`another host: ${url}`);
-    if (url.origin === site.origin) files.set(url.pathname.replace(/^\/$/, "/index.html"), 0);
+    if (url.origin === site.origin) files.add(url.pathname.replace(/^\/$/, "/index.html"));
   });
+  page.on("websocket", (socket) => new URL(socket.url()).host !== new URL(site.origin).host && faults.push(`another host: ${socket.url()}`));
   await page.addInitScript(() => addEventListener("securitypolicyviolation", (event) =>
     console.error(`policy: ${event.violatedDirective} ${event.blockedURI}`)));
   return { page, faults, files };
