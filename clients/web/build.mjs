@@ -16,8 +16,8 @@ const page = path.join(here, "viewer/index.html");
 /** @param {string[]} entryPoints @param {Record<string, string>} define */
 async function bundle(entryPoints, define) {
   const { metafile } = await build({
-    absWorkingDir: here, entryPoints, define, outdir: out, entryNames: "[name]-[hash]", assetNames: "[name]-[hash]", chunkNames: "[name]-[hash]",
-    bundle: true, splitting: true, minify: true, format: "esm", target: "es2022", metafile: true, legalComments: "none", logLevel: "warning",
+    absWorkingDir: here, entryPoints, define, outdir: out, entryNames: "[name]-[hash]", assetNames: "[name]-[hash]",
+    bundle: true, splitting: true, chunkNames: "[name]-[hash]", minify: true, format: "esm", target: "es2022", metafile: true, legalComments: "none", logLevel: "warning",
     loader: { ".svg": "file", ".png": "file", ".woff2": "file", ".yaml": "text" },
   });
   const outputs = Object.entries(metafile.outputs);

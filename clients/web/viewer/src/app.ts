@@ -51,14 +51,14 @@ export class App {
       return lookOf(tissue?.name ?? "", tissue?.group ?? "other");
     });
     this.stage.patient.add(this.body.group);
-    this.picker = new Picker(this.stage.renderer, this.stage.camera, this.body, this.stage.patient);
+    this.picker = new Picker(this.stage, this.body);
     this.views = new Views(this.stage);
     this.tools = new Tools(this.stage, this.picker, {
       click: (pointer) => this.select(pointer.pick()?.row ?? null),
       doubleClick: (pointer) => this.#focusOn(pointer.pick()?.row ?? null),
       hover: (pointer) => this.#hover(pointer),
     });
-    this.panels = new PanelHost(places.root);
+    this.panels = new PanelHost(places.root, (insets) => this.stage.setInsets(insets));
     this.#says = places.root.querySelector<HTMLElement>("#says")!;
     this.live = new Live(this.store, this.history, this.body);
     this.live.onBody((first) => this.#bodyCame(first));
@@ -164,5 +164,11 @@ export class App {
       this.stage.placeGround(center.x, center.y, center.z, (Math.max(size.x, size.y) / 1000) * 0.9);
     }
     this.stage.invalidate();
+    if (first) {
+      const stop = this.stage.onAfterDraw(() => {
+        performance.mark("ecorche body");
+        stop();
+      });
+    }
   }
 }

@@ -72,7 +72,8 @@ export class Live {
     const client = await Client.connect(address(), { token: this.#token, name: "ecorche viewer, rest" });
     try {
       await client.open(this.client.model.model);
-      const stream = await client.subscribeMesh();
+      performance.mark("ecorche opened");
+    const stream = await client.subscribeMesh();
       const frame = stream.latest ?? await new Promise<BodyFrame>((resolve, reject) => {
         stream.on("frame", resolve);
         client.on("state", ({ state, reason }) => state !== "open" && reject(new ConnectionError(reason)));
@@ -102,7 +103,9 @@ export class Live {
     const asked = hashParameters();
     const models = await client.listModels();
     if (models.length === 0) throw new Error("the server holds no model (give `ecorche serve` one)");
+    performance.mark("ecorche connected");
     await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? "");
+    performance.mark("ecorche opened");
     const stream = await client.subscribeMesh({ normals: true, adaptive: true });
     this.stream = stream;
     stream.on("frame", (frame) => this.#show(frame));
@@ -132,6 +135,7 @@ export class Live {
 
   #show(frame: BodyFrame): void {
     const first = this.frame === null;
+    if (first) performance.mark("ecorche frame");
     this.frame = frame;
     const changed = frame.layout !== this.#layout;
     if (changed) {

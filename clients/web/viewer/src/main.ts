@@ -12,6 +12,8 @@ try {
   const root = document.querySelector<HTMLElement>("#viewer")!;
   const app = new App({ root, canvas: root.querySelector("canvas")! });
   for (const add of PARTS) add(app);
+  // For the browser's console, and for tests.
+  Object.assign(window, { ecorche: app });
   void app.live.start();
 } catch (error) {
   showCover({

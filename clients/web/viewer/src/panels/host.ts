@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where panels stand: in a dock left or right of the picture, or all in one sheet from below where there is little width. Parts of
 // the viewer register theirs; each is a tab.
+import type { Insets } from "../scene/stage.js";
 import { h, icon, type IconName } from "./dom.js";
 
 export interface Panel {
@@ -29,13 +30,17 @@ interface Dock {
 }
 
 const NARROW = "(max-width: 760px)";
+// Pixels of what else stands round the picture: gaps beside a dock, the line above, the tools below.
+const BESIDE = 24;
+const ABOVE = 64;
 
 export class PanelHost {
   readonly #entries: Entry[] = [];
   readonly #docks: Record<"left" | "right" | "sheet", Dock>;
   readonly #narrow = matchMedia(NARROW);
 
-  constructor(root: HTMLElement) {
+  /** `cover` is told what the docks cover of the picture. */
+  constructor(root: HTMLElement, private readonly cover: (insets: Insets) => void) {
     const dock = (name: string, label: string): Dock => {
       const tabs = h("div", { class: "tabs", role: "tablist", aria: { label } });
       const content = h("div", { class: "dock-content" });
@@ -117,6 +122,14 @@ export class PanelHost {
         section.hidden = !open;
       }
     }
+    this.cover(this.#insets());
+  }
+
+  #insets(): Insets {
+    const wide = ({ root, open }: Dock) => (this.narrow || root.hidden || open === null ? 0 : root.offsetWidth + BESIDE);
+    const { left, right, sheet } = this.#docks;
+    const below = this.narrow ? sheet.root.offsetHeight + BESIDE / 2 : ABOVE;
+    return { left: wide(left), right: wide(right), top: ABOVE, bottom: below };
   }
 
   #tabKeys(event: KeyboardEvent, tabs: HTMLElement): void {

@@ -17,7 +17,9 @@ export function addToolsBar(app: App): void {
   bar.className = "float";
   bar.setAttribute("role", "toolbar");
   bar.setAttribute("aria-label", "View");
-  const view = (side: Side, label: string, key: string, name: string) => iconButton(name, label, () => app.fit(side), key);
+  const view = (side: Side, label: string, key: string, word: string) => h("button", {
+    type: "button", class: "word-button", title: `${label} (${key})`, on: { click: () => app.fit(side) },
+  }, word);
   const undo = iconButton("undo", "Undo", () => app.undo(), "Ctrl+Z"), redo = iconButton("redo", "Redo", () => app.redo(), "Ctrl+Shift+Z");
   const glass = iconButton("glass", "See through the skin", () => app.layers.toggleSeeThrough(), "S");
   const save = iconButton("save", "Save", () => {}, undefined);
@@ -25,8 +27,8 @@ export function addToolsBar(app: App): void {
   popover(save, menu, "Save");
   const divider = () => h("span", { class: "divider" });
   bar.append(
-    iconButton("fit", "Fit the body", () => app.fit(), "F"), view("front", "From the front", "1", "front"),
-    view("left", "From the patient's left", "2", "side"), view("top", "From above", "5", "top"), glass, divider(),
+    iconButton("fit", "Fit the body", () => app.fit(), "F"), view("front", "From the front", "1", "Front"),
+    view("left", "From the patient's left", "2", "Side"), view("top", "From above", "5", "Top"), glass, divider(),
     undo, redo, divider(), save, iconButton("theme", "Light or dark", () => nextTheme(app), "D"), iconButton("help", "Help and keys", () => openHelp(app), "?"),
     menu,
   );

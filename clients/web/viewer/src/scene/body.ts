@@ -106,7 +106,7 @@ export class Body {
     this.shared.restBox.value.set(rest.low[0], rest.low[1], rest.low[2], rest.step);
     const buffer = new THREE.InterleavedBuffer(rest.numbers, STRIDE);
     for (const { geometry } of this.#parts.values()) {
-      geometry.setAttribute("rest", new THREE.InterleavedBufferAttribute(buffer, 3, 0, false));
+      geometry.setAttribute("rest", integers(buffer));
     }
   }
 
@@ -128,6 +128,12 @@ export class Body {
     part.prepass.visible = part.mesh.visible && part.mesh.material.transparent;
     part.pick.visible = part.mesh.visible;
     part.pick.userData["glass"] = part.mesh.material.transparent;
+  }
+
+  /** How strongly a tissue is drawn, 0 to 1. */
+  shown(row: number): number {
+    const mesh = this.#parts.get(row)?.mesh;
+    return mesh?.visible ? (mesh.material.uniforms["opacity"]!.value as number) : 0;
   }
 
   setGlow(row: number, glow: number): void {
@@ -171,13 +177,12 @@ export class Body {
     const topology = this.#topology;
     if (!topology) return;
     this.#buffer = new THREE.InterleavedBuffer(numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
-    const position = new THREE.InterleavedBufferAttribute(this.#buffer, 3, 0, false);
-    const normal = new THREE.InterleavedBufferAttribute(this.#buffer, 1, 3, false);
+    const vertex = integers(this.#buffer);
     const index = new THREE.BufferAttribute(topology.indices, 1);
     const depth = depthMaterial();
     for (const range of topology.ranges) {
       const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute("position", position).setAttribute("packedNormal", normal).setIndex(index);
+      geometry.setAttribute("vertex", vertex).setIndex(index);
       geometry.setDrawRange(range.firstIndex, range.indexCount);
       const mesh = new THREE.Mesh(geometry, new TissueMaterial(this.looks(range.row), this.shared));
       const prepass = new THREE.Mesh(geometry, depth);
@@ -206,4 +211,9 @@ export class Body {
     this.#positions = null;
     this.#rest = null;
   }
+}
+
+/** An attribute that the shader reads as `uvec4`. */
+function integers(buffer: THREE.InterleavedBuffer): THREE.InterleavedBufferAttribute {
+  return Object.assign(new THREE.InterleavedBufferAttribute(buffer, STRIDE, 0, false), { gpuType: THREE.IntType });
 }

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// GLSL of the body. Positions come as u16 and are placed by the matrix of their group; the normal stands beside them as two signed bytes.
+// GLSL of the body. A vertex is four integers: x, y and z, which the matrix of the group places, and an octahedral normal.
+//
+// Why integers: graphics cards read them as they are. Three u16 that become floats are no format of theirs, and the driver would
+// convert the whole buffer after every frame, once for each tissue.
 
-/** Of a vertex: `packedNormal` holds an "oct16" normal, u in its low byte. */
-export const DECODE_NORMAL = /* glsl */ `
-attribute float packedNormal;
+const VERTEX = /* glsl */ `
+attribute uvec4 vertex;
+vec3 bodyPosition() { return vec3(vertex.xyz); }
+`;
 
+/** "oct16": u + 128 in the low byte and v + 128 in the high one, in 127ths. */
+const NORMAL = /* glsl */ `
 vec3 bodyNormal() {
-  float high = floor(packedNormal / 256.0);
-  vec2 uv = vec2(packedNormal - high * 256.0, high);
-  uv = (uv - step(127.5, uv) * 256.0) / 127.0;
+  vec2 uv = (vec2(vertex.w & 255u, vertex.w >> 8) - 128.0) / 127.0;
   vec3 normal = vec3(uv, 1.0 - abs(uv.x) - abs(uv.y));
   if (normal.z < 0.0) {
     vec2 signs = vec2(uv.x < 0.0 ? -1.0 : 1.0, uv.y < 0.0 ? -1.0 : 1.0);
@@ -19,16 +23,16 @@ vec3 bodyNormal() {
 `;
 
 /** How far a vertex is from where it was scanned, mm. */
-export const FROM_REST = /* glsl */ `
-attribute vec3 rest;
+const FROM_REST = /* glsl */ `
+attribute uvec4 rest;
 uniform vec4 restBox;   // low, step
 uniform vec4 poseBox;
-float fromRest() { return length((position * poseBox.w + poseBox.xyz) - (rest * restBox.w + restBox.xyz)); }
+float fromRest() { return length((bodyPosition() * poseBox.w + poseBox.xyz) - (vec3(rest.xyz) * restBox.w + restBox.xyz)); }
 `;
 
 export const TISSUE_VERTEX = /* glsl */ `
 #include <common>
-${DECODE_NORMAL}
+${VERTEX}${NORMAL}
 #ifdef SCALAR
 ${FROM_REST}
 varying float vScalar;
@@ -38,7 +42,7 @@ varying vec3 vView;
 #include <clipping_planes_pars_vertex>
 
 void main() {
-  vec4 mvPosition = modelViewMatrix * vec4(position, 1.0);
+  vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
   vNormal = normalMatrix * bodyNormal();
   vView = mvPosition.xyz;
   #ifdef SCALAR
@@ -120,7 +124,7 @@ void main() {
   // Creases are darker, ridges lighter: how the normal turns over the surface, from pixel to pixel.
   vec3 dpx = dFdx(vView), dpy = dFdy(vView);
   float bend = dot(dFdx(n), dpx) / max(dot(dpx, dpx), 1e-12) + dot(dFdy(n), dpy) / max(dot(dpy, dpy), 1e-12);
-  float crease = clamp(bend * 0.006, -0.35, 0.18);
+  float crease = clamp(bend * 0.004, -0.2, 0.1);
   diffuse *= 1.0 + crease;
 
   vec3 lit = base * diffuse * RECIPROCAL_PI * 1.65;
@@ -145,11 +149,11 @@ void main() {
 /** The chosen tissue's outline: its back faces, moved out along the normal by `width` pixels. */
 export const OUTLINE_VERTEX = /* glsl */ `
 #include <common>
-${DECODE_NORMAL}
+${VERTEX}${NORMAL}
 uniform float width;
 uniform vec2 viewport;
 void main() {
-  vec4 clip = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  vec4 clip = projectionMatrix * modelViewMatrix * vec4(bodyPosition(), 1.0);
   vec3 normal = normalMatrix * bodyNormal();
   vec2 out2 = (projectionMatrix * vec4(normal, 0.0)).xy;
   clip.xy += normalize(out2 + vec2(1e-9)) * width * 2.0 / viewport * clip.w;
@@ -167,18 +171,18 @@ void main() {
 
 /** Picking: the tissue's row and how far it is from rest, and where the surface is, in one pixel of four u32. */
 export const PICK_VERTEX = /* glsl */ `
-#ifdef SCALAR
+${VERTEX}#ifdef SCALAR
 ${FROM_REST}
 varying float vScalar;
 #endif
 uniform vec4 box;   // low and step, mm
 varying vec3 vPlace;
 void main() {
-  vPlace = position * box.w + box.xyz;
+  vPlace = bodyPosition() * box.w + box.xyz;
   #ifdef SCALAR
   vScalar = fromRest();
   #endif
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(bodyPosition(), 1.0);
 }
 `;
 
@@ -197,5 +201,24 @@ void main() {
   scalar = uint(clamp(vScalar * 16.0, 0.0, 65535.0));
   #endif
   picked = uvec4((tissue + 1u) | (scalar << 16), floatBitsToUint(vPlace.x), floatBitsToUint(vPlace.y), floatBitsToUint(vPlace.z));
+}
+`;
+
+/** Depth alone. */
+export const DEPTH_VERTEX = /* glsl */ `
+${VERTEX}
+#include <clipping_planes_pars_vertex>
+void main() {
+  vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
+  gl_Position = projectionMatrix * mvPosition;
+  #include <clipping_planes_vertex>
+}
+`;
+
+export const DEPTH_FRAGMENT = /* glsl */ `
+#include <clipping_planes_pars_fragment>
+void main() {
+  #include <clipping_planes_fragment>
+  gl_FragColor = vec4(1.0);
 }
 `;

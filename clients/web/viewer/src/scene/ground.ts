@@ -42,7 +42,7 @@ export function ground() {
       varying vec2 at;
       void main() {
         float far = length(at);
-        float contact = exp(-far * far * 26.0) * 0.55, wide = exp(-far * far * 5.0) * 0.3;
+        float contact = exp(-far * far * 14.0) * 0.34, wide = exp(-far * far * 4.0) * 0.26;
         gl_FragColor = vec4(shadow, (contact + wide) * (1.0 - smoothstep(0.75, 1.0, far)));
         #include <colorspace_fragment>
       }`,

@@ -20,7 +20,7 @@ const look = (color: number, scatter: number, wrap: number, roughness: number, s
 const GROUPS: Record<string, Look> = {
   skin: look(0xdba98c, 0xc4553a, 0.42, 0.55, 0.32),
   bone: look(0xe9dfc6, 0xb9935c, 0.22, 0.62, 0.22),
-  muscle: look(0xa8433a, 0x6e1512, 0.2, 0.42, 0.55),
+  muscle: look(0x94342d, 0x6e1512, 0.2, 0.42, 0.5),
   organ: look(0xb9705f, 0x7d2a20, 0.28, 0.36, 0.6),
   vessel: look(0xb3322d, 0x701010, 0.25, 0.3, 0.65),
   nerve: look(0xe8cf72, 0xa97f25, 0.3, 0.45, 0.35),

@@ -2,6 +2,7 @@
 // What lies under a pixel: the body drawn once more into a target of one pixel, as numbers. No tree over triangles that move.
 import * as THREE from "three";
 import type { Body } from "./body.js";
+import type { Stage } from "./stage.js";
 
 export interface Picked {
   /** Row of the tissue. */
@@ -23,36 +24,34 @@ export class Picker {
   #clear = new THREE.Color(0, 0, 0);
 
   constructor(
-    private readonly renderer: THREE.WebGLRenderer,
-    private readonly camera: THREE.PerspectiveCamera,
+    private readonly stage: Stage,
     private readonly body: Body,
-    patient: THREE.Object3D,
   ) {
     const holder = new THREE.Group();
     holder.matrixAutoUpdate = false;
-    holder.matrix.copy(patient.matrix);
+    holder.matrix.copy(stage.patient.matrix);
     holder.add(body.pickGroup);
     this.#scene.add(holder);
   }
 
-  /** x and y in pixels of CSS from the upper left of a picture of `width` by `height`. What one looks through is missed where
-   *  something solid lies behind it. */
-  pick(x: number, y: number, width: number, height: number): Picked | null {
-    return this.#draw(x, y, width, height, false) ?? this.#draw(x, y, width, height, true);
+  /** x and y in pixels of CSS from the upper left of the picture. What one looks through is missed where something solid lies behind
+   *  it. */
+  pick(x: number, y: number): Picked | null {
+    return this.#draw(x, y, false) ?? this.#draw(x, y, true);
   }
 
-  #draw(x: number, y: number, width: number, height: number, glass: boolean): Picked | null {
+  #draw(x: number, y: number, glass: boolean): Picked | null {
     const shown: THREE.Object3D[] = [];
     for (const mesh of this.body.pickGroup.children) {
       if (!mesh.visible || Boolean(mesh.userData["glass"]) === glass) continue;
       mesh.visible = false;
       shown.push(mesh);
     }
-    const target = this.renderer.getRenderTarget();
-    const color = this.renderer.getClearColor(new THREE.Color());
-    const alpha = this.renderer.getClearAlpha();
-    const { camera, renderer } = this;
-    camera.setViewOffset(width, height, Math.floor(x), Math.floor(y), 1, 1);
+    const { camera, renderer } = this.stage;
+    const target = renderer.getRenderTarget();
+    const color = renderer.getClearColor(new THREE.Color());
+    const alpha = renderer.getClearAlpha();
+    this.stage.window({ x, y });
     renderer.setRenderTarget(this.#target);
     renderer.setClearColor(this.#clear, 0);
     renderer.clear();
@@ -60,7 +59,7 @@ export class Picker {
     renderer.readRenderTargetPixels(this.#target, 0, 0, 1, 1, this.#pixel);
     renderer.setRenderTarget(target);
     renderer.setClearColor(color, alpha);
-    camera.clearViewOffset();
+    this.stage.window();
     for (const mesh of shown) mesh.visible = true;
     const tissue = this.#pixel[0]! & 0xffff;
     if (tissue === 0) return null;

@@ -13,6 +13,13 @@ export interface Surroundings {
   readonly accent: number;
 }
 
+export interface Insets {
+  readonly left: number;
+  readonly right: number;
+  readonly top: number;
+  readonly bottom: number;
+}
+
 export class Stage {
   readonly renderer: THREE.WebGLRenderer;
   readonly scene = new THREE.Scene();
@@ -25,7 +32,9 @@ export class Stage {
   #wanted = 0;
   #before = new Set<(seconds: number) => void>();
   #after = new Set<() => void>();
+  #resized = new Set<() => void>();
   #last = 0;
+  #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
@@ -66,10 +75,38 @@ export class Stage {
     return () => this.#after.delete(listener);
   }
 
+  /** Called after the picture, or what panels leave of it, has another size. */
+  onResize(listener: () => void): () => void {
+    this.#resized.add(listener);
+    return () => this.#resized.delete(listener);
+  }
+
   surround(colors: Surroundings): void {
     this.#backdrop.setColors(colors.above, colors.below);
     this.#ground.setColor(colors.shadow);
     this.invalidate();
+  }
+
+  /** What panels cover of the picture, pixels of CSS: the body is brought to the middle of what is left. */
+  setInsets(insets: Insets): void {
+    this.#insets = insets;
+    this.resize();
+  }
+
+  /** Pixels of CSS of the whole picture, and of what no panel covers. */
+  get size(): { width: number; height: number; freeWidth: number; freeHeight: number } {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
+    const { left, right, top, bottom } = this.#insets;
+    return { width: Math.max(1, width), height: Math.max(1, height), freeWidth: Math.max(80, width - left - right), freeHeight: Math.max(80, height - top - bottom) };
+  }
+
+  /** The camera's window on the picture, moved so that what it looks at is in the middle of the free part; or one pixel of that. */
+  window(pixel?: { x: number; y: number }): void {
+    const { width, height } = this.size;
+    const { left, right, top, bottom } = this.#insets;
+    const x = (right - left) / 2, y = (bottom - top) / 2;
+    if (pixel) this.camera.setViewOffset(width, height, Math.floor(pixel.x) + x, Math.floor(pixel.y) + y, 1, 1);
+    else this.camera.setViewOffset(width, height, x, y, width, height);
   }
 
   /** Puts the ground under the body: `floor` is its lowest point, the radius that of its trunk, m. */
@@ -78,12 +115,12 @@ export class Stage {
   }
 
   resize(): void {
-    const parent = this.canvas.parentElement!;
-    const width = Math.max(1, parent.clientWidth), height = Math.max(1, parent.clientHeight);
+    const { width, height } = this.size;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.window();
+    for (const listener of [...this.#resized]) listener();
     this.invalidate();
   }
 

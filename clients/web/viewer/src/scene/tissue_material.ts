@@ -2,7 +2,7 @@
 // The materials of the body: one per tissue, of three.js' ShaderMaterial over the GLSL beside it.
 import * as THREE from "three";
 import type { Look } from "./palette.js";
-import { OUTLINE_FRAGMENT, OUTLINE_VERTEX, PICK_FRAGMENT, PICK_VERTEX, TISSUE_FRAGMENT, TISSUE_VERTEX } from "./body_shader.js";
+import { DEPTH_FRAGMENT, DEPTH_VERTEX, OUTLINE_FRAGMENT, OUTLINE_VERTEX, PICK_FRAGMENT, PICK_VERTEX, TISSUE_FRAGMENT, TISSUE_VERTEX } from "./body_shader.js";
 
 /** Uniforms that all tissues share: set once, seen by every material. */
 export interface SharedUniforms {
@@ -62,9 +62,7 @@ export class TissueMaterial extends THREE.ShaderMaterial {
 /** Writes depth alone: the nearest surface of what is shown as glass. */
 export function depthMaterial(): THREE.ShaderMaterial {
   return new THREE.ShaderMaterial({
-    vertexShader: "#include <clipping_planes_pars_vertex>\nvoid main() { vec4 mvPosition = modelViewMatrix * vec4(position, 1.0); "
-      + "gl_Position = projectionMatrix * mvPosition;\n#include <clipping_planes_vertex>\n}",
-    fragmentShader: "#include <clipping_planes_pars_fragment>\nvoid main() {\n#include <clipping_planes_fragment>\ngl_FragColor = vec4(1.0); }",
+    vertexShader: DEPTH_VERTEX, fragmentShader: DEPTH_FRAGMENT,
     colorWrite: false, transparent: true, side: THREE.FrontSide, clipping: true,
   });
 }

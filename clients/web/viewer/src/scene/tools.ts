@@ -80,7 +80,7 @@ export class Tools {
     const caster = new THREE.Raycaster();
     camera.updateMatrixWorld();
     caster.setFromCamera(new THREE.Vector2((x / box.width) * 2 - 1, 1 - (y / box.height) * 2), camera);
-    return { x, y, ray: caster.ray, event, pick: () => this.picker.pick(x, y, box.width, box.height) };
+    return { x, y, ray: caster.ray, event, pick: () => this.picker.pick(x, y) };
   }
 
   #down(event: PointerEvent): void {

@@ -18,10 +18,13 @@ export interface CameraPlace {
 
 export class Views {
   #flight: { from: CameraPlace; to: CameraPlace; at: number } | null = null;
+  #fitted: { box: THREE.Box3; side: Side | undefined } | null = null;
 
   constructor(private readonly stage: Stage) {
     stage.onBeforeDraw((seconds) => this.#fly(seconds));
-    stage.controls.addEventListener("start", () => (this.#flight = null));
+    stage.controls.addEventListener("start", () => (this.#flight = this.#fitted = null));
+    // Until somebody moves the camera, what was fitted stays fitted when the window or the panels change.
+    stage.onResize(() => this.#fitted && this.fit(this.#fitted.box, this.#fitted.side, true));
   }
 
   get place(): CameraPlace {
@@ -29,7 +32,7 @@ export class Views {
   }
 
   set place(place: CameraPlace) {
-    this.#flight = null;
+    this.#flight = this.#fitted = null;
     this.stage.camera.position.fromArray(place.position);
     this.stage.controls.target.fromArray(place.target);
     this.stage.controls.update();
@@ -46,6 +49,7 @@ export class Views {
     direction.normalize();
     const away = this.#distance(box, center, direction);
     this.#go({ position: center.clone().addScaledVector(direction, away).toArray(), target: center.toArray() }, now);
+    this.#fitted = { box: box.clone(), side };
   }
 
   /** Turns the camera about its target, degrees. */
@@ -80,13 +84,14 @@ export class Views {
     const up = Math.abs(direction.y) > 0.99 ? new THREE.Vector3(0, 0, -1) : new THREE.Vector3(0, 1, 0);
     const right = new THREE.Vector3().crossVectors(up, direction).normalize();
     const above = new THREE.Vector3().crossVectors(direction, right);
-    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2));
+    const { height, freeWidth, freeHeight } = this.stage.size;
+    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2)) / height;
     let most = 0.1;
     for (let corner = 0; corner < 8; corner++) {
       const at = new THREE.Vector3(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y, corner & 4 ? box.max.z : box.min.z)
         .applyMatrix4(patient.matrix).sub(center);
-      const half = Math.max(Math.abs(at.dot(above)) / tangent, Math.abs(at.dot(right)) / (tangent * camera.aspect));
-      most = Math.max(most, half * 1.14 + at.dot(direction));
+      const half = Math.max(Math.abs(at.dot(above)) / (tangent * freeHeight), Math.abs(at.dot(right)) / (tangent * freeWidth));
+      most = Math.max(most, half * 1.06 + at.dot(direction));
     }
     return most;
   }
