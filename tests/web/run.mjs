@@ -16,7 +16,7 @@ const out = fs.mkdtempSync(path.join(web, "node_modules/.tests-"));
 process.on("exit", () => fs.rmSync(out, { recursive: true, force: true }));
 await build({
   absWorkingDir: here, entryPoints: process.argv.slice(2), outdir: out, outExtension: { ".js": ".mjs" }, outbase: here,
-  bundle: true, platform: "node", format: "esm", target: "node18", external: ["ws", "playwright-core", "axe-core", "esbuild"], sourcemap: "inline",
+  bundle: true, platform: "node", format: "esm", target: "node18", external: ["ws", "playwright-core", "axe-core", "esbuild", "yaml"], sourcemap: "inline",
   nodePaths: [path.join(web, "node_modules")], loader: { ".yaml": "text" }, define: { ROOT: JSON.stringify(root) },
 });
 const files = process.argv.slice(2).map((file) => path.join(out, file.replace(/\.ts$/, ".mjs")));

@@ -125,9 +125,11 @@ export function clamp(joint: Joint, rotation: Quat): Quat {
 /** Angles within the limits that stand for the joint's rotation: of the two triples that give it, the one inside. */
 export function anglesWithin(joint: Joint, rotation: Quat): Angles {
   const first = anglesFromRotation(joint, rotation);
-  if (same(first, intoRanges(joint, first))) return first;
+  const firstInside = intoRanges(joint, first);
+  if (same(first, firstInside)) return firstInside;
   const second = otherTriple(joint, first);
-  return same(second, intoRanges(joint, second)) ? second : first;
+  const secondInside = intoRanges(joint, second);
+  return same(second, secondInside) ? secondInside : first;
 }
 
 export interface SetAngle {

@@ -91,14 +91,26 @@ function mount(app: App, poser: Poser, copyLink: () => Promise<void>, content: H
     if (poser.state.rig !== rig) return;
     given.replaceChildren(...(await givenPoses(rig)).map((preset) => presetCard(poser, rig, preset.name, preset.pose)));
   };
+  // Their parser comes when somebody looks.
+  let seen = false;
+  const fillSeen = () => {
+    const { rig } = poser.state;
+    if (rig && seen) void fill(rig).catch((error: unknown) => app.say(`The poses of ecorche did not come: ${String(error)}`));
+  };
+  new IntersectionObserver((entries, observer) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    observer.disconnect();
+    seen = true;
+    fillSeen();
+  }).observe(keep);
   poser.store.watch((state) => state.rig, (rig) => {
     saved = rig ? new SavedPoses(rig.name, localStorage) : null;
     list();
     given.replaceChildren();
-    if (rig) void fill(rig).catch((error: unknown) => app.say(`The poses of ecorche did not come: ${String(error)}`));
+    fillSeen();
   }, true);
   // Figures are drawn in the theme's colours.
-  app.store.watch((state) => state.theme, () => poser.state.rig && void fill(poser.state.rig));
+  app.store.watch((state) => state.theme, fillSeen);
 }
 
 export function downloadPose(app: App, poser: Poser): void {

@@ -115,7 +115,7 @@ export class PoseTool implements PointerTool {
     const start = this.scene.projector.acrossFrom(hold.place, this.scene.projector.sight(pointer.ray)) ?? hold.place;
     const offset = subtract(hold.place, start);
     this.#hold = null;
-    if (hold.row === 0) {
+    if (hold.row === 0 && this.poser.state.pins.length === 0) {
       if (!this.poser.begin()) return this.refused();
       this.#hold = { kind: "root", place: hold.place, offset, from: this.poser.state.asked.rootTranslation };
     } else {
