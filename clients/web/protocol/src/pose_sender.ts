@@ -24,6 +24,7 @@ export class PoseSender {
   /** The newest pose that was set. */
   newest: Pose | undefined;
   private waits = false;
+  private sent = { sequence: 0n, rigDigest: 0n };  // the newest
   private readonly flying = new Set<bigint>();
 
   constructor(private readonly send: (message: Message) => boolean) {}
@@ -47,12 +48,19 @@ export class PoseSender {
     this.sequence = sequence;
   }
 
+  /** After a loss and restart(): the newest pose goes again where the session never got it, and still has this rig. */
+  recover(rigDigest: bigint): void {
+    if (this.sent.sequence > this.sequence && this.sent.rigDigest === rigDigest) this.waits = true;
+    if (this.waits) this.flush(rigDigest);
+  }
+
   private flush(rigDigest: bigint): void {
     if (!this.newest || this.flying.size >= IN_FLIGHT) return;
     const sequence = this.sequence + 1n;
     if (!this.send({ case: "poseUpdate", value: updateOf(this.newest, sequence, rigDigest) })) return;
     this.waits = false;
     this.sequence = sequence;
+    this.sent = { sequence, rigDigest };
     this.flying.add(sequence);
   }
 }
