@@ -35,6 +35,12 @@ export class PoseSender {
     this.flush(rigDigest);
   }
 
+  /** After a loss and restart(): the newest pose goes again where the session never got it, and still has this rig. */
+  recover(rigDigest: bigint): void {
+    if (this.sent.sequence > this.sequence && this.sent.rigDigest === rigDigest) this.waits = true;
+    if (this.waits) this.flush(rigDigest);
+  }
+
   /** A PoseAck: of a pose of ours, of ones that it overtook, or of a clip's. */
   acknowledged(sequence: bigint, rigDigest: bigint): void {
     for (const sent of this.flying) if (sent <= sequence) this.flying.delete(sent);
@@ -48,20 +54,14 @@ export class PoseSender {
     this.sequence = sequence;
   }
 
-  /** After a loss and restart(): the newest pose goes again where the session never got it, and still has this rig. */
-  recover(rigDigest: bigint): void {
-    if (this.sent.sequence > this.sequence && this.sent.rigDigest === rigDigest) this.waits = true;
-    if (this.waits) this.flush(rigDigest);
-  }
-
   private flush(rigDigest: bigint): void {
     if (!this.newest || this.flying.size >= IN_FLIGHT) return;
     const sequence = this.sequence + 1n;
     if (!this.send({ case: "poseUpdate", value: updateOf(this.newest, sequence, rigDigest) })) return;
     this.waits = false;
     this.sequence = sequence;
-    this.sent = { sequence, rigDigest };
     this.flying.add(sequence);
+    this.sent = { sequence, rigDigest };
   }
 }
 
