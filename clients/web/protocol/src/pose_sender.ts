@@ -24,20 +24,22 @@ export class PoseSender {
   /** The newest pose that was set. */
   newest: Pose | undefined;
   private waits = false;
-  private sent = { sequence: 0n, rigDigest: 0n };  // the newest
+  private rig = 0n;         // of the newest
+  private sentAs = 0n;      // the newest's sequence
   private readonly flying = new Set<bigint>();
 
   constructor(private readonly send: (message: Message) => boolean) {}
 
   set(pose: Pose, rigDigest: bigint): void {
     this.newest = pose;
+    this.rig = rigDigest;
     this.waits = true;
     this.flush(rigDigest);
   }
 
-  /** After a loss and restart(): the newest pose goes again where the session never got it, and still has this rig. */
+  /** After a loss and restart(): the newest pose goes again where the session never got it. */
   recover(rigDigest: bigint): void {
-    if (this.sent.sequence > this.sequence && this.sent.rigDigest === rigDigest) this.waits = true;
+    if (this.newest && this.sentAs > this.sequence) this.waits = true;
     if (this.waits) this.flush(rigDigest);
   }
 
@@ -55,13 +57,14 @@ export class PoseSender {
   }
 
   private flush(rigDigest: bigint): void {
-    if (!this.newest || this.flying.size >= IN_FLIGHT) return;
+    if (this.rig !== rigDigest) this.waits = false;  // another body: its joints are others
+    if (!this.newest || !this.waits || this.flying.size >= IN_FLIGHT) return;
     const sequence = this.sequence + 1n;
     if (!this.send({ case: "poseUpdate", value: updateOf(this.newest, sequence, rigDigest) })) return;
     this.waits = false;
     this.sequence = sequence;
     this.flying.add(sequence);
-    this.sent = { sequence, rigDigest };
+    this.sentAs = sequence;
   }
 }
 
