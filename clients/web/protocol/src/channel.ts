@@ -13,14 +13,20 @@ export type ToLink =
   | { kind: "forget"; stream: number }
   | { kind: "hang up" };
 
-/** Tells of `vertices` that hold the newest frame. */
+/** Tells of the newest frame of a stream: where its vertices are, and all else that it says. */
 export interface FrameNote extends Quantisation {
   kind: "frame";
   stream: number;
   level: number;
+  /** A MeshFrame without its arrays. */
   envelope: Uint8Array;
-  buffer: ArrayBuffer;
+  /** Of the whole frame, on the wire. */
+  bytes: number;
   decodeMs: number;
+  /** Of publisher.ts, where slots are shared. */
+  word?: number;
+  /** Else the vertices themselves, to be returned. */
+  buffer?: ArrayBuffer;
 }
 
 export interface Statistics {
@@ -34,12 +40,16 @@ export interface Statistics {
 
 export type ToClient =
   | { kind: "message"; envelope: Uint8Array; payload: Uint8Array }
-  | { kind: "layouts"; stream: number; layouts: MeshLayout[]; topology: bigint }
+  | { kind: "layouts"; stream: number; layouts: MeshLayout[] }
+  /** Where a level's frames will be, once and before the first. */
+  | { kind: "slots"; stream: number; level: number; slots: Uint16Array[]; control: Int32Array }
   | FrameNote
   | { kind: "statistics"; statistics: Statistics }
   /** The connection ended or never began. */
   | { kind: "closed"; code: number; reason: string }
-  /** A fault of ours or of the peer's bytes: the connection is closed with it. */
+  /** The peer's bytes are no such protocol: the connection is ended. */
+  | { kind: "refused"; message: string }
+  /** A fault of our own code. */
   | { kind: "failed"; message: string };
 
 export type Post<Message> = (message: Message, transfer?: ArrayBuffer[]) => void;

@@ -8,9 +8,10 @@
 //     client.setPose({ rotation });
 import { create, fromBinary, type MessageInitShape } from "@bufbuild/protobuf";
 import { retryDelay } from "./backoff.js";
+import { makeBridge, type Bridge } from "./bridge.js";
 import type { FrameNote, Post, Statistics, ToClient, ToLink } from "./channel.js";
 import { Emitter } from "./emitter.js";
-import { Code, ConnectionError, ServerError } from "./errors.js";
+import { Code, ConnectionError, report, ServerError } from "./errors.js";
 import { Encoding } from "./gen/ecorche/v1/common_pb.js";
 import type { ClipSummary, IkSolved } from "./gen/ecorche/v1/command_pb.js";
 import { IkTargetSchema, SolveIkSchema } from "./gen/ecorche/v1/command_pb.js";
@@ -18,9 +19,8 @@ import { EnvelopeSchema, type Envelope } from "./gen/ecorche/v1/envelope_pb.js";
 import { ClientHelloSchema, type ServerHello } from "./gen/ecorche/v1/hello_pb.js";
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
 import { SubscribeSchema, type PoseAck, type VolumeFrame } from "./gen/ecorche/v1/stream_pb.js";
-import { Link } from "./link.js";
 import { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
-import { PoseSender, vector, type Pose } from "./pose_sender.js";
+import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
 import { encode, Requests, type Answer, type Case, type Message } from "./requests.js";
 
@@ -61,6 +61,8 @@ export interface ClientOptions {
   /** For the server's log. */
   name?: string;
   onState?: (change: StateChange) => void;
+  /** The bundle of worker.ts, which receives and decodes; false: this thread does. None: as the page was bundled. */
+  worker?: string | URL | false;
 }
 
 type IkTargetInit = MessageInitShape<typeof IkTargetSchema>;
@@ -83,6 +85,7 @@ export class Client extends Emitter<ClientEvents> {
   control: ControlState = { role: Role.UNSPECIFIED, vacant: false, reservedSeconds: 0 };
   state: StateChange = { state: "connecting", reason: "" };
 
+  private readonly bridge: Bridge;
   private readonly post: Post<ToLink>;
   private readonly requests = new Requests();
   private readonly poses = new PoseSender((message) => this.tell(message));
@@ -94,8 +97,8 @@ export class Client extends Emitter<ClientEvents> {
 
   private constructor(private readonly url: string, private readonly options: ClientOptions) {
     super();
-    const link = new Link((message) => this.hear(message));
-    this.post = (message) => link.take(message);
+    this.bridge = makeBridge(options.worker, (message) => this.hear(message));
+    this.post = this.bridge.post;
   }
 
   /** Rejects where the first connection fails; later losses are healed, as "state" tells. */
@@ -273,7 +276,9 @@ export class Client extends Emitter<ClientEvents> {
       case "layouts": return this.streams.get(message.stream)?.arrange(message.layouts);
       case "statistics": return this.emit("statistics", message.statistics);
       case "closed": return this.lost(this.ending ?? new ConnectionError(message.reason || `the connection ended (${message.code})`));
-      case "failed": return this.lost(new ConnectionError(message.message));
+      case "refused": return this.lost(new ConnectionError(message.message));
+      case "slots": return this.streams.get(message.stream)?.share(message.level, message.slots, message.control);
+      case "failed": return this.fail(message.message);
     }
   }
 
@@ -305,6 +310,12 @@ export class Client extends Emitter<ClientEvents> {
     const { message } = fromBinary(EnvelopeSchema, note.envelope);
     const frame = message.case === "meshFrame" ? this.streams.get(note.stream)?.show(note, message.value) : undefined;
     if (frame) this.emit("frame", frame);
+  }
+
+  /** A fault of our own: never healed in silence. */
+  private fail(message: string): void {
+    this.close(message);
+    report(new Error(message));
   }
 
   private lost(error: Error): void {
@@ -362,4 +373,4 @@ export class Client extends Emitter<ClientEvents> {
   }
 }
 
-export { vector };
+

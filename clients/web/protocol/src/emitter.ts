@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+import { report } from "./errors.js";
 
 /** Listeners by the name of their event. One that throws is the listener's own fault: the others are still told. */
 export class Emitter<Events> {
@@ -17,15 +18,8 @@ export class Emitter<Events> {
       try {
         (listener as (value: Events[K]) => void)(value);
       } catch (error) {
-        reportLater(error);
+        report(error);
       }
     }
   }
-}
-
-/** As an uncaught error, which a page's and a test's handlers see. */
-function reportLater(error: unknown): void {
-  queueMicrotask(() => {
-    throw error;
-  });
 }

@@ -30,3 +30,12 @@ export class ServerError extends Error {
 export class ConnectionError extends Error {
   override name = "ConnectionError";
 }
+
+/** As an uncaught error, which the handlers of a page and of a test see. */
+export function report(error: unknown): void {
+  queueMicrotask(() => {
+    throw error;
+  });
+}
+
+export const describeFault = (error: unknown): string => (error instanceof Error ? (error.stack ?? error.message) : String(error));

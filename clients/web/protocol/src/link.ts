@@ -3,10 +3,12 @@
 // Knows nothing of poses and sessions: see client.ts. Talks by the messages of channel.ts only.
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import type { Post, ToClient, ToLink } from "./channel.js";
+import type { MakeKernel } from "./decode/kernel.js";
+import { describeFault } from "./errors.js";
 import { decodeFrame, encodeFrame, ProtocolError } from "./framing.js";
 import { EnvelopeSchema, type Envelope } from "./gen/ecorche/v1/envelope_pb.js";
 import type { ModelOpened } from "./gen/ecorche/v1/model_pb.js";
-import { type MeshFrame, type MeshSelection, type Subscribed } from "./gen/ecorche/v1/stream_pb.js";
+import type { MeshFrame, MeshSelection, Subscribed } from "./gen/ecorche/v1/stream_pb.js";
 import { levelLayout, wholeLayout, wholeTissues, type WholeTissue } from "./layout.js";
 import { Meter } from "./meter.js";
 import { MeshFeed } from "./mesh_feed.js";
@@ -17,10 +19,14 @@ const SECOND_MS = 1000;
 const PING_REQUEST = 1n;
 
 interface Stream {
-  handle: number;
   subscription: number;
-  selection: MeshSelection;
   feed: MeshFeed;
+}
+
+export interface LinkOptions {
+  makeKernel: MakeKernel;
+  /** Threads share memory here. */
+  shared: boolean;
 }
 
 export class Link {
@@ -32,7 +38,7 @@ export class Link {
   private readonly meter = new Meter();
   private clock: ReturnType<typeof setInterval> | undefined;
 
-  constructor(private readonly post: Post<ToClient>) {}
+  constructor(private readonly options: LinkOptions, private readonly post: Post<ToClient>) {}
 
   take(message: ToLink): void {
     switch (message.kind) {
@@ -98,10 +104,11 @@ export class Link {
       if (!(data instanceof ArrayBuffer)) throw new ProtocolError("a message of text");
       this.meter.received(data.byteLength);
       const { envelope, payload } = decodeFrame(data);
-      this.handle(fromBinary(EnvelopeSchema, envelope), envelope, payload);
+      this.handle(parse(envelope), envelope, payload);
     } catch (error) {
       this.drop();
-      this.post({ kind: "failed", message: error instanceof Error ? error.message : String(error) });
+      if (error instanceof ProtocolError) this.post({ kind: "refused", message: error.message });
+      else this.post({ kind: "failed", message: describeFault(error) });
     }
   }
 
@@ -143,8 +150,10 @@ export class Link {
     const { handle, selection } = asked;
     const layouts = answer.levels.map((level) => levelLayout(level, payload, this.tissues));
     if (!layouts.some((layout) => layout.level === selection.level)) layouts.unshift(wholeLayout(this.tissues, selection.tissues));
-    this.streams.set(handle, { handle, subscription: answer.subscription, selection, feed: new MeshFeed(layouts, this.topology) });
-    this.post({ kind: "layouts", stream: handle, layouts, topology: this.topology });
+    const { topology, options: { makeKernel, shared } } = this;
+    const feed = new MeshFeed({ stream: handle, layouts, topology, encoding: selection.encoding, makeKernel, shared }, this.post);
+    this.streams.set(handle, { subscription: answer.subscription, feed });
+    this.post({ kind: "layouts", stream: handle, layouts });
   }
 
   private resume(subscriptions: { was: number; is: number }[]): void {
@@ -160,15 +169,8 @@ export class Link {
 
   private show(frame: MeshFrame, payload: Uint8Array<ArrayBuffer>): void {
     this.acknowledge(frame.subscription, frame.frame);
-    for (const { handle, subscription, feed } of this.streams.values()) {
-      if (subscription !== frame.subscription) continue;
-      const start = performance.now(), decoded = feed.decode(frame, payload), decodeMs = performance.now() - start;
-      this.meter.decoded(decodeMs);
-      if (!decoded) continue;
-      const { level } = frame, envelope = toBinary(EnvelopeSchema, create(EnvelopeSchema, {
-        message: { case: "meshFrame", value: { ...frame, arrays: [] } },
-      }));
-      this.post({ kind: "frame", stream: handle, level, envelope, decodeMs, ...decoded }, [decoded.buffer]);
+    for (const { subscription, feed } of this.streams.values()) {
+      if (subscription === frame.subscription) this.meter.decoded(feed.show(frame, payload));
     }
   }
 
@@ -179,4 +181,10 @@ export class Link {
   }
 }
 
-
+function parse(envelope: Uint8Array): Envelope {
+  try {
+    return fromBinary(EnvelopeSchema, envelope);
+  } catch (error) {
+    throw new ProtocolError(`an envelope cannot be read: ${error}`);
+  }
+}

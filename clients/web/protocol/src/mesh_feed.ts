@@ -1,89 +1,118 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frames of one subscription: each is checked whole against the layout of its level, then decoded into a free buffer. Where
-// none is free the newest frame waits for one, and takes the place of an older one that waits.
+// The frames of one subscription: each is checked whole against the layout of its level, then decoded and published.
+import { create, toBinary } from "@bufbuild/protobuf";
+import type { FrameNote, Post, ToClient } from "./channel.js";
+import type { Kernel, MakeKernel } from "./decode/kernel.js";
+import { quantisationOf, type Quantisation } from "./decode/packed.js";
 import { arrayOf, ProtocolError } from "./framing.js";
 import { Encoding, ScalarType } from "./gen/ecorche/v1/common_pb.js";
+import { EnvelopeSchema } from "./gen/ecorche/v1/envelope_pb.js";
 import { MeshArray_Kind, type MeshArray, type MeshFrame } from "./gen/ecorche/v1/stream_pb.js";
-import { decodeDeltas } from "./decode/deltas.js";
-import { packNormals, packNumbers, packPositions, quantisationOf, STRIDE, type Quantisation } from "./decode/packed.js";
 import type { MeshLayout, TissueRange } from "./layout.js";
+import { makeControl, Pool, SharedWriter, SLOTS } from "./publisher.js";
 
-const BUFFERS = 3;
-
-export interface Decoded extends Quantisation {
-  buffer: ArrayBuffer;
+export interface FeedOptions {
+  stream: number;
+  layouts: MeshLayout[];
+  topology: bigint;
+  encoding: Encoding;
+  makeKernel: MakeKernel;
+  /** Frames go through memory that threads share. */
+  shared: boolean;
 }
 
-/** What is kept for one level from frame to frame. */
-class Level {
-  vertices: Uint16Array<ArrayBuffer> | undefined;
-  key: { number: bigint; vertices: Uint16Array } | undefined;
-  free: ArrayBuffer[] = [];
-  made = 0;
+type Waiting = Omit<FrameNote, "buffer" | "word">;
 
-  constructor(readonly layout: MeshLayout) {}
+/** What is kept for one level from frame to frame. */
+interface Level {
+  kernel: Kernel;
+  keyframe: bigint | undefined;
+  publisher: SharedWriter | Pool;
+  /** Until a buffer comes back. */
+  waiting: Waiting | undefined;
 }
 
 export class MeshFeed {
   private readonly levels = new Map<number, Level>();
 
-  constructor(layouts: MeshLayout[], readonly topology: bigint) {
-    for (const layout of layouts) this.levels.set(layout.level, new Level(layout));
-  }
+  constructor(private readonly options: FeedOptions, private readonly post: Post<ToClient>) {}
 
-  /** Undefined where the frame waits for a buffer. Throws ProtocolError for what is no frame of this subscription. */
-  decode(frame: MeshFrame, payload: Uint8Array<ArrayBuffer>): Decoded | undefined {
-    const level = this.levels.get(frame.level);
-    if (!level) throw new ProtocolError(`a frame of level ${frame.level}, which was not subscribed to`);
-    if (frame.topologyDigest !== this.topology) throw new ProtocolError("a frame of another topology");
-    const { ranges, vertexCount } = level.layout;
-    const positions = arraysOf(frame.arrays, MeshArray_Kind.POSITIONS, ranges), normals = normalsOf(frame.arrays, ranges, payload);
-    const isDelta = frame.encoding === Encoding.U16_DELTA && frame.keyframe !== frame.frame;
-    const quantisation = isDelta || frame.encoding !== Encoding.F32 ? boxOf(frame) : undefined;
-
-    if (isDelta) {
-      if (level.key?.number !== frame.keyframe) throw new ProtocolError(`frame ${frame.frame} is against keyframe ${frame.keyframe}, which did not come`);
-      const { key } = level, deltas = positions.map((array) => bytesOf(array, payload)), vertices = level.vertices!;
-      ranges.forEach((range, i) => decodeDeltas(deltas[i], part(key.vertices, range), part(vertices, range)));
-    } else if (frame.encoding === Encoding.F32) {
-      const rows = positions.map((array, i) => rowsOf(array, payload, ScalarType.F32, ranges[i]));
-      const own = quantisationOf(rows), vertices = (level.vertices ??= new Uint16Array(vertexCount * STRIDE));
-      ranges.forEach((range, i) => packPositions(rows[i], own, part(vertices, range)));
-      return this.publish(level, normals, own);
-    } else {
-      const rows = positions.map((array, i) => rowsOf(array, payload, ScalarType.U16, ranges[i]));
-      const vertices = (level.vertices ??= new Uint16Array(vertexCount * STRIDE));
-      ranges.forEach((range, i) => packNumbers(rows[i], part(vertices, range)));
-      if (frame.encoding === Encoding.U16_DELTA) {
-        level.key ??= { number: 0n, vertices: new Uint16Array(vertexCount * STRIDE) };
-        level.key.vertices.set(vertices);
-        level.key.number = frame.frame;
-      }
-    }
-    return this.publish(level, normals, quantisation!);
+  /** Throws ProtocolError for what is no frame of this subscription. */
+  show(frame: MeshFrame, payload: Uint8Array<ArrayBuffer>): number {
+    const start = performance.now();
+    const layout = this.options.layouts.find(({ level }) => level === frame.level);
+    if (!layout) throw new ProtocolError(`a frame of level ${frame.level}, which was not subscribed to`);
+    if (frame.topologyDigest !== this.options.topology) throw new ProtocolError("a frame of another topology");
+    const [level, quantisation] = this.decode(frame, payload, layout), decodeMs = performance.now() - start;
+    this.publish(level, {
+      kind: "frame", stream: this.options.stream, level: frame.level, bytes: payload.buffer.byteLength, decodeMs, ...quantisation,
+      envelope: toBinary(EnvelopeSchema, create(EnvelopeSchema, { message: { case: "meshFrame", value: { ...frame, arrays: [] } } })),
+    });
+    return decodeMs;
   }
 
   /** A buffer of this level that the other side needs no more. */
-  giveBack(level: number, buffer: ArrayBuffer): void {
-    this.levels.get(level)?.free.push(buffer);
+  giveBack(number: number, buffer: ArrayBuffer): void {
+    const level = this.levels.get(number);
+    if (!level || level.publisher instanceof SharedWriter) return;
+    level.publisher.giveBack(buffer);
+    if (level.waiting) this.publish(level, level.waiting);
   }
 
-  private publish(level: Level, normals: Int8Array[] | undefined, quantisation: Quantisation): Decoded | undefined {
-    const vertices = level.vertices!;
-    if (normals) level.layout.ranges.forEach((range, i) => packNormals(normals[i], part(vertices, range)));
-    let buffer = level.free.pop();
-    if (!buffer && level.made < BUFFERS) {
-      buffer = new ArrayBuffer(vertices.byteLength);
-      ++level.made;
+  private decode(frame: MeshFrame, payload: Uint8Array<ArrayBuffer>, layout: MeshLayout): [Level, Quantisation] {
+    const { ranges } = layout, { encoding } = frame;
+    const positions = arraysOf(frame.arrays, MeshArray_Kind.POSITIONS, ranges), normals = normalsOf(frame.arrays, ranges, payload);
+    if (encoding === Encoding.U16_DELTA && frame.keyframe !== frame.frame) {
+      const level = this.levels.get(layout.level), quantisation = boxOf(frame);
+      if (level === undefined || level.keyframe !== frame.keyframe) {
+        throw new ProtocolError(`frame ${frame.frame} is against keyframe ${frame.keyframe}, which did not come`);
+      }
+      const slot = slotOf(level), deltas = positions.map((array) => arrayOf(array.array, payload, ScalarType.U8, 1));
+      ranges.forEach((range, i) => level.kernel.decodeDeltas(slot, range, deltas[i], normals?.[i]));
+      return [level, quantisation];
     }
-    if (!buffer) return undefined;
-    new Uint16Array(buffer).set(vertices);
-    return { buffer, ...quantisation };
+    if (encoding === Encoding.F32) {
+      const rows = positions.map((array, i) => rowsOf(array, payload, ScalarType.F32, ranges[i])), quantisation = quantisationOf(rows);
+      const level = this.levelOf(layout), slot = slotOf(level);
+      ranges.forEach((range, i) => level.kernel.packPositions(slot, range, rows[i], quantisation, normals?.[i]));
+      return [level, quantisation];
+    }
+    if (encoding !== Encoding.U16 && encoding !== Encoding.U16_DELTA) throw new ProtocolError(`a frame of encoding ${encoding}, which was not asked for`);
+    const rows = positions.map((array, i) => rowsOf(array, payload, ScalarType.U16, ranges[i])), quantisation = boxOf(frame);
+    const level = this.levelOf(layout), slot = slotOf(level), keep = encoding === Encoding.U16_DELTA;
+    if (keep && this.options.encoding !== Encoding.U16_DELTA) throw new ProtocolError("a keyframe, which was not asked for");
+    ranges.forEach((range, i) => level.kernel.packNumbers(slot, range, rows[i], normals?.[i], keep));
+    if (keep) level.keyframe = frame.frame;
+    return [level, quantisation];
+  }
+
+  /** Made with the first frame that has bytes for all of its vertices: a few bytes that tell of many make no room. */
+  private levelOf(layout: MeshLayout): Level {
+    const found = this.levels.get(layout.level);
+    if (found) return found;
+    const { shared, makeKernel, encoding, stream } = this.options, { ranges, vertexCount } = layout;
+    const kernel = makeKernel({ ranges, vertexCount, shared, slots: shared ? SLOTS : 1, deltas: encoding === Encoding.U16_DELTA });
+    const control = shared ? makeControl() : undefined;
+    const level: Level = {
+      kernel, keyframe: undefined, waiting: undefined,
+      publisher: control ? new SharedWriter(control) : new Pool(kernel.slots[0].byteLength),
+    };
+    if (control) this.post({ kind: "slots", stream, level: layout.level, slots: kernel.slots, control });
+    this.levels.set(layout.level, level);
+    return level;
+  }
+
+  private publish(level: Level, note: Waiting): void {
+    if (level.publisher instanceof SharedWriter) return this.post({ ...note, word: level.publisher.publish() });
+    const buffer = level.publisher.take();
+    level.waiting = buffer ? undefined : note;
+    if (!buffer) return;
+    new Uint16Array(buffer).set(level.kernel.slots[0]);
+    this.post({ ...note, buffer }, [buffer]);
   }
 }
 
-const part = (vertices: Uint16Array, range: TissueRange): Uint16Array =>
-  vertices.subarray(range.firstVertex * STRIDE, (range.firstVertex + range.vertexCount) * STRIDE);
+const slotOf = (level: Level): number => (level.publisher instanceof SharedWriter ? level.publisher.slot : 0);
 
 /** The arrays of one kind, a tissue of the layout each, in its order. */
 function arraysOf(arrays: MeshArray[], kind: MeshArray_Kind, ranges: TissueRange[]): MeshArray[] {
@@ -108,8 +137,6 @@ function rowsOf<T extends ScalarType.F32 | ScalarType.U16>(array: MeshArray, pay
   if (rows.length !== 3 * range.vertexCount) throw new ProtocolError(`${rows.length / 3} positions for ${range.vertexCount} vertices`);
   return rows;
 }
-
-const bytesOf = (array: MeshArray, payload: Uint8Array<ArrayBuffer>): Uint8Array => arrayOf(array.array, payload, ScalarType.U8, 1);
 
 function boxOf(frame: MeshFrame): Quantisation {
   const { box } = frame;

@@ -6,6 +6,7 @@ import { Emitter } from "./emitter.js";
 import { Encoding } from "./gen/ecorche/v1/common_pb.js";
 import type { ClampedJoint, MeshFrame, PoseQuality, ServerTimings } from "./gen/ecorche/v1/stream_pb.js";
 import type { MeshLayout } from "./layout.js";
+import { SharedReader } from "./publisher.js";
 
 export interface MeshOptions {
   /** Names; none: all. */
@@ -38,6 +39,8 @@ export interface BodyFrame extends Quantisation {
   quality: PoseQuality | undefined;
   clamped: ClampedJoint[];
   timings: ServerTimings | undefined;
+  /** What it took on the wire. */
+  bytes: number;
   decodeMs: number;
 }
 
@@ -56,6 +59,7 @@ export class MeshStream extends Emitter<MeshEvents> {
   generation = 0;
   /** Its number on the present connection. */
   subscription = 0;
+  private readonly shared = new Map<number, { slots: Uint16Array[]; reader: SharedReader }>();
 
   constructor(readonly handle: number, public options: MeshOptions, private readonly giveBack: (level: number, buffer: ArrayBuffer) => void) {
     super();
@@ -64,22 +68,33 @@ export class MeshStream extends Emitter<MeshEvents> {
   arrange(layouts: MeshLayout[]): void {
     this.layouts = layouts;
     this.latest = undefined;
+    this.shared.clear();
     this.emit("layouts", layouts);
   }
 
-  /** Undefined for a frame of a layout that is no more. */
+  share(level: number, slots: Uint16Array[], control: Int32Array): void {
+    this.shared.set(level, { slots, reader: new SharedReader(control) });
+  }
+
+  /** Undefined where a newer frame is on its way. */
   show(note: FrameNote, frame: MeshFrame): BodyFrame | undefined {
-    const layout = this.layouts.find(({ level }) => level === note.level);
-    if (!layout) return undefined;
+    const layout = this.layouts.find(({ level }) => level === note.level), vertices = this.verticesOf(note);
+    if (!layout || !vertices) return undefined;
     const { latest } = this;
     this.latest = {
-      stream: this, layout, vertices: new Uint16Array(note.buffer), scale: note.scale, offset: note.offset,
+      stream: this, layout, vertices, scale: note.scale, offset: note.offset,
       frame: frame.frame, poseSequence: frame.poseSequence, level: frame.level, encoding: frame.encoding,
-      quality: frame.quality, clamped: frame.clamped, timings: frame.timings, decodeMs: note.decodeMs,
+      quality: frame.quality, clamped: frame.clamped, timings: frame.timings, bytes: note.bytes, decodeMs: note.decodeMs,
     };
     ++this.generation;
     this.emit("frame", this.latest);
-    if (latest) this.giveBack(latest.level, latest.vertices.buffer as ArrayBuffer);
+    if (latest?.vertices.buffer instanceof ArrayBuffer) this.giveBack(latest.level, latest.vertices.buffer);
     return this.latest;
+  }
+
+  private verticesOf({ level, word, buffer }: FrameNote): Uint16Array | undefined {
+    if (buffer) return new Uint16Array(buffer);
+    const shared = this.shared.get(level), slot = word === undefined ? undefined : shared?.reader.take(word);
+    return slot === undefined ? undefined : shared!.slots[slot];
   }
 }
