@@ -121,12 +121,6 @@ void main() {
   vec3 keyTint = mix(scatter, vec3(1.0), smoothstep(0.0, 0.45, keyPlain + 0.12));
   vec3 diffuse = ambient + keyColor * keyWrapped * mix(keyTint, vec3(1.0), 1.0 - wrap) + fillColor * wrapped(dot(n, toFill), wrap);
 
-  // Creases are darker, ridges lighter: how the normal turns over the surface, from pixel to pixel.
-  vec3 dpx = dFdx(vView), dpy = dFdy(vView);
-  float bend = dot(dFdx(n), dpx) / max(dot(dpx, dpx), 1e-12) + dot(dFdy(n), dpy) / max(dot(dpy, dpy), 1e-12);
-  float crease = clamp(bend * 0.004, -0.2, 0.1);
-  diffuse *= 1.0 + crease;
-
   vec3 lit = base * diffuse * RECIPROCAL_PI * 1.65;
   lit += shine * (keyColor * highlight(n, v, toKey, roughness) + fillColor * highlight(n, v, toFill, roughness + 0.1)) * 0.9;
   float edge = pow(1.0 - facing, 3.0);
