@@ -37,8 +37,8 @@ ${VERTEX}${NORMAL}
 ${FROM_REST}
 varying float vScalar;
 #endif
-varying vec3 vNormal;
-varying vec3 vView;
+centroid varying vec3 vNormal;
+centroid varying vec3 vView;
 #include <clipping_planes_pars_vertex>
 
 void main() {
@@ -65,8 +65,8 @@ uniform float shine;
 uniform float opacity;
 uniform float glow;
 uniform vec3 accent;
-varying vec3 vNormal;
-varying vec3 vView;
+centroid varying vec3 vNormal;
+centroid varying vec3 vView;
 #ifdef SCALAR
 uniform vec2 scalarRange;
 varying float vScalar;
