@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ecorche/wire/convert.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -37,6 +38,32 @@ void joint_to_proto(const Joint& joint, v1::Joint& out) {
     a.set_max(angle.max);
   }
 }
+
+int find_angle(const Joint& joint, const std::string& name) {
+  const auto found = std::find_if(joint.sequence.begin(), joint.sequence.end(),
+                                  [&](const AngleAxis& a) { return a.name == name; });
+  return found == joint.sequence.end() ? -1 : static_cast<int>(found - joint.sequence.begin());
+}
+
+// What names no joint or angle of the skeleton moves nothing, and is left out.
+void couplings_to_proto(const Skeleton& skeleton, const Joint& joint, v1::Joint& out) {
+  for (const Coupling& coupling : joint.coupled) {
+    const int lead = skeleton.find_joint(coupling.joint);
+    if (lead < 0) continue;
+    const int angle = find_angle(skeleton.segments[static_cast<std::size_t>(lead)].joint, coupling.angle);
+    const int driven = find_angle(joint, coupling.drives), slides = coupling.slides();
+    if (angle < 0 || (slides < 0 && driven < 0)) continue;
+    v1::JointCoupling& c = *out.add_coupled();
+    c.set_joint(static_cast<std::uint32_t>(lead));
+    c.set_angle(static_cast<std::uint32_t>(angle));
+    if (slides < 0) {
+      c.set_driven_angle(static_cast<std::uint32_t>(driven));
+    } else {
+      c.set_slide_axis(static_cast<std::uint32_t>(slides));
+    }
+    c.set_ratio(coupling.ratio);
+  }
+}
 static_assert(static_cast<int>(JointKind::ball) + 1 == v1::JOINT_KIND_BALL);
 static_assert(static_cast<int>(JointKind::free) + 1 == v1::JOINT_KIND_FREE);
 
@@ -59,6 +86,28 @@ Status joint_from_proto(const v1::Joint& joint, Joint& out) {
                             .rest = a.rest(),
                             .min = a.min(),
                             .max = a.max()});
+  }
+  return {};
+}
+
+// After all joints, since a coupling may name a later one.
+Status couplings_from_proto(const v1::Skeleton& skeleton, Rig& out) {
+  for (std::size_t row = 0; row < out.skeleton.segments.size(); ++row) {
+    Joint& joint = out.skeleton.segments[row].joint;
+    for (const v1::JointCoupling& c : skeleton.segments(static_cast<int>(row)).joint().coupled()) {
+      const bool known = c.joint() < out.skeleton.segments.size();
+      const Joint* lead = known ? &out.skeleton.segments[c.joint()].joint : nullptr;
+      const bool slides = c.drives_case() == v1::JointCoupling::kSlideAxis;
+      if (!known || c.angle() >= lead->sequence.size() || (slides && c.slide_axis() > 2) ||
+          (!slides && c.driven_angle() >= joint.sequence.size()))
+        return invalid("skeleton: joint '" + joint.name + "' is coupled to what there is not");
+      joint.coupled.push_back(
+          {.joint = lead->name,
+           .angle = lead->sequence[c.angle()].name,
+           .drives = slides ? std::string(1, static_cast<char>('x' + c.slide_axis())) + "_mm"
+                            : joint.sequence[c.driven_angle()].name,
+           .ratio = c.ratio()});
+    }
   }
   return {};
 }
@@ -115,6 +164,7 @@ void to_proto(const Rig& rig, v1::Skeleton& out) {
     s.set_name(segment.name);
     s.set_parent(segment.parent);
     joint_to_proto(segment.joint, *s.mutable_joint());
+    couplings_to_proto(rig.skeleton, segment.joint, *s.mutable_joint());
     s.mutable_aliases()->Assign(segment.aliases.begin(), segment.aliases.end());
   }
 }
@@ -136,7 +186,7 @@ Status from_proto(const v1::Skeleton& skeleton, Rig& out) {
     if (const Status status = joint_from_proto(s.joint(), segment.joint); !status.ok()) return status;
     out.skeleton.segments.push_back(std::move(segment));
   }
-  return {};
+  return couplings_from_proto(skeleton, out);
 }
 
 namespace {

@@ -99,6 +99,38 @@ TEST(Convert, ASkeletonComesBack) {
   }
 }
 
+TEST(Convert, CouplingsComeBackAndThoseToNothingAreRefused) {
+  Rig rig = test::toy_model().rig;
+  Joint& root = rig.skeleton.segments[0].joint;
+  Joint& joint = rig.skeleton.segments[1].joint;
+  const std::string lead = root.sequence.at(2).name;
+  joint.coupled = {{root.name, lead, joint.sequence.at(1).name, 0.25},
+                   {joint.name, joint.sequence.at(0).name, "y_mm", -2.5},
+                   {"nowhere", lead, joint.sequence.at(1).name, 1}};
+  v1::Skeleton skeleton;
+  to_proto(rig, skeleton);
+  Rig back;
+  ASSERT_TRUE(from_proto(skeleton, back).ok());
+  const std::vector<Coupling>& coupled = back.skeleton.segments[1].joint.coupled;
+  ASSERT_EQ(coupled.size(), 2U);
+  for (std::size_t i = 0; i < coupled.size(); ++i) {
+    EXPECT_EQ(coupled[i].joint, joint.coupled[i].joint);
+    EXPECT_EQ(coupled[i].angle, joint.coupled[i].angle);
+    EXPECT_EQ(coupled[i].drives, joint.coupled[i].drives);
+    EXPECT_EQ(coupled[i].ratio, joint.coupled[i].ratio);
+  }
+  v1::JointCoupling& first = *skeleton.mutable_segments(1)->mutable_joint()->mutable_coupled(0);
+  first.set_angle(3);
+  EXPECT_EQ(from_proto(skeleton, back).code, StatusCode::invalid_argument);
+  first.set_angle(0);
+  first.set_slide_axis(3);
+  EXPECT_EQ(from_proto(skeleton, back).code, StatusCode::invalid_argument);
+  first.set_slide_axis(2);
+  EXPECT_TRUE(from_proto(skeleton, back).ok());
+  first.set_joint(99);
+  EXPECT_EQ(from_proto(skeleton, back).code, StatusCode::invalid_argument);
+}
+
 TEST(Convert, ASkeletonWithChildrenBeforeParentsIsRefused) {
   v1::Skeleton skeleton;
   to_proto(test::toy_model().rig, skeleton);

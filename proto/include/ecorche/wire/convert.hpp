@@ -20,9 +20,9 @@ void to_proto(const ImageGrid& grid, v1::Grid& out);
 /// invalid_argument: not nine direction numbers, or a size beyond 2^31.
 Status from_proto(const v1::Grid& grid, ImageGrid& out);
 
-/// All but how the centres were found and what is coupled: a client needs neither.
+/// All but how the centres were found: a client does not need it.
 void to_proto(const Rig& rig, v1::Skeleton& out);
-/// invalid_argument: parents that do not come first, an unknown kind, an axis beyond 2.
+/// invalid_argument: parents that do not come first, an unknown kind, an axis beyond 2, a coupling to what there is not.
 Status from_proto(const v1::Skeleton& skeleton, Rig& out);
 
 /// Fills root_translation, rotation and translation. Exact: doubles travel as they are.

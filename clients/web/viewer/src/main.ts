@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the page begins.
+import { App } from "./app.js";
+import { showCover } from "./panels/cover.js";
+import { addPanels } from "./panels/index.js";
+import { addPosing } from "./posing/index.js";
+
+/** Parts that hook into the viewer by what App makes public. */
+const PARTS: readonly ((app: App) => void)[] = [addPanels];
+
+try {
+  const root = document.querySelector<HTMLElement>("#viewer")!;
+  const app = new App({ root, canvas: root.querySelector("canvas")! });
+  for (const add of PARTS) add(app);
+  const posing = addPosing(app);
+  // For the browser's console, and for tests.
+  Object.assign(window, { ecorche: Object.assign(app, { posing }) });
+  void app.live.start();
+} catch (error) {
+  showCover({
+    lead: "This browser cannot draw the body",
+    text: "The viewer needs WebGL 2. Switch on hardware acceleration in the browser's settings, or open this page in a newer browser.",
+    detail: error instanceof Error ? error.message : String(error),
+  });
+  console.warn(error);
+}

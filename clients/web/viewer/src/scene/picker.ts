@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// What lies under a pixel: the body drawn once more into a target of one pixel, as numbers. No tree over triangles that move.
+import * as THREE from "three";
+import type { Body } from "./body.js";
+import type { Stage } from "./stage.js";
+
+export interface Picked {
+  /** Row of the tissue. */
+  readonly row: number;
+  /** Where on its surface, mm, LPS. */
+  readonly point: THREE.Vector3;
+  /** mm from rest, in steps of a sixteenth; only while that is shown. */
+  readonly fromRest: number;
+}
+
+export class Picker {
+  #target = new THREE.WebGLRenderTarget(1, 1, {
+    format: THREE.RGBAIntegerFormat, type: THREE.UnsignedIntType, internalFormat: "RGBA32UI",
+    minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter, generateMipmaps: false,
+  });
+  #scene = new THREE.Scene();
+  #pixel = new Uint32Array(4);
+  #floats = new Float32Array(this.#pixel.buffer);
+  #clear = new THREE.Color(0, 0, 0);
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly body: Body,
+  ) {
+    const holder = new THREE.Group();
+    holder.matrixAutoUpdate = false;
+    holder.matrix.copy(stage.patient.matrix);
+    holder.add(body.pickGroup);
+    this.#scene.add(holder);
+  }
+
+  /** x and y in pixels of CSS from the upper left of the picture. What one looks through is missed where something solid lies behind
+   *  it. */
+  pick(x: number, y: number): Picked | null {
+    return this.#draw(x, y, false) ?? this.#draw(x, y, true);
+  }
+
+  #draw(x: number, y: number, glass: boolean): Picked | null {
+    const shown: THREE.Object3D[] = [];
+    for (const mesh of this.body.pickGroup.children) {
+      if (!mesh.visible || Boolean(mesh.userData["glass"]) === glass) continue;
+      mesh.visible = false;
+      shown.push(mesh);
+    }
+    const { camera, renderer } = this.stage;
+    const target = renderer.getRenderTarget();
+    const color = renderer.getClearColor(new THREE.Color());
+    const alpha = renderer.getClearAlpha();
+    this.stage.window({ x, y });
+    renderer.setRenderTarget(this.#target);
+    renderer.setClearColor(this.#clear, 0);
+    renderer.clear();
+    renderer.render(this.#scene, camera);
+    renderer.readRenderTargetPixels(this.#target, 0, 0, 1, 1, this.#pixel);
+    renderer.setRenderTarget(target);
+    renderer.setClearColor(color, alpha);
+    this.stage.window();
+    for (const mesh of shown) mesh.visible = true;
+    const tissue = this.#pixel[0]! & 0xffff;
+    if (tissue === 0) return null;
+    const point = new THREE.Vector3(this.#floats[1]!, this.#floats[2]!, this.#floats[3]!);
+    return { row: tissue - 1, point, fromRest: (this.#pixel[0]! >>> 16) / 16 };
+  }
+
+  dispose(): void {
+    this.#target.dispose();
+  }
+}

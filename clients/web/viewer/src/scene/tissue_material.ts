@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The materials of the body: one per tissue, of three.js' ShaderMaterial over the GLSL beside it.
+import * as THREE from "three";
+import type { Look } from "./palette.js";
+import { DEPTH_FRAGMENT, DEPTH_VERTEX, OUTLINE_FRAGMENT, OUTLINE_VERTEX, PICK_FRAGMENT, PICK_VERTEX, TISSUE_FRAGMENT, TISSUE_VERTEX } from "./body_shader.js";
+
+/** Uniforms that all tissues share: set once, seen by every material. */
+export interface SharedUniforms {
+  /** low x, y, z and step of the present frame, mm. */
+  readonly poseBox: THREE.IUniform<THREE.Vector4>;
+  readonly restBox: THREE.IUniform<THREE.Vector4>;
+  /** What the darkest and the lightest colour of a scalar stand for. */
+  readonly scalarRange: THREE.IUniform<THREE.Vector2>;
+  readonly accent: THREE.IUniform<THREE.Color>;
+  /** Pixels of the picture. */
+  readonly viewport: THREE.IUniform<THREE.Vector2>;
+}
+
+export function sharedUniforms(): SharedUniforms {
+  return {
+    poseBox: { value: new THREE.Vector4() }, restBox: { value: new THREE.Vector4() },
+    scalarRange: { value: new THREE.Vector2(0, 1) }, accent: { value: new THREE.Color(0x2f8fff) },
+    viewport: { value: new THREE.Vector2(1, 1) },
+  };
+}
+
+export class TissueMaterial extends THREE.ShaderMaterial {
+  constructor(look: Look, shared: SharedUniforms) {
+    super({
+      vertexShader: TISSUE_VERTEX, fragmentShader: TISSUE_FRAGMENT, side: THREE.DoubleSide, clipping: true,
+      uniforms: {
+        color: { value: new THREE.Color(look.color) }, scatter: { value: new THREE.Color(look.scatter) },
+        wrap: { value: look.wrap }, roughness: { value: look.roughness }, shine: { value: look.shine },
+        opacity: { value: 1 }, glow: { value: 0 },
+        accent: shared.accent, scalarRange: shared.scalarRange, poseBox: shared.poseBox, restBox: shared.restBox,
+      },
+    });
+  }
+
+  /** 1 is solid; less is drawn after all that is solid, like glass. */
+  setOpacity(opacity: number): void {
+    const glass = opacity < 0.999;
+    this.uniforms["opacity"]!.value = opacity;
+    if (this.transparent === glass) return;
+    this.transparent = glass;
+    // Of glass only the front is seen; its depth was written before (Body.prepass), so that it is never blended with itself.
+    this.side = glass ? THREE.FrontSide : THREE.DoubleSide;
+    this.depthWrite = !glass;
+    setDefine(this, "GLASS", glass);
+  }
+
+  /** 0 to 1: under the pointer, chosen. */
+  setGlow(glow: number): void {
+    this.uniforms["glow"]!.value = glow;
+  }
+
+  setScalar(on: boolean): void {
+    setDefine(this, "SCALAR", on);
+  }
+}
+
+/** Writes depth alone: the nearest surface of what is shown as glass. */
+export function depthMaterial(): THREE.ShaderMaterial {
+  return new THREE.ShaderMaterial({
+    vertexShader: DEPTH_VERTEX, fragmentShader: DEPTH_FRAGMENT,
+    colorWrite: false, transparent: true, side: THREE.FrontSide, clipping: true,
+  });
+}
+
+export function outlineMaterial(shared: SharedUniforms): THREE.ShaderMaterial {
+  return new THREE.ShaderMaterial({
+    vertexShader: OUTLINE_VERTEX, fragmentShader: OUTLINE_FRAGMENT, side: THREE.BackSide,
+    uniforms: { accent: shared.accent, viewport: shared.viewport, width: { value: 2.5 } },
+  });
+}
+
+export class PickMaterial extends THREE.ShaderMaterial {
+  constructor(row: number, shared: SharedUniforms) {
+    super({
+      glslVersion: THREE.GLSL3, vertexShader: PICK_VERTEX, fragmentShader: PICK_FRAGMENT, side: THREE.DoubleSide,
+      blending: THREE.NoBlending, toneMapped: false,
+      uniforms: { tissue: { value: row }, box: shared.poseBox, poseBox: shared.poseBox, restBox: shared.restBox },
+    });
+  }
+
+  setScalar(on: boolean): void {
+    setDefine(this, "SCALAR", on);
+  }
+}
+
+function setDefine(material: THREE.ShaderMaterial, name: string, on: boolean): void {
+  if ((name in material.defines) === on) return;
+  if (on) material.defines[name] = "";
+  else delete material.defines[name];
+  material.needsUpdate = true;
+}
