@@ -10,6 +10,7 @@ export { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
 export { Policy, type Choice, type Observed } from "./policy.js";
 export type { Pose } from "./pose_sender.js";
 export type { Probed, ProbeOptions } from "./probe.js";
+export type { ConnectionState, ControlState, StateChange } from "./states.js";
 export { NO_NORMAL, STRIDE, type Quantisation } from "./decode/packed.js";
 export * from "./gen/ecorche/v1/common_pb.js";
 export * from "./gen/ecorche/v1/command_pb.js";
