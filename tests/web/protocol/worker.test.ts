@@ -65,7 +65,7 @@ for (const [name, site, worker, shared, most] of [
 ] as const) {
   test(name, async (t) => {
     const [page, faults] = await opened(t, site(), worker);
-    const shown = await within(30, page.evaluate((poses) => window.run(poses), POSES), "the page");
+    const shown = await within(90, page.evaluate((poses) => window.run(poses), POSES), "the page");
     assert.deepEqual(faults, []);
     assert.equal(shown.digest, expected);
     assert.deepEqual([shown.shared, shown.isolated], [shared, site() === isolated]);
@@ -80,6 +80,6 @@ for (const [name, worker, fault] of [
 ] as const) {
   test(`${name} fails the page`, async (t) => {
     const [page] = await opened(t, isolated, worker);
-    assert.match(await within(20, page.evaluate(() => window.failed()), "an error of the page"), fault);
+    assert.match(await within(60, page.evaluate(() => window.failed()), "an error of the page"), fault);
   });
 }

@@ -10,7 +10,7 @@ import { create, fromBinary, type MessageInitShape } from "@bufbuild/protobuf";
 import { makeBridge, type Bridge } from "./bridge.js";
 import type { FrameNote, Post, Statistics, ToClient, ToLink } from "./channel.js";
 import { Emitter } from "./emitter.js";
-import { ConnectionError, report, ServerError } from "./errors.js";
+import { Code, ConnectionError, report, ServerError } from "./errors.js";
 import { Encoding } from "./gen/ecorche/v1/common_pb.js";
 import type { ClipSummary, IkSolved } from "./gen/ecorche/v1/command_pb.js";
 import { IkTargetSchema, SolveIkSchema } from "./gen/ecorche/v1/command_pb.js";
@@ -18,6 +18,7 @@ import { EnvelopeSchema, type Envelope } from "./gen/ecorche/v1/envelope_pb.js";
 import { ClientHelloSchema, type ServerHello } from "./gen/ecorche/v1/hello_pb.js";
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
 import { SubscribeSchema, type PoseAck, type VolumeFrame } from "./gen/ecorche/v1/stream_pb.js";
+import type { IkOptions } from "./ik.js";
 import { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
 import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
@@ -49,14 +50,9 @@ export interface ClientOptions {
 }
 
 type IkTargetInit = MessageInitShape<typeof IkTargetSchema>;
-export interface IkOptions {
-  /** Four per joint; none: the present pose. */
-  from?: ArrayLike<number>;
-  /** Show the result, too; for the controller. */
-  apply?: boolean;
-  /** The whole body may turn and go. */
-  moveRoot?: boolean;
-}
+
+/** None of these mends itself by dialling again. */
+const FINAL: number[] = [Code.UNAUTHENTICATED, Code.FAILED_PRECONDITION, Code.INVALID_ARGUMENT];
 
 export class Client extends Emitter<ClientEvents> {
   hello!: ServerHello;
@@ -75,6 +71,7 @@ export class Client extends Emitter<ClientEvents> {
   private readonly redial = new Redial({
     restore: () => this.restore(),
     waits: (reason, retryMs) => this.change({ state: "reconnecting", reason, retryMs }),
+    isFinal: (error) => error instanceof ServerError && FINAL.includes(error.code),
     givesUp: (reason) => this.close(reason),
   });
 

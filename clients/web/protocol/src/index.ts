@@ -5,6 +5,7 @@ export * from "./client.js";
 export * from "./errors.js";
 export { ProtocolError } from "./framing.js";
 export type { Statistics } from "./channel.js";
+export type { IkOptions } from "./ik.js";
 export type { MeshLayout, TissueRange } from "./layout.js";
 export { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
 export { Policy, type Choice, type Observed } from "./policy.js";

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Dialling again after a loss, until it succeeds or cannot.
 import { retryDelay } from "./backoff.js";
-import { Code, ServerError } from "./errors.js";
-
-/** None of these mends itself. */
-const FINAL: number[] = [Code.UNAUTHENTICATED, Code.FAILED_PRECONDITION, Code.INVALID_ARGUMENT];
 
 export interface RedialOptions {
   /** Connects, and makes all as it was. */
   restore(): Promise<void>;
   waits(reason: string, retryMs: number): void;
+  isFinal(error: Error): boolean;
   givesUp(reason: string): void;
 }
 
@@ -23,7 +20,7 @@ export class Redial {
 
   after(error: Error, tries = 0): void {
     if (this.stopped) return;
-    if (error instanceof ServerError && FINAL.includes(error.code)) return this.options.givesUp(error.message);
+    if (this.options.isFinal(error)) return this.options.givesUp(error.message);
     const retryMs = retryDelay(tries, this.retrySeconds, Math.random());
     this.options.waits(error.message, retryMs);
     this.timer = setTimeout(() => {
