@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// A subscription to posed surfaces, as the client's side sees it.
+import type { FrameNote } from "./channel.js";
+import type { Quantisation } from "./decode/packed.js";
+import { Emitter } from "./emitter.js";
+import { Encoding } from "./gen/ecorche/v1/common_pb.js";
+import type { ClampedJoint, MeshFrame, PoseQuality, ServerTimings } from "./gen/ecorche/v1/stream_pb.js";
+import type { MeshLayout } from "./layout.js";
+import { SharedReader } from "./publisher.js";
+
+export interface MeshOptions {
+  /** Names; none: all. */
+  tissues?: string[];
+  /** Of detail: 0, all, to 3. */
+  level?: number;
+  /** The server may send coarser levels while the pose moves and the line is slow. */
+  adaptive?: boolean;
+  encoding?: Encoding;
+  normals?: boolean;
+  /** Quality of every pose, measured before its frame leaves. */
+  quality?: boolean;
+  /** Frames per second, the newest of each interval; 0: every pose. */
+  maxRate?: number;
+}
+
+/** One pose of all tissues of a stream. position = offset + scale * number on each axis, mm, LPS. */
+export interface BodyFrame extends Quantisation {
+  stream: MeshStream;
+  /** Which vertices and triangles `vertices` holds: the same object for every frame of a level. */
+  layout: MeshLayout;
+  /** u16 x, y, z and an octahedral normal (decode/packed.ts) for each vertex; valid until the next frame of the stream. */
+  vertices: Uint16Array;
+  frame: bigint;
+  /** 0: the rest pose of a new session. */
+  poseSequence: bigint;
+  level: number;
+  encoding: Encoding;
+  /** The newest that was measured; see PoseQuality.poseSequence. */
+  quality: PoseQuality | undefined;
+  clamped: ClampedJoint[];
+  timings: ServerTimings | undefined;
+  /** What it took on the wire. */
+  bytes: number;
+  decodeMs: number;
+}
+
+export interface MeshEvents {
+  frame: BodyFrame;
+  /** The vertices and triangles became others: after another choice of tissues, or of a model that was read again. */
+  layouts: MeshLayout[];
+}
+
+export class MeshStream extends Emitter<MeshEvents> {
+  /** Level by level, the finest first. */
+  layouts: MeshLayout[] = [];
+  /** The newest frame. */
+  latest: BodyFrame | undefined;
+  /** Counts the frames. */
+  generation = 0;
+  /** Its number on the present connection. */
+  subscription = 0;
+  private readonly shared = new Map<number, { slots: Uint16Array[]; reader: SharedReader }>();
+
+  constructor(readonly handle: number, public options: MeshOptions, private readonly giveBack: (level: number, buffer: ArrayBuffer) => void) {
+    super();
+  }
+
+  arrange(layouts: MeshLayout[]): void {
+    this.layouts = layouts;
+    this.latest = undefined;
+    this.shared.clear();
+    this.emit("layouts", layouts);
+  }
+
+  share(level: number, slots: Uint16Array[], control: Int32Array): void {
+    this.shared.set(level, { slots, reader: new SharedReader(control) });
+  }
+
+  /** Undefined where a newer frame is on its way. */
+  show(note: FrameNote, frame: MeshFrame): BodyFrame | undefined {
+    const layout = this.layouts.find(({ level }) => level === note.level), vertices = this.verticesOf(note);
+    if (!layout || !vertices) return undefined;
+    const { latest } = this;
+    this.latest = {
+      stream: this, layout, vertices, scale: note.scale, offset: note.offset,
+      frame: frame.frame, poseSequence: frame.poseSequence, level: frame.level, encoding: frame.encoding,
+      quality: frame.quality, clamped: frame.clamped, timings: frame.timings, bytes: note.bytes, decodeMs: note.decodeMs,
+    };
+    ++this.generation;
+    this.emit("frame", this.latest);
+    if (latest?.vertices.buffer instanceof ArrayBuffer) this.giveBack(latest.level, latest.vertices.buffer);
+    return this.latest;
+  }
+
+  private verticesOf({ level, word, buffer }: FrameNote): Uint16Array | undefined {
+    if (buffer) return new Uint16Array(buffer);
+    const shared = this.shared.get(level), slot = word === undefined ? undefined : shared?.reader.take(word);
+    return slot === undefined ? undefined : shared!.slots[slot];
+  }
+}

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs tests in TypeScript: bundles each to where it finds the packages of clients/web, then `node --test`.
+//
+//     node tests/web/run.mjs protocol/client.test.ts ...
+//     node tests/web/run.mjs --types                         checks the types of all tests instead
+import { spawnSync } from "node:child_process";
+import fs from "node:fs";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = path.dirname(fileURLToPath(import.meta.url)), root = path.resolve(here, "../.."), web = path.join(root, "clients/web");
+const prepared = spawnSync(path.join(root, "scripts/viewer"), ["--protocol"], { stdio: "inherit" });
+if (prepared.status !== 0) process.exit(prepared.status ?? 70);
+
+if (process.argv[2] === "--types") {
+  process.exit(spawnSync(path.join(web, "node_modules/.bin/tsc"), ["-p", here], { stdio: "inherit" }).status ?? 70);
+}
+const { build } = await import(path.join(web, "node_modules/esbuild/lib/main.js"));
+const out = fs.mkdtempSync(path.join(web, "node_modules/.tests-"));
+process.on("exit", () => fs.rmSync(out, { recursive: true, force: true }));
+await build({
+  absWorkingDir: here, entryPoints: process.argv.slice(2), outdir: out, outExtension: { ".js": ".mjs" }, outbase: here,
+  bundle: true, platform: "node", format: "esm", target: "node18", external: ["ws", "playwright-core", "axe-core", "esbuild"], sourcemap: "inline",
+  nodePaths: [path.join(web, "node_modules")], define: { ROOT: JSON.stringify(root) },
+});
+const files = process.argv.slice(2).map((file) => path.join(out, file.replace(/\.ts$/, ".mjs")));
+const { status } = spawnSync(process.execPath, ["--enable-source-maps", "--test", ...files], { stdio: "inherit", timeout: 280_000 });
+process.exit(status ?? 70);
