@@ -215,6 +215,7 @@ TEST(Together, WhoComesStartsFromThePresentPose) {
   EXPECT_EQ(bo.opened().last_sequence(), far);
   EXPECT_EQ(bo.opened().pose().sequence(), far);
   EXPECT_EQ(bo.opened().pose().skinning(), v1::SKINNING_COR);
+  ASSERT_EQ(bo.opened().pose().rotation_size(), 4 * bo.opened().skeleton().segments_size());
   EXPECT_EQ(bo.opened().pose().rotation(8), std::cos(0.2)) << "exactly as it was sent";
   // Who opens a session that its controller left goes on from there.
   ada.goodbye();
@@ -247,6 +248,7 @@ TEST(Together, ObserversGetThePoseWithTheFrame) {
   };
   const v1::PoseState pose = frame_of(with).pose();
   EXPECT_EQ(pose.sequence(), 4U);
+  ASSERT_EQ(pose.rotation_size(), 4 * bo.opened().skeleton().segments_size());
   EXPECT_EQ(pose.rotation(8), std::cos(0.3));
   EXPECT_EQ(pose.root_translation().x(), 7);
   EXPECT_FALSE(frame_of(without).has_pose());
