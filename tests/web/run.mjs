@@ -24,9 +24,9 @@ await build({
   nodePaths: [path.join(web, "node_modules")], loader: { ".yaml": "text" }, define: { ROOT: JSON.stringify(root) },
 });
 const env = { ...process.env };
-// A folder of its own: tests beside this one may build, too.
-if (process.argv.slice(2).some((file) => !file.startsWith("protocol/"))) {
-  env.ECORCHE_VIEWER ??= path.join(out, "site");
+// A folder of its own: tests beside this one may build, too. ECORCHE_VIEWER names one that is built.
+if (!env.ECORCHE_VIEWER && process.argv.slice(2).some((file) => fs.readFileSync(path.join(here, file), "utf8").includes("support/page.js"))) {
+  env.ECORCHE_VIEWER = path.join(out, "site");
   const { status } = spawnSync(path.join(root, "scripts/viewer"), ["--out", env.ECORCHE_VIEWER], { stdio: ["ignore", "ignore", "inherit"], env: process.env });
   if (status !== 0) process.exit(status ?? 70);
 }
