@@ -25,6 +25,7 @@ export interface Posing {
   readonly poser: Poser;
   readonly drag: BodyDrag;
   readonly scene: PoseScene;
+  readonly clips: Clips;
   link(): string;
 }
 
@@ -57,7 +58,7 @@ export function addPosing(app: App): Posing {
   addPeoplePanel(app, together);
   addPoseKeys(app, poser, options, () => downloadPose(app, poser));
   follow(app, poser, together, clips);
-  return { poser, drag, scene, link: () => presentLink(app, poser) };
+  return { poser, drag, scene, clips, link: () => presentLink(app, poser) };
 }
 
 /** What the server tells of the pose, and what is chosen elsewhere in the viewer. */
