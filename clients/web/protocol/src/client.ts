@@ -186,9 +186,9 @@ export class Client extends Emitter<ClientEvents> {
     return (await this.ask({ case: "listClips", value: { $typeName: "ecorche.v1.ListClips" } }, "clipList")).value.clips;
   }
 
-  /** No name: stop. */
-  async playClip(name: string, { speed = 1, loop = false } = {}): Promise<void> {
-    await this.ask({ case: "playClip", value: { $typeName: "ecorche.v1.PlayClip", name, speed, loop } }, "status");
+  /** No name: stop. `position`: in seconds of the clip; `paused`: only the pose there is shown. */
+  async playClip(name: string, { speed = 1, loop = false, position = 0, paused = false } = {}): Promise<void> {
+    await this.ask({ case: "playClip", value: { $typeName: "ecorche.v1.PlayClip", name, speed, loop, position, paused } }, "status");
   }
 
   /** Begins a recording on the server under this name; none: ends it, once its file is whole. */
