@@ -216,7 +216,7 @@ export class Client extends Emitter<ClientEvents> {
     return (await this.ask({ case: "listClips", value: { $typeName: "ecorche.v1.ListClips" } }, "clipList")).value.clips;
   }
 
-  /** No name: stop. */
+  /** No name: stop. `position`: in seconds of the clip; `paused`: only the pose there is shown. */
   async playClip(name: string, options: { speed?: number; loop?: boolean; position?: number; paused?: boolean } = {}): Promise<void> {
     await this.ask({ case: "playClip", value: create(PlayClipSchema, { name, speed: 1, ...options }) }, "status");
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Poses on their way: few at a time, and of those that wait only the newest. A queue would show what the user did long ago.
-import type { PoseUpdate } from "./gen/ecorche/v1/stream_pb.js";
 import { Skinning, type JointTranslation } from "./gen/ecorche/v1/common_pb.js";
+import type { PoseUpdate } from "./gen/ecorche/v1/stream_pb.js";
 import type { Message } from "./requests.js";
 
 /** A whole pose; docs/reference/protocol.md, "Poses" and "Angles". */
