@@ -21,7 +21,7 @@ before(async () => {
   server = await Server.start();
   site = await Site.start(() => server.httpPort);
   browser = await launch();
-  viewed = await newPage(browser, site, { viewport: { width: 840, height: 560 } });
+  viewed = await newPage(browser, site, { viewport: { width: 840, height: 560 }, hasTouch: true });
   ({ page } = viewed);
   await openBody(page, site, `#session=${SESSION}`);
   // Looks on: what it sees is what the server made of the page's poses.
