@@ -4,27 +4,10 @@ import type { MessageInitShape } from "@bufbuild/protobuf";
 import type { Statistics } from "./channel.js";
 import type { ClipState, IkTargetSchema, Members } from "./gen/ecorche/v1/command_pb.js";
 import type { PoseState } from "./gen/ecorche/v1/common_pb.js";
-import type { ModelOpened, Role } from "./gen/ecorche/v1/model_pb.js";
+import type { ModelOpened } from "./gen/ecorche/v1/model_pb.js";
 import type { PoseAck, VolumeFrame } from "./gen/ecorche/v1/stream_pb.js";
 import type { BodyFrame } from "./mesh_stream.js";
-
-export type ConnectionState = "connecting" | "open" | "reconnecting" | "closed";
-
-export interface StateChange {
-  state: ConnectionState;
-  /** One line for a person: why it is so; empty where all is well. */
-  reason: string;
-  /** Under "reconnecting": when the next try comes. */
-  retryMs?: number;
-}
-
-export interface ControlState {
-  role: Role;
-  /** Free: claimControl would be granted. */
-  vacant: boolean;
-  /** Kept for its last holder so long; 0: not. */
-  reservedSeconds: number;
-}
+import type { ControlState, StateChange } from "./states.js";
 
 export interface ClientEvents {
   frame: BodyFrame;
@@ -58,11 +41,3 @@ export interface ClientOptions {
 }
 
 export type IkTargetInit = MessageInitShape<typeof IkTargetSchema>;
-export interface IkOptions {
-  /** Four per joint; none: the present pose. */
-  from?: ArrayLike<number>;
-  /** Show the result, too; for the controller. */
-  apply?: boolean;
-  /** The whole body may turn and go. */
-  moveRoot?: boolean;
-}
