@@ -6,58 +6,26 @@
 //     const stream = await client.subscribeMesh({ tissues: ["skin"] });
 //     stream.on("frame", ({ vertices, scale, offset }) => ...);
 //     client.setPose({ rotation });
-import { create, fromBinary, type MessageInitShape } from "@bufbuild/protobuf";
+import { create, fromBinary } from "@bufbuild/protobuf";
 import { makeBridge, type Bridge } from "./bridge.js";
-import type { FrameNote, Post, Statistics, ToClient, ToLink } from "./channel.js";
+import type { FrameNote, Post, ToClient, ToLink } from "./channel.js";
+import type { ClientEvents, ClientOptions, IkTargetInit } from "./client_events.js";
 import { Emitter } from "./emitter.js";
 import { Code, ConnectionError, report, ServerError } from "./errors.js";
 import { Encoding, type PoseState } from "./gen/ecorche/v1/common_pb.js";
-import type { ClipState, ClipSummary, ControlGranted, IkSolved, Members } from "./gen/ecorche/v1/command_pb.js";
-import { AskControlSchema, GiveControlSchema, IkTargetSchema, PlayClipSchema, SolveIkSchema, SteerClipSchema } from "./gen/ecorche/v1/command_pb.js";
+import type { ClipSummary, ControlGranted, IkSolved } from "./gen/ecorche/v1/command_pb.js";
+import { AskControlSchema, GiveControlSchema, PlayClipSchema, SolveIkSchema, SteerClipSchema } from "./gen/ecorche/v1/command_pb.js";
 import { EnvelopeSchema, type Envelope } from "./gen/ecorche/v1/envelope_pb.js";
 import { ClientHelloSchema, Feature, type ServerHello } from "./gen/ecorche/v1/hello_pb.js";
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
-import { SubscribeSchema, type PoseAck, type VolumeFrame } from "./gen/ecorche/v1/stream_pb.js";
+import { SubscribeSchema } from "./gen/ecorche/v1/stream_pb.js";
 import type { IkOptions } from "./ik.js";
-import { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
+import { MeshStream, type MeshOptions } from "./mesh_stream.js";
 import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
 import { Redial } from "./redial.js";
 import { encode, Requests, type Answer, type Case, type Message } from "./requests.js";
 import type { ControlState, StateChange } from "./states.js";
-
-export interface ClientEvents {
-  frame: BodyFrame;
-  /** A pose of this session was taken up or refused: clamped joints, skipped poses. */
-  pose: PoseAck;
-  control: ControlState;
-  /** The pose that the session shows, where this client did not set it: of a newcomer, an observer, a clip. */
-  shown: PoseState;
-  /** Who is in the session. */
-  members: Members;
-  /** What the server plays. */
-  clip: ClipState;
-  state: StateChange;
-  statistics: Statistics;
-  /** The model was read anew: open() again for it. */
-  modelChanged: { identity: bigint };
-  /** The model is open anew, after a loss that the server did not remember, or after open(). */
-  opened: ModelOpened;
-  volume: { frame: VolumeFrame; payload: Uint8Array };
-}
-
-export interface ClientOptions {
-  token?: string;
-  /** For the server's log. */
-  name?: string;
-  /** What others in the session call who uses this client. */
-  person?: string;
-  onState?: (change: StateChange) => void;
-  /** The bundle of worker.ts, which receives and decodes; false: this thread does. None: as the page was bundled. */
-  worker?: string | URL | false;
-}
-
-type IkTargetInit = MessageInitShape<typeof IkTargetSchema>;
 
 /** None of these mends itself by dialling again. */
 const FINAL: number[] = [Code.UNAUTHENTICATED, Code.FAILED_PRECONDITION, Code.INVALID_ARGUMENT];

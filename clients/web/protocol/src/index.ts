@@ -2,6 +2,7 @@
 // All that users of the library need.
 export { adapt, type Adaptation } from "./adapt.js";
 export * from "./client.js";
+export type * from "./client_events.js";
 export * from "./errors.js";
 export { ProtocolError } from "./framing.js";
 export type { Statistics } from "./channel.js";
