@@ -3,7 +3,7 @@
 export { adapt, type Adaptation } from "./adapt.js";
 export * from "./client.js";
 export * from "./errors.js";
-export { ProtocolError } from "./framing.js";
+export { arrayOf, ProtocolError, type KnownScalar } from "./framing.js";
 export type { Statistics } from "./channel.js";
 export type { MeshLayout, TissueRange } from "./layout.js";
 export { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";

@@ -4,9 +4,10 @@ import { App } from "./app.js";
 import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
+import { addSlices } from "./slices/index.js";
 
 /** Parts that hook into the viewer by what App makes public. */
-const PARTS: readonly ((app: App) => void)[] = [addPanels, addPosing];
+const PARTS: readonly ((app: App) => void)[] = [addPanels, addPosing, addSlices];
 
 try {
   const root = document.querySelector<HTMLElement>("#viewer")!;
