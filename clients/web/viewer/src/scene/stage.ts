@@ -38,10 +38,11 @@ export class Stage {
   #more: Insets | null = null;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, stencil: true, powerPreference: "high-performance" });
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1;
     this.renderer.info.autoReset = true;
+    this.renderer.localClippingEnabled = true;
     // The front of the patient looks along +z, his head along +y.
     this.patient.matrixAutoUpdate = false;
     this.patient.matrix.makeRotationX(-Math.PI / 2).scale(new THREE.Vector3(0.001, 0.001, 0.001));

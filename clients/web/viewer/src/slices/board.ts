@@ -12,7 +12,7 @@ import type { SliceState } from "./state.js";
 import { presetOf } from "./window.js";
 
 /** Takes clicks in place of the cross-hair, in mm of the patient. True: it used this one. */
-export type PlaneTool = (point: Vec3, phase: "down" | "move" | "up", id: PlaneId) => boolean;
+export type PlaneTool = (point: Vec3, phase: "down" | "move" | "up", view: PlaneView) => boolean;
 
 export class Board {
   readonly root = h("div", { class: "board", hidden: true });
@@ -24,7 +24,8 @@ export class Board {
     const { store } = slices;
     const actions = {
       tool: (view: PlaneView, point: Vec3, phase: "down" | "move" | "up") => {
-        if (!this.tool(point, phase, view.id) && phase !== "up") slices.moveTo(this.#onPlane(view.id, point));
+        const here = this.#onPlane(view.id, point);
+        if (!this.tool(here, phase, view) && phase !== "up") slices.moveTo(here);
       },
       window: (dx: number, dy: number) => {
         const { level, width } = store.state.window, gain = Math.max(0.5, width / 250);

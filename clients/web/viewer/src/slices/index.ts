@@ -34,6 +34,9 @@ export function addSlices(app: App): void {
     use(run);
   };
   app.keys.add(
+    { keys: ["l"], label: "Measure a distance", group, run: open(({ slices }) => slices.store.set({ tool: "distance" })) },
+    { keys: ["Shift+l"], label: "Measure an angle", group, run: open(({ slices }) => slices.store.set({ tool: "angle" })) },
+    { keys: ["c"], label: "Cut the body open, or close it", group, run: open(({ clipping }) => clipping.toggle()) },
     { keys: ["x"], label: "Slices beside the body, or none", group, run: open(({ slices }) => slices.store.set({ open: !slices.store.state.open })) },
   );
 }

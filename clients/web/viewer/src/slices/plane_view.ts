@@ -11,6 +11,9 @@ const css = (color: number): string => `#${color.toString(16).padStart(6, "0")}`
 const GAP = 9;
 const SCALES = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 const MOST_ZOOM = 40;
+// Pixels round a picture that is fitted, for letters and words.
+const SIDE = 16;
+const EDGE = 32;
 
 export class PlaneView {
   readonly canvas = h("canvas", { tabIndex: 0 });
@@ -130,7 +133,7 @@ export class PlaneView {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!plane || width === 0 || height === 0) return null;
     const [pixelX, pixelY] = plane.pixel, sizeX = plane.width * pixelX, sizeY = plane.height * pixelY;
-    const perMm = Math.min(width / sizeX, height / sizeY) * 0.94 * this.#zoom;
+    const perMm = Math.max(0.02, Math.min((width - 2 * SIDE) / sizeX, (height - 2 * EDGE) / sizeY)) * this.#zoom;
     const corner = (size: number, extent: number, step: number, pan: number) => size / 2 - perMm * (extent / 2 - step / 2 + pan);
     return {
       x: corner(width, sizeX, pixelX, this.#pan[0]), y: corner(height, sizeY, pixelY, this.#pan[1]),
@@ -181,11 +184,11 @@ export class PlaneView {
     context.globalAlpha = 1;
   }
 
-  /** A bar of a round length at the lower edge. */
+  /** A bar of a round length at the lower left. */
   #drawScale(context: CanvasRenderingContext2D, width: number, height: number): void {
     const mm = this.mmPerPixel;
     const length = SCALES.filter((each) => each / mm <= width * 0.28).at(-1) ?? 1;
-    const pixels = length / mm, left = width / 2 - pixels / 2, y = height - 22.5;
+    const pixels = length / mm, left = 11.5, y = height - 30.5;
     context.strokeStyle = context.fillStyle = "#e8e8e8";
     context.lineWidth = 1;
     context.beginPath();

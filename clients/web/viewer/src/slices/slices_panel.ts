@@ -79,7 +79,7 @@ export function addSlicesPanel(app: App, slices: Slices, board: Board, content: 
 
 function toolRow({ store }: Slices): HTMLElement {
   const buttons = TOOLS.map(({ id, label, icon: path }) => h("button", {
-    type: "button", class: "text-button", data: { tool: id }, on: { click: () => store.set({ tool: id, ...(store.state.open ? {} : { open: true }) }) },
+    type: "button", class: "text-button", data: { tool: id }, on: { click: () => store.set({ tool: id }) },
   }, icon(path), label));
   store.watch((state) => state.tool, (tool) => {
     for (const button of buttons) button.setAttribute("aria-pressed", String(button.dataset["tool"] === tool));
