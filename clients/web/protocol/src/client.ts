@@ -396,7 +396,8 @@ export class Client extends Emitter<ClientEvents> {
       if (resumed) {
         this.poses.restart(resumed.lastSequence);
         this.setControl({ role: resumed.role, vacant: false, reservedSeconds: 0 });
-        this.tellShown(resumed.pose);
+        // Who poses knows better: what the line swallowed goes again.
+        if (resumed.role !== Role.CONTROLLER) this.tellShown(resumed.pose);
         await this.subscribeMissing(resumed.subscriptions);
       } else if (this.model) {
         await this.open(this.model.model, this.model.session);

@@ -7,14 +7,17 @@ import { addPosing } from "./posing/index.js";
 import { addSlices } from "./slices/index.js";
 
 /** Parts that hook into the viewer by what App makes public. */
-const PARTS: readonly ((app: App) => void)[] = [addPanels, addPosing, addSlices];
+const PARTS: readonly ((app: App) => void)[] = [addPanels];
 
 try {
   const root = document.querySelector<HTMLElement>("#viewer")!;
   const app = new App({ root, canvas: root.querySelector("canvas")! });
   for (const add of PARTS) add(app);
+  const posing = addPosing(app);
+  // After posing, whose tab is open at first.
+  addSlices(app);
   // For the browser's console, and for tests.
-  Object.assign(window, { ecorche: app });
+  Object.assign(window, { ecorche: Object.assign(app, { posing }) });
   void app.live.start();
 } catch (error) {
   showCover({
