@@ -4,7 +4,7 @@ export { adapt, type Adaptation } from "./adapt.js";
 export * from "./client.js";
 export type * from "./client_events.js";
 export * from "./errors.js";
-export { ProtocolError } from "./framing.js";
+export { arrayOf, ProtocolError, type KnownScalar } from "./framing.js";
 export type { Statistics } from "./channel.js";
 export type { IkOptions } from "./ik.js";
 export type { MeshLayout, TissueRange } from "./layout.js";

@@ -4,6 +4,7 @@ import { App } from "./app.js";
 import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
+import { addSlices } from "./slices/index.js";
 
 /** Parts that hook into the viewer by what App makes public. */
 const PARTS: readonly ((app: App) => void)[] = [addPanels];
@@ -13,6 +14,8 @@ try {
   const app = new App({ root, canvas: root.querySelector("canvas")! });
   for (const add of PARTS) add(app);
   const posing = addPosing(app);
+  // After posing, whose tab is open at first.
+  addSlices(app);
   // For the browser's console, and for tests.
   Object.assign(window, { ecorche: Object.assign(app, { posing }) });
   void app.live.start();

@@ -14,6 +14,8 @@ export interface Panel {
   readonly order: number;
   /** Fills the panel, once. */
   mount(content: HTMLElement): void;
+  /** It is seen now, or no more. */
+  shown?(on: boolean): void;
 }
 
 interface Entry {
@@ -59,7 +61,7 @@ export class PanelHost {
   }
 
   add(panel: Panel): void {
-    const section = h("section", { class: "panel", id: `panel-${panel.id}`, role: "tabpanel", aria: { labelledby: `tab-${panel.id}` } });
+    const section = h("section", { class: "panel", hidden: true, id: `panel-${panel.id}`, role: "tabpanel", aria: { labelledby: `tab-${panel.id}` } });
     const tab = h("button", {
       type: "button", class: "tab", id: `tab-${panel.id}`, role: "tab", title: panel.title, aria: { controls: section.id, selected: false },
       on: { click: () => this.toggle(panel.id) },
@@ -119,7 +121,10 @@ export class PanelHost {
         const open = panel.id === dock.open;
         tab.setAttribute("aria-selected", String(open));
         tab.tabIndex = open || (dock.open === null && here[0]?.panel === panel) ? 0 : -1;
-        section.hidden = !open;
+        if (section.hidden === open) {
+          section.hidden = !open;
+          panel.shown?.(open);
+        }
       }
     }
     this.cover(this.#insets());

@@ -55,6 +55,7 @@ export class Body {
   #rest: Positions | null = null;
   #outline: THREE.Mesh;
   #scalar = false;
+  #clipping: THREE.Plane[] = [];
 
   constructor(private readonly looks: (row: number) => Look) {
     for (const group of [this.group, this.pickGroup]) group.matrixAutoUpdate = false;
@@ -147,6 +148,22 @@ export class Body {
     if (part) this.#outline.geometry = part.geometry;
   }
 
+  /** What lies behind these planes (of the scene) is not drawn, nor picked. */
+  setClipping(planes: THREE.Plane[]): void {
+    this.#clipping = planes;
+    (this.#outline.material as THREE.Material).clippingPlanes = planes;
+    for (const part of this.#parts.values()) this.#clip(part);
+  }
+
+  /** Triangles of a tissue, in numbers of the present frame. */
+  geometry(row: number): THREE.BufferGeometry | undefined {
+    return this.#parts.get(row)?.geometry;
+  }
+
+  #clip({ mesh, prepass, pick }: Part): void {
+    for (const { material } of [mesh, prepass, pick]) (material as THREE.Material).clippingPlanes = this.#clipping;
+  }
+
   range(row: number): TissueRange | undefined {
     return this.#parts.get(row)?.range;
   }
@@ -193,7 +210,9 @@ export class Body {
       for (const each of [mesh, prepass, pick]) each.frustumCulled = false;
       this.group.add(mesh, prepass);
       this.pickGroup.add(pick);
-      this.#parts.set(range.row, { range, geometry, mesh, prepass, pick });
+      const part = { range, geometry, mesh, prepass, pick };
+      this.#clip(part);
+      this.#parts.set(range.row, part);
     }
   }
 

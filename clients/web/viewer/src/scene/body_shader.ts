@@ -146,18 +146,23 @@ export const OUTLINE_VERTEX = /* glsl */ `
 ${VERTEX}${NORMAL}
 uniform float width;
 uniform vec2 viewport;
+#include <clipping_planes_pars_vertex>
 void main() {
-  vec4 clip = projectionMatrix * modelViewMatrix * vec4(bodyPosition(), 1.0);
+  vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
+  vec4 clip = projectionMatrix * mvPosition;
   vec3 normal = normalMatrix * bodyNormal();
   vec2 out2 = (projectionMatrix * vec4(normal, 0.0)).xy;
   clip.xy += normalize(out2 + vec2(1e-9)) * width * 2.0 / viewport * clip.w;
   gl_Position = clip;
+  #include <clipping_planes_vertex>
 }
 `;
 
 export const OUTLINE_FRAGMENT = /* glsl */ `
 uniform vec3 accent;
+#include <clipping_planes_pars_fragment>
 void main() {
+  #include <clipping_planes_fragment>
   gl_FragColor = vec4(accent, 1.0);
   #include <colorspace_fragment>
 }
@@ -171,12 +176,15 @@ varying float vScalar;
 #endif
 uniform vec4 box;   // low and step, mm
 varying vec3 vPlace;
+#include <clipping_planes_pars_vertex>
 void main() {
   vPlace = bodyPosition() * box.w + box.xyz;
   #ifdef SCALAR
   vScalar = fromRest();
   #endif
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(bodyPosition(), 1.0);
+  vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
+  gl_Position = projectionMatrix * mvPosition;
+  #include <clipping_planes_vertex>
 }
 `;
 
@@ -189,7 +197,9 @@ varying float vScalar;
 #endif
 varying vec3 vPlace;
 layout(location = 0) out highp uvec4 picked;
+#include <clipping_planes_pars_fragment>
 void main() {
+  #include <clipping_planes_fragment>
   uint scalar = 0u;
   #ifdef SCALAR
   scalar = uint(clamp(vScalar * 16.0, 0.0, 65535.0));

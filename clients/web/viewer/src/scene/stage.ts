@@ -34,13 +34,15 @@ export class Stage {
   #after = new Set<() => void>();
   #resized = new Set<() => void>();
   #last = 0;
-  #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
+  #panels: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
+  #more: Insets | null = null;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, stencil: true, powerPreference: "high-performance" });
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1;
     this.renderer.info.autoReset = true;
+    this.renderer.localClippingEnabled = true;
     // The front of the patient looks along +z, his head along +y.
     this.patient.matrixAutoUpdate = false;
     this.patient.matrix.makeRotationX(-Math.PI / 2).scale(new THREE.Vector3(0.001, 0.001, 0.001));
@@ -91,8 +93,27 @@ export class Stage {
 
   /** What panels cover of the picture, pixels of CSS: the body is brought to the middle of what is left. */
   setInsets(insets: Insets): void {
-    this.#insets = insets;
+    this.#panels = insets;
     this.resize();
+  }
+
+  /** What else is covered, of what panels leave; null: nothing. */
+  cover(more: Insets | null): void {
+    const same = (["left", "right", "top", "bottom"] as const).every((side) => (more?.[side] ?? 0) === (this.#more?.[side] ?? 0));
+    this.#more = more;
+    if (!same) this.resize();
+  }
+
+  /** What panels leave of the picture, pixels of CSS. */
+  get free(): { left: number; top: number; width: number; height: number } {
+    const { clientWidth, clientHeight } = this.canvas.parentElement!;
+    const { left, right, top, bottom } = this.#panels;
+    return { left, top, width: Math.max(80, clientWidth - left - right), height: Math.max(80, clientHeight - top - bottom) };
+  }
+
+  get #insets(): Insets {
+    const sum = (side: keyof Insets) => this.#panels[side] + (this.#more?.[side] ?? 0);
+    return { left: sum("left"), right: sum("right"), top: sum("top"), bottom: sum("bottom") };
   }
 
   /** Pixels of CSS of the whole picture, and of what no panel covers. */

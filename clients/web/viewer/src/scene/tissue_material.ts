@@ -67,9 +67,19 @@ export function depthMaterial(): THREE.ShaderMaterial {
   });
 }
 
+/** Counts surfaces in the stencil: the far side of a tissue up, the near side down. What is left over is where a cut goes through it. */
+export function countMaterial(side: THREE.Side, planes: THREE.Plane[]): THREE.ShaderMaterial {
+  const count = side === THREE.BackSide ? THREE.IncrementWrapStencilOp : THREE.DecrementWrapStencilOp;
+  return new THREE.ShaderMaterial({
+    vertexShader: DEPTH_VERTEX, fragmentShader: DEPTH_FRAGMENT, side, clipping: true, clippingPlanes: planes,
+    colorWrite: false, depthWrite: false, depthTest: false,
+    stencilWrite: true, stencilFunc: THREE.AlwaysStencilFunc, stencilFail: count, stencilZFail: count, stencilZPass: count,
+  });
+}
+
 export function outlineMaterial(shared: SharedUniforms): THREE.ShaderMaterial {
   return new THREE.ShaderMaterial({
-    vertexShader: OUTLINE_VERTEX, fragmentShader: OUTLINE_FRAGMENT, side: THREE.BackSide,
+    vertexShader: OUTLINE_VERTEX, fragmentShader: OUTLINE_FRAGMENT, side: THREE.BackSide, clipping: true,
     uniforms: { accent: shared.accent, viewport: shared.viewport, width: { value: 2.5 } },
   });
 }
@@ -78,7 +88,7 @@ export class PickMaterial extends THREE.ShaderMaterial {
   constructor(row: number, shared: SharedUniforms) {
     super({
       glslVersion: THREE.GLSL3, vertexShader: PICK_VERTEX, fragmentShader: PICK_FRAGMENT, side: THREE.DoubleSide,
-      blending: THREE.NoBlending, toneMapped: false,
+      blending: THREE.NoBlending, toneMapped: false, clipping: true,
       uniforms: { tissue: { value: row }, box: shared.poseBox, poseBox: shared.poseBox, restBox: shared.restBox },
     });
   }

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// Slices in Chromium: loaded when asked for, their pixels, the linked cross-hair, windows, measures by clicks, and the body cut open.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import type { Browser } from "playwright-core";
+import { Client, type ModelOpened } from "../../../clients/web/protocol/src/index.js";
+import type { PlaneGeometry } from "../../../clients/web/viewer/src/slices/plane.js";
+import { pointAt } from "../../../clients/web/viewer/src/slices/plane.js";
+import { CT_PRESETS, greyOf, type Window } from "../../../clients/web/viewer/src/slices/window.js";
+import { launch, newPage, openBody, Site, type Viewed } from "../support/page.js";
+import { apart, colorAt, project } from "../support/picture.js";
+import { Server } from "../support/server.js";
+
+type Three = readonly [number, number, number];
+const SESSION = "viewer_slices";
+let server: Server, site: Site, browser: Browser, viewed: Viewed, client: Client, model: ModelOpened;
+
+before(async () => {
+  server = await Server.start();
+  site = await Site.start(() => server.httpPort);
+  client = await Client.connect(server.url);
+  model = await client.open("", SESSION);
+  browser = await launch();
+  viewed = await newPage(browser, site);
+  await openBody(viewed.page, site, `#session=${SESSION}`);
+});
+after(async () => {
+  await browser?.close();
+  client?.close();
+  site?.stop();
+  await server?.stop();
+});
+
+const part = <T>(read: string) => viewed.page.evaluate(`(${read})(window.ecorcheSlices)`) as Promise<T>;
+const state = <T>(read: string) => part<T>(`({ slices }) => (${read})(slices.store.state)`);
+
+/** Waits until every plane shows the cross-hair's place. */
+const current = () => viewed.page.waitForFunction(() => {
+  const { slices, board } = (window as any).ecorcheSlices ?? {};
+  return board && [...board.views.values()].every((view: any) => view.plane && view.plane.origin[view.orientation.normal] === slices.store.state.cross[view.orientation.normal]);
+}, undefined, { timeout: 90_000 });
+
+/** Where a point is on a plane, pixels of the page. */
+const onPage = (id: string, point: Three) => viewed.page.evaluate(([plane, at]) => {
+  const view = (window as any).ecorcheSlices.board.views.get(plane), box = view.canvas.getBoundingClientRect(), { x, y } = view.placeOf(at);
+  return { x: box.left + x, y: box.top + y };
+}, [id, point] as const);
+
+/** What the page draws there. */
+const drawn = (id: string, points: readonly Three[]) => viewed.page.evaluate(([plane, all]) => {
+  const view = (window as any).ecorcheSlices.board.views.get(plane), ratio = view.canvas.width / view.canvas.clientWidth;
+  view.draw();
+  return all.map((point) => {
+    const { x, y } = view.placeOf(point);
+    return [...view.canvas.getContext("2d").getImageData(Math.floor(x * ratio), Math.floor(y * ratio), 1, 1).data] as number[];
+  });
+}, [id, points] as const);
+
+test("the slices come when they are asked for, and not before", async () => {
+  const { page, files } = viewed;
+  const before = [...files].filter((name) => /\/part-/.test(name));
+  assert.deepEqual(before, []);
+  await page.keyboard.press("x");
+  await current();
+  assert.equal([...files].filter((name) => /\/part-/.test(name)).length, 1);
+  assert.equal(await page.locator(".plane canvas:visible").count(), 3);
+  assert.deepEqual(await page.locator(".plane[data-plane=axial] .letter").allTextContents(), ["R", "L", "A", "P"]);
+});
+
+test("a drawn pixel is the posed volume's voxel under the window of a preset", async () => {
+  const { page } = viewed;
+  await part("({ slices }) => slices.store.set({ overlay: 0, smooth: false })");
+  for (const preset of CT_PRESETS) {
+    await page.click(`[data-preset="${preset.name}"]`);
+    assert.deepEqual(await state<Window>("(s) => s.window"), { width: preset.width, level: preset.level });
+  }
+  await page.click("[data-preset='Bone']");
+  const bone = CT_PRESETS[1]!;
+  for (const id of ["axial", "coronal", "sagittal"]) {
+    const plane = await part<PlaneGeometry>(`({ board }) => board.views.get("${id}").plane`);
+    const points: Three[] = [];
+    for (let row = 5; row < plane.height; row += 7) for (let column = 4; column < plane.width; column += 5) points.push(pointAt(plane, column, row));
+    // What the server says of the same places by another way.
+    const rest = (await client.probe(points.flat(), { volumes: ["ct"] })).values!;
+    const pixels = await drawn(id, points);
+    const { cross } = await state<{ cross: Three }>("(s) => ({ cross: s.cross })");
+    let inBody = 0, compared = 0, off = 0;
+    points.forEach((point, i) => {
+      const [red, green, blue] = pixels[i]!;
+      // Lines, letters and the scale are drawn over it: those pixels have a colour, or are not of the volume.
+      if (point.some((value, axis) => Math.abs(value - cross[axis]!) < 13) || red !== green || green !== blue) return;
+      ++compared;
+      if (rest[i] !== -1000) ++inBody;
+      if (Math.abs(red! - greyOf(Math.round(rest[i]!), bone)) > 1) ++off;
+    });
+    // A ray of the probe and one of the plane may choose differently at the very border of the body.
+    assert.ok(compared > 100 && inBody > 15 && off <= 0.03 * inBody + 3, `${id}: ${off} of ${inBody} pixels in the body differ (${compared} compared)`);
+  }
+});
+
+test("a click moves the cross-hair in all planes, wheel and arrows step by a slice", async () => {
+  const { page } = viewed, step = 6;
+  const cross = () => state<Three>("(s) => s.cross");
+  const target: Three = [(await cross())[0] + 10 * step, (await cross())[1], (await cross())[2] + 20 * step];
+  const at = await onPage("coronal", target);
+  await page.mouse.click(at.x, at.y);
+  assert.ok(apart([...await cross()] as [number, number, number], [...target] as [number, number, number]) <= step, `${await cross()}, expected ${target}`);
+  await current();
+  const before = await cross();
+  await page.mouse.wheel(0, -120);
+  await page.waitForFunction((y) => (window as any).ecorcheSlices.slices.store.state.cross[1] === y, before[1] + step);
+  await page.focus(".plane[data-plane=axial] canvas");
+  await page.keyboard.press("ArrowUp");
+  await page.keyboard.press("ArrowUp");
+  await page.keyboard.press("ArrowDown");
+  assert.equal((await cross())[2], before[2] + step);
+  await page.keyboard.press("Shift+ArrowRight");
+  assert.equal((await cross())[0], before[0] + step);
+  await current();
+});
+
+test("two clicks measure the true distance, posed and scanned, and it is listed, copied and removed", async () => {
+  const { page } = viewed;
+  const { x, y, z } = model.skeleton!.segments.find(({ name }) => name === "thorax")!.joint!.center!;
+  await part(`({ slices, board }) => { slices.moveTo([${x}, ${y}, ${z}]); board.fit(); }`);
+  await current();
+  const plane = await part<PlaneGeometry>("({ board }) => board.views.get('coronal').plane");
+  const level = (await state<Three>("(s) => s.cross"))[2];
+  const ends: Three[] = [[-90, plane.origin[1], level], [90, plane.origin[1], level]];
+  await page.focus("#canvas");
+  await page.keyboard.press("l");
+  for (const end of ends) {
+    const at = await onPage("coronal", end);
+    await page.mouse.click(at.x, at.y);
+  }
+  await page.waitForFunction(() => (window as any).ecorcheSlices.measures.store.state.list.length === 1);
+  const mm = await part<number>("({ board }) => board.views.get('coronal').mmPerPixel");
+  const row = page.locator(".measures tbody tr");
+  const [posed, scanned] = (await row.locator("td").allTextContents()).map(Number.parseFloat);
+  assert.ok(Math.abs(posed! - 180) <= 2 * mm && Math.abs(scanned! - posed!) < 0.11, `${posed} and ${scanned} mm, expected 180 within ${2 * mm}`);
+  assert.ok((await row.textContent())!.includes("Distance 1"));
+  await page.click(".measures button[aria-label='Remove distance 1']");
+  assert.equal(await row.count(), 0);
+  await page.keyboard.press("Escape");
+  await part("({ slices }) => slices.store.set({ tool: 'cross', open: false })");
+});
+
+test("the clipping plane opens the body and closes the cut with lids", async () => {
+  const { page } = viewed;
+  const femur = model.tissues.findIndex(({ name }) => name === "femur_right");
+  await page.evaluate((row) => (window as any).ecorche.layers.isolate([row]), femur);
+  const middle = await page.evaluate((row) => {
+    const { min, max } = (window as any).ecorche.body.bounds([row]);
+    return [(min.x + max.x) / 2, (min.y + max.y) / 2, (min.z + max.z) / 2];
+  }, femur) as unknown as Three;
+  // Across the shaft, seen from above: there is no lid before the cut, and the tissue's flat colour after it.
+  await page.evaluate(() => (window as any).ecorche.fit("top", true));
+  const at = await project(page, [...middle] as [number, number, number]);
+  await part(`({ clipping }) => { clipping.toggle(); clipping.store.set({ clip: { ...clipping.store.state.clip, plane: "axial", tilt: 0, turn: 0, at: ${JSON.stringify(middle)}, flipped: true } }); }`);
+  const lid = await colorAt(page, at);
+  assert.ok(apart(lid, [0xe9, 0xdf, 0xc6]) < 16, `${lid} where the lid of a bone should be`);
+  await part("({ clipping }) => clipping.store.set({ clip: { ...clipping.store.state.clip, at: [0, 0, -5000] } })");
+  const gone = await colorAt(page, at);
+  assert.ok(apart(gone, lid) > 12, "nothing is cut away");
+  await part("({ clipping }) => clipping.toggle()");
+});
+
+test("nothing went wrong in the page", () => assert.deepEqual(viewed.faults, []));
