@@ -2,6 +2,7 @@
 // Runs tests in TypeScript: bundles each to where it finds the packages of clients/web, then `node --test`.
 //
 //     node tests/web/run.mjs protocol/client.test.ts ...
+//     node tests/web/run.mjs --types                         checks the types of all tests instead
 import { spawnSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
@@ -11,6 +12,9 @@ const here = path.dirname(fileURLToPath(import.meta.url)), root = path.resolve(h
 const prepared = spawnSync(path.join(root, "scripts/viewer"), ["--protocol"], { stdio: "inherit" });
 if (prepared.status !== 0) process.exit(prepared.status ?? 70);
 
+if (process.argv[2] === "--types") {
+  process.exit(spawnSync(path.join(web, "node_modules/.bin/tsc"), ["-p", here], { stdio: "inherit" }).status ?? 70);
+}
 const { build } = await import(path.join(web, "node_modules/esbuild/lib/main.js"));
 const out = fs.mkdtempSync(path.join(web, "node_modules/.tests-"));
 process.on("exit", () => fs.rmSync(out, { recursive: true, force: true }));

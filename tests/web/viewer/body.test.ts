@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The body in the picture: a known pixel shows a known tissue, before and after a pose; names, choice, layers and undo.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { after, before, beforeEach, test } from "node:test";
 import type { Browser } from "playwright-core";
 import { Client, type BodyFrame, type MeshStream, type ModelOpened } from "../../../clients/web/protocol/src/index.js";
 import { launch, newPage, openBody, Site, type Viewed } from "../support/page.js";
@@ -28,6 +28,12 @@ after(async () => {
   site?.stop();
   await server?.stop();
 });
+
+beforeEach(() => viewed.page.evaluate(() => {
+  const { layers, store } = (window as any).ecorche;
+  layers.restore({ layers: store.state.model.tissues.map(() => ({ visible: true, opacity: 1 })), isolated: null, seeThrough: true });
+  store.set({ selected: null, hovered: null, scalar: "none" });
+}));
 
 const rowOf = (name: string) => {
   const row = model.tissues.findIndex((tissue) => tissue.name === name);
@@ -56,11 +62,11 @@ async function alone(name: string): Promise<{ at: { x: number; y: number }; empt
 
 test("a known pixel shows a known tissue, before and after a pose", async () => {
   const { page } = viewed;
-  const before = await alone("humerus_right");
-  assert.ok(apart(before.color, before.empty) > 12, `${before.color} on ${before.empty}: nothing is drawn where the humerus is`);
+  const before = await alone("hand_bones_right");
+  assert.ok(apart(before.color, before.empty) > 12, `${before.color} on ${before.empty}: nothing is drawn where the hand is`);
   assert.ok(before.color[0] > before.color[2] && before.color[2] > 90, `${before.color} is not the colour of bone`);
   await page.mouse.move(before.at.x, before.at.y);
-  await page.waitForFunction(() => document.querySelector("#tip")!.textContent!.includes("Humerus, right"));
+  await page.waitForFunction(() => document.querySelector("#tip")!.textContent!.includes("Hand bones, right"));
   await undo();
 
   const muscle = await alone("biceps_brachii_right");
@@ -76,14 +82,14 @@ test("a known pixel shows a known tissue, before and after a pose", async () => 
   await posed;
   await page.waitForFunction(() => (window as any).ecorche.store.state.poseSequence === 1n);
 
-  const now = await alone("humerus_right");
+  const now = await alone("hand_bones_right");
   assert.ok(Math.hypot(now.at.x - before.at.x, now.at.y - before.at.y) > 15, "the pose does not move the arm in the picture");
-  assert.ok(apart(now.color, now.empty) > 12, `${now.color} on ${now.empty}: nothing is drawn where the humerus went`);
-  assert.ok(apart(await colorAt(page, before.at), before.empty) < 12, "the humerus is still drawn where it was");
+  assert.ok(apart(now.color, now.empty) > 12, `${now.color} on ${now.empty}: nothing is drawn where the hand went`);
+  assert.ok(apart(await colorAt(page, before.at), before.empty) < 12, "the hand is still drawn where it was");
   await page.mouse.move(before.at.x, before.at.y);
   await page.waitForFunction(() => document.querySelector<HTMLElement>("#tip")!.hidden);
   await page.mouse.move(now.at.x, now.at.y);
-  await page.waitForFunction(() => document.querySelector("#tip")!.textContent!.includes("Humerus, right"));
+  await page.waitForFunction(() => document.querySelector("#tip")!.textContent!.includes("Hand bones, right"));
   await undo();
 });
 
@@ -142,10 +148,10 @@ test("the surface tells the distance from rest", async () => {
     await own.open();
     const rest = await own.subscribeMesh();
     const restFrame = rest.latest ?? await within(30, new Promise<BodyFrame>((resolve) => { rest.on("frame", resolve); }), "the rest pose");
-    const posed = await frame(), row = rowOf("humerus_right");
+    const posed = await frame(), row = rowOf("hand_bones_right");
     const before = foremostVertex(posed, row);
     const moved = Math.hypot(...[0, 1, 2].map((axis) => at(posed, before, axis) - at(restFrame, before, axis)));
-    assert.ok(moved > 20, `the humerus moved by ${moved} mm only`);
+    assert.ok(moved > 20, `the hand moved by ${moved} mm only`);
     await page.selectOption("#surface", "distance");
     await page.waitForFunction(() => (window as any).ecorche.body.rest !== null);
     await isolate(row);

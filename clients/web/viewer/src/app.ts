@@ -132,6 +132,7 @@ export class App {
     const layers = () => {
       for (const { row } of store.state.model?.tissues ?? []) body.setOpacity(row, shownOpacity(store.state, row));
       body.setOutline(store.state.selected);
+      if (store.state.selected !== null) body.setGlow(store.state.selected, 0.5);
       stage.invalidate();
     };
     store.watch((state) => state.layers, layers);

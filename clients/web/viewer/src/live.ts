@@ -11,6 +11,8 @@ import { qualityOf } from "./state/quality.js";
 import type { Store } from "./state/store.js";
 
 const RETRY_MS = 2000;
+const LEVELS_AFTER_MS = 1500;
+const MESH = { normals: true };
 
 export interface Opened {
   readonly client: Client;
@@ -106,10 +108,12 @@ export class Live {
     performance.mark("ecorche connected");
     await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? "");
     performance.mark("ecorche opened");
-    const stream = await client.subscribeMesh({ normals: true, adaptive: true });
+    const stream = await client.subscribeMesh(MESH);
     this.stream = stream;
     stream.on("frame", (frame) => this.#show(frame));
     if (stream.latest) this.#show(stream.latest);
+    // Coarser levels are for later, and many bytes: the first picture does not wait for them.
+    setTimeout(() => void client.changeMesh(stream, { ...MESH, adaptive: true }).catch(() => {}), LEVELS_AFTER_MS);
   }
 
   #opened(client: Client, opened: ModelOpened): void {

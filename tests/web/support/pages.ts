@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pages for Chromium, served by node as the server would: cross-origin isolated, or not, under the viewer's policy.
+import { build } from "esbuild";
+import fs from "node:fs";
+import http from "node:http";
+import type { AddressInfo } from "node:net";
+import path from "node:path";
+import { chromium, type Browser, type Page } from "playwright-core";
+
+declare const ROOT: string;
+const web = () => path.join(ROOT, "clients/web");
+const TYPES: Record<string, string> = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css" };
+const POLICY = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; connect-src 'self' ws://127.0.0.1:*";
+
+/** Text by the path it is served under. */
+export type Files = Record<string, string>;
+
+/** Each entry (of clients/web or the tests) as a module of its name, `page.js` of `page.ts`. */
+export async function bundle(entries: string[]): Promise<Files> {
+  const { outputFiles } = await build({
+    absWorkingDir: web(), entryPoints: entries, outdir: "/", entryNames: "[name]", bundle: true, format: "esm", target: "es2022", write: false,
+    nodePaths: [path.join(web(), "node_modules")],
+  });
+  return Object.fromEntries(outputFiles.map(({ path: name, text }) => [`/${path.basename(name)}`, text]));
+}
+
+export interface Site {
+  origin: string;
+  close(): Promise<void>;
+}
+
+export async function serve(files: Files, { isolated = true, port = 0 } = {}): Promise<Site> {
+  const server = http.createServer((request, response) => {
+    const { pathname } = new URL(request.url!, "http://127.0.0.1"), text = files[pathname];
+    response.writeHead(text === undefined ? 404 : 200, {
+      "Content-Type": TYPES[path.extname(pathname)] ?? "text/plain", "Content-Security-Policy": POLICY, "X-Content-Type-Options": "nosniff",
+      ...(isolated && { "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp" }),
+    });
+    response.end(text ?? "");
+  });
+  await new Promise<void>((resolve) => server.listen(port, "127.0.0.1", resolve));
+  return {
+    origin: `http://127.0.0.1:${(server.address() as AddressInfo).port}`,
+    close: () => new Promise((resolve) => { server.close(() => resolve()); server.closeAllConnections(); }),
+  };
+}
+
+export async function launch(): Promise<Browser> {
+  const executablePath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find((file) => fs.existsSync(file));
+  if (!executablePath) throw new Error("no Chromium (run scripts/setup --tests)");
+  return chromium.launch({ executablePath, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+}
+
+/** What went wrong in the page: uncaught errors, and what the console says of errors (also of the page's policy). */
+export function faultsOf(page: Page): string[] {
+  const faults: string[] = [];
+  page.on("pageerror", (error) => faults.push(error.message));
+  page.on("console", (message) => { if (message.type() === "error") faults.push(message.text()); });
+  return faults;
+}
