@@ -380,7 +380,7 @@ export class Client extends Emitter<ClientEvents> {
     this.change({ state: "reconnecting", reason: error.message, retryMs });
     this.retry = setTimeout(() => {
       this.restore().then(
-        () => this.change({ state: "open", reason: "" }),
+        () => this.restored(),
         (failure: Error) => { if (this.state.state === "reconnecting") this.comeBack(tries + 1, failure); },
       );
     }, retryMs);
@@ -404,6 +404,11 @@ export class Client extends Emitter<ClientEvents> {
     } finally {
       this.restoring = false;
     }
+  }
+
+  private restored(): void {
+    this.change({ state: "open", reason: "" });
+    if (this.model && this.control.role === Role.CONTROLLER) this.poses.recover(this.model.rigDigest);
   }
 
   private async subscribeMissing(kept: { was: number; is: number }[]): Promise<void> {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // All that users of the library need.
+export { adapt, type Adaptation } from "./adapt.js";
 export * from "./client.js";
 export * from "./errors.js";
 export { ProtocolError } from "./framing.js";
 export type { Statistics } from "./channel.js";
 export type { MeshLayout, TissueRange } from "./layout.js";
 export { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
+export { Policy, type Choice, type Observed } from "./policy.js";
 export type { Pose } from "./pose_sender.js";
 export type { Probed, ProbeOptions } from "./probe.js";
 export { NO_NORMAL, STRIDE, type Quantisation } from "./decode/packed.js";

@@ -59,6 +59,7 @@ export class Link {
     socket.onmessage = (event) => {
       if (socket === this.socket) this.hear(event.data);
     };
+    socket.onerror = () => {};  // says nothing of why; "close" follows
     socket.onclose = (event) => {
       if (socket !== this.socket) return;
       this.drop();
@@ -121,7 +122,7 @@ export class Link {
       case "modelOpened": return this.opened(message.value, envelope, payload);
       case "subscribed": this.subscribed(message.value, requestId, payload); break;
       case "serverHello":
-        if (message.value.resumed) this.resume(message.value.resumed.subscriptions);
+        this.resume(message.value.resumed?.subscriptions ?? []);
         break;
       case "volumeFrame":
         this.acknowledge(message.value.subscription, message.value.frame);
@@ -138,6 +139,7 @@ export class Link {
 
   /** The triangles stay here, where layouts are made. */
   private opened(model: ModelOpened, envelope: Uint8Array<ArrayBuffer>, payload: Uint8Array<ArrayBuffer>): void {
+    this.streams.clear();  // subscriptions end with that
     this.tissues = wholeTissues(model, payload);
     this.topology = model.topologyDigest;
     this.post({ kind: "message", envelope: envelope.slice(), payload: new Uint8Array() });
@@ -156,10 +158,12 @@ export class Link {
     this.post({ kind: "layouts", stream: handle, layouts });
   }
 
+  /** Streams that the server still has go on by their new numbers; the others are subscribed to anew. */
   private resume(subscriptions: { was: number; is: number }[]): void {
-    for (const stream of this.streams.values()) {
+    for (const [handle, stream] of this.streams) {
       const now = subscriptions.find(({ was }) => was === stream.subscription);
       if (now) stream.subscription = now.is;
+      else this.streams.delete(handle);
     }
   }
 

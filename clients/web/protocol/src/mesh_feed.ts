@@ -140,6 +140,6 @@ function rowsOf<T extends ScalarType.F32 | ScalarType.U16>(array: MeshArray, pay
 
 function boxOf(frame: MeshFrame): Quantisation {
   const { box } = frame;
-  if (!box || !(box.step > 0)) throw new ProtocolError("a frame of numbers without their box");
+  if (!box || !(box.step > 0) || ![box.step, box.lowX, box.lowY, box.lowZ].every(Number.isFinite)) throw new ProtocolError("a frame of numbers without their box");
   return { scale: box.step, offset: [box.lowX, box.lowY, box.lowZ] };
 }

@@ -26,14 +26,23 @@ export class PoseSender {
   /** The newest pose that was set. */
   newest: Pose | undefined;
   private waits = false;
+  private rig = 0n;         // of the newest
+  private sentAs = 0n;      // the newest's sequence
   private readonly flying = new Set<bigint>();
 
   constructor(private readonly send: (message: Message) => boolean) {}
 
   set(pose: Pose, rigDigest: bigint): void {
     this.newest = pose;
+    this.rig = rigDigest;
     this.waits = true;
     this.flush(rigDigest);
+  }
+
+  /** After a loss and restart(): the newest pose goes again where the session never got it. */
+  recover(rigDigest: bigint): void {
+    if (this.newest && this.sentAs > this.sequence) this.waits = true;
+    if (this.waits) this.flush(rigDigest);
   }
 
   /** A PoseAck: of a pose of ours, of ones that it overtook, or of a clip's. */
@@ -56,12 +65,14 @@ export class PoseSender {
   }
 
   private flush(rigDigest: bigint): void {
-    if (!this.newest || this.flying.size >= IN_FLIGHT) return;
+    if (this.rig !== rigDigest) this.waits = false;  // another body: its joints are others
+    if (!this.newest || !this.waits || this.flying.size >= IN_FLIGHT) return;
     const sequence = this.sequence + 1n;
     if (!this.send({ case: "poseUpdate", value: updateOf(this.newest, sequence, rigDigest) })) return;
     this.waits = false;
     this.sequence = this.own = sequence;
     this.flying.add(sequence);
+    this.sentAs = sequence;
   }
 }
 

@@ -34,8 +34,9 @@ export class Keys {
     const focused = event.target instanceof Element ? event.target : null;
     const command = event.ctrlKey || event.metaKey;
     if (focused?.matches(EDITED) && event.key !== "Escape") return;
+    // What is open over the page has the keys, and closes by Escape without help.
+    if (document.querySelector("dialog[open], [popover]:popover-open")) return;
     // Arrows and Enter belong to what is focused, where that is a control; a letter never does.
-    if (focused?.closest("dialog[open], [popover]:popover-open") && event.key !== "Escape") return;
     if (event.key.length > 1 && event.key !== "Escape" && focused?.closest("button, a, input, [role=tree], [role=tablist], [role=slider]")) return;
     const plain = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const named = `${command ? "Ctrl+" : ""}${event.shiftKey && (plain.length > 1 || /[a-z]/.test(plain)) ? "Shift+" : ""}${plain}`;

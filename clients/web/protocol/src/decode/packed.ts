@@ -33,29 +33,31 @@ export function packNormals(normals: Int8Array, out: Uint16Array): void {
 
 /** The smallest cube of 65535 steps that all of these positions lie in. */
 export function quantisationOf(tissues: Float32Array[]): Quantisation {
-  const low = [0, 0, 0], high = [0, 0, 0];
-  for (let axis = 0; axis < 3; ++axis) {
-    let least = Infinity, most = -Infinity;
-    for (const positions of tissues) {
-      for (let i = axis; i < positions.length; i += 3) {
-        const value = positions[i];
-        if (!(Math.abs(value) < Infinity)) throw new ProtocolError(`a position that is not finite: ${value}`);
-        if (value < least) least = value;
-        if (value > most) most = value;
-      }
+  let lowX = Infinity, lowY = Infinity, lowZ = Infinity, highX = -Infinity, highY = -Infinity, highZ = -Infinity, sum = 0;
+  for (const positions of tissues) {
+    for (let i = 0; i < positions.length; i += 3) {
+      const x = positions[i], y = positions[i + 1], z = positions[i + 2];
+      if (x < lowX) lowX = x;
+      if (x > highX) highX = x;
+      if (y < lowY) lowY = y;
+      if (y > highY) highY = y;
+      if (z < lowZ) lowZ = z;
+      if (z > highZ) highZ = z;
+      sum += x - x + (y - y) + (z - z);  // 0, but for what is not finite
     }
-    if (least <= most) [low[axis], high[axis]] = [least, most];
   }
-  const extent = Math.max(...high.map((value, axis) => value - low[axis]));
-  return { scale: extent > 0 ? extent / 65535 : 1, offset: [low[0], low[1], low[2]] };
+  if (sum !== 0) throw new ProtocolError("a position that is not finite");
+  if (!(lowX <= highX)) return { scale: 1, offset: [0, 0, 0] };
+  const extent = Math.max(highX - lowX, highY - lowY, highZ - lowZ);
+  return { scale: extent > 0 ? extent / 65535 : 1, offset: [lowX, lowY, lowZ] };
 }
 
-/** `positions`: f32, mm, 3 per vertex. */
+/** `positions`: f32, mm, 3 per vertex, within the cube. */
 export function packPositions(positions: Float32Array, quantisation: Quantisation, out: Uint16Array): void {
   const [x, y, z] = quantisation.offset, steps = 1 / quantisation.scale;
   for (let from = 0, to = 0; to < out.length; from += 3, to += STRIDE) {
-    out[to] = Math.round((positions[from] - x) * steps);
-    out[to + 1] = Math.round((positions[from + 1] - y) * steps);
-    out[to + 2] = Math.round((positions[from + 2] - z) * steps);
+    out[to] = (positions[from] - x) * steps + 0.5;
+    out[to + 1] = (positions[from + 1] - y) * steps + 0.5;
+    out[to + 2] = (positions[from + 2] - z) * steps + 0.5;
   }
 }
