@@ -4,16 +4,19 @@ import { App } from "./app.js";
 import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
+import { addHeadset } from "./xr/index.js";
 
 /** Parts that hook into the viewer by what App makes public. */
-const PARTS: readonly ((app: App) => void)[] = [addPanels, addPosing];
+const PARTS: readonly ((app: App) => void)[] = [addPanels];
 
 try {
   const root = document.querySelector<HTMLElement>("#viewer")!;
   const app = new App({ root, canvas: root.querySelector("canvas")! });
   for (const add of PARTS) add(app);
+  const posing = addPosing(app);
+  const headset = addHeadset(app, posing);
   // For the browser's console, and for tests.
-  Object.assign(window, { ecorche: app });
+  Object.assign(window, { ecorche: Object.assign(app, { posing, headset }) });
   void app.live.start();
 } catch (error) {
   showCover({
