@@ -16,8 +16,11 @@
 #include "app/served_clips.hpp"
 #include "app/signals.hpp"
 #include "app/token_file.hpp"
+#include "app/viewer/viewer_files.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/platform/heap.hpp"
+#include "core/platform/terminal.hpp"
+#include "runtime/server/net/web_host.hpp"
 #include "runtime/server/server.hpp"
 
 namespace ecorche::app {
@@ -26,7 +29,9 @@ namespace {
 struct ServeSettings {
   std::vector<std::string> models;
   std::string listen = "127.0.0.1:7070";
-  std::string http;
+  std::string http;  // empty: of this machine alone, by the first port from 7071 on that is free
+  bool no_http = false;
+  std::string viewer_folder;
   std::string port_file;
   std::string token_file;
   std::string clips;
@@ -71,6 +76,43 @@ std::string written(const std::string& host, std::uint16_t port) {
   return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
 
+// The HTTP port of who asked for none in particular: others on this machine may have taken it.
+constexpr std::uint16_t kHttpPort = 7071, kMorePorts = 63;
+
+server::Options options_of(const ServeSettings& settings) {
+  server::Options options = settings.options;
+  options.listen = endpoint(settings.listen);
+  if (!settings.http.empty()) {
+    options.http = endpoint(settings.http);
+  } else if (!settings.no_http) {
+    options.http = {.host = "127.0.0.1", .port = kHttpPort};
+    options.http_more_ports = kMorePorts;
+  }
+  if (!settings.viewer_folder.empty())
+    options.viewer = server::folder_files(settings.viewer_folder);
+  else if (!viewer_files().empty())
+    options.viewer = server::embedded_files(viewer_files());
+  if (!settings.token_file.empty()) options.token = read_token(settings.token_file);
+  options.version = ECORCHE_VERSION;
+  return options;
+}
+
+// What a browser is given. An address of all interfaces is none to ask for.
+std::string page_url(const server::Options& options, std::uint16_t port) {
+  const std::string& host = options.http->host;
+  const bool all = host == "0.0.0.0" || host == "::";
+  const std::string& name = all && !options.host_names.empty() ? options.host_names.front() : host;
+  return (options.certificate.empty() ? "http://" : "https://") + written(name, port) + "/";
+}
+
+std::string check_host_name(const std::string& name) {
+  const auto good = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.';
+  };
+  if (!name.empty() && std::all_of(name.begin(), name.end(), good)) return {};
+  return "'" + name + "' is no host name (give it as in viewer.example, without scheme and port)";
+}
+
 int run_serve(const ServeSettings& settings, const Program& program) {
   platform::use_tidy_heap();
   // stdout is for the result.
@@ -78,13 +120,7 @@ int run_serve(const ServeSettings& settings, const Program& program) {
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l: %v");
   spdlog::set_level(spdlog::level::from_str(settings.log));
 
-  server::Options options = settings.options;
-  options.listen = endpoint(settings.listen);
-  if (!settings.http.empty()) options.http = endpoint(settings.http);
-  const std::string host = options.listen.host, http_host = options.http ? options.http->host : "";
-  const char* scheme = options.certificate.empty() ? "http" : "https";
-  if (!settings.token_file.empty()) options.token = read_token(settings.token_file);
-  options.version = ECORCHE_VERSION;
+  const server::Options options = options_of(settings);
   if (!options.record_folder.empty()) files::make_folder(options.record_folder);
 
   // The main thread serves; as many workers as threads take up poses, all of them inside one arena, which
@@ -92,23 +128,27 @@ int run_serve(const ServeSettings& settings, const Program& program) {
   const int threads = program.threads > 0 ? program.threads : tbb::this_task_arena::max_concurrency();
   tbb::task_arena arena(threads);
   server::Workers workers(threads, [&arena](const server::Job& job) { arena.execute(job); });
-  server::Server server(std::move(options), read_models(settings, program), workers);
+  server::Server server(options, read_models(settings, program), workers);
   if (settings.real_time && !server::going_first()) {
     throw Error(ErrorKind::refused, "--real-time", "the system does not let this process",
                 "give it CAP_SYS_NICE or an RLIMIT_RTPRIO of 1 (ulimit -r 1), or serve without");
   }
 
-  const std::string where = written(host, server.port());
+  const std::string where = written(options.listen.host, server.port());
   if (!settings.port_file.empty()) {
     std::string ports = std::to_string(server.port()) + "\n";
-    if (server.http_port() != 0) ports += std::to_string(server.http_port()) + "\n";
+    if (!settings.http.empty()) ports += std::to_string(server.http_port()) + "\n";
     files::write_text(settings.port_file, ports);
   }
   nlohmann::json report{{"address", where}, {"port", server.port()}, {"models", settings.models.size()}};
   std::string text = "listening on " + where;
   if (server.http_port() != 0) {
+    const std::string url = page_url(options, server.http_port());
     report["http_port"] = server.http_port();
-    text += std::string(", and ") + scheme + "://" + written(http_host, server.http_port());
+    report["url"] = url;
+    text += ", and " + url;
+    // For the eyes of who started it: a file or a journal would keep it.
+    if (!options.token.empty() && platform::stdout_is_terminal()) text += "#token=" + options.token;
   }
   program.result(text, report);
 
@@ -128,12 +168,22 @@ void declare_serve(CLI::App& app, Program& program, Run& chosen) {
       ->required();
   command->add_option("--listen", settings->listen, "HOST:PORT; port 0 picks a free one")
       ->capture_default_str();
-  command->add_option("--http", settings->http,
-                      "HOST:PORT of /healthz, /readyz, /metrics and, at /v1, WebSockets");
+  auto* http = command->add_option("--http", settings->http,
+                                   "HOST:PORT of the viewer, /healthz, /readyz, /metrics and, at /v1, "
+                                   "WebSockets; by default 127.0.0.1 and "
+                                   "the first free port from 7071 on");
+  command->add_flag("--no-http", settings->no_http, "no such port")->excludes(http);
+  command
+      ->add_option("--host-name", settings->options.host_names,
+                   "a name besides the address of --http by which browsers ask for the viewer; repeatable")
+      ->check(check_host_name);
+  command->add_option("--viewer-dir", settings->viewer_folder,
+                      "show the viewer in this folder, as it is, in place of the program's own");
   command->add_option("--origin", settings->options.origins,
-                      "a page that may connect from a browser, as https://viewer.example; repeatable");
-  command->add_option("--port-file", settings->port_file,
-                      "write the port, and below it that of --http, to this file once listening");
+                      "another server's page that may connect, as https://viewer.example; repeatable");
+  command->add_option(
+      "--port-file", settings->port_file,
+      "write the port, and below it that of --http where it is given, to this file once listening");
   command->add_option("--tls-certificate", settings->options.certificate,
                       "speak TLS, as the owner of this PEM chain");
   command->add_option("--tls-key", settings->options.key, "its key, PEM, unencrypted");

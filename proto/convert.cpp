@@ -189,7 +189,11 @@ Status from_proto(const v1::Skeleton& skeleton, Rig& out) {
   return couplings_from_proto(skeleton, out);
 }
 
-void to_proto(const Pose& pose, v1::PoseUpdate& out) {
+namespace {
+
+// A PoseUpdate or a PoseState.
+template <class Message>
+void fill(const Pose& pose, Message& out) {
   to_proto(pose.root_translation, *out.mutable_root_translation());
   out.clear_rotation();
   out.clear_translation();
@@ -202,6 +206,16 @@ void to_proto(const Pose& pose, v1::PoseUpdate& out) {
     translation.set_joint(static_cast<std::uint32_t>(joint));
     to_proto(pose.translation[joint], *translation.mutable_offset());
   }
+}
+
+}  // namespace
+
+void to_proto(const Pose& pose, v1::PoseUpdate& out) {
+  fill(pose, out);
+}
+
+void to_proto(const Pose& pose, v1::PoseState& out) {
+  fill(pose, out);
 }
 
 Status from_proto(const v1::PoseUpdate& update, std::size_t joints, Pose& out) {

@@ -26,7 +26,7 @@ import time
 
 import numpy as np
 
-from ecorche.v1 import common_pb2, envelope_pb2
+from ecorche.v1 import common_pb2, envelope_pb2, hello_pb2, model_pb2
 from ecorche_frames import ENCODINGS, Body, MeshFrame, Part, ServerError, VolumeFrame, aligned, array, encode
 
 
@@ -40,6 +40,8 @@ class Client:
         self.body = None
         self.acks = []            # v1.PoseAck since the last look
         self.model_changed = False  # ModelChanged came: open() again for the new one
+        self.members, self.clip = None, None  # the newest v1.Members and v1.ClipState
+        self.has_control = False  # as the server last said
         self.bytes_received = 0
         self._requests = 0
         self._sequence = 0
@@ -65,6 +67,7 @@ class Client:
         hello.client_hello.token = token
         hello.client_hello.resume_token = resume_token
         hello.client_hello.encodings.extend(ENCODINGS.values())
+        hello.client_hello.features.extend([hello_pb2.FEATURE_PRESENCE, hello_pb2.FEATURE_CLIP_STATE])
         self.server = self._call(hello)[0].server_hello
 
     def __enter__(self):
@@ -90,18 +93,20 @@ class Client:
         answer, payload = self._call(request)
         self.body = Body(answer.model_opened, payload)
         self.model_changed = False
+        self.has_control = answer.model_opened.role == model_pb2.ROLE_CONTROLLER
+        self._sequence = answer.model_opened.last_sequence
         return self.body
 
     def subscribe_mesh(self, tissues=(), quality=False, encoding="f32", normals=False, level=0, adaptive=False, region=None,
-                       max_rate=0.0):
+                       max_rate=0.0, pose=False):
         """Frames of these tissues, of all by default; returns the subscription's number. `encoding`: of ENCODINGS. `level`: of
         detail, 0 (all) to 3; `adaptive`: the server may choose coarser ones. `region`: (low, high), mm, LPS, in the scan. See
-        `parts` for which vertices come."""
+        `parts` for which vertices come. `pose`: each frame's `message.pose` is what it shows."""
         request = envelope_pb2.Envelope()
         mesh = request.subscribe.mesh
         mesh.tissues.extend(tissues)
         mesh.encoding = ENCODINGS[encoding]
-        mesh.normals, mesh.quality, mesh.level, mesh.adaptive = normals, quality, level, adaptive
+        mesh.normals, mesh.quality, mesh.level, mesh.adaptive, mesh.pose = normals, quality, level, adaptive, pose
         request.subscribe.max_rate = max_rate
         self._set_box(mesh, region)
         answer, payload = self._call(request)
@@ -165,10 +170,31 @@ class Client:
         request.list_clips.SetInParent()
         return list(self._call(request)[0].clip_list.clips)
 
-    def play(self, name, speed=1.0, loop=False):
-        """Lets the server play a clip; "" stops it."""
+    def play(self, name, speed=1.0, loop=False, position=0.0, paused=False):
+        """Lets the server play a clip from `position` (s) on; "" stops it. `clip` tells where it is."""
         request = envelope_pb2.Envelope()
         request.play_clip.name, request.play_clip.speed, request.play_clip.loop = name, speed, loop
+        request.play_clip.position, request.play_clip.paused = position, paused
+        self._call(request)
+
+    def steer(self, **to):
+        """Changes how the clip plays: any of paused, position (s), step (poses), speed and loop."""
+        request = envelope_pb2.Envelope()
+        request.steer_clip.SetInParent()
+        for name, value in to.items():
+            setattr(request.steer_clip, name, value)
+        self._call(request)
+
+    def ask_control(self, withdraw=False):
+        """Asks for the session's control; True where it was free. `members` tells who asks, `has_control` once it was given."""
+        request = envelope_pb2.Envelope()
+        request.ask_control.withdraw = withdraw
+        return self._call(request)[0].WhichOneof("message") == "control_granted"
+
+    def give_control(self, connection):
+        """Gives the session's control to another of its `members`."""
+        request = envelope_pb2.Envelope()
+        request.give_control.connection = connection
         self._call(request)
 
     def record(self, name):
@@ -274,6 +300,15 @@ class Client:
             self._sequence = max(self._sequence, envelope.pose_ack.sequence)
         elif kind == "model_changed":
             self.model_changed = True
+        elif kind == "members":
+            self.members = envelope.members
+        elif kind == "clip_state":
+            self.clip = envelope.clip_state
+        elif kind == "control_changed":
+            self.has_control = envelope.control_changed.role == model_pb2.ROLE_CONTROLLER
+        elif kind == "control_granted":
+            self.has_control = True
+            self._sequence = envelope.control_granted.last_sequence
         elif kind == "goodbye":
             raise ServerError(envelope.goodbye.status)
         elif kind == "status" and envelope.request_id == 0:

@@ -1,11 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/listen.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include <ecorche/values/error.hpp>
 
 namespace ecorche::server {
+namespace {
+
+boost::system::error_code try_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
+  boost::system::error_code ec, ignored;
+  acceptor.open(endpoint.protocol(), ec);
+  if (!ec) acceptor.set_option(tcp::acceptor::reuse_address(true), ec);
+  if (!ec) acceptor.bind(endpoint, ec);
+  if (!ec) acceptor.listen(net::socket_base::max_listen_connections, ec);
+  if (ec) acceptor.close(ignored);
+  return ec;
+}
+
+}  // namespace
 
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   boost::system::error_code ec;
@@ -23,26 +37,22 @@ tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   return {address, where.port};
 }
 
-void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
+void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, std::uint16_t more_ports) {
+  const auto ports_left = static_cast<std::uint16_t>(65535 - endpoint.port());
+  const std::uint16_t more = endpoint.port() == 0 ? std::uint16_t{0} : std::min(more_ports, ports_left);
   boost::system::error_code ec;
+  for (std::uint32_t port = endpoint.port(); port <= std::uint32_t{endpoint.port()} + more; ++port) {
+    ec = try_listening(acceptor, {endpoint.address(), static_cast<std::uint16_t>(port)});
+    if (ec != net::error::address_in_use) break;
+  }
+  if (!ec) return;
   const std::string where = endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
-  const auto check = [&] {
-    if (!ec) return;
-    if (ec == net::error::address_in_use) {
-      throw Error(ErrorKind::temporary, where, "the address is in use",
-                  "stop the other server, or --listen on another port; 0 picks a free one");
-    }
-    throw Error(ErrorKind::usage, where, "cannot listen: " + ec.message(),
-                "use an address of this machine and a port that you may use");
-  };
-  acceptor.open(endpoint.protocol(), ec);
-  check();
-  acceptor.set_option(tcp::acceptor::reuse_address(true), ec);
-  check();
-  acceptor.bind(endpoint, ec);
-  check();
-  acceptor.listen(net::socket_base::max_listen_connections, ec);
-  check();
+  if (ec == net::error::address_in_use) {
+    throw Error(ErrorKind::temporary, where, "the address is in use",
+                "stop the other server, or use another port; 0 picks a free one");
+  }
+  throw Error(ErrorKind::usage, where, "cannot listen: " + ec.message(),
+              "use an address of this machine and a port that you may use");
 }
 
 }  // namespace ecorche::server

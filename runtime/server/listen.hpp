@@ -2,6 +2,8 @@
 // Where a server may be reached, and that it is.
 #pragma once
 
+#include <cstdint>
+
 #include "runtime/server/net/asio.hpp"
 #include "runtime/server/resources/options.hpp"
 
@@ -11,8 +13,8 @@ namespace ecorche::server {
 /// nothing keeps them out: neither TLS with a token nor `options.insecure`.
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options);
 
-/// Throws Error{temporary} where the address is in use, Error{usage} where this machine or its user has none
-/// such.
-void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint);
+/// Where the port is in use, at one of `more_ports` after it. Throws Error{temporary} where all are in use,
+/// Error{usage} where this machine or its user has no such address.
+void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, std::uint16_t more_ports = 0);
 
 }  // namespace ecorche::server

@@ -57,13 +57,17 @@ struct Server::Impl {
     start_listening(acceptor, endpoint_of(options.listen, options));
     port = acceptor.local_endpoint().port();
     if (options.http) {
-      start_listening(http_acceptor, endpoint_of(*options.http, options));
+      start_listening(http_acceptor, endpoint_of(*options.http, options), options.http_more_ports);
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
     web_context = {
         .token = options.token,
         .origins = options.origins,
+        .tls = !options.certificate.empty(),
+        .hosts = options.http ? HostList(http_acceptor.local_endpoint().address(), options.host_names)
+                              : HostList(),
+        .viewer = options.viewer,
         .header_bytes = options.limits.hello_bytes,
         .messages_per_second = options.limits.messages_per_second,
         .ready = [this] { return !stopping; },
@@ -300,12 +304,14 @@ Clock::duration Server::Impl::look_after(Clock::time_point now) {
   for (const auto& connection : connections) next = std::min(next, connection->check(now));
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   for (const auto& request : requests) {
-    const Clock::duration left = duration(registry->limits().hello_seconds) - (now - request->born());
+    const Limits& limits = registry->limits();
+    const double most = request->sending() ? limits.stall_seconds : limits.hello_seconds;
+    const Clock::duration left = duration(most) - (now - request->moved());
     if (left > Clock::duration::zero()) {
       next = std::min(next, left);
       continue;
     }
-    if (!request->over()) registry->metrics().hit("hello");
+    if (!request->over()) registry->metrics().hit(request->sending() ? "stall" : "hello");
     request->close();
   }
   std::erase_if(requests, [](const auto& request) { return request->over(); });

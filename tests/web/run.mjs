@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs tests in TypeScript: bundles each to where it finds the packages of clients/web, then `node --test`.
 //
-//     node tests/web/run.mjs protocol/client.test.ts ...
+//     node tests/web/run.mjs protocol/client.test.ts ...     of the viewer: builds it first, for these tests alone
 //     node tests/web/run.mjs --types                         checks the types of all tests instead
 import { spawnSync } from "node:child_process";
 import fs from "node:fs";
@@ -23,6 +23,13 @@ await build({
   bundle: true, platform: "node", format: "esm", target: "node18", external: ["ws", "playwright-core", "axe-core", "esbuild", "yaml"], sourcemap: "inline",
   nodePaths: [path.join(web, "node_modules")], loader: { ".yaml": "text" }, define: { ROOT: JSON.stringify(root) },
 });
+const env = { ...process.env };
+// A folder of its own: tests beside this one may build, too.
+if (process.argv.slice(2).some((file) => !file.startsWith("protocol/"))) {
+  env.ECORCHE_VIEWER ??= path.join(out, "site");
+  const { status } = spawnSync(path.join(root, "scripts/viewer"), ["--out", env.ECORCHE_VIEWER], { stdio: ["ignore", "ignore", "inherit"], env: process.env });
+  if (status !== 0) process.exit(status ?? 70);
+}
 const files = process.argv.slice(2).map((file) => path.join(out, file.replace(/\.ts$/, ".mjs")));
-const { status } = spawnSync(process.execPath, ["--enable-source-maps", "--test", ...files], { stdio: "inherit", timeout: 280_000 });
+const { status } = spawnSync(process.execPath, ["--enable-source-maps", "--test", ...files], { stdio: "inherit", timeout: 580_000, env });
 process.exit(status ?? 70);

@@ -5,7 +5,9 @@
 #include <new>
 
 #include <ecorche/wire/convert.hpp>
+#include "runtime/server/handlers/display_name.hpp"
 #include "runtime/server/resources/shares.hpp"
+#include "runtime/server/session/pose_state.hpp"
 
 namespace ecorche::server {
 
@@ -29,6 +31,15 @@ void Client::log(spdlog::level::level_enum level, std::string_view what,
   try {
     registry_.journal().line(level, address_, peer_, std::string(what).append(why));
   } catch (const std::exception&) {
+  }
+}
+
+void Client::introduce(const v1::ClientHello& hello) {
+  name_ = display_name(hello.name());
+  if (name_.empty()) name_ = display_name(hello.client());
+  for (const v1::Feature feature : {v1::FEATURE_CLIP_STATE, v1::FEATURE_PRESENCE}) {
+    if (std::find(hello.features().begin(), hello.features().end(), feature) != hello.features().end())
+      hears_of_.insert(feature);
   }
 }
 
@@ -139,6 +150,14 @@ bool Client::claim_control() {
   return true;
 }
 
+v1::Envelope Client::control_granted() const {
+  v1::Envelope envelope;
+  v1::ControlGranted& granted = *envelope.mutable_control_granted();
+  granted.set_last_sequence(last_sequence_);
+  describe(session_->poses().present(), *granted.mutable_pose());
+  return envelope;
+}
+
 // What a session tells it, from among its other members: where there is no memory for it, this client ends
 // soon after, and the others hear what they should.
 template <class Tell>
@@ -183,6 +202,17 @@ void Client::control_changed(v1::Role role, bool vacant, double reserved_seconds
     changed.set_reserved_seconds(reserved_seconds);
     answer(0, std::move(envelope));
   });
+}
+
+void Client::control_given() {
+  last_sequence_ = session_->poses().last_sequence();
+  if (over()) return;
+  notify([&] { answer(0, control_granted()); });
+}
+
+void Client::tell(const std::shared_ptr<const wire::EncodedFrame>& news) {
+  if (over()) return;
+  notify([&] { output_.answer(news); });
 }
 
 void Client::model_changed(std::uint64_t identity) {

@@ -30,7 +30,7 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   ~Client() override;
 
   SessionRegistry& registry() const { return registry_; }
-  std::uint64_t number() const { return number_; }  ///< of its connection
+  std::uint64_t number() const override { return number_; }  ///< of its connection
   /// address_of() its peer.
   const std::string& address() const { return address_; }
   /// For what is made for it on other threads.
@@ -43,6 +43,10 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   /// The hellos are exchanged; `token` is the key to its place.
   void greet(std::string token);
   bool greeted() const { return greeted_; }
+  /// What it says of itself.
+  void introduce(const v1::ClientHello& hello);
+  std::string_view name() const override { return name_; }
+  bool hears_of(v1::Feature feature) const override { return hears_of_.contains(feature); }
   bool ending() const { return ending_since_.has_value(); }
   std::optional<Clock::time_point> ending_since() const { return ending_since_; }
   bool closed() const { return closed_; }
@@ -86,6 +90,8 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   void undo_rejoin() { std::exchange(session_, nullptr)->leave(*this, true); }
   /// False while another holds control or may come back to it.
   bool claim_control();
+  /// What it is told where it has control: from where to go on.
+  v1::Envelope control_granted() const;
   /// It controlled the session of this name, of a model that was.
   void inherit(const std::string& session) { inherited_ = session; }
 
@@ -129,6 +135,8 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   void control_changed(v1::Role role, bool vacant, double reserved_seconds) override;
   void model_changed(std::uint64_t identity) override;
   bool may_take(std::uint32_t subscription, std::uint64_t bytes) override;
+  void tell(const std::shared_ptr<const wire::EncodedFrame>& news) override;
+  void control_given() override;
   std::shared_ptr<const Pool> kept_share() const override { return kept_share_; }
 
   void acknowledge(const PoseOutcome& outcome, const Skipped& skipped);
@@ -158,6 +166,8 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   v1::Role role_ = v1::ROLE_UNSPECIFIED;
   std::string inherited_;
   std::string resume_token_;
+  std::string name_;
+  std::set<v1::Feature> hears_of_;  ///< of those that it is told of
   std::set<std::uint32_t> subscriptions_;
   std::uint64_t last_sequence_ = 0;
   Pending pending_;

@@ -29,8 +29,12 @@ void ClientOutput::answer(const v1::Envelope& envelope, std::shared_ptr<const wi
   // What only this client reads is its frames' like: so long as it does not, it counts.
   const bool shared = payload.use_count() != 1;
   wire::EncodedFrame frame = wire::encode(envelope, std::move(payload));
-  outbox_.answer(shared ? std::make_shared<const wire::EncodedFrame>(std::move(frame))
-                        : memory_.hold(std::move(frame)));
+  answer(shared ? std::make_shared<const wire::EncodedFrame>(std::move(frame))
+                : memory_.hold(std::move(frame)));
+}
+
+void ClientOutput::answer(SharedFrame frame) {
+  outbox_.answer(std::move(frame));
   wake_.cancel();
 }
 

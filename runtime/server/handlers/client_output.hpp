@@ -32,6 +32,8 @@ class ClientOutput {
                Metrics& metrics);
 
   void answer(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload);
+  /// The same for several clients.
+  void answer(SharedFrame frame);
   /// As Member::deliver.
   bool deliver(const PosedFrame& frame);
   std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Who poses.
+#include <string>
 #include <utility>
 
 #include "runtime/server/handlers/handlers.hpp"
@@ -11,9 +12,35 @@ Status handle_claim_control(Client& client, const v1::ClaimControl&, const Reque
     return {StatusCode::permission_denied,
             "control: another connection holds it, or may come back to it (try again later)"};
   }
-  v1::Envelope envelope;
-  envelope.mutable_control_granted()->set_last_sequence(client.last_sequence());
-  client.answer(request.id(), std::move(envelope));
+  client.answer(request.id(), client.control_granted());
+  return {};
+}
+
+Status handle_ask_control(Client& client, const v1::AskControl& ask, const Request& request) {
+  if (!client.hears_of(v1::FEATURE_PRESENCE)) {
+    return {StatusCode::failed_precondition,
+            "control: this connection's hello does not name FEATURE_PRESENCE (name it, or ClaimControl)"};
+  }
+  if (!ask.withdraw() && client.claim_control()) {
+    client.answer(request.id(), client.control_granted());
+    return {};
+  }
+  client.answer_status(request.id(), {});
+  client.session()->ask_for_control(client, !ask.withdraw());
+  return {};
+}
+
+Status handle_give_control(Client& client, const v1::GiveControl& give, const Request& request) {
+  Control& control = client.session()->control();
+  Member* const to = find_member(control, give.connection());
+  const std::string who = "control: connection " + std::to_string(give.connection());
+  if (!to) return {StatusCode::not_found, who + " is not in this session (see Members)"};
+  if (!to->hears_of(v1::FEATURE_PRESENCE)) {
+    return {StatusCode::failed_precondition,
+            who + " takes none that it did not claim (ReleaseControl, and it may claim it)"};
+  }
+  client.answer_status(request.id(), {});
+  if (to != &client && control.hand_over(client, *to, Clock::now())) to->control_given();
   return {};
 }
 

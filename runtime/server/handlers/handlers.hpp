@@ -30,6 +30,8 @@ Status handle_pose_update(Client& client, const v1::PoseUpdate& update, const Re
 // control.cpp
 Status handle_claim_control(Client& client, const v1::ClaimControl& claim, const Request& request);
 Status handle_release_control(Client& client, const v1::ReleaseControl& release, const Request& request);
+Status handle_ask_control(Client& client, const v1::AskControl& ask, const Request& request);
+Status handle_give_control(Client& client, const v1::GiveControl& give, const Request& request);
 
 // thresholds.cpp
 Status handle_set_thresholds(Client& client, const v1::SetThresholds& wanted, const Request& request);
@@ -43,6 +45,7 @@ Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& 
 // clips.cpp
 Status handle_list_clips(Client& client, const v1::ListClips& list, const Request& request);
 Status handle_play_clip(Client& client, const v1::PlayClip& play, const Request& request);
+Status handle_steer_clip(Client& client, const v1::SteerClip& steer, const Request& request);
 
 // recording.cpp
 Status handle_record(Client& client, const v1::Record& record, const Request& request);

@@ -18,7 +18,8 @@ constexpr std::size_t kMaxPing = 64;  // bytes
 constexpr std::array kFeatures{v1::FEATURE_VOLUMES, v1::FEATURE_QUALITY,    v1::FEATURE_CONTROL,
                                v1::FEATURE_RESUME,  v1::FEATURE_CLIPS,      v1::FEATURE_INVERSE_KINEMATICS,
                                v1::FEATURE_RELOAD,  v1::FEATURE_THRESHOLDS, v1::FEATURE_SPHERES,
-                               v1::FEATURE_PROBE};
+                               v1::FEATURE_PROBE,   v1::FEATURE_POSE,       v1::FEATURE_CLIP_STATE,
+                               v1::FEATURE_PRESENCE};
 
 void describe(const Limits& limits, v1::Limits& out) {
   out.set_hello_bytes(limits.hello_bytes);
@@ -82,6 +83,7 @@ Status handle_client_hello(Client& client, const v1::ClientHello& hello, const R
   out.set_connection(client.number());
   const std::string resume_token = random_token();
   out.set_resume_token(resume_token);
+  client.introduce(hello);
   client.greet(resume_token);
   if (hello.resume_token().empty())
     client.answer(request.id(), std::move(envelope));

@@ -75,7 +75,10 @@ void on_solved(Client& client, const v1::Envelope& request, const IkOutcome& out
   Status status = outcome.status;
   // Meanwhile another may have taken control, or a later pose have come.
   if (status.ok() && apply_as != 0) status = check_needs(client, request);
-  if (status.ok() && apply_as != 0) status = check_sequence(apply_as, client.last_sequence());
+  if (status.ok() && apply_as != 0) {
+    const std::uint64_t newest = client.session()->poses().last_sequence();
+    status = check_sequence(apply_as, client.last_sequence(), newest);
+  }
   if (!status.ok()) return client.answer_status(request.request_id(), status);
   answer_solved(client, request.request_id(), outcome.result);
   if (apply_as == 0) return;
@@ -95,7 +98,9 @@ Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& 
   kinematics::IkProblem problem;
   if (Status status = read_problem(solve, segments, problem); !status.ok()) return status;
   if (solve.apply_as() != 0) {
-    if (Status status = check_sequence(solve.apply_as(), client.last_sequence()); !status.ok()) return status;
+    const std::uint64_t newest = session.poses().last_sequence();
+    if (Status status = check_sequence(solve.apply_as(), client.last_sequence(), newest); !status.ok())
+      return status;
   }
   Pose start;
   if (Status status = read_start(solve, segments, session.poses().present().pose, start); !status.ok())

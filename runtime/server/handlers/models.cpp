@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "runtime/server/handlers/handlers.hpp"
+#include "runtime/server/session/pose_state.hpp"
 
 namespace ecorche::server {
 
@@ -27,6 +28,8 @@ Status handle_open_model(Client& client, const v1::OpenModel& open, const Reques
   opened = model.opened;
   opened.set_session(client.session()->name());
   opened.set_role(client.role());
+  opened.set_last_sequence(client.session()->poses().last_sequence());
+  describe(client.session()->poses().present(), *opened.mutable_pose());
   if (open.without_triangles()) {
     client.answer(request.id(), std::move(envelope));
     return {};

@@ -34,7 +34,9 @@ Status handle_pose_update(Client& client, const v1::PoseUpdate& update, const Re
   const ServedModel& model = *client.session()->model();
   if (update.rig_digest() != model.opened.rig_digest())
     return {StatusCode::invalid_argument, "pose: meant for another rig (send ModelOpened.rig_digest)"};
-  if (Status status = check_sequence(update.sequence(), client.last_sequence()); !status.ok()) return status;
+  const std::uint64_t newest = client.session()->poses().last_sequence();
+  if (Status status = check_sequence(update.sequence(), client.last_sequence(), newest); !status.ok())
+    return status;
   PoseRequest pose;
   pose.sequence = update.sequence();
   if (Status status = read_skinning(update.skinning(), pose.skinning); !status.ok()) return status;

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "runtime/server/session/mesh_streams.hpp"
+#include "runtime/server/session/pose_state.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -61,6 +62,7 @@ void take_place(Client& client, ResumeRequest& request) {
   resumed.set_session(session.name());
   resumed.set_role(client.role());
   resumed.set_last_sequence(client.last_sequence());
+  describe(session.poses().present(), *resumed.mutable_pose());
   for (const SubscriptionRequest& asked : request.subscriptions) {
     const Subscription* const again = session.subscribe(client, asked);
     if (!again) {  // others have its memory by now

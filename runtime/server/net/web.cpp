@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "runtime/server/net/tls.hpp"
-#include "runtime/server/net/web_host.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -26,6 +25,15 @@ using boost::system::error_code;
 // A message of a WebSocket is one frame of this protocol.
 constexpr std::string_view kSubprotocol = "ecorche.v1";
 constexpr std::size_t kMostHead = 14;  // bytes before the content of a frame (RFC 6455, 5.2)
+
+constexpr const char* kOtherHost =
+    "this server was not started for the name that you asked by (ask by its address, or start it with "
+    "--host-name NAME)\n";
+constexpr const char* kNoViewer =
+    "There is no viewer in this ecorche: it was built without one.\n\n"
+    "To get it, run ./scripts/viewer in the repository (it needs npm), and build ecorche again;\n"
+    "or name a folder that ./scripts/viewer made: ecorche serve --viewer-dir build/viewer ...\n\n"
+    "All else is served: see /healthz, /readyz, /metrics and /v1.\n";
 
 // A transport as Beast wants its streams, so that its templates are made once for all of them.
 class Stream {
@@ -234,12 +242,59 @@ class Request final : public WebRequest {
     }
     if (target == "/metrics") {
       if (!proven()) co_return co_await deny();
-      const auto host = request[http::field::host];
-      if (context_.token.empty() && !names_this_machine({host.data(), host.size()}))
+      if (context_.token.empty() && !names_this_machine(header(http::field::host)))
         co_return co_await answer(http::status::forbidden, "without a token, ask by address or localhost\n");
       co_return co_await answer(http::status::ok, context_.metrics());
     }
-    co_return co_await answer(http::status::not_found, "see /healthz, /readyz, /metrics and /v1\n");
+    co_await show(target);
+  }
+
+  std::string_view header(http::field field) const {
+    const auto value = parser_.get()[field];
+    return {value.data(), value.size()};
+  }
+
+  // A file of the viewer.
+  net::awaitable<void> show(std::string_view target) {
+    if (!context_.hosts.has(header(http::field::host)))
+      co_return co_await answer(http::status::misdirected_request, kOtherHost);
+    if (!context_.viewer && target == "/") co_return co_await answer(http::status::not_found, kNoViewer);
+    FileAnswer file;
+    if (context_.viewer) {
+      file = answer_file(*context_.viewer, {.target = target,
+                                            .accept_encoding = header(http::field::accept_encoding),
+                                            .if_none_match = header(http::field::if_none_match)});
+    }
+    if (file.status == 404)
+      co_return co_await answer(http::status::not_found, "see /, /healthz, /readyz, /metrics and /v1\n");
+    co_await send(std::move(file));
+  }
+
+  net::awaitable<void> send(FileAnswer file) {
+    http::response<http::string_body> response(static_cast<http::status>(file.status), 11);
+    response.set(http::field::server, "ecorche");
+    for (const auto& [name, value] : page_rules()) response.set(name, value);
+    response.set(http::field::etag, file.etag);
+    response.set(http::field::cache_control, file.caching);
+    response.set(http::field::vary, "Accept-Encoding");
+    if (file.body) {
+      response.set(http::field::content_type, file.type);
+      if (file.gzip) response.set(http::field::content_encoding, "gzip");
+      response.content_length(file.bytes);
+    }
+    response.keep_alive(false);
+    has_moved();
+    error_code ec;
+    co_await http::async_write(*stream_, response, quietly(ec));
+    const bool whole = file.body && parser_.get().method() != http::verb::head;
+    for (std::uint64_t left = whole ? file.bytes : 0; left > 0 && !ec && !over_; has_moved()) {
+      const auto piece = file.body->next();
+      if (piece.empty() || piece.size() > left) co_return stream_->transport().close();  // it has changed
+      left -= piece.size();
+      const net::const_buffer buffer(piece.data(), piece.size());
+      co_await stream_->transport().write(std::span(&buffer, 1), ec);
+    }
+    if (!ec) co_await linger();
   }
 
   // Who has shown the token is not kept out by those who have none, nor a viewer by who asks for pages.
@@ -251,8 +306,7 @@ class Request final : public WebRequest {
   // Whoever needs no token has it.
   bool proven() const {
     if (context_.token.empty()) return true;
-    const auto header = parser_.get()[http::field::authorization];
-    return bears({header.data(), header.size()}, context_.token);
+    return bears(header(http::field::authorization), context_.token);
   }
 
   net::awaitable<void> deny() {
@@ -262,19 +316,21 @@ class Request final : public WebRequest {
 
   net::awaitable<void> upgrade() {
     const auto& request = parser_.get();
+    // Browsers name the page that asks; other clients name none, and could claim any.
+    const std::string_view origin = header(http::field::origin), host = header(http::field::host);
+    const bool invited = !origin.empty() && std::find(context_.origins.begin(), context_.origins.end(),
+                                                      origin) != context_.origins.end();
+    if (!invited && !context_.hosts.has(host)) {
+      context_.denied();
+      co_return co_await answer(http::status::misdirected_request, kOtherHost);
+    }
     if (!websocket::is_upgrade(request))
       co_return co_await answer(http::status::upgrade_required, "/v1 speaks WebSocket\n");
-    // Browsers name the page that asks; other clients name none, and could claim any.
-    const auto origin = request[http::field::origin];
-    const bool foreign = !origin.empty() &&
-                         std::find(context_.origins.begin(), context_.origins.end(),
-                                   std::string_view(origin.data(), origin.size())) == context_.origins.end();
-    if (foreign) {
+    if (!invited && !origin.empty() && !same_origin(origin, host, context_.tls)) {
       context_.denied();
       co_return co_await answer(http::status::forbidden, "pages of this origin may not connect\n");
     }
-    const auto token = request[http::field::authorization];
-    if (!token.empty() && !proven()) co_return co_await deny();
+    if (!header(http::field::authorization).empty() && !proven()) co_return co_await deny();
     if (!http::token_list(request[http::field::sec_websocket_protocol])
              .exists({kSubprotocol.data(), kSubprotocol.size()}))
       co_return co_await answer(http::status::bad_request, "the subprotocol is ecorche.v1\n");
@@ -305,13 +361,19 @@ class Request final : public WebRequest {
     response.set(http::field::server, "ecorche");
     response.set(http::field::content_type, "text/plain; version=0.0.4; charset=utf-8");
     response.set(http::field::cache_control, "no-store");
+    response.set("X-Content-Type-Options", "nosniff");
     if (status == http::status::unauthorized) response.set(http::field::www_authenticate, "Bearer");
     response.keep_alive(false);
     response.content_length(body.size());
     if (parser_.get().method() != http::verb::head) response.body() = std::move(body);
     error_code ec;
     co_await http::async_write(*stream_, response, quietly(ec));
-    if (ec) co_return;
+    if (!ec) co_await linger();
+  }
+
+  // Until the client has read its answer.
+  net::awaitable<void> linger() {
+    error_code ec;
     co_await stream_->transport().finish(ec);
     // Unread bytes would reset the connection before the answer is read.
     std::array<std::byte, 1024> rest{};

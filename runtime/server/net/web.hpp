@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The HTTP port: /healthz, /readyz, /metrics, and /v1, where a WebSocket begins.
+// The HTTP port: /healthz, /readyz, /metrics, /v1, where a WebSocket begins, and the viewer for browsers.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "runtime/server/net/transport.hpp"
+#include "runtime/server/net/web_files.hpp"
+#include "runtime/server/net/web_host.hpp"
 
 namespace ecorche::server {
 
@@ -18,8 +20,11 @@ enum class WebKind : std::uint8_t { page, handshake, proven };
 
 /// What the HTTP port asks the server.
 struct WebContext {
-  std::string token;                 ///< empty: none is asked for
-  std::vector<std::string> origins;  ///< pages that may connect, as browsers name them
+  std::string token;                       ///< empty: none is asked for
+  std::vector<std::string> origins;        ///< pages of others that may connect, as browsers name them
+  bool tls = false;                        ///< it is spoken on this port
+  HostList hosts;                          ///< by which browsers may ask, and whose own pages may connect
+  std::shared_ptr<const WebFiles> viewer;  ///< null: there is none
   std::size_t header_bytes = 4 << 10;
   double messages_per_second = 2000;  ///< of a client, pings among them
   std::function<bool()> ready;
@@ -41,9 +46,16 @@ class WebRequest : public std::enable_shared_from_this<WebRequest> {
   /// Closed, or gone on.
   virtual bool over() const = 0;
   Clock::time_point born() const { return born_; }
+  /// When it was born or, once it is answered with a file, when a part of that was last taken.
+  Clock::time_point moved() const { return moved_; }
+  /// It is being answered with a file, which may take long.
+  bool sending() const { return moved_ != born_; }
+
+ protected:
+  void has_moved() { moved_ = Clock::now(); }
 
  private:
-  Clock::time_point born_ = Clock::now();
+  Clock::time_point born_ = Clock::now(), moved_ = born_;
 };
 
 /// `context` outlives it.

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,10 +47,15 @@ struct Endpoint {
   std::uint16_t port = 0;          ///< 0: any free one
 };
 
+class WebFiles;
+
 struct Options {
   Endpoint listen{.host = "127.0.0.1", .port = 7070};
-  std::optional<Endpoint> http;         ///< health, metrics and WebSockets; none by default
-  std::vector<std::string> origins;     ///< pages whose scripts may connect, e.g. `https://viewer.example`
+  std::optional<Endpoint> http;         ///< the viewer, health, metrics and WebSockets; none by default
+  std::uint16_t http_more_ports = 0;    ///< where that port is taken, so many after it are tried
+  std::vector<std::string> origins;     ///< others' pages that may connect, e.g. `https://viewer.example`
+  std::vector<std::string> host_names;  ///< by which browsers ask, besides the address of `http`
+  std::shared_ptr<const WebFiles> viewer = {};  ///< that `http` shows; null: none
   std::string certificate, key;         ///< PEM files; both or neither. With them both ports speak TLS only
   std::string token;                    ///< clients must show it; empty: none is asked for
   bool insecure = false;                ///< listen beyond loopback although TLS or the token is missing

@@ -19,6 +19,7 @@ v1::Role Control::join(Member& member, bool heir, Clock::time_point now) {
     give(member);
     notify(now, &member);
   }
+  tell_change();
   return controller_ == &member ? v1::ROLE_CONTROLLER : v1::ROLE_OBSERVER;
 }
 
@@ -27,6 +28,7 @@ v1::Role Control::rejoin(Member& member, bool control, Clock::time_point now) {
   members_.insert(&member);
   give(member);
   notify(now, &member);
+  tell_change();
   return v1::ROLE_CONTROLLER;
 }
 
@@ -50,6 +52,7 @@ void Control::leave(Member& member, bool may_return, Clock::time_point now) {
   } else if (controlled) {
     notify(now);
   }
+  tell_change();
 }
 
 bool Control::claim(Member& member, Clock::time_point now) {
@@ -57,6 +60,15 @@ bool Control::claim(Member& member, Clock::time_point now) {
   if (controller_ || reserved(now)) return false;
   give(member);
   notify(now);
+  tell_change();
+  return true;
+}
+
+bool Control::hand_over(Member& from, Member& to, Clock::time_point now) {
+  if (controller_ != &from) return false;
+  give(to);
+  notify(now);
+  tell_change();
   return true;
 }
 
@@ -66,6 +78,7 @@ bool Control::release(Member& member, Clock::time_point now) {
   uncontrolled_since_ = now;
   reserved_since_.reset();
   notify(now);
+  tell_change();
   return true;
 }
 

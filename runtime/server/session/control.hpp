@@ -2,8 +2,10 @@
 // Who is in a session, and who of them poses.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "runtime/server/net/asio.hpp"
 #include "runtime/server/session/member.hpp"
@@ -18,6 +20,9 @@ class Control {
   /// `linger`: so long a place is kept for who left. `now`: since when nobody is here.
   Control(Clock::duration linger, Clock::time_point now) : linger_(linger), empty_since_(now) {}
 
+  /// `changed` is called after every change of members or control. It throws nothing.
+  void on_change(std::function<void()> changed) { changed_ = std::move(changed); }
+
   /// Gives control to the member where it is free; to an `heir` also where it is reserved for one.
   v1::Role join(Member& member, bool heir, Clock::time_point now);
   /// As join; with `control`, the control that it left with is its again, unless somebody has it.
@@ -31,6 +36,8 @@ class Control {
   bool claim(Member& member, Clock::time_point now);
   /// False where the member does not hold it.
   bool release(Member& member, Clock::time_point now);
+  /// From who holds it to another member. False where `from` does not hold it.
+  bool hand_over(Member& from, Member& to, Clock::time_point now);
   /// Tells all once control is free that was reserved.
   void expire(Clock::time_point now);
 
@@ -51,8 +58,12 @@ class Control {
   bool reserved(Clock::time_point now) const;
   void give(Member& member);
   void notify(Clock::time_point now, const Member* but = nullptr) const;
+  void tell_change() const {
+    if (changed_) changed_();
+  }
 
   Clock::duration linger_;
+  std::function<void()> changed_;
   std::set<Member*> members_;
   Member* controller_ = nullptr;
   std::optional<Clock::time_point> reserved_since_;  ///< for the last controller

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <string_view>
 
 #include <ecorche/v1/envelope.pb.h>
+#include <ecorche/wire/framing.hpp>
 #include "runtime/server/resources/memory_budget.hpp"
 
 namespace ecorche::server {
@@ -35,6 +37,18 @@ class Member {
     static_cast<void>(subscription), static_cast<void>(bytes);
     return true;
   }
+  /// Of its connection, and what others call it.
+  virtual std::uint64_t number() const { return 0; }
+  virtual std::string_view name() const { return {}; }
+  /// Its hello names the feature, of those that a client must name to be told of it.
+  virtual bool hears_of(v1::Feature feature) const {
+    static_cast<void>(feature);
+    return false;
+  }
+  /// What all hear who hear of its feature.
+  virtual void tell(const std::shared_ptr<const wire::EncodedFrame>& news) { static_cast<void>(news); }
+  /// Who held control gave it to this one, which has heard of the change.
+  virtual void control_given() {}
   /// Its part of what all keep; null: it has no share of its own.
   virtual std::shared_ptr<const Pool> kept_share() const { return nullptr; }
 };

@@ -8,6 +8,7 @@
 #include "runtime/server/resources/guarded.hpp"
 #include "runtime/server/schedule/serially.hpp"
 #include "runtime/server/session/mesh_stream.hpp"
+#include "runtime/server/session/pose_state.hpp"
 #include "runtime/server/session/quality_job.hpp"
 #include "runtime/server/session/recording.hpp"
 #include "runtime/server/session/volume_stream.hpp"
@@ -175,6 +176,7 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
   for (const ClampedJoint& clamped : body.clamped) {
     describe(clamped, job.model->model().rig.skeleton, *frame.add_clamped());
   }
+  if (stream.spec().pose) server::describe(job.request, *frame.mutable_pose());
   const auto start = Clock::now();
   wire::Pieces pieces;
   std::shared_ptr<wire::Payload> payload;

@@ -6,17 +6,13 @@
 
 #include <ecorche/wire/convert.hpp>
 #include "proto/recording.hpp"
+#include "runtime/server/session/pose_state.hpp"
 
 namespace ecorche::server {
 namespace {
 
 constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kEndBytes = 64;  // the last frame's, kept free
-
-v1::Skinning skinning_to_proto(runtime::Skinning skinning) {
-  if (skinning == runtime::Skinning::dqs) return v1::SKINNING_DQS;
-  return skinning == runtime::Skinning::lbs ? v1::SKINNING_LBS : v1::SKINNING_COR;
-}
 
 // Whether a frame's bytes follow from the pose, and not from how soon the client took those before. (Frames
 // against keyframes never come here.)

@@ -8,6 +8,13 @@
 #include "runtime/server/session/retained_bytes.hpp"
 
 namespace ecorche::server {
+namespace {
+
+constexpr auto kBetweenMembers = std::chrono::milliseconds(250);
+constexpr auto kBetweenClips = std::chrono::milliseconds(100);
+constexpr auto kWhilePlaying = std::chrono::milliseconds(500);
+
+}  // namespace
 
 Session::Session(const Services& services, std::shared_ptr<const ServedModel> model, std::string name,
                  bool named, const Limits& limits, SessionOwner owner)
@@ -34,14 +41,18 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
       probes_(kept_by_probe(model_->model()), owner_.kept ? owner_.kept : memory_.kept_pool(),
               services.destroy_later),
       quality_(executor_, quality_turns_, table_, poses_, model_),
-      player_(std::make_shared<ClipPlayer>(io_,
-                                           [this](const Pose& pose) {
-                                             PoseRequest request;
-                                             request.sequence = poses_.last_sequence() + 1;
-                                             request.pose = pose;
-                                             request.skinning = poses_.present().skinning;
-                                             put(std::move(request));
-                                           })),
+      player_(std::make_shared<ClipPlayer>(
+          io_,
+          [this](const Pose& pose) {
+            PoseRequest request;
+            request.sequence = poses_.last_sequence() + 1;
+            request.pose = pose;
+            request.skinning = poses_.present().skinning;
+            put(std::move(request));
+          },
+          [this] { clip_news_.changed(); })),
+      members_news_(io_, kBetweenMembers, [this] { tell_members(); }),
+      clip_news_(io_, kBetweenClips, [this] { tell_clip(); }),
       alarm_(io_,
              [this] {
                table_.wake(Clock::now());
@@ -49,7 +60,12 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
                start_jobs();
              }),
       quality_turn_([this] { return quality_.measure(shared_from_this()); }, account_),
-      first_frame_turn_([this] { return show_newcomers(); }, account_) {}
+      first_frame_turn_([this] { return show_newcomers(); }, account_) {
+  control_.on_change([this] {
+    presence_.follow(control_);
+    members_news_.changed();
+  });
+}
 
 Session::~Session() {
   player_->release();
@@ -59,6 +75,16 @@ void Session::log_error(const std::string& what) const {
   if (journal_) journal_->line(spdlog::level::err, "session " + name_ + ": " + what);
 }
 
+v1::Role Session::join(Member& member, bool heir) {
+  if (player_->clip()) clip_news_.changed();
+  return control_.join(member, heir, Clock::now());
+}
+
+v1::Role Session::rejoin(Member& member, bool control) {
+  if (player_->clip()) clip_news_.changed();
+  return control_.rejoin(member, control, Clock::now());
+}
+
 void Session::leave(Member& member, bool may_return) {
   const auto now = Clock::now();
   table_.remove(member);
@@ -66,6 +92,8 @@ void Session::leave(Member& member, bool may_return) {
   control_.leave(member, may_return, now);
   if (!control_.members().empty()) return;
   player_->stop();
+  members_news_.forget();
+  clip_news_.forget();
   set_alarm();  // a server that stops would wait for who watches at the slowest rate
   forget_probes(now);
 }
@@ -93,8 +121,40 @@ void Session::put(PoseRequest request) {
   start_jobs();
 }
 
-void Session::play(std::shared_ptr<const Clip> clip, double speed, bool loop) {
-  player_->play(std::move(clip), speed, loop);
+void Session::ask_for_control(Member& member, bool asks) {
+  if (presence_.ask(member, asks)) members_news_.changed();
+}
+
+void Session::tell(v1::Feature feature, const v1::Envelope& news) const {
+  const auto hears = [&](const Member* member) { return member->hears_of(feature); };
+  const std::set<Member*>& members = control_.members();
+  if (std::none_of(members.begin(), members.end(), hears)) return;
+  const auto encoded = std::make_shared<const wire::EncodedFrame>(wire::encode(news));
+  for (Member* member : members) {
+    if (hears(member)) member->tell(encoded);
+  }
+}
+
+void Session::tell_members() const {
+  v1::Envelope envelope;
+  *envelope.mutable_members() = presence_.list(control_);
+  tell(v1::FEATURE_PRESENCE, envelope);
+}
+
+void Session::tell_clip() {
+  v1::Envelope envelope;
+  v1::ClipState& state = *envelope.mutable_clip_state();
+  if (const std::shared_ptr<const Clip>& clip = player_->clip()) {
+    state.set_name(clip->name);
+    state.set_position(player_->position());
+    state.set_seconds(clip->seconds());
+    state.set_frames_per_second(clip->frames_per_second());
+    state.set_speed(player_->speed());
+    state.set_loop(player_->loops());
+    state.set_playing(player_->playing());
+  }
+  tell(v1::FEATURE_CLIP_STATE, envelope);
+  if (player_->playing()) clip_news_.again_after(kWhilePlaying);
 }
 
 void Session::set_thresholds(const runtime::QualityThresholds& thresholds) {

@@ -20,7 +20,9 @@
 #include "runtime/server/session/frame_planner.hpp"
 #include "runtime/server/session/job_pacer.hpp"
 #include "runtime/server/session/job_reporter.hpp"
+#include "runtime/server/session/news.hpp"
 #include "runtime/server/session/pose_slot.hpp"
+#include "runtime/server/session/presence.hpp"
 #include "runtime/server/session/probe_queue.hpp"
 #include "runtime/server/session/quality_tracker.hpp"
 #include "runtime/server/session/session_recorder.hpp"
@@ -53,7 +55,7 @@ struct SessionOwner {
 
 /// Lives on the I/O thread, and wires what a posed body is made of:
 ///
-///   Control            members, and who of them poses
+///   Control            members, and who of them poses; Presence tells them of each other
 ///   PoseSlot           the pose that waits, where the newest wins, and the one that is shown
 ///   SubscriptionTable  who sees what; FramePlanner chooses of it what a job makes
 ///   VolumeJobs         volumes, which take longer than all else of a pose, beside the meshes of newer poses
@@ -74,13 +76,15 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   const std::shared_ptr<const ServedModel>& model() const { return model_; }
 
   /// See Control.
-  v1::Role join(Member& member, bool heir = false) { return control_.join(member, heir, Clock::now()); }
-  v1::Role rejoin(Member& member, bool control) { return control_.rejoin(member, control, Clock::now()); }
+  v1::Role join(Member& member, bool heir = false);
+  v1::Role rejoin(Member& member, bool control);
   /// With its subscriptions. `may_return`: keeps an unnamed session, and the member's control, for
   /// `linger_seconds`. Throws nothing.
   void leave(Member& member, bool may_return);
   Control& control() { return control_; }
   const Control& control() const { return control_; }
+  /// The member asks whoever holds control for it, or asks no more; all who hear of Members hear of that.
+  void ask_for_control(Member& member, bool asks);
 
   /// See SubscriptionTable::add(). Frames follow, the present pose first.
   const Subscription* subscribe(Member& member, const SubscriptionRequest& asked);
@@ -93,9 +97,9 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   /// From the member that holds control; already checked against the rig.
   void pose(PoseRequest request);
   const PoseSlot& poses() const { return poses_; }
-  /// Poses by itself, until the clip ends, a pose comes or everybody has left.
-  void play(std::shared_ptr<const Clip> clip, double speed, bool loop);
-  void stop_clip() { player_->stop(); }
+  /// Poses by itself, until the clip ends, a pose comes or everybody has left. All who hear of ClipState hear
+  /// how far it is.
+  ClipPlayer& player() { return *player_; }
 
   const runtime::QualityThresholds& thresholds() const { return quality_.thresholds(); }
   void set_thresholds(const runtime::QualityThresholds& thresholds);
@@ -139,6 +143,9 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   std::shared_ptr<JobListener> listener() { return {shared_from_this(), this}; }
   void put(PoseRequest request);
   void log_error(const std::string& what) const;
+  void tell_members() const;
+  void tell_clip();
+  void tell(v1::Feature feature, const v1::Envelope& news) const;
   // session_jobs.cpp
   StreamKinds pose_kinds() const;
   FramePlan plan_present(Clock::time_point now) const;
@@ -182,6 +189,8 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   QualityTracker quality_;
   SessionRecorder recorder_;
   std::shared_ptr<ClipPlayer> player_;
+  Presence presence_;
+  News members_news_, clip_news_;
   Alarm alarm_;  ///< for who is due
   Turn quality_turn_, first_frame_turn_;
   std::uint64_t frames_ = 0;

@@ -49,6 +49,7 @@ Status read_mesh(const v1::MeshSelection& mesh, const Model& model, MeshSpec& ou
   out.level = mesh.level();
   out.adaptive = mesh.adaptive();
   out.control_nodes = mesh.control_nodes();
+  out.pose = mesh.pose();
   if (out.level > coarsest_level) {
     return {StatusCode::invalid_argument, "subscribe: level " + std::to_string(out.level) +
                                               " (ask for 0 to " + std::to_string(coarsest_level) + ")"};

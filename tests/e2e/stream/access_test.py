@@ -85,10 +85,10 @@ class Access(unittest.TestCase):
             self.assertEqual(caught.exception.code, 401)
             caught.exception.close()
             _, out, _ = server.stop()
-            self.assertEqual(out, f"listening on {server.address}, and https://127.0.0.1:{server.http_port}\n", "both ports are named")
+            self.assertEqual(out, f"listening on {server.address}, and https://127.0.0.1:{server.http_port}/\n", "both ports are named")
         with Server(MODEL, options=["--http", "[::1]:0"], host="[::1]") as server:
             _, out, _ = server.stop()
-            self.assertEqual(out, f"listening on {server.address}, and http://[::1]:{server.http_port}\n")
+            self.assertEqual(out, f"listening on {server.address}, and http://[::1]:{server.http_port}/\n")
 
     def test_real_time_is_for_who_may(self):
         """One thread of the server alone, and none where the system does not let it."""

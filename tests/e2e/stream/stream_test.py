@@ -176,7 +176,7 @@ class Serve(unittest.TestCase):
             code, out, _ = server.stop()
             self.assertEqual(code, 0)
             self.assertLess(time.monotonic() - start, 10)
-            self.assertEqual(out, f"listening on {server.address}\n")
+            self.assertRegex(out, rf"^listening on {server.address}, and http://127\.0\.0\.1:\d+/\n$")
             self.assertEqual(client.wait(30), 75)
             self.assertIn("error: ", client.stderr.read())
             client.stderr.close()

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "runtime/server/session/member.hpp"
@@ -23,6 +24,11 @@ struct FakeMember final : Member {
   bool has_keyframes = true;          // that frames are against
   std::uint32_t level = 0;            // that suits it, unless the body stands still
   std::shared_ptr<const Pool> share = nullptr;
+  std::uint64_t connection = 0;
+  std::string called;
+  std::vector<v1::Feature> features;  // that it hears of
+  int news = 0;                       // that it was told
+  int given = 0;                      // how often it was given control
 
   bool deliver(const PosedFrame& frame) override {
     frames.push_back(frame.number);
@@ -38,6 +44,13 @@ struct FakeMember final : Member {
   void model_changed(std::uint64_t) override {}
   bool may_take(std::uint32_t, std::uint64_t) override { return reads; }
   std::shared_ptr<const Pool> kept_share() const override { return share; }
+  std::uint64_t number() const override { return connection; }
+  std::string_view name() const override { return called; }
+  bool hears_of(v1::Feature feature) const override {
+    return std::find(features.begin(), features.end(), feature) != features.end();
+  }
+  void tell(const std::shared_ptr<const wire::EncodedFrame>&) override { ++news; }
+  void control_given() override { ++given; }
 };
 
 }  // namespace ecorche::server

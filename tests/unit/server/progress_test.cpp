@@ -316,6 +316,7 @@ TEST(Movement, OfAWebSocketIsItsCarriers) {
   Sockets sockets(io);
   std::unique_ptr<Transport> transport;
   WebContext context;
+  context.hosts = HostList(net::ip::make_address("127.0.0.1"), {});
   context.admit = [](auto&&...) { return true; };
   context.welcome = [&](std::unique_ptr<Transport> welcomed, const std::string&, bool) {
     transport = std::move(welcomed);
@@ -323,7 +324,7 @@ TEST(Movement, OfAWebSocketIsItsCarriers) {
   const auto request = web_request(tcp_transport(std::move(sockets.server)), "test", context);
   request->start();
   net::write(sockets.client, net::buffer(std::string(
-                                 "GET /v1 HTTP/1.1\r\nHost: test\r\nUpgrade: websocket\r\n"
+                                 "GET /v1 HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
                                  "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
                                  "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: ecorche.v1\r\n\r\n")));
   while (!transport) ASSERT_GT(io.run_one(), 0U);

@@ -132,7 +132,7 @@ TEST(Shares, OneKindOfRequestKeepsNoOtherOut) {
   EXPECT_TRUE(starts(WebClient(server.http()).upgrade(token + "Sec-WebSocket-Protocol: ecorche.v1\r\n"),
                      "HTTP/1.1 101"));
   Elsewhere other(server.http());
-  other.send("GET / HTTP/1.1\r\nHost: test\r\n\r\n");
+  other.send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_TRUE(starts(other.rest(), "HTTP/1.1 404"));
 }
 

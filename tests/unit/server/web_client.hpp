@@ -36,11 +36,12 @@ class WebClient {
   }
 
   /// The answer to a handshake, up to its empty line.
-  std::string upgrade(const std::string& headers = "Sec-WebSocket-Protocol: ecorche.v1\r\n") {
-    send(
-        "GET /v1 HTTP/1.1\r\nHost: test\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" +
-        headers + "\r\n");
+  std::string upgrade(const std::string& headers = "Sec-WebSocket-Protocol: ecorche.v1\r\n",
+                      const std::string& host = "localhost") {
+    send("GET /v1 HTTP/1.1\r\nHost: " + host +
+         "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" +
+         headers + "\r\n");
     std::size_t end = std::string::npos;
     try {
       while ((end = bytes_.find("\r\n\r\n")) == std::string::npos && read(10)) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pages for Chromium, served by node as the server would: cross-origin isolated, or not, under the viewer's policy.
 import { build } from "esbuild";
+import { spawn } from "node:child_process";
 import fs from "node:fs";
 import http from "node:http";
 import type { AddressInfo } from "node:net";
+import os from "node:os";
 import path from "node:path";
 import { chromium, type Browser, type Page } from "playwright-core";
 
@@ -29,11 +31,17 @@ export interface Site {
   close(): Promise<void>;
 }
 
-export async function serve(files: Files, { isolated = true, port = 0 } = {}): Promise<Site> {
+/** `posted`: what the page posts to its own origin. */
+export async function serve(files: Files, { isolated = true, port = 0, posted = (_: string): void => {} } = {}): Promise<Site> {
   const server = http.createServer((request, response) => {
+    if (request.method === "POST") {
+      let body = "";
+      request.on("data", (bytes) => { body += bytes; }).on("end", () => { response.writeHead(204).end(); posted(body); });
+      return;
+    }
     const { pathname } = new URL(request.url!, "http://127.0.0.1"), text = files[pathname];
     response.writeHead(text === undefined ? 404 : 200, {
-      "Content-Type": TYPES[path.extname(pathname)] ?? "text/plain", "Content-Security-Policy": POLICY, "X-Content-Type-Options": "nosniff",
+      "Content-Type": TYPES[path.extname(pathname) || ".html"] ?? "text/plain", "Content-Security-Policy": POLICY, "X-Content-Type-Options": "nosniff",
       ...(isolated && { "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp" }),
     });
     response.end(text ?? "");
@@ -45,10 +53,26 @@ export async function serve(files: Files, { isolated = true, port = 0 } = {}): P
   };
 }
 
-export async function launch(): Promise<Browser> {
-  const executablePath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find((file) => fs.existsSync(file));
-  if (!executablePath) throw new Error("no Chromium (run scripts/setup --tests)");
-  return chromium.launch({ executablePath, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+function executable(): string {
+  const found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find((file) => fs.existsSync(file));
+  if (!found) throw new Error("no Chromium (run scripts/setup --tests)");
+  return found;
+}
+
+export const launch = (): Promise<Browser> => chromium.launch({ executablePath: executable(), args: FLAGS });
+
+/** Chromium without the debugging tap, which would look at every message of a WebSocket. Ends what it returns. */
+export function openUntapped(url: string): () => Promise<void> {
+  const profile = fs.mkdtempSync(path.join(os.tmpdir(), "ecorche-chromium-"));
+  const child = spawn(executable(), [...FLAGS, "--headless=new", `--user-data-dir=${profile}`, url], { detached: true, stdio: "ignore" });
+  const ended = new Promise((resolve) => child.once("exit", resolve));
+  return async () => {
+    if (child.exitCode === null) process.kill(-child.pid!, "SIGKILL");
+    await ended;
+    fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+  };
 }
 
 /** What went wrong in the page: uncaught errors, and what the console says of errors (also of the page's policy). */

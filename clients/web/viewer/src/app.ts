@@ -38,8 +38,8 @@ export class App {
   readonly panels: PanelHost;
   /** The client of the protocol, and what it opened. */
   readonly live: Live;
-  /** Of the pointer, for the name beside it. */
-  readonly pointer = new Store<{ x: number; y: number; fromRest: number }>({ x: 0, y: 0, fromRest: 0 });
+  /** Of the pointer, for the name beside it: `inside` the picture, not over a panel. */
+  readonly pointer = new Store<{ x: number; y: number; fromRest: number; inside: boolean }>({ x: 0, y: 0, fromRest: 0, inside: false });
   /** What say() said last. */
   readonly said = new Store<{ text: string; count: number }>({ text: "", count: 0 });
   /** More parts of the help; each is asked when it opens. */
@@ -118,6 +118,7 @@ export class App {
     if (!pointer) {
       cancelAnimationFrame(this.#hoverAsked);
       this.#hoverAsked = 0;
+      this.pointer.set({ inside: false });
       this.store.set({ hovered: null });
       return;
     }
@@ -126,7 +127,7 @@ export class App {
       if (!this.#hoverAt) return;
       const { x, y } = this.#hoverAt;
       const picked = this.#hoverAt.pick();
-      this.pointer.set({ x, y, fromRest: picked?.fromRest ?? 0 });
+      this.pointer.set({ x, y, fromRest: picked?.fromRest ?? 0, inside: true });
       this.store.set({ hovered: picked?.row ?? null });
     });
   }

@@ -27,6 +27,7 @@ Status from_proto(const v1::Skeleton& skeleton, Rig& out);
 
 /// Fills root_translation, rotation and translation. Exact: doubles travel as they are.
 void to_proto(const Pose& pose, v1::PoseUpdate& out);
+void to_proto(const Pose& pose, v1::PoseState& out);
 /// A pose of a rig of `joints` joints. invalid_argument: another number of joints, a value that is not
 /// finite, a quaternion whose length is not 1 within 1e-3, a translation of no joint or beyond 1e6 mm.
 Status from_proto(const v1::PoseUpdate& update, std::size_t joints, Pose& out);

@@ -9,10 +9,10 @@ export function addTip(app: App): void {
   const tip = app.places.root.querySelector<HTMLElement>("#tip")!;
   const update = () => {
     const { hovered, model, scalar } = app.store.state;
-    const tissue = hovered === null ? undefined : model?.tissues[hovered];
+    const { x, y, fromRest, inside } = app.pointer.state;
+    const tissue = hovered === null || !inside ? undefined : model?.tissues[hovered];
     tip.hidden = !tissue;
     if (!tissue) return;
-    const { x, y, fromRest } = app.pointer.state;
     tip.replaceChildren(tissue.label, scalar === "distance" ? h("small", {}, `${fromRest.toFixed(1)} mm from rest`) : h("small", {}, tissue.group));
     const { clientWidth, clientHeight } = app.places.root;
     const left = x + OFFSET + tip.offsetWidth > clientWidth ? x - OFFSET - tip.offsetWidth : x + OFFSET;

@@ -32,7 +32,7 @@ export interface Pull {
 const at = (v: Vec3) => ({ x: v[0], y: v[1], z: v[2] });
 
 /** A pin counts so many times as the part that is pulled. */
-const PIN_WEIGHT = 4;
+const PIN_WEIGHT = 30;
 /** What the server takes in one request. */
 const MOST_TARGETS = 64;
 
@@ -68,6 +68,11 @@ export class BodyDrag {
     this.#loop?.aim(target);
   }
 
+  /** When the newest target has been answered. */
+  async settled(): Promise<void> {
+    await this.#loop?.settled();
+  }
+
   /** Lets go: the newest target is still answered, and the whole pull is one step to undo. */
   async end(): Promise<void> {
     const loop = this.#loop;
@@ -90,7 +95,7 @@ export class BodyDrag {
   async reach(segment: number, place: Vec3, target: Vec3): Promise<number | null> {
     if (!this.begin(segment, place)) return null;
     this.aim(target);
-    await this.#loop?.settled();
+    await this.settled();
     const left = this.store.state.pull?.residual ?? null;
     await this.end();
     return left;

@@ -13,7 +13,7 @@ import { PoseTool, type SegmentUnder } from "./pose_tool.js";
 import { Poser } from "./poser.js";
 import { poseOf, samePose, restPose } from "./pose.js";
 import { rigOf } from "./rig.js";
-import { copyLink, restoreLink } from "./share.js";
+import { copyLink, presentLink, restoreLink } from "./share.js";
 import { Clips } from "./clips.js";
 import { addClipsPanel } from "./clips_panel.js";
 import { addPeoplePanel, fillStrip } from "./people_panel.js";
@@ -26,6 +26,7 @@ export interface Posing {
   readonly drag: BodyDrag;
   readonly scene: PoseScene;
   readonly under: SegmentUnder;
+  link(): string;
 }
 
 export function addPosing(app: App): Posing {
@@ -57,7 +58,7 @@ export function addPosing(app: App): Posing {
   addPeoplePanel(app, together);
   addPoseKeys(app, poser, options, () => downloadPose(app, poser));
   follow(app, poser, together, clips);
-  return { poser, drag, scene, under };
+  return { poser, drag, scene, under, link: () => presentLink(app, poser) };
 }
 
 /** What the server tells of the pose, and what is chosen elsewhere in the viewer. */
@@ -66,7 +67,7 @@ function follow(app: App, poser: Poser, together: Together, clips: Clips): void 
   let seen: Client | null = null;
   app.live.onOpened(({ client, model }) => {
     if (client !== seen) {
-      listen(client, poser);
+      listen(client, poser, clips);
       together.follow(client);
       clips.follow(client);
     }
@@ -85,9 +86,10 @@ function follow(app: App, poser: Poser, together: Together, clips: Clips): void 
   });
 }
 
-function listen(client: Client, poser: Poser): void {
+function listen(client: Client, poser: Poser, clips: Clips): void {
   client.on("pose", ({ status, clamped }) => {
-    if ((status?.code ?? 0) === 0) poser.clamped(clamped);
+    // What a clip asks is nobody's mistake here.
+    if ((status?.code ?? 0) === 0) poser.clamped(clips.store.state.now ? [] : clamped);
   });
   client.on("shown", (pose) => poser.observe(pose));
 }

@@ -109,6 +109,12 @@ export class PoseScene {
     return best;
   }
 
+  /** Of the chosen joint: where its ring is in the picture, so many radians from its handle. */
+  placeOnRing(index: number, turn: number): ScreenPoint | null {
+    const ring = this.#rings[index];
+    return ring ? this.#onRing(ring, index, ring.value + turn) : null;
+  }
+
   #onRing(ring: Ring, index: number, angle: number): ScreenPoint {
     const radius = radiusOf(index) * this.projector.mmPerPixel(ring.center);
     return this.projector.toScreen(add(ring.center, scale(directionAt(ring, angle), radius)));

@@ -14,7 +14,7 @@ import { jointLabel, spoken } from "./words.js";
 
 type Hold =
   | { kind: "ring"; row: number; angle: number; drag: RingDrag; atLimit: boolean }
-  | { kind: "press"; row: number; place: Vec3; x: number; y: number }
+  | { kind: "press"; row: number; place: Vec3; x: number; y: number; grip: Vec3 }
   | { kind: "pull"; place: Vec3; offset: Vec3 }
   | { kind: "root"; place: Vec3; offset: Vec3; from: Vec3 };
 
@@ -36,19 +36,25 @@ export class PoseTool implements PointerTool {
     this.scene.hover(hit);
     if (hit?.kind === "ring") return this.#takeRing(hit, pointer);
     if (hit) {
-      this.#hold = { kind: "press", row: hit.row, place: hit.center, x: pointer.x, y: pointer.y };
+      this.#press(hit.row, hit.center, pointer);
       return true;
     }
     if (!this.pullsBody) return false;
     const picked = pointer.pick();
     if (!picked) return false;
     const place = plain(picked.point);
-    this.#hold = { kind: "press", row: this.under(picked.row, place), place, x: pointer.x, y: pointer.y };
+    this.#press(this.under(picked.row, place), place, pointer);
     return true;
   }
 
+  /** Not yet a pull: that begins where the pointer went down, not where it was when it had gone far enough. */
+  #press(row: number, place: Vec3, pointer: ScenePointer): void {
+    const grip = this.scene.projector.acrossFrom(place, this.scene.projector.sight(pointer.ray)) ?? place;
+    this.#hold = { kind: "press", row, place, x: pointer.x, y: pointer.y, grip };
+  }
+
   move(pointer: ScenePointer): void {
-    if (this.#hold?.kind === "press" && Math.hypot(pointer.x - this.#hold.x, pointer.y - this.#hold.y) > PRESS_PIXELS) this.#pull(pointer);
+    if (this.#hold?.kind === "press" && Math.hypot(pointer.x - this.#hold.x, pointer.y - this.#hold.y) > PRESS_PIXELS) this.#pull(this.#hold);
     const hold = this.#hold;
     if (!hold) return;
     if (hold.kind === "ring") return this.#turn(hold, pointer);
@@ -100,7 +106,7 @@ export class PoseTool implements PointerTool {
     const value = hold.drag.moved(this.scene.projector.sight(pointer.ray), [pointer.x, pointer.y]);
     const set = setAngle(rig!.segments[hold.row]!.joint, body.rotation[hold.row]!, hold.angle, value);
     this.poser.show(withRotation(asked, hold.row, set.rotation));
-    if (set.limit !== null && !hold.atLimit) this.poser.sayLimit(hold.row, hold.angle, set.limit);
+    if (set.limit !== null) this.poser.sayLimit(hold.row, hold.angle, set.limit, !hold.atLimit);
     hold.atLimit = set.limit !== null;
   }
 
@@ -109,11 +115,9 @@ export class PoseTool implements PointerTool {
     return `${jointLabel(joint)}: ${spoken(joint.sequence[hold.angle]!.name, this.poser.angle(hold.row, hold.angle))}`;
   }
 
-  #pull(pointer: ScenePointer): void {
-    const hold = this.#hold as Hold & { kind: "press" };
+  #pull(hold: Hold & { kind: "press" }): void {
     this.poser.select(hold.row);
-    const start = this.scene.projector.acrossFrom(hold.place, this.scene.projector.sight(pointer.ray)) ?? hold.place;
-    const offset = subtract(hold.place, start);
+    const offset = subtract(hold.place, hold.grip);
     this.#hold = null;
     if (hold.row === 0 && this.poser.state.pins.length === 0) {
       if (!this.poser.begin()) return this.refused();

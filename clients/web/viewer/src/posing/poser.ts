@@ -95,8 +95,9 @@ export class Poser {
     const held = joints.filter(({ joint }) => rig.segments[joint]).map(({ joint, removed }) => ({
       row: joint, text: `${jointLabel(rig.segments[joint]!.joint)} is at its limit: ${degreesText(removed)} of what was asked is left out`,
     }));
-    if (held.length === 0 && this.state.held.length === 0) return;
-    if (held.length > 0 && held.map((h) => h.row).join() !== this.state.held.map((h) => h.row).join()) this.say(held[0]!.text);
+    // A stop that was told here already is still told: the next change takes it away.
+    if (held.length === 0) return;
+    if (held.map((h) => h.row).join() !== this.state.held.map((h) => h.row).join()) this.say(held[0]!.text);
     this.store.set({ held });
   }
 
@@ -161,10 +162,11 @@ export class Poser {
     return set.value;
   }
 
-  sayLimit(row: number, angle: number, limit: number): void {
+  /** An angle that stands at its limit; `aloud`: where it came there just now. */
+  sayLimit(row: number, angle: number, limit: number, aloud = true): void {
     const { joint } = this.state.rig!.segments[row]!;
     const text = `${jointLabel(joint)}: ${angleLabel(joint.sequence[angle]!.name).toLowerCase()} stops at ${degreesText(limit)}, its limit`;
-    this.say(text);
+    if (aloud) this.say(text);
     this.store.set({ held: [{ row, text }] });
   }
 

@@ -37,8 +37,8 @@ ${VERTEX}${NORMAL}
 ${FROM_REST}
 varying float vScalar;
 #endif
-varying vec3 vNormal;
-varying vec3 vView;
+centroid varying vec3 vNormal;
+centroid varying vec3 vView;
 #include <clipping_planes_pars_vertex>
 
 void main() {
@@ -65,8 +65,8 @@ uniform float shine;
 uniform float opacity;
 uniform float glow;
 uniform vec3 accent;
-varying vec3 vNormal;
-varying vec3 vView;
+centroid varying vec3 vNormal;
+centroid varying vec3 vView;
 #ifdef SCALAR
 uniform vec2 scalarRange;
 varying float vScalar;
@@ -120,12 +120,6 @@ void main() {
   float keyWrapped = wrapped(dot(n, toKey), wrap);
   vec3 keyTint = mix(scatter, vec3(1.0), smoothstep(0.0, 0.45, keyPlain + 0.12));
   vec3 diffuse = ambient + keyColor * keyWrapped * mix(keyTint, vec3(1.0), 1.0 - wrap) + fillColor * wrapped(dot(n, toFill), wrap);
-
-  // Creases are darker, ridges lighter: how the normal turns over the surface, from pixel to pixel.
-  vec3 dpx = dFdx(vView), dpy = dFdy(vView);
-  float bend = dot(dFdx(n), dpx) / max(dot(dpx, dpx), 1e-12) + dot(dFdy(n), dpy) / max(dot(dpy, dpy), 1e-12);
-  float crease = clamp(bend * 0.004, -0.2, 0.1);
-  diffuse *= 1.0 + crease;
 
   vec3 lit = base * diffuse * RECIPROCAL_PI * 1.65;
   lit += shine * (keyColor * highlight(n, v, toKey, roughness) + fillColor * highlight(n, v, toFill, roughness + 0.1)) * 0.9;

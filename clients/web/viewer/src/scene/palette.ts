@@ -20,9 +20,9 @@ const look = (color: number, scatter: number, wrap: number, roughness: number, s
 const GROUPS: Record<string, Look> = {
   skin: look(0xdba98c, 0xc4553a, 0.42, 0.55, 0.32),
   bone: look(0xe9dfc6, 0xb9935c, 0.22, 0.62, 0.22),
-  muscle: look(0x94342d, 0x6e1512, 0.2, 0.42, 0.5),
+  muscle: look(0x852d28, 0x5e1110, 0.2, 0.4, 0.5),
   organ: look(0xb9705f, 0x7d2a20, 0.28, 0.36, 0.6),
-  vessel: look(0xb3322d, 0x701010, 0.25, 0.3, 0.65),
+  vessel: look(0xa32320, 0x640c0c, 0.25, 0.3, 0.65),
   nerve: look(0xe8cf72, 0xa97f25, 0.3, 0.45, 0.35),
   cartilage: look(0xbfd4d8, 0x6f9aa6, 0.35, 0.4, 0.45),
   ligament: look(0xdcd3b8, 0xa28f62, 0.25, 0.5, 0.3),
@@ -33,7 +33,7 @@ const GROUPS: Record<string, Look> = {
 // The first whose pattern is found in the name wins.
 const ORGANS: readonly (readonly [RegExp, Look])[] = [
   [/heart|myocard|atri|ventric/, look(0xa23a37, 0x5f1010, 0.22, 0.34, 0.65)],
-  [/lung/, look(0xd9a09a, 0xa4504a, 0.4, 0.5, 0.4)],
+  [/lung/, look(0xcb918b, 0x97463f, 0.36, 0.48, 0.4)],
   [/liver/, look(0x7d3527, 0x41110a, 0.2, 0.3, 0.7)],
   [/gall/, look(0x6c8a45, 0x33480f, 0.25, 0.3, 0.7)],
   [/kidney|renal|adrenal/, look(0x8d4238, 0x4d1511, 0.22, 0.34, 0.62)],

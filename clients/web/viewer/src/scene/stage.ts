@@ -65,6 +65,8 @@ export class Stage {
       minDistance: 0.08, maxDistance: 20, zoomToCursor: true, zoomSpeed: 1.2, rotateSpeed: 0.9,
     });
     this.controls.addEventListener("change", () => this.invalidate());
+    document.addEventListener("visibilitychange", () => this.invalidate());
+    canvas.addEventListener("webglcontextrestored", () => this.invalidate());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
   }

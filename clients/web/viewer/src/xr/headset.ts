@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import type { App } from "../app.js";
 import type { Posing } from "../posing/index.js";
+import type { Surroundings } from "../scene/stage.js";
 import { shownOpacity } from "../state/layers.js";
 import { labelOf } from "../state/names.js";
 import { levelWithin } from "./detail.js";
@@ -114,7 +115,7 @@ export class Headset {
     );
     await stage.immerse(this.session, {
       camera: this.#camera,
-      background: this.stay.inRoom ? null : new THREE.Color(stage.surroundings.below),
+      background: this.stay.inRoom ? null : backgroundOf(stage.surroundings),
       frame: (seconds, frame) => this.#frame(seconds, frame),
     });
     await this.#setLevel();
@@ -274,6 +275,9 @@ export class Headset {
     return (state.model?.tissues ?? []).map(({ row }) => row).filter((row) => shownOpacity(state, row) > 0);
   }
 }
+
+/** Darker than the page: all round the eyes a light wall dazzles, and bone would not stand out from it. */
+const backgroundOf = ({ below, shadow }: Surroundings): THREE.Color => new THREE.Color(below).lerp(new THREE.Color(shadow), 0.6);
 
 /** Felt in the hand, where the browser can. */
 function pulse(gamepad: Gamepad | undefined): void {
