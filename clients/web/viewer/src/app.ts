@@ -40,6 +40,10 @@ export class App {
   readonly live: Live;
   /** Of the pointer, for the name beside it: `inside` the picture, not over a panel. */
   readonly pointer = new Store<{ x: number; y: number; fromRest: number; inside: boolean }>({ x: 0, y: 0, fromRest: 0, inside: false });
+  /** What say() said last. */
+  readonly said = new Store<{ text: string; count: number }>({ text: "", count: 0 });
+  /** More parts of the help; each is asked when it opens. */
+  readonly helpParts: (() => { title: string; lines: readonly string[] })[] = [];
   #hoverAt: ScenePointer | null = null;
   #hoverAsked = 0;
   #says: HTMLElement;
@@ -94,6 +98,7 @@ export class App {
 
   /** A line that shows for a moment and is read out. */
   say(text: string): void {
+    this.said.set({ text, count: this.said.state.count + 1 });
     this.#says.textContent = text;
     this.#says.classList.remove("shown");
     // Begins the animation anew.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The line to the server: connects, opens the model that the address names, and puts what comes into the state and the scene.
-import { Client, Code, ConnectionError, Role, ServerError, type BodyFrame, type MeshLayout, type MeshStream, type ModelOpened } from "../../protocol/src/index.js";
+import { Client, Code, ConnectionError, Role, ServerError, type BodyFrame, type MeshLayout, type MeshOptions, type MeshStream, type ModelOpened } from "../../protocol/src/index.js";
 import { hashParameters, takeToken } from "./hash.js";
 import { restNumbers } from "./rest.js";
 import type { Body, Positions } from "./scene/body.js";
@@ -12,7 +12,6 @@ import type { Store } from "./state/store.js";
 
 const RETRY_MS = 2000;
 const LEVELS_AFTER_MS = 1500;
-const MESH = { normals: true };
 
 export interface Opened {
   readonly client: Client;
@@ -28,6 +27,8 @@ export class Live {
   #layout: MeshLayout | null = null;
   #token: string | undefined;
   #topology = 0n;
+  #mesh: MeshOptions = { normals: true };
+  #level: number | null = null;
 
   constructor(private readonly store: Store<AppState>, private readonly history: History, private readonly body: Body) {}
 
@@ -86,6 +87,18 @@ export class Live {
     }
   }
 
+  /** One level of detail and no other, 0 being all; null: as the line bears it. */
+  async setLevel(level: number | null): Promise<void> {
+    if (level === this.#level) return;
+    this.#level = level;
+    await this.#subscribe();
+  }
+
+  async #subscribe(): Promise<void> {
+    const options = this.#level === null ? this.#mesh : { ...this.#mesh, adaptive: false, level: this.#level };
+    if (this.client && this.stream) await this.client.changeMesh(this.stream, options);
+  }
+
   async #connect(): Promise<void> {
     const client = await Client.connect(address(), {
       token: this.#token, name: "ecorche viewer", person: localStorage.getItem("ecorche.name") ?? "",
@@ -108,12 +121,15 @@ export class Live {
     performance.mark("ecorche connected");
     await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? "");
     performance.mark("ecorche opened");
-    const stream = await client.subscribeMesh(MESH);
+    const stream = await client.subscribeMesh(this.#mesh);
     this.stream = stream;
     stream.on("frame", (frame) => this.#show(frame));
     if (stream.latest) this.#show(stream.latest);
     // Coarser levels are for later, and many bytes: the first picture does not wait for them.
-    setTimeout(() => void client.changeMesh(stream, { ...MESH, adaptive: true }).catch(() => {}), LEVELS_AFTER_MS);
+    setTimeout(() => {
+      this.#mesh = { ...this.#mesh, adaptive: true };
+      if (this.#level === null) void this.#subscribe().catch(() => {});
+    }, LEVELS_AFTER_MS);
   }
 
   #opened(client: Client, opened: ModelOpened): void {

@@ -5,6 +5,7 @@ import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
 import { addSlices } from "./slices/index.js";
+import { addHeadset } from "./xr/index.js";
 
 /** Parts that hook into the viewer by what App makes public. */
 const PARTS: readonly ((app: App) => void)[] = [addPanels];
@@ -16,8 +17,9 @@ try {
   const posing = addPosing(app);
   // After posing, whose tab is open at first.
   addSlices(app);
+  const headset = addHeadset(app, posing);
   // For the browser's console, and for tests.
-  Object.assign(window, { ecorche: Object.assign(app, { posing }) });
+  Object.assign(window, { ecorche: Object.assign(app, { posing, headset }) });
   void app.live.start();
 } catch (error) {
   showCover({

@@ -19,6 +19,10 @@ export function openHelp(app: App): void {
     h("p", {}, "A body in the pose that the server computes, as it was scanned and deformed. For training and education, not for planning surgery."),
     h("h3", {}, "Pointer"), h("dl", { class: "keys" }, ...pointer),
     ...[...groups].flatMap(([name, list]) => [h("h3", {}, name), list]),
+    ...app.helpParts.flatMap((part) => {
+      const { title, lines } = part();
+      return [h("h3", {}, title), ...lines.map((line) => h("p", {}, line))];
+    }),
     h("h3", {}, "About"),
     h("p", {}, "ecorche, Apache-2.0. ", h("button", { type: "button", class: "text-button", on: { click: () => void openLicences() } }, "Licences")),
   ]);

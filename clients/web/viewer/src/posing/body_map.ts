@@ -15,24 +15,30 @@ export function segmentAt(tissue: Tissue | undefined, point: Vec3, tissues: read
 }
 
 function nearestBone(point: Vec3, tissues: readonly Tissue[], body: Body): number | null {
+  const nearest = nearestVertex(point, tissues.filter((tissue) => tissue.segment >= 0).map((tissue) => tissue.row), body);
+  return nearest && tissues[nearest.row]!.segment;
+}
+
+/** Of some tissues, by row, the one whose surface has a vertex nearest to a point, and how far that is; mm, LPS, on the posed body. */
+export function nearestVertex(point: Vec3, rows: readonly number[], body: Body): { readonly row: number; readonly far: number } | null {
   const { positions } = body;
   if (!positions) return null;
   const { numbers, low, step } = positions;
   // In the frame's own numbers: nothing is converted on the way.
   const [x, y, z] = point.map((p, axis) => (p - low[axis]!) / step) as [number, number, number];
   let least = Infinity, best: number | null = null;
-  for (const tissue of tissues) {
-    const range = tissue.segment < 0 ? undefined : body.range(tissue.row);
+  for (const row of rows) {
+    const range = body.range(row);
     if (!range) continue;
     for (let at = range.firstVertex * STRIDE, end = at + range.vertexCount * STRIDE; at < end; at += STRIDE) {
       const dx = numbers[at]! - x, dy = numbers[at + 1]! - y, dz = numbers[at + 2]! - z;
       const far = dx * dx + dy * dy + dz * dz;
       if (far >= least) continue;
       least = far;
-      best = tissue.segment;
+      best = row;
     }
   }
-  return best;
+  return best === null ? null : { row: best, far: Math.sqrt(least) * step };
 }
 
 /** Where no bone is in the picture. */

@@ -9,7 +9,7 @@ import { addPoseKeys } from "./keys.js";
 import { addLibraryPanel, downloadPose } from "./library_panel.js";
 import { addPosePanel, type PoseOptions } from "./pose_panel.js";
 import { PoseScene } from "./pose_scene.js";
-import { PoseTool } from "./pose_tool.js";
+import { PoseTool, type SegmentUnder } from "./pose_tool.js";
 import { Poser } from "./poser.js";
 import { poseOf, samePose, restPose } from "./pose.js";
 import { rigOf } from "./rig.js";
@@ -20,12 +20,13 @@ import { addPeoplePanel, fillStrip } from "./people_panel.js";
 import { Together } from "./together.js";
 import { h } from "../panels/dom.js";
 
-/** For the browser's console, and for tests. */
+/** For other parts, the browser's console, and tests. */
 export interface Posing {
   readonly poser: Poser;
   readonly drag: BodyDrag;
   readonly scene: PoseScene;
   readonly clips: Clips;
+  readonly under: SegmentUnder;
   link(): string;
 }
 
@@ -39,7 +40,7 @@ export function addPosing(app: App): Posing {
   const drag = new BodyDrag(poser, { solveIk: (targets, options) => client().solveIk(targets, options) }, say);
   const scene = new PoseScene(app.stage, poser, drag);
   const options = new Store<PoseOptions>({ pulls: false, joints: true });
-  const under = (row: number, point: readonly [number, number, number]) => {
+  const under: SegmentUnder = (row, point) => {
     const tissues = app.store.state.model?.tissues ?? [];
     return segmentAt(tissues[row], point, tissues, app.body, poser.state.rig!, poser.state.motions);
   };
@@ -58,7 +59,7 @@ export function addPosing(app: App): Posing {
   addPeoplePanel(app, together);
   addPoseKeys(app, poser, options, () => downloadPose(app, poser));
   follow(app, poser, together, clips);
-  return { poser, drag, scene, clips, link: () => presentLink(app, poser) };
+  return { poser, drag, scene, clips, under, link: () => presentLink(app, poser) };
 }
 
 /** What the server tells of the pose, and what is chosen elsewhere in the viewer. */

@@ -56,7 +56,6 @@ export function ground() {
       material.uniforms["shadow"]!.value.set(shadow);
     },
     place(x: number, floor: number, z: number, radius: number) {
-      mesh.visible = true;
       mesh.position.set(x, floor, z);
       mesh.scale.setScalar(radius);
     },

@@ -22,36 +22,56 @@ export class Picker {
   #pixel = new Uint32Array(4);
   #floats = new Float32Array(this.#pixel.buffer);
   #clear = new THREE.Color(0, 0, 0);
+  #holder = new THREE.Group();
+  /** Looks along a ray: its whole picture is one pixel. */
+  #eye = new THREE.PerspectiveCamera(0.1, 1, 0.01, 60);
 
   constructor(
     private readonly stage: Stage,
     private readonly body: Body,
   ) {
-    const holder = new THREE.Group();
-    holder.matrixAutoUpdate = false;
-    holder.matrix.copy(stage.patient.matrix);
-    holder.add(body.pickGroup);
-    this.#scene.add(holder);
+    this.#holder.matrixAutoUpdate = false;
+    this.#holder.add(body.pickGroup);
+    this.#scene.add(this.#holder);
   }
 
   /** x and y in pixels of CSS from the upper left of the picture. What one looks through is missed where something solid lies behind
    *  it. */
   pick(x: number, y: number): Picked | null {
-    return this.#draw(x, y, false) ?? this.#draw(x, y, true);
+    this.stage.window({ x, y });
+    const picked = this.#through(this.stage.camera);
+    this.stage.window();
+    return picked;
   }
 
-  #draw(x: number, y: number, glass: boolean): Picked | null {
+  /** Along a ray in the scene: metres, y up. */
+  pickAlong(ray: THREE.Ray): Picked | null {
+    this.#eye.position.copy(ray.origin);
+    this.#eye.up.set(0, Math.abs(ray.direction.y) > 0.99 ? 0 : 1, Math.abs(ray.direction.y) > 0.99 ? 1 : 0);
+    this.#eye.lookAt(ray.origin.clone().add(ray.direction));
+    return this.#through(this.#eye);
+  }
+
+  #through(camera: THREE.Camera): Picked | null {
+    return this.#draw(camera, false) ?? this.#draw(camera, true);
+  }
+
+  #draw(camera: THREE.Camera, glass: boolean): Picked | null {
     const shown: THREE.Object3D[] = [];
     for (const mesh of this.body.pickGroup.children) {
       if (!mesh.visible || Boolean(mesh.userData["glass"]) === glass) continue;
       mesh.visible = false;
       shown.push(mesh);
     }
-    const { camera, renderer } = this.stage;
+    const { renderer, patient } = this.stage;
     const target = renderer.getRenderTarget();
     const color = renderer.getClearColor(new THREE.Color());
     const alpha = renderer.getClearAlpha();
-    this.stage.window({ x, y });
+    // Else the renderer would take a headset's camera for this one.
+    const { enabled } = renderer.xr;
+    renderer.xr.enabled = false;
+    this.#holder.matrix.copy(patient.matrix);
+    this.#holder.matrixWorldNeedsUpdate = true;
     renderer.setRenderTarget(this.#target);
     renderer.setClearColor(this.#clear, 0);
     renderer.clear();
@@ -59,7 +79,7 @@ export class Picker {
     renderer.readRenderTargetPixels(this.#target, 0, 0, 1, 1, this.#pixel);
     renderer.setRenderTarget(target);
     renderer.setClearColor(color, alpha);
-    this.stage.window();
+    renderer.xr.enabled = enabled;
     for (const mesh of shown) mesh.visible = true;
     const tissue = this.#pixel[0]! & 0xffff;
     if (tissue === 0) return null;

@@ -20,6 +20,15 @@ export interface Insets {
   readonly bottom: number;
 }
 
+/** What a headset gives in place of the page's clock and camera. */
+export interface Immersion {
+  readonly camera: THREE.PerspectiveCamera;
+  /** Null where the room itself is seen behind the scene. */
+  readonly background: THREE.Color | null;
+  /** Before every picture. */
+  frame(seconds: number, frame: XRFrame): void;
+}
+
 export class Stage {
   readonly renderer: THREE.WebGLRenderer;
   readonly scene = new THREE.Scene();
@@ -36,6 +45,9 @@ export class Stage {
   #last = 0;
   #panels: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
   #more: Insets | null = null;
+  #surroundings: Surroundings = { above: 0, below: 0, shadow: 0, accent: 0 };
+  #immersed = false;
+  #grounded = false;
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, stencil: true, powerPreference: "high-performance" });
@@ -63,7 +75,7 @@ export class Stage {
 
   /** Draws a picture at the next turn of the screen. */
   invalidate(): void {
-    if (this.#wanted || document.hidden) return;
+    if (this.#wanted || this.#immersed || document.hidden) return;
     this.#wanted = requestAnimationFrame((time) => this.#draw(time));
   }
 
@@ -88,7 +100,43 @@ export class Stage {
   surround(colors: Surroundings): void {
     this.#backdrop.setColors(colors.above, colors.below);
     this.#ground.setColor(colors.shadow);
+    this.#surroundings = colors;
     this.invalidate();
+  }
+
+  get surroundings(): Surroundings {
+    return this.#surroundings;
+  }
+
+  get immersed(): boolean {
+    return this.#immersed;
+  }
+
+  /** From now on the headset of a session asks for pictures; `surface` ends that. */
+  async immerse(session: XRSession, { camera, background, frame }: Immersion): Promise<void> {
+    const { xr } = this.renderer;
+    cancelAnimationFrame(this.#wanted);
+    this.#wanted = 0;
+    this.#immersed = xr.enabled = true;
+    // A backdrop that goes with the head makes people sick.
+    this.#backdrop.mesh.visible = this.#ground.mesh.visible = false;
+    this.scene.background = background;
+    xr.setReferenceSpaceType("local-floor");
+    xr.setAnimationLoop((time: number, now?: XRFrame) => now && this.#present(time, camera, (seconds) => frame(seconds, now)));
+    await xr.setSession(session);
+  }
+
+  /** The page's own clock and camera again. */
+  surface(): void {
+    const { renderer } = this;
+    renderer.xr.setAnimationLoop(null);
+    // At the end of a session the renderer begins to ask the page's clock.
+    renderer.setAnimationLoop(null);
+    this.#immersed = renderer.xr.enabled = false;
+    this.#backdrop.mesh.visible = true;
+    this.#ground.mesh.visible = this.#grounded;
+    this.scene.background = null;
+    this.resize();
   }
 
   /** What panels cover of the picture, pixels of CSS: the body is brought to the middle of what is left. */
@@ -135,12 +183,17 @@ export class Stage {
   /** Puts the ground under the body: `floor` is its lowest point, the radius that of its trunk, m. */
   placeGround(x: number, floor: number, z: number, radius: number): void {
     this.#ground.place(x, floor, z, radius);
+    this.#grounded = true;
+    this.#ground.mesh.visible = !this.#immersed;
   }
 
   resize(): void {
     const { width, height } = this.size;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(width, height);
+    // A headset has a size of its own.
+    if (!this.#immersed) {
+      this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+      this.renderer.setSize(width, height);
+    }
     this.camera.aspect = width / height;
     this.window();
     for (const listener of [...this.#resized]) listener();
@@ -161,11 +214,15 @@ export class Stage {
 
   #draw(time: number): void {
     this.#wanted = 0;
+    this.#present(time, this.camera, () => this.controls.update());
+  }
+
+  #present(time: number, camera: THREE.Camera, last: (seconds: number) => void): void {
     const seconds = Math.min(0.1, (time - this.#last) / 1000);
     this.#last = time;
     for (const listener of [...this.#before]) listener(seconds);
-    this.controls.update();
-    this.render();
+    last(seconds);
+    this.renderer.render(this.scene, camera);
     for (const listener of [...this.#after]) listener();
   }
 }
