@@ -13,6 +13,8 @@ import type { Store } from "./state/store.js";
 const RETRY_MS = 2000;
 const LEVELS_AFTER_MS = 1500;
 
+type WholeBody = Pick<BodyFrame, "vertices" | "layout" | "offset" | "scale">;
+
 export interface Opened {
   readonly client: Client;
   readonly model: ModelOpened;
@@ -29,6 +31,7 @@ export class Live {
   #topology = 0n;
   #mesh: MeshOptions = { normals: true };
   #level: number | null = null;
+  #whole: Promise<WholeBody> | null = null;
 
   constructor(private readonly store: Store<AppState>, private readonly history: History, private readonly body: Body) {}
 
@@ -68,20 +71,29 @@ export class Live {
     }
   }
 
-  /** The scanned body in the order of the present vertices: the first frame of a session of its own, which ends with that. */
+  /** The scanned body in the order of the present vertices. */
   async rest(): Promise<Positions> {
+    const whole = await (this.#whole ??= this.#fetchRest());
     const layout = this.#layout;
-    if (!layout || !this.client?.model) throw new ConnectionError("no model is open");
+    if (!layout) throw new ConnectionError("no model is open");
+    return { numbers: restNumbers(whole, layout), low: whole.offset, step: whole.scale };
+  }
+
+  /** The first frame of a session of its own, which ends with that; kept for the model's other levels of detail. */
+  async #fetchRest(): Promise<WholeBody> {
+    if (!this.client?.model) throw new ConnectionError("no model is open");
     const client = await Client.connect(address(), { token: this.#token, name: "ecorche viewer, rest" });
     try {
       await client.open(this.client.model.model);
-      performance.mark("ecorche opened");
-    const stream = await client.subscribeMesh();
+      const stream = await client.subscribeMesh();
       const frame = stream.latest ?? await new Promise<BodyFrame>((resolve, reject) => {
         stream.on("frame", resolve);
         client.on("state", ({ state, reason }) => state !== "open" && reject(new ConnectionError(reason)));
       });
-      return { numbers: restNumbers(frame, layout), low: frame.offset, step: frame.scale };
+      return { vertices: frame.vertices.slice(), layout: frame.layout, offset: frame.offset, scale: frame.scale };
+    } catch (error) {
+      this.#whole = null;
+      throw error;
     } finally {
       client.close();
     }
@@ -145,6 +157,7 @@ export class Live {
     } else {
       this.#topology = opened.topologyDigest;
       this.#layout = null;
+      this.#whole = null;
       this.frame = null;
       this.history.clear();
       const layers = model.tissues.map(() => ({ visible: true, opacity: 1 }));
