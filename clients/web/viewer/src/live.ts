@@ -12,6 +12,8 @@ import type { Store } from "./state/store.js";
 
 const RETRY_MS = 2000;
 const LEVELS_AFTER_MS = 1500;
+/** Whoever opens the server's address comes into the same session, and sees the same body. */
+const SHARED_SESSION = "shared";
 
 type WholeBody = Pick<BodyFrame, "vertices" | "layout" | "offset" | "scale">;
 
@@ -57,6 +59,10 @@ export class Live {
   /** Tries until there is a body, or until only a person can help (store.link says how). */
   async start(): Promise<void> {
     this.#token = takeToken();
+    // Who leaves says so: else control of the session is kept for them for a minute. What comes back out of the browser's own cache
+    // has said it already.
+    addEventListener("pagehide", () => this.client?.close());
+    addEventListener("pageshow", ({ persisted }) => persisted && location.reload());
     for (;;) {
       try {
         await this.#connect();
@@ -131,7 +137,7 @@ export class Live {
     const models = await client.listModels();
     if (models.length === 0) throw new Error("the server holds no model (give `ecorche serve` one)");
     performance.mark("ecorche connected");
-    await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? "");
+    await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? SHARED_SESSION);
     performance.mark("ecorche opened");
     const stream = await client.subscribeMesh(this.#mesh);
     this.stream = stream;
