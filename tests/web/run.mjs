@@ -25,7 +25,7 @@ await build({
 });
 const env = { ...process.env };
 // A folder of its own: tests beside this one may build, too.
-if (process.argv.slice(2).some((file) => !file.startsWith("protocol/"))) {
+if (process.argv.slice(2).some((file) => /^(viewer|posing\/(posing|together))/.test(file))) {
   env.ECORCHE_VIEWER ??= path.join(out, "site");
   const { status } = spawnSync(path.join(root, "scripts/viewer"), ["--out", env.ECORCHE_VIEWER], { stdio: ["ignore", "ignore", "inherit"], env: process.env });
   if (status !== 0) process.exit(status ?? 70);

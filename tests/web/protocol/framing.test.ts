@@ -48,6 +48,13 @@ test("lying lengths are refused", () => {
   }
 });
 
+test("a payload that is no multiple of 16 is refused, though all lengths agree", () => {
+  const frame = new Uint8Array(32 + 24);
+  frame.set(PING.subarray(0, 32));
+  new DataView(frame.buffer).setUint32(4, 24, true);
+  assert.throws(() => decodeFrame(frame.buffer), ProtocolError);
+});
+
 test("padding that is not zero is refused", () => {
   for (let at = 17; at < 32; ++at) {
     const frame = PING.slice();

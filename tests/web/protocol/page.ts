@@ -23,8 +23,12 @@ const frameOf = (stream: MeshStream, sequence: bigint): Promise<BodyFrame> => ne
   });
 });
 
+/** The first uncaught error of the page itself: those of a worker do not come here by themselves. */
+const failed = new Promise<string>((resolve) => addEventListener("error", ({ message }) => resolve(message)));
 const started = start();
+started.catch(() => {});  // what failed is told by `failed`
 Object.assign(window, {
+  failed: () => failed,
   /** Poses one after another; what the vertices of the last one hash to, and what they lie in. */
   async run(poses: number) {
     const { client, model, stream } = await started;

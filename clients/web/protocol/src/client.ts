@@ -6,82 +6,26 @@
 //     const stream = await client.subscribeMesh({ tissues: ["skin"] });
 //     stream.on("frame", ({ vertices, scale, offset }) => ...);
 //     client.setPose({ rotation });
-import { create, fromBinary, type MessageInitShape } from "@bufbuild/protobuf";
-import { retryDelay } from "./backoff.js";
+import { create, fromBinary } from "@bufbuild/protobuf";
 import { makeBridge, type Bridge } from "./bridge.js";
-import type { FrameNote, Post, Statistics, ToClient, ToLink } from "./channel.js";
+import type { FrameNote, Post, ToClient, ToLink } from "./channel.js";
+import type { ClientEvents, ClientOptions, IkTargetInit } from "./client_events.js";
 import { Emitter } from "./emitter.js";
 import { Code, ConnectionError, report, ServerError } from "./errors.js";
 import { Encoding, type PoseState } from "./gen/ecorche/v1/common_pb.js";
-import type { ClipState, ClipSummary, ControlGranted, IkSolved, Members } from "./gen/ecorche/v1/command_pb.js";
-import { AskControlSchema, GiveControlSchema, IkTargetSchema, PlayClipSchema, SolveIkSchema, SteerClipSchema } from "./gen/ecorche/v1/command_pb.js";
+import type { ClipSummary, ControlGranted, IkSolved } from "./gen/ecorche/v1/command_pb.js";
+import { AskControlSchema, GiveControlSchema, PlayClipSchema, SolveIkSchema, SteerClipSchema } from "./gen/ecorche/v1/command_pb.js";
 import { EnvelopeSchema, type Envelope } from "./gen/ecorche/v1/envelope_pb.js";
 import { ClientHelloSchema, Feature, type ServerHello } from "./gen/ecorche/v1/hello_pb.js";
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
-import { SubscribeSchema, type PoseAck, type VolumeFrame } from "./gen/ecorche/v1/stream_pb.js";
-import { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
+import { SubscribeSchema } from "./gen/ecorche/v1/stream_pb.js";
+import type { IkOptions } from "./ik.js";
+import { MeshStream, type MeshOptions } from "./mesh_stream.js";
 import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
+import { Redial } from "./redial.js";
 import { encode, Requests, type Answer, type Case, type Message } from "./requests.js";
-
-export type ConnectionState = "connecting" | "open" | "reconnecting" | "closed";
-
-export interface StateChange {
-  state: ConnectionState;
-  /** One line for a person: why it is so; empty where all is well. */
-  reason: string;
-  /** Under "reconnecting": when the next try comes. */
-  retryMs?: number;
-}
-
-export interface ControlState {
-  role: Role;
-  /** Free: claimControl would be granted. */
-  vacant: boolean;
-  /** Kept for its last holder so long; 0: not. */
-  reservedSeconds: number;
-}
-
-export interface ClientEvents {
-  frame: BodyFrame;
-  /** A pose of this session was taken up or refused: clamped joints, skipped poses. */
-  pose: PoseAck;
-  control: ControlState;
-  /** The pose that the session shows, where this client did not set it: of a newcomer, an observer, a clip. */
-  shown: PoseState;
-  /** Who is in the session. */
-  members: Members;
-  /** What the server plays. */
-  clip: ClipState;
-  state: StateChange;
-  statistics: Statistics;
-  /** The model was read anew: open() again for it. */
-  modelChanged: { identity: bigint };
-  /** The model is open anew, after a loss that the server did not remember, or after open(). */
-  opened: ModelOpened;
-  volume: { frame: VolumeFrame; payload: Uint8Array };
-}
-
-export interface ClientOptions {
-  token?: string;
-  /** For the server's log. */
-  name?: string;
-  /** What others in the session call who uses this client. */
-  person?: string;
-  onState?: (change: StateChange) => void;
-  /** The bundle of worker.ts, which receives and decodes; false: this thread does. None: as the page was bundled. */
-  worker?: string | URL | false;
-}
-
-type IkTargetInit = MessageInitShape<typeof IkTargetSchema>;
-export interface IkOptions {
-  /** Four per joint; none: the present pose. */
-  from?: ArrayLike<number>;
-  /** Show the result, too; for the controller. */
-  apply?: boolean;
-  /** The whole body may turn and go. */
-  moveRoot?: boolean;
-}
+import type { ControlState, StateChange } from "./states.js";
 
 /** None of these mends itself by dialling again. */
 const FINAL: number[] = [Code.UNAUTHENTICATED, Code.FAILED_PRECONDITION, Code.INVALID_ARGUMENT];
@@ -100,8 +44,12 @@ export class Client extends Emitter<ClientEvents> {
   private readonly streams = new Map<number, MeshStream>();
   private nextHandle = 1;
   private ending: Error | undefined;  // why the server ends the connection, told before it does
-  private retrySeconds = 0;
-  private retry: ReturnType<typeof setTimeout> | undefined;
+  private readonly redial = new Redial({
+    restore: () => this.restore(),
+    waits: (reason, retryMs) => this.change({ state: "reconnecting", reason, retryMs }),
+    isFinal: (error) => error instanceof ServerError && FINAL.includes(error.code),
+    givesUp: (reason) => this.close(reason),
+  });
 
   private constructor(private readonly url: string, private readonly options: ClientOptions) {
     super();
@@ -126,7 +74,7 @@ export class Client extends Emitter<ClientEvents> {
 
   close(reason = "closed"): void {
     if (this.state.state === "closed") return;
-    clearTimeout(this.retry);
+    this.redial.stop();
     this.change({ state: "closed", reason });
     this.tell({ case: "goodbye", value: { $typeName: "ecorche.v1.Goodbye", retrySeconds: 0 } });
     this.post({ kind: "hang up" });
@@ -335,7 +283,7 @@ export class Client extends Emitter<ClientEvents> {
       case "modelChanged": return this.emit("modelChanged", { identity: message.value.identity });
       case "volumeFrame": return this.emit("volume", { frame: message.value, payload });
       case "goodbye":
-        this.retrySeconds = message.value.retrySeconds;
+        this.redial.retrySeconds = message.value.retrySeconds;
         this.ending = new ConnectionError(message.value.status?.message || "the server stops");
         return;
       case "status":
@@ -371,32 +319,20 @@ export class Client extends Emitter<ClientEvents> {
 
   private lost(error: Error): void {
     this.requests.fail(error);
-    if (this.state.state === "open") this.comeBack(0, error);
-  }
-
-  private comeBack(tries: number, error: Error): void {
-    if (error instanceof ServerError && FINAL.includes(error.code)) return this.close(error.message);
-    const retryMs = retryDelay(tries, this.retrySeconds, Math.random());
-    this.change({ state: "reconnecting", reason: error.message, retryMs });
-    this.retry = setTimeout(() => {
-      this.restore().then(
-        () => this.restored(),
-        (failure: Error) => { if (this.state.state === "reconnecting") this.comeBack(tries + 1, failure); },
-      );
-    }, retryMs);
+    if (this.state.state === "open") this.redial.after(error);
   }
 
   /** The place again where the server remembers it, else the same model and session anew. */
   private async restore(): Promise<void> {
     this.hello = await this.dial();
-    this.retrySeconds = 0;
     const { resumed } = this.hello;
     this.restoring = true;
     try {
       if (resumed) {
         this.poses.restart(resumed.lastSequence);
         this.setControl({ role: resumed.role, vacant: false, reservedSeconds: 0 });
-        this.tellShown(resumed.pose);
+        // Who poses knows better: what the line swallowed goes again.
+        if (resumed.role !== Role.CONTROLLER) this.tellShown(resumed.pose);
         await this.subscribeMissing(resumed.subscriptions);
       } else if (this.model) {
         await this.open(this.model.model, this.model.session);
@@ -404,9 +340,6 @@ export class Client extends Emitter<ClientEvents> {
     } finally {
       this.restoring = false;
     }
-  }
-
-  private restored(): void {
     this.change({ state: "open", reason: "" });
     if (this.model && this.control.role === Role.CONTROLLER) this.poses.recover(this.model.rigDigest);
   }

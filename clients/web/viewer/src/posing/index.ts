@@ -26,6 +26,7 @@ export interface Posing {
   readonly drag: BodyDrag;
   readonly scene: PoseScene;
   readonly under: SegmentUnder;
+  readonly clips: Clips;
   link(): string;
 }
 
@@ -58,7 +59,7 @@ export function addPosing(app: App): Posing {
   addPeoplePanel(app, together);
   addPoseKeys(app, poser, options, () => downloadPose(app, poser));
   follow(app, poser, together, clips);
-  return { poser, drag, scene, under, link: () => presentLink(app, poser) };
+  return { poser, drag, scene, under, clips, link: () => presentLink(app, poser) };
 }
 
 /** What the server tells of the pose, and what is chosen elsewhere in the viewer. */
