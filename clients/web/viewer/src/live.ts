@@ -34,6 +34,7 @@ export class Live {
   #mesh: MeshOptions = { normals: true };
   #level: number | null = null;
   #whole: Promise<WholeBody> | null = null;
+  #changing: Promise<void> = Promise.resolve();
 
   constructor(private readonly store: Store<AppState>, private readonly history: History, private readonly body: Body) {}
 
@@ -112,9 +113,13 @@ export class Live {
     await this.#subscribe();
   }
 
-  async #subscribe(): Promise<void> {
-    const options = this.#level === null ? this.#mesh : { ...this.#mesh, adaptive: false, level: this.#level };
-    if (this.client && this.stream) await this.client.changeMesh(this.stream, options);
+  /** One change after the other: each ends the subscription before it. */
+  #subscribe(): Promise<void> {
+    this.#changing = this.#changing.catch(() => {}).then(async () => {
+      const options = this.#level === null ? this.#mesh : { ...this.#mesh, adaptive: false, level: this.#level };
+      if (this.client && this.stream) await this.client.changeMesh(this.stream, options);
+    });
+    return this.#changing;
   }
 
   async #connect(): Promise<void> {

@@ -6,6 +6,7 @@ import type { BodyDrag } from "../posing/body_drag.js";
 import type { SegmentUnder } from "../posing/pose_tool.js";
 import { plain } from "../posing/projector.js";
 import type { Vec3 } from "../posing/rotation.js";
+import type { PressKind } from "./sources.js";
 import type { Body } from "../scene/body.js";
 
 /** How far a hand may be from the surface, m of the room. */
@@ -20,6 +21,8 @@ export interface Near {
 }
 
 export class Grip {
+  /** By what it was taken: letting go of anything else changes nothing. */
+  kind: PressKind = "squeeze";
   #holder: XRInputSource | null = null;
 
   constructor(private readonly body: Body, private readonly patient: THREE.Matrix4, private readonly drag: BodyDrag,
@@ -39,9 +42,10 @@ export class Grip {
   }
 
   /** False where poses are not taken; the poser says why. */
-  take(holder: XRInputSource, { segment, place }: Near): boolean {
+  take(holder: XRInputSource, kind: PressKind, { segment, place }: Near): boolean {
     if (!this.drag.begin(segment, place)) return false;
     this.#holder = holder;
+    this.kind = kind;
     return true;
   }
 

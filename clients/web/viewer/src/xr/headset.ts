@@ -9,7 +9,7 @@ import { labelOf } from "../state/names.js";
 import { levelWithin } from "./detail.js";
 import { Grip, type Near } from "./grip.js";
 import { Room } from "./room.js";
-import { BUTTON, Sources, type Press, type Source } from "./sources.js";
+import { BUTTON, Sources, type Press, type PressKind, type Source } from "./sources.js";
 import { Stand } from "./stand.js";
 import { Wands } from "./wands.js";
 import { Label, Plate } from "./words.js";
@@ -57,8 +57,8 @@ export class Headset {
     const { stage, body } = app;
     this.left = new Promise((resolve) => (this.#gone = resolve));
     this.#home = stage.patient.matrix.clone();
-    // What is hidden does not stand lower than what is seen.
-    const box = body.bounds(), size = box.getSize(new THREE.Vector3());
+    // Hidden tissues count: a skull alone is where the head is, not on the floor.
+    const box = body.bounds(app.store.state.model?.tissues.map(({ row }) => row)), size = box.getSize(new THREE.Vector3());
     const foot = box.getCenter(new THREE.Vector3()).setZ(box.min.z).applyMatrix4(this.#home);
     this.stand = new Stand(this.#home, foot);
     // Another than the page's, which the headset would move.
@@ -118,7 +118,8 @@ export class Headset {
       background: this.stay.inRoom ? null : backgroundOf(stage.surroundings),
       frame: (seconds, frame) => this.#frame(seconds, frame),
     });
-    await this.#setLevel();
+    // The view does not wait for it.
+    void this.#setLevel();
     this.#say("Squeeze at the body to take hold, point and press to name.\nThe stick turns and enlarges.");
   }
 
@@ -159,8 +160,7 @@ export class Headset {
     this.#room.follow(this.stand);
     for (const press of this.#sources.takePresses()) this.#press(press);
     for (const { button } of this.#sources.takeClicks()) this.#click(button);
-    const holder = this.#sources.all.find(({ input }) => input === this.#grip.holder);
-    if (holder?.hold) this.#grip.carry(holder.hold);
+    this.#carry();
     this.#lookAround(seconds);
     this.#wands.update(this.#sources.all, frame, base, ({ input }) => ({ holds: input === this.#grip.holder, near: this.#near.has(input) }), stage.surroundings.accent);
     this.#label(seconds);
@@ -183,21 +183,30 @@ export class Headset {
     if (y) this.stand.resize(GROWTH ** (y * seconds));
   }
 
+  #carry(): void {
+    const { holder } = this.#grip;
+    if (!holder) return;
+    const source = this.#sources.all.find(({ input }) => input === holder);
+    if (source?.hold) this.#grip.carry(source.hold);
+    // A controller that was switched off lets go; one that is only out of sight does not.
+    else if (!source) this.#grip.letGo();
+  }
+
   #press({ kind, down, source }: Press): void {
     if (!down) {
-      if (this.#grip.holder === source.input) this.#grip.letGo();
+      if (this.#grip.holder === source.input && this.#grip.kind === kind) this.#grip.letGo();
       return;
     }
     const near = source.hold && this.#grip.near(source.hold, this.#shownRows());
     // Hands have no squeeze: with them one takes between thumb and finger.
-    if (near && (kind === "squeeze" || source.isHand)) return this.#take(source, near);
+    if (near && (kind === "squeeze" || source.isHand)) return this.#take(source, kind, near);
     if (kind === "select") return this.#choose(source);
     if (source.hold) this.#say("Nothing is within reach: bring the hand to the body, then squeeze");
   }
 
-  #take(source: Source, near: Near): void {
+  #take(source: Source, kind: PressKind, near: Near): void {
     if (this.#grip.holder) return this.#say("One part at a time: let go of the other first");
-    if (!this.#grip.take(source.input, near)) return;
+    if (!this.#grip.take(source.input, kind, near)) return;
     pulse(source.input.gamepad);
   }
 

@@ -2,6 +2,7 @@
 // The way into a headset: buttons where sessions are on offer, and words where not. All else is fetched when somebody enters.
 import type { App } from "../app.js";
 import type { Posing } from "../posing/index.js";
+import { keyCaps } from "../keys.js";
 import { h } from "../panels/dom.js";
 import { Store } from "../state/store.js";
 import { HEADSET_TRIANGLES } from "./detail.js";
@@ -82,6 +83,8 @@ export class HeadsetDoor {
 
 const wordOf = (mode: Mode): string => WAYS.find((way) => way.mode === mode)!.word;
 
+const keysOf = (key: string): string => keyCaps(key).join("+");
+
 export function addHeadset(app: App, posing: Posing): HeadsetDoor {
   const door = new HeadsetDoor(app, posing);
   const bar = app.places.root.querySelector<HTMLElement>("#tools")!;
@@ -92,7 +95,7 @@ export function addHeadset(app: App, posing: Posing): HeadsetDoor {
       const inside = door.store.state.mode === mode;
       button.hidden = !door.offers(mode);
       button.setAttribute("aria-pressed", String(inside));
-      button.title = `${inside ? `Leave ${word}` : title} (${key.toUpperCase()})`;
+      button.title = `${inside ? `Leave ${word}` : title} (${keysOf(key)})`;
       divider.hidden = buttons.every((each) => each.hidden);
     };
     door.store.watch((state) => state, () => show());
@@ -104,7 +107,7 @@ export function addHeadset(app: App, posing: Posing): HeadsetDoor {
     title: "Headset",
     lines: WAYS.map(({ mode, word, key }) => {
       const why = door.store.state.why[mode];
-      return `${word}: ${why === undefined ? "being looked for." : why === "" ? `on offer, by the button ${word} or the key ${key.toUpperCase()}.` : why}`;
+      return `${word}: ${why === undefined ? "being looked for." : why === "" ? `on offer, by the button ${word} or the key ${keysOf(key)}.` : why}`;
     }),
   }));
   // Asked when the picture is there: some browsers wake a headset for it.
