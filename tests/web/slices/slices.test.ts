@@ -106,6 +106,7 @@ test("a drawn pixel is the posed volume's voxel under the window of a preset", a
     // A ray of the probe and one of the plane may choose differently at the very border of the body.
     assert.ok(compared > 60 && inBody > 15 && off <= 0.03 * inBody + 3, `${id}: ${off} of ${inBody} pixels in the body differ (${compared} compared)`);
   }
+  await part("({ board }) => board.fit()");
 });
 
 test("a click moves the cross-hair in all planes, wheel and arrows step by a slice", async () => {
