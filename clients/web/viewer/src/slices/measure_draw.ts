@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures in the pictures: on the planes that hold their points, and over the body.
 import * as THREE from "three";
-import { Overlay, type Label } from "../posing/overlay.js";
+import { apart, Overlay, type Label } from "../posing/overlay.js";
 import { Projector, three } from "../posing/projector.js";
 import type { Vec3 } from "../posing/rotation.js";
 import type { Stage } from "../scene/stage.js";
@@ -29,6 +29,7 @@ export function shapesOf({ store }: Measures): readonly Shape[] {
 export function drawOnPlane(measures: Measures, halfSlice: (axis: number) => number, axisOf: (id: string) => number): Draw {
   return (context, place, plane) => {
     const half = halfSlice(axisOf(plane.id)) + 1e-6;
+    const words: Label[] = [];
     for (const { points, text } of shapesOf(measures)) {
       const at = points.map(place);
       if (at.some(({ off }) => Math.abs(off) > half)) continue;
@@ -44,15 +45,19 @@ export function drawOnPlane(measures: Measures, halfSlice: (axis: number) => num
         context.arc(x, y, 3, 0, 2 * Math.PI);
         context.fill();
       }
-      if (text) {
-        const { x, y } = at.length === 3 ? at[1]! : { x: (at[0]!.x + at[1]!.x) / 2, y: (at[0]!.y + at[1]!.y) / 2 };
-        context.font = "600 12px system-ui, sans-serif";
-        context.textAlign = "left";
-        context.textBaseline = "middle";
-        context.fillText(text, x + 9, y - 9);
-      }
-      context.shadowBlur = 0;
+      const { x, y } = at.length === 3 ? at[1]! : { x: (at[0]!.x + at.at(-1)!.x) / 2, y: (at[0]!.y + at.at(-1)!.y) / 2 };
+      if (text) words.push({ text, x: x + 9, y: y - 12, left: false, kind: "measure" });
     }
+    context.font = "600 12px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.textBaseline = "middle";
+    context.shadowColor = "#000";
+    for (const { text, x, y } of apart(words)) {
+      context.shadowBlur = 3;
+      context.fillStyle = COLOR;
+      context.fillText(text, x, y);
+    }
+    context.shadowBlur = 0;
   };
 }
 

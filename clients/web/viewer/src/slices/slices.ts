@@ -155,8 +155,8 @@ export class Slices {
   }
 
   #ask(): void {
+    if (this.store.state.open && !this.#field) return this.#bodyMoved();  // which asks, once it knows where the body is
     const { open, volume, labels, cross } = this.store.state;
-    if (open && !this.#field) this.#bodyMoved();
     const names = [volume, labels].filter((name): name is string => name !== null);
     if (!open || !this.#field) return this.#feed.want([], []);
     this.#feed.want(ORIENTATIONS.map((each) => planeThrough(each, cross, this.#field!, this.#lattice)), names);
