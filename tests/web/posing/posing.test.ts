@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Posing in Chromium against the real server: rings, fields and limits, pulls and pins, undo, files, saved poses, links.
-// ECORCHE_PICTURES: a folder for pictures of what was done.
+// Posing in Chromium against the real server: rings, fields and limits, pulls and pins, undo, files, links. Pictures go to ECORCHE_PICTURES.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
@@ -257,10 +256,11 @@ test("what is pinned stays while another part is pulled, and what is beyond reac
   assert.ok(slid < 2, `the pinned foot went ${slid} mm`);
   assert.ok(pull.residual < 2, `${pull.residual} mm are left`);
   assert.ok(distance(vertices(posed, "hand_bones_left")[0]!, hand) > 100);
-  // Far beyond reach.
+  // Beyond reach where the pelvis stays, but within the window: Chromium tells a page nothing of a mouse beyond it.
+  await page.locator("#move-root").uncheck();
   await page.evaluate(() => (window as any).ecorche.posing.poser.resetAll());
   await drawn();
-  const high: Three = [wrist[0], wrist[1], wrist[2] + 1250], far = await project(page, high), again = await project(page, wrist);
+  const beyond: Three = [wrist[0] + 1300, wrist[1], wrist[2] + 200], far = await project(page, beyond), again = await project(page, wrist);
   await page.mouse.move(again.x, again.y);
   await page.mouse.down();
   await page.mouse.move(far.x, far.y, { steps: 3 });
@@ -271,7 +271,7 @@ test("what is pinned stays while another part is pulled, and what is beyond reac
   await page.keyboard.press("Escape");
   await page.mouse.up();
   assert.ok(Math.abs(await angle("shoulder_left")) < 1e-3, "Escape takes it back");
-  for (const pin of await page.locator(".pins button").all()) await pin.click();
+  for (const pin of ["Foot, left", "Foot, right"]) await page.locator(".pins li", { hasText: pin }).locator("button").click();
 });
 
 test("the tool pulls the body anywhere, also under a finger", async () => {
@@ -287,7 +287,7 @@ test("the tool pulls the body anywhere, also under a finger", async () => {
   await send("touchEnd");
   await page.waitForFunction(() => (window as any).ecorche.posing.drag.store.state.pull === null);
   assert.equal(model.skeleton!.segments[pull.segment]!.name, "shank_left");
-  assert.ok(Math.abs(await angle("hip_left")) > 2 || Math.abs(await angle("knee_left")) > 2);
+  assert.ok(Math.abs(await angle("hip_left", 1)) > 2, "the leg went aside with the finger");
   await page.keyboard.press("g");
 });
 
@@ -328,7 +328,7 @@ test("a downloaded pose.yaml is what the program reads, and its file comes back"
   execFileSync(process.env["ECORCHE_BIN"]!, ["pose", process.env["ECORCHE_MODEL"]!, "-o", out, "--pose", file, "--tissues", "humerus_right,tibia_left", "--volumes", "none", "--format", "obj"], { stdio: "pipe" });
   const shown = await frame();
   for (const name of ["humerus_right", "tibia_left"]) {
-    const theirs = fs.readFileSync(path.join(out, "tissues", `${name}.obj`), "utf8").split("\n").filter((line) => line.startsWith("v ")).map((line) => line.split(" ").slice(1, 4).map(Number));
+    const theirs = fs.readFileSync(path.join(out, `${name}.obj`), "utf8").split("\n").filter((line) => line.startsWith("v ")).map((line) => line.split(" ").slice(1, 4).map(Number));
     const ours = vertices(shown, name);
     assert.equal(theirs.length, ours.length);
     ours.forEach((vertex, i) => assert.ok(distance(vertex, theirs[i]!) < 0.15, `${name} ${i}: ${vertex} here, ${theirs[i]} there`));
