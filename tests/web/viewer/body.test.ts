@@ -107,7 +107,7 @@ test("what is chosen in the picture is chosen in the tree, and the other way", a
   await page.click(`.tree li[data-row="${rowOf("femur_left")}"] .name`);
   assert.equal(await state("(s) => s.selected"), rowOf("femur_left"));
   await page.fill("#tissue-search", "");
-  await page.click("#canvas", { position: { x: 880, y: 300 } });
+  await page.click("#canvas", { position: { x: 312, y: 120 } });  // between the panels, beside the body
   assert.equal(await state("(s) => s.selected"), null);
   assert.equal(await countColor(page, ACCENT), 0);
 });
@@ -152,6 +152,8 @@ test("the surface tells the distance from rest", async () => {
     const before = foremostVertex(posed, row);
     const moved = Math.hypot(...[0, 1, 2].map((axis) => at(posed, before, axis) - at(restFrame, before, axis)));
     assert.ok(moved > 20, `the hand moved by ${moved} mm only`);
+    // A joint's dot under the pointer has the word before the tissue.
+    await page.locator("#panel-pose button", { hasText: "Joints" }).click();
     await page.selectOption("#surface", "distance");
     await page.waitForFunction(() => (window as any).ecorche.body.rest !== null);
     await isolate(row);

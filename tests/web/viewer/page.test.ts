@@ -50,11 +50,11 @@ test("loads little, from nowhere else, and breaks no rule of its policy", async 
   await page.click("#canvas", { position: { x: 10, y: 10 } });
   await page.keyboard.press("?");
   await page.waitForSelector("dialog[open]");
-  assert.match((await page.textContent("dialog"))!, /See through the skin/);
+  assert.match((await page.textContent("dialog[open]"))!, /See through the skin/);
   assert.deepEqual(await serious(page), []);
   await page.click("dialog >> text=Licences");
-  await page.waitForSelector("dialog .licence");
-  const licences = (await page.textContent("dialog"))!;
+  await page.waitForSelector("dialog[open] .licence");
+  const licences = (await page.textContent("dialog[open]"))!;
   for (const name of ["three", "@bufbuild/protobuf"]) assert.ok(licences.includes(name), `the licences leave out ${name}`);
   await page.keyboard.press("Escape");
   await page.click(".verdict");
