@@ -22,7 +22,8 @@ Status from_proto(const v1::Grid& grid, ImageGrid& out);
 
 /// All but how the centres were found: a client does not need it.
 void to_proto(const Rig& rig, v1::Skeleton& out);
-/// invalid_argument: parents that do not come first, an unknown kind, an axis beyond 2, a coupling to what there is not.
+/// invalid_argument: parents that do not come first, an unknown kind, an axis beyond 2, a coupling to what
+/// there is not.
 Status from_proto(const v1::Skeleton& skeleton, Rig& out);
 
 /// Fills root_translation, rotation and translation. Exact: doubles travel as they are.
