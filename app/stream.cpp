@@ -282,16 +282,16 @@ class Stream {
     const double seconds = std::max(1e-9, milliseconds(last_frame_ - started_) / 1000);
     const double fps = static_cast<double>(meshes_.frames) / seconds;
     nlohmann::json figures{{"server", client_.server().server()},
-                        {"model", opened_.model()},
-                        {"poses", sequence_},
-                        {"skipped", skipped_},
-                        {"clamped_poses", clamped_},
-                        {"frames", meshes_.frames},
-                        {"seconds", seconds},
-                        {"frames_per_second", fps},
-                        {"latency_ms", meshes_.percentiles()},
-                        {"volume_frames", volumes_.frames},
-                        {"bytes", client_.bytes_received()}};
+                           {"model", opened_.model()},
+                           {"poses", sequence_},
+                           {"skipped", skipped_},
+                           {"clamped_poses", clamped_},
+                           {"frames", meshes_.frames},
+                           {"seconds", seconds},
+                           {"frames_per_second", fps},
+                           {"latency_ms", meshes_.percentiles()},
+                           {"volume_frames", volumes_.frames},
+                           {"bytes", client_.bytes_received()}};
     if (!settings_.volume.empty()) figures["volume_latency_ms"] = volumes_.percentiles();
     if (settings_.quality) figures["frames_with_warning"] = warned_;
     if (warned_ > 0) program_.warn();

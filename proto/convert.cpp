@@ -101,12 +101,12 @@ Status couplings_from_proto(const v1::Skeleton& skeleton, Rig& out) {
       if (!known || c.angle() >= lead->sequence.size() || (slides && c.slide_axis() > 2) ||
           (!slides && c.driven_angle() >= joint.sequence.size()))
         return invalid("skeleton: joint '" + joint.name + "' is coupled to what there is not");
-      joint.coupled.push_back(
-          {.joint = lead->name,
-           .angle = lead->sequence[c.angle()].name,
-           .drives = slides ? std::string(1, static_cast<char>('x' + c.slide_axis())) + "_mm"
-                            : joint.sequence[c.driven_angle()].name,
-           .ratio = c.ratio()});
+      joint.coupled.push_back({.joint = lead->name,
+                               .angle = lead->sequence[c.angle()].name,
+                               .drives = slides
+                                             ? std::string(1, static_cast<char>('x' + c.slide_axis())) + "_mm"
+                                             : joint.sequence[c.driven_angle()].name,
+                               .ratio = c.ratio()});
     }
   }
   return {};

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <ecorche/values/error.hpp>
+#include "core/kinematics/angle_limits.hpp"
 
 namespace ecorche::kinematics {
 namespace {
@@ -65,13 +66,6 @@ Angles into_ranges(const Joint& joint, const Angles& angles) {
           into_range(joint.sequence[2], angles[2], pi)};
 }
 
-// The same rotation by the other triple: R(a) R(b) R(c) = R(a + pi) R(pi - b) R(c + pi).
-Angles other_triple(const Joint& joint, const Angles& angles) {
-  const double pi = std::numbers::pi;
-  const auto wrapped = [](double x) { return std::remainder(x, kFullTurn); };
-  return {wrapped(angles[0] + pi), wrapped(joint.sequence[1].sign * pi - angles[1]), wrapped(angles[2] + pi)};
-}
-
 bool limited(const Joint& joint) {
   return std::any_of(joint.sequence.begin(), joint.sequence.end(),
                      [](const AngleAxis& a) { return std::isfinite(a.min) || std::isfinite(a.max); });
@@ -127,7 +121,7 @@ int find_angle(const Joint& joint, const std::string& name) {
 // The driven joint's rotation with every coupled angle set.
 Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row) {
   const Joint& joint = skeleton.segments[row].joint;
-  Angles angles = angles_from_rotation(joint, pose.rotation[row]);
+  Angles angles = angles_within_limits(joint, pose.rotation[row]);
   std::array<bool, 3> driven{false, false, false};
   for (const Coupling& coupling : joint.coupled) {
     if (coupling.slides() >= 0) continue;
@@ -143,7 +137,7 @@ Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row) 
     }
     const Joint& leader = skeleton.segments[static_cast<std::size_t>(lead)].joint;
     const auto a = static_cast<std::size_t>(leads), b = static_cast<std::size_t>(drives);
-    const double moved = angles_from_rotation(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
+    const double moved = angles_within_limits(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
                          leader.sequence[a].rest;
     if (!driven[b]) angles[b] = joint.sequence[b].rest;
     driven[b] = true;
@@ -168,7 +162,7 @@ Eigen::Vector3d slid(const Skeleton& skeleton, const Pose& pose, const Joint& jo
     if (leads < 0) continue;
     const auto a = static_cast<std::size_t>(leads);
     out[axis] +=
-        coupling.ratio * (angles_from_rotation(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
+        coupling.ratio * (angles_within_limits(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
                           leader.sequence[a].rest);
   }
   return out;

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <tuple>
 
 #include <ecorche/kinematics/angles.hpp>
 #include <ecorche/values/error.hpp>
+#include "core/kinematics/angle_limits.hpp"
 
 namespace ecorche::kinematics {
 namespace {
@@ -38,41 +38,7 @@ Quaterniond turned(const Quaterniond& q, int k, double angle) {
   return q * Quaterniond(std::cos(0.5 * angle), v.x(), v.y(), v.z());
 }
 
-// Angles of a joint; of the two triples of a rotation the one that is less outside of the limits.
-Angles start_angles(const Joint& joint, const Quaterniond& rotation) {
-  if (joint.sequence.size() != 3) return {0, 0, 0};
-  constexpr double pi = std::numbers::pi;
-  Angles one = angles_from_rotation(joint, rotation);
-  Angles two{std::remainder(one[0] + pi, 2 * pi),
-             std::remainder(joint.sequence[1].sign * pi - one[1], 2 * pi),
-             std::remainder(one[2] + pi, 2 * pi)};
-  const auto outside = [&](Angles& a) {
-    double sum = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto [low, high] = angle_range(joint, i);
-      while (a[i] > high && a[i] - 2 * pi >= low) a[i] -= 2 * pi;
-      while (a[i] < low && a[i] + 2 * pi <= high) a[i] += 2 * pi;
-      sum += std::max({a[i] - high, low - a[i], 0.0});
-    }
-    return sum;
-  };
-  const double first = outside(one), second = outside(two);
-  return second < first - 1e-9 ? two : one;
-}
-
 }  // namespace
-
-std::pair<double, double> angle_range(const Joint& joint, std::size_t angle) {
-  const bool limited = std::any_of(joint.sequence.begin(), joint.sequence.end(), [](const AngleAxis& a) {
-    return std::isfinite(a.min) || std::isfinite(a.max);
-  });
-  const AngleAxis& a = joint.sequence[angle];
-  const bool several = joint.kind == JointKind::ball || joint.kind == JointKind::free;
-  if (several && !limited) return {-kInfinity, kInfinity};
-  const double open = angle == 1 ? std::numbers::pi / 2 : std::numbers::pi;
-  return {std::min(std::isfinite(a.min) ? a.min : -open, a.rest),
-          std::max(std::isfinite(a.max) ? a.max : open, a.rest)};
-}
 
 IkChain::IkChain(const Rig& rig, const IkProblem& problem, const Pose& start)
     : rig_(rig),
@@ -174,7 +140,7 @@ void IkChain::find_links(const Pose& start) {
   start_.angle.assign(segments_.size(), {0, 0, 0});
   for (std::size_t j = 0; j < segments_.size(); ++j) {
     const Joint& joint = segments_[j].joint;
-    if (segments_[j].parent >= 0) start_.angle[j] = start_angles(joint, start.rotation[j]);
+    if (segments_[j].parent >= 0) start_.angle[j] = angles_within_limits(joint, start.rotation[j]);
     if (link_of_[j] < 0) continue;
     link_of_[j] = static_cast<int>(links_.size());
     Link link;

@@ -19,9 +19,6 @@ struct Freedom {
   double low = 0, high = 0;  ///< radians; infinite where nothing holds it
 };
 
-/// The ends of an angle's range as `clamp` has them.
-std::pair<double, double> angle_range(const Joint& joint, std::size_t angle);
-
 /// What the solver changes: everything else of a pose stays.
 struct IkState {
   std::vector<std::array<double, 3>> angle;                  ///< #segments

@@ -105,6 +105,27 @@ TEST(Constrain, CoupledAnglesFollowTheirLeaderAboutRest) {
   for (std::size_t j = 0; j < 4; ++j) EXPECT_LT(again.rotation[j].angularDistance(pose.rotation[j]), 1e-9);
 }
 
+// As a shoulder that is abducted beyond the horizontal: the plain triple of that rotation has another angle
+// in the middle.
+TEST(Constrain, ALeaderBeyondAQuarterTurnLeadsByTheAngleThatItsLimitsMean) {
+  Rig rig = test::chain(3);
+  auto& segments = rig.skeleton.segments;
+  segments[1].joint.sequence[0].min = segments[1].joint.sequence[2].min = -1;
+  segments[1].joint.sequence[0].max = segments[1].joint.sequence[2].max = 1;
+  segments[1].joint.sequence[1].min = -2.1;
+  segments[1].joint.sequence[1].max = 0.8;
+  const double adducted = -1.9;
+  segments[2].joint.coupled = {{"j1", "adduction", "flexion", 0.25}, {"j1", "adduction", "y_mm", 10}};
+  Pose pose = Pose::rest(3);
+  pose.rotation[1] = rotation_from_angles(segments[1].joint, {0.3, adducted, -0.2});
+  ASSERT_GT(std::abs(angles_from_rotation(segments[1].joint, pose.rotation[1])[1] - adducted), 0.5);
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  EXPECT_TRUE(clamped.empty());
+  EXPECT_NEAR(angles_from_rotation(segments[2].joint, pose.rotation[2])[0], 0.25 * adducted, 1e-9);
+  EXPECT_NEAR(pose.translation[2].y(), 10 * adducted, 1e-9);
+}
+
 TEST(Constrain, ACoupledAngleKeepsItsOwnLimits) {
   Rig rig = test::chain(3);
   auto& segments = rig.skeleton.segments;

@@ -7,7 +7,7 @@ import path from "node:path";
 import { after, before, test } from "node:test";
 import { parse } from "yaml";
 import { Client } from "../../../clients/web/protocol/src/index.js";
-import { anglesFromRotation, anglesWithin, constrain, rotationFromAngles, setAngle, settable, type Angles } from "../../../clients/web/viewer/src/posing/angles.js";
+import { anglesFromRotation, constrain, rotationFromAngles, setAngle, settable, type Angles } from "../../../clients/web/viewer/src/posing/angles.js";
 import { forward, move, placeJoint } from "../../../clients/web/viewer/src/posing/forward.js";
 import { counterpart, mirrorPose } from "../../../clients/web/viewer/src/posing/mirror.js";
 import { restPose, samePose, withRotation, type Pose } from "../../../clients/web/viewer/src/posing/pose.js";
@@ -130,19 +130,7 @@ test("joints that follow others are where the program has them", async () => {
   assert.equal(girdle.coupled.length, 1);
   assert.equal(body.segments[findJoint(body, "knee_left")]!.joint.coupled[0]!.slideAxis, 1);
   assert.deepEqual(settable(girdle), [0, 2]);
-  // Only poses of which the program's solver, the oracle here, and its posing read the angles that lead alike: beyond a quarter turn of
-  // the middle angle they do not.
-  const alike = (pose: Pose) => body.segments.every(({ joint }) => joint.coupled.every(({ joint: row, angle }) => {
-    const lead = body.segments[row]!.joint, rotation = constrain(body, pose).pose.rotation[row]!;
-    return Math.abs(anglesWithin(lead, rotation)[angle]! - anglesFromRotation(lead, rotation)[angle]!) < 1e-9;
-  }));
-  const drawn = () => {
-    for (;;) {
-      const pose = randomPose(body, 0.3);
-      if (alike(pose)) return pose;
-    }
-  };
-  for (let i = 0; i < 4; i++) holdAgainstProgram(model, body, drawn());
+  for (let i = 0; i < 6; i++) holdAgainstProgram(model, body, randomPose(body, 0.3));
 });
 
 /** The small patient, its girdle and knee coupled. */

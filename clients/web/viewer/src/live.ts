@@ -9,6 +9,7 @@ import type { History } from "./state/history.js";
 import { labelOf } from "./state/names.js";
 import { qualityOf } from "./state/quality.js";
 import type { Store } from "./state/store.js";
+import { wordsOf } from "./errors.js";
 
 const RETRY_MS = 2000;
 const LEVELS_AFTER_MS = 1500;
@@ -214,7 +215,6 @@ function reasonOf(error: unknown): string {
   if (error instanceof ServerError && error.code === Code.UNAUTHENTICATED) {
     return "The server wants another token. Open the whole address that `ecorche serve` printed, with all that follows its #.";
   }
-  if (error instanceof ServerError) return `The server refuses: ${error.message}`;
   if (error instanceof ConnectionError) return "The server does not answer. Is `ecorche serve` running, and is this page's address its own?";
-  return error instanceof Error ? error.message : String(error);
+  return wordsOf(error);
 }

@@ -6,6 +6,7 @@ import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
 import { addSlices } from "./slices/index.js";
 import { addHeadset } from "./xr/index.js";
+import { wordsOf } from "./errors.js";
 
 /** Parts that hook into the viewer by what App makes public. */
 const PARTS: readonly ((app: App) => void)[] = [addPanels];
@@ -25,7 +26,7 @@ try {
   showCover({
     lead: "This browser cannot draw the body",
     text: "The viewer needs WebGL 2. Switch on hardware acceleration in the browser's settings, or open this page in a newer browser.",
-    detail: error instanceof Error ? error.message : String(error),
+    detail: wordsOf(error),
   });
   console.warn(error);
 }

@@ -3,6 +3,7 @@
 import type { App } from "../app.js";
 import { keyCaps } from "../keys.js";
 import { h, iconButton } from "./dom.js";
+import { wordsOf } from "../errors.js";
 
 export function openHelp(app: App): void {
   const groups = new Map<string, HTMLElement>();
@@ -41,7 +42,7 @@ async function openLicences(): Promise<void> {
       return h("details", { class: "licence" }, h("summary", {}, head!), h("pre", {}, text.join("\n").trim()));
     }));
   } catch (error) {
-    list.replaceChildren(h("p", {}, `The licences did not come: ${error instanceof Error ? error.message : String(error)}. Is the server still running?`));
+    list.replaceChildren(h("p", {}, `The licences did not come: ${wordsOf(error)}. Is the server still running?`));
   }
 }
 

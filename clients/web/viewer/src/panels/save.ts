@@ -3,6 +3,7 @@
 import type { App } from "../app.js";
 import { shownOpacity } from "../state/layers.js";
 import { h, icon } from "./dom.js";
+import { wordsOf } from "../errors.js";
 
 export function saveMenu(app: App): HTMLElement {
   const menu = h("div", { class: "menu" });
@@ -28,7 +29,7 @@ async function saveMeshes(app: App, ending: "glb" | "stl"): Promise<void> {
     download(blob, `${fileName(app)}.${ending}`);
     app.say(`Saved ${tissues.length} ${tissues.length === 1 ? "tissue" : "tissues"}`);
   } catch (error) {
-    app.say(`Not saved: ${error instanceof Error ? error.message : String(error)}`);
+    app.say(`Not saved: ${wordsOf(error)}`);
   }
 }
 

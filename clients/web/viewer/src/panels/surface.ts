@@ -4,6 +4,7 @@ import type { App } from "../app.js";
 import { farthestFromRest, niceRange } from "../scene/distance.js";
 import type { Scalar } from "../state/app_state.js";
 import { h, setText } from "./dom.js";
+import { wordsOf } from "../errors.js";
 
 const EVERY_MS = 250;
 
@@ -44,7 +45,7 @@ export function addSurface(app: App, content: HTMLElement): void {
         app.body.setRest(await app.live.rest());
       } catch (error) {
         app.store.set({ scalar: "none" });
-        app.say(`The scanned body did not come: ${error instanceof Error ? error.message : String(error)}`);
+        app.say(`The scanned body did not come: ${wordsOf(error)}`);
         return;
       }
     }

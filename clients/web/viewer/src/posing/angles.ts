@@ -157,12 +157,12 @@ export interface Clamped {
 
 // The driven joint's rotation with every coupled angle set.
 function follow(rig: Rig, rotation: readonly Quat[], joint: Joint, own: Quat): Quat {
-  const angles = [...anglesFromRotation(joint, own)] as [number, number, number];
+  const angles = [...anglesWithin(joint, own)] as [number, number, number];
   const driven = new Set<number>();
   for (const c of joint.coupled) {
     if (c.drivenAngle < 0) continue;
     const lead = rig.segments[c.joint]!.joint;
-    const moved = anglesFromRotation(lead, rotation[c.joint]!)[c.angle]! - lead.sequence[c.angle]!.rest;
+    const moved = anglesWithin(lead, rotation[c.joint]!)[c.angle]! - lead.sequence[c.angle]!.rest;
     if (!driven.has(c.drivenAngle)) angles[c.drivenAngle] = joint.sequence[c.drivenAngle]!.rest;
     driven.add(c.drivenAngle);
     angles[c.drivenAngle]! += c.ratio * moved;
@@ -175,7 +175,7 @@ function slid(rig: Rig, rotation: readonly Quat[], joint: Joint): Vec3 {
   for (const c of joint.coupled) {
     if (c.slideAxis < 0) continue;
     const lead = rig.segments[c.joint]!.joint;
-    out[c.slideAxis]! += c.ratio * (anglesFromRotation(lead, rotation[c.joint]!)[c.angle]! - lead.sequence[c.angle]!.rest);
+    out[c.slideAxis]! += c.ratio * (anglesWithin(lead, rotation[c.joint]!)[c.angle]! - lead.sequence[c.angle]!.rest);
   }
   return out;
 }

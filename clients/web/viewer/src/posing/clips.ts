@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motion that the server plays, and what it records: asked for here, told by the server.
-import { Feature, ServerError, type Client, type ClipState, type ClipSummary } from "../../../protocol/src/index.js";
+import { Feature, type Client, type ClipState, type ClipSummary } from "../../../protocol/src/index.js";
 import { Store } from "../state/store.js";
+import { askServer } from "./ask_server.js";
 
 export interface ClipsState {
   readonly clips: readonly ClipSummary[];
@@ -136,12 +137,7 @@ export class Clips {
     });
   }
 
-  async #do(run: (client: Client) => Promise<void>): Promise<void> {
-    if (!this.#client) return this.say("Not connected");
-    try {
-      await run(this.#client);
-    } catch (error) {
-      this.say(error instanceof ServerError ? `The server refuses: ${error.message}` : error instanceof Error ? error.message : String(error));
-    }
+  #do(run: (client: Client) => Promise<void>): Promise<void> {
+    return askServer(this.#client, this.say, run);
   }
 }

@@ -11,6 +11,7 @@ import type { Pose } from "./pose.js";
 import { SavedPoses, type SavedPose } from "./saved_poses.js";
 import { thumbnail } from "./thumbnail.js";
 import { readPose, writePose } from "./pose_yaml.js";
+import { wordsOf } from "../errors.js";
 
 const WIDTH = 116, HEIGHT = 132;
 const LIBRARY = "M5 4h5v16H5zM10 4h5v16h-5zM15.5 5l4-1 3.2 15-4 1z";
@@ -32,7 +33,7 @@ export async function openPose(app: App, poser: Poser, text: string, name: strin
     app.say(`Opened ${name}`);
     return true;
   } catch (error) {
-    app.say(`${name}: ${error instanceof Error ? error.message : String(error)}`);
+    app.say(`${name}: ${wordsOf(error)}`);
     return false;
   }
 }
@@ -82,7 +83,7 @@ function mount(app: App, poser: Poser, copyLink: () => Promise<void>, content: H
       app.say(`Saved ${pose.name}`);
       name.value = "";
     } catch (error) {
-      app.say(`Not saved: ${error instanceof Error ? error.message : String(error)}`);
+      app.say(`Not saved: ${wordsOf(error)}`);
     }
     list();
   });

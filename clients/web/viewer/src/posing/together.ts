@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Who is in the session and who poses: asked for, taken, given.
-import { Feature, Role, ServerError, type Client, type Members } from "../../../protocol/src/index.js";
+import { Feature, Role, type Client, type Members } from "../../../protocol/src/index.js";
 import { Store } from "../state/store.js";
+import { askServer } from "./ask_server.js";
 
 export interface Person {
   readonly connection: bigint;
@@ -97,12 +98,7 @@ export class Together {
     }
   }
 
-  async #do(run: (client: Client) => Promise<void>): Promise<void> {
-    if (!this.#client) return this.say("Not connected");
-    try {
-      await run(this.#client);
-    } catch (error) {
-      this.say(error instanceof ServerError ? `The server refuses: ${error.message}` : error instanceof Error ? error.message : String(error));
-    }
+  #do(run: (client: Client) => Promise<void>): Promise<void> {
+    return askServer(this.#client, this.say, run);
   }
 }

@@ -3,6 +3,7 @@
 import type { App } from "../app.js";
 import { h } from "../panels/dom.js";
 import type { SlicesPart } from "./part.js";
+import { wordsOf } from "../errors.js";
 
 const ICON = "M4 4h7v7H4zM13 4h7v7h-7zM4 13h7v7H4zM16.5 13v7M13 16.5h7";
 
@@ -15,7 +16,7 @@ export function addSlices(app: App): void {
   });
   const use = (run: (part: SlicesPart) => void) => void part().then(run, (error: unknown) => {
     coming = undefined;
-    app.say(`The slices did not load: ${error instanceof Error ? error.message : String(error)}`);
+    app.say(`The slices did not load: ${wordsOf(error)}`);
   });
   let opened = false;
   app.panels.add({

@@ -4,6 +4,7 @@ import { length, subtract, type Vec3 } from "../posing/rotation.js";
 import type { History } from "../state/history.js";
 import { Store } from "../state/store.js";
 import { pointsOf, spell, valuesOf, type Measure, type MeasureKind, type MeasurePoint } from "./measure.js";
+import { wordsOf } from "../errors.js";
 
 export interface MeasureState {
   readonly list: readonly Measure[];
@@ -33,7 +34,7 @@ export class Measures {
   /** One more point: the first of `candidates` that lies in the body, else the first of all. Points come in the order of calls. */
   add(kind: MeasureKind, candidates: readonly Vec3[]): Promise<void> {
     this.#adding = this.#adding.then(() => this.#add(kind, candidates)).catch((error: unknown) => {
-      this.say(`The point could not be measured: ${error instanceof Error ? error.message : String(error)}`);
+      this.say(`The point could not be measured: ${wordsOf(error)}`);
     });
     return this.#adding;
   }
@@ -85,7 +86,7 @@ export class Measures {
         });
       }
     } catch (error) {
-      this.say(`Measures do not follow the body: ${error instanceof Error ? error.message : String(error)}`);
+      this.say(`Measures do not follow the body: ${wordsOf(error)}`);
     } finally {
       this.#following = false;
     }

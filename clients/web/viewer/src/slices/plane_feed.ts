@@ -4,6 +4,7 @@
 import { arrayOf, type Client, type KnownScalar, type VolumeFrame } from "../../../protocol/src/index.js";
 import { samePlane, stepsOf, type PlaneGeometry, type PlaneId } from "./plane.js";
 import type { Numbers } from "./window.js";
+import { wordsOf } from "../errors.js";
 
 export interface PlanePicture {
   readonly plane: PlaneGeometry;
@@ -92,7 +93,7 @@ export class PlaneFeed {
       // A line that is down mends itself, and says so in its own place.
       if (this.#client?.state.state === "open") {
         track.wanted = null;
-        this.say(`The ${track.id} plane of ${track.volume} does not come: ${error instanceof Error ? error.message : String(error)}`);
+        this.say(`The ${track.id} plane of ${track.volume} does not come: ${wordsOf(error)}`);
       }
     } finally {
       track.busy = false;

@@ -13,6 +13,7 @@ import { BUTTON, Sources, type Press, type PressKind, type Source } from "./sour
 import { Stand } from "./stand.js";
 import { Wands } from "./wands.js";
 import { Label, Plate } from "./words.js";
+import { wordsOf } from "../errors.js";
 
 // A second: by what a stick that is pushed all the way turns and enlarges.
 const TURN = Math.PI / 2;
@@ -293,5 +294,3 @@ function pulse(gamepad: Gamepad | undefined): void {
   const [actuator] = (gamepad as { hapticActuators?: readonly { pulse?(strength: number, ms: number): Promise<unknown> }[] } | undefined)?.hapticActuators ?? [];
   actuator?.pulse?.(0.4, 30).catch(() => {});
 }
-
-const wordsOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));

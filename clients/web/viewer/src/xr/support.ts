@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether the body can be shown in a headset or in the room, and if not, why: in words for a person.
+import { wordsOf } from "../errors.js";
 
 export type Mode = "immersive-vr" | "immersive-ar";
 
@@ -25,5 +26,3 @@ export function refusal(error: unknown): string {
   if (name === "InvalidStateError") return "another page or window holds the headset. Leave it there first.";
   return wordsOf(error);
 }
-
-const wordsOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
