@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche stream`: a client that plays a clip against a server, checks what comes back, and measures.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <optional>
@@ -55,7 +56,8 @@ struct Arrivals {
     std::sort(latency_ms.begin(), latency_ms.end());
     // Nearest rank.
     const auto at = [&](double share) {
-      return latency_ms[static_cast<std::size_t>(share * static_cast<double>(latency_ms.size() - 1) + 0.5)];
+      return latency_ms[static_cast<std::size_t>(
+          std::lround(share * static_cast<double>(latency_ms.size() - 1)))];
     };
     if (latency_ms.empty()) return nullptr;
     return {{"p50", at(0.5)}, {"p90", at(0.9)}, {"p99", at(0.99)}, {"max", latency_ms.back()}};

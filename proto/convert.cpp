@@ -183,7 +183,7 @@ Status from_proto(const v1::Skeleton& skeleton, Rig& out) {
     segment.name = s.name();
     segment.parent = s.parent();
     segment.aliases.assign(s.aliases().begin(), s.aliases().end());
-    if (const Status status = joint_from_proto(s.joint(), segment.joint); !status.ok()) return status;
+    if (Status status = joint_from_proto(s.joint(), segment.joint); !status.ok()) return status;
     out.skeleton.segments.push_back(std::move(segment));
   }
   return couplings_from_proto(skeleton, out);

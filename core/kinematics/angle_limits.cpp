@@ -32,10 +32,9 @@ std::array<double, 3> other_triple(const Joint& joint, const std::array<double, 
 std::array<double, 3> angles_within_limits(const Joint& joint, const Eigen::Quaterniond& rotation) {
   if (joint.sequence.size() != 3) return {0, 0, 0};
   constexpr double pi = std::numbers::pi;
-  using Angles = std::array<double, 3>;
-  Angles one = angles_from_rotation(joint, rotation);
-  Angles two = other_triple(joint, one);
-  const auto outside = [&](Angles& a) {
+  std::array<double, 3> one = angles_from_rotation(joint, rotation);
+  std::array<double, 3> two = other_triple(joint, one);
+  const auto outside = [&](std::array<double, 3>& a) {
     double sum = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       const auto [low, high] = angle_range(joint, i);
