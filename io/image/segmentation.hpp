@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// 3D Slicer's segmentations: a NRRD that names its own segments, in layers where they overlap.
+// Segmentations that name their own segments, in layers where they overlap: 3D Slicer's NRRD, DICOM SEG.
 #pragma once
 
 #include <filesystem>
@@ -10,6 +10,7 @@
 #include "core/files/read_options.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/nifti_form.hpp"
+#include "io/image/segment_codes.hpp"
 
 namespace ecorche::io {
 
@@ -19,6 +20,12 @@ struct Segmentation {
   /// layer.
   std::vector<Image> layers;
   LabelNames names;  ///< empty where the file names no segment
+  /// Of DICOM SEG only. Its segments keep their numbers as ids.
+  std::map<std::int64_t, SegmentCodes> codes = {};
+  /// Which share voxels. Nothing is lost: each segment lies whole in the first layer where it has room, in
+  /// the file's order, so that of two that overlap the earlier one lies in the earlier layer. Whoever wants
+  /// one map takes the first layer that is not 0.
+  std::vector<LabelOverlap> overlaps = {};
 };
 
 /// Reads any image that `read_image` reads as labels. Of a NRRD with `Segment0_Name`, ... the segments are
