@@ -16,11 +16,13 @@ struct CodedName {
   bool operator==(const CodedName&) const = default;
 };
 
-/// Of one label of a DICOM segmentation.
+/// Of one label of a segmentation.
 struct SegmentCodes {
   std::string label;         ///< Segment Label as it is written
   CodedName category, type;  ///< `SCT 91723000 Anatomical Structure`, `SCT 71341001 Femur`
   CodedName side;            ///< type's modifier: `SCT 24028007 Right`, `SCT 7771000 Left`, ...
+  CodedName region,
+      region_side;  ///< where it lies, and the region's modifier: what a type `Bone` leaves open
 
   bool operator==(const SegmentCodes&) const = default;
 };
