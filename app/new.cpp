@@ -101,6 +101,8 @@ void declare_new(CLI::App& app, Program& program, Run& chosen) {
                    "HU: what is denser is the patient, where no label shows the body")
       ->check(CLI::Range(-1000.0, 200.0))
       ->capture_default_str();
+  command->add_flag("--skin-from-labels", settings->options.skin_from_labels,
+                    "draw the skin round all labels, where neither a label nor a CT shows it");
   add_read_budget(*command, settings->limits);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
