@@ -18,7 +18,7 @@ async function bundle(entryPoints, define) {
   const { metafile } = await build({
     absWorkingDir: here, entryPoints, define, outdir: out, entryNames: "[name]-[hash]", assetNames: "[name]-[hash]",
     bundle: true, splitting: true, chunkNames: "[name]-[hash]", minify: true, format: "esm", target: "es2022", metafile: true, legalComments: "none", logLevel: "warning",
-    loader: { ".svg": "file", ".png": "file", ".woff2": "file", ".yaml": "text" },
+    loader: { ".svg": "file", ".png": "file", ".woff2": "file", ".yaml": "text", ".glsl": "text" },
   });
   const outputs = Object.entries(metafile.outputs);
   const nameOf = (entry) => path.basename(outputs.find(([, output]) => output.entryPoint === entry)[0]);

@@ -21,7 +21,7 @@ process.on("exit", () => fs.rmSync(out, { recursive: true, force: true }));
 await build({
   absWorkingDir: here, entryPoints: process.argv.slice(2), outdir: out, outExtension: { ".js": ".mjs" }, outbase: here,
   bundle: true, platform: "node", format: "esm", target: "node18", external: ["ws", "playwright-core", "axe-core", "esbuild", "yaml"], sourcemap: "inline",
-  nodePaths: [path.join(web, "node_modules")], loader: { ".yaml": "text" }, define: { ROOT: JSON.stringify(root) },
+  nodePaths: [path.join(web, "node_modules")], loader: { ".yaml": "text", ".glsl": "text" }, define: { ROOT: JSON.stringify(root) },
 });
 const env = { ...process.env };
 // A folder of its own: tests beside this one may build, too. ECORCHE_VIEWER names one that is built.

@@ -79,7 +79,7 @@ test("a stream follows: coarse in motion, whole at rest", async (t) => {
   const model = await client.open();
   const stream = await client.subscribeMesh();  // not `adaptive`: then the server would choose, too
   const choices: Choice[] = [], policy = new Policy();
-  const adaptation = adapt(client, stream, (choice) => choices.push(choice), policy);
+  const adaptation = adapt(client, stream, (choice) => choices.push(choice), { policy });
   adaptation.drawn(200);
   let angle = 0;
   const moving = setInterval(() => client.setPose(bendingPose(model, angle += 0.01)), 40);

@@ -87,13 +87,14 @@ export class Client extends Emitter<ClientEvents> {
 
   /** No `model`: the server's first. No `session`: one of its own. Streams that there are go on with the new body. */
   async open(model = "", session = ""): Promise<ModelOpened> {
+    const streams = [...this.streams.values()];  // not those that are asked for while the answer is on its way
     const { value } = await this.ask({ case: "openModel", value: create(OpenModelSchema, { model, session }) }, "modelOpened");
     this.model = value;
     this.poses.restart(value.lastSequence);
     this.setControl({ role: value.role, vacant: false, reservedSeconds: 0 });
     this.emit("opened", value);
     this.tellShown(value.pose);
-    for (const stream of this.streams.values()) await this.subscribe(stream);
+    for (const stream of streams) await this.subscribe(stream);
     return value;
   }
 
@@ -224,9 +225,13 @@ export class Client extends Emitter<ClientEvents> {
   }
 
   private async subscribe(stream: MeshStream): Promise<void> {
-    const { tissues = [], level = 0, adaptive = false, encoding = Encoding.U16_DELTA, normals = false, quality = false, maxRate = 0 } = stream.options;
+    const { tissues = [], level = 0, adaptive = false, encoding = Encoding.U16_DELTA, normals = false, quality = false, maxRate = 0, motions = false } = stream.options;
     const value = create(SubscribeSchema, {
-      what: { case: "mesh", value: { tissues, level, adaptive, encoding, normals, quality, pose: true } }, maxRate,
+      what: {
+        case: "mesh",
+        value: motions ? { tissues, level, quality, motions, pose: true, encoding: Encoding.F32 } : { tissues, level, adaptive, encoding, normals, quality, pose: true },
+      },
+      maxRate,
     });
     const answer = await this.ask({ case: "subscribe", value }, "subscribed", undefined, stream.handle);
     stream.subscription = answer.value.subscription;
@@ -257,7 +262,7 @@ export class Client extends Emitter<ClientEvents> {
     switch (message.kind) {
       case "message": return this.handle(fromBinary(EnvelopeSchema, message.envelope), message.payload);
       case "frame": return this.show(message);
-      case "layouts": return this.streams.get(message.stream)?.arrange(message.layouts);
+      case "layouts": return this.streams.get(message.stream)?.arrange(message.layouts, message.skinning);
       case "statistics": return this.emit("statistics", message.statistics);
       case "closed": return this.lost(this.ending ?? new ConnectionError(message.reason || `the connection ended (${message.code})`));
       case "refused": return this.lost(new ConnectionError(message.message));

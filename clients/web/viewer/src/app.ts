@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer, wired: state, scene, panels and the line to the server. Other parts (posing) hook in through what is public here.
 import * as THREE from "three";
+import { Arrival } from "./arrival.js";
 import { Keys } from "./keys.js";
 import { Live } from "./live.js";
 import { PanelHost } from "./panels/host.js";
@@ -64,7 +65,7 @@ export class App {
     });
     this.panels = new PanelHost(places.root, (insets) => this.stage.setInsets(insets));
     this.#says = places.root.querySelector<HTMLElement>("#says")!;
-    this.live = new Live(this.store, this.history, this.body);
+    this.live = new Live(this.store, this.history, this.body, new Arrival(this.stage, (text) => this.say(text)));
     this.live.onBody((first) => this.#bodyCame(first));
     this.#draw();
   }

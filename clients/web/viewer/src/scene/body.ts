@@ -23,7 +23,10 @@ export interface Topology {
 
 /** p = low + step * number, mm, LPS. Four numbers a vertex: x, y, z and the normal. */
 export interface Positions {
+  /** Of positions that lie on the GPU read back when they are asked for. */
   readonly numbers: Uint16Array;
+  /** Where they lie on the GPU already. */
+  readonly gpu?: WebGLBuffer;
   readonly low: readonly [number, number, number];
   readonly step: number;
 }
@@ -92,12 +95,12 @@ export class Body {
       group.matrix.makeScale(step, step, step).setPosition(low[0], low[1], low[2]);
       group.matrixWorldNeedsUpdate = true;
     }
-    if (!this.#buffer) {
-      this.#build(positions.numbers);
-      return;
+    if (this.#parts.size === 0) {
+      this.#build(positions);
+    } else if (this.#buffer) {
+      this.#buffer.array = positions.numbers;
+      this.#buffer.needsUpdate = true;
     }
-    this.#buffer.array = positions.numbers;
-    this.#buffer.needsUpdate = true;
   }
 
   /** The scanned body, of the same topology, for the distance from it. */
@@ -190,11 +193,11 @@ export class Body {
     return box;
   }
 
-  #build(numbers: Uint16Array): void {
+  #build(positions: Positions): void {
     const topology = this.#topology;
     if (!topology) return;
-    this.#buffer = new THREE.InterleavedBuffer(numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
-    const vertex = integers(this.#buffer);
+    if (!positions.gpu) this.#buffer = new THREE.InterleavedBuffer(positions.numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
+    const vertex = this.#buffer ? integers(this.#buffer) : resident(positions.gpu!, topology.vertices);
     const index = new THREE.BufferAttribute(topology.indices, 1);
     const depth = depthMaterial();
     for (const range of topology.ranges) {
@@ -230,6 +233,13 @@ export class Body {
     this.#positions = null;
     this.#rest = null;
   }
+}
+
+/** The same of numbers that are on the GPU. */
+function resident(buffer: WebGLBuffer, count: number): THREE.BufferAttribute {
+  const attribute = new THREE.GLBufferAttribute(buffer, WebGL2RenderingContext.UNSIGNED_SHORT, STRIDE, 2, count);
+  // three.js draws from it as from any other, though its types do not say so.
+  return Object.assign(attribute, { gpuType: THREE.IntType }) as unknown as THREE.BufferAttribute;
 }
 
 /** An attribute that the shader reads as `uvec4`. */

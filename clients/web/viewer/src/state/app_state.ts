@@ -19,7 +19,12 @@ export interface Stats {
   readonly latencyMs: number;
   /** 0 is all; each next one has about a quarter of the triangles. */
   readonly level: number;
+  /** How the body comes: its vertices, or what they are skinned by here. */
+  readonly way: Way;
 }
+
+/** `frames`: the server's vertices; `skinning`: the segments' motions. */
+export type Way = "frames" | "skinning";
 
 export interface Tissue {
   /** Row of ModelOpened.tissues. */
@@ -86,7 +91,7 @@ export interface AppState {
 export function firstState(): AppState {
   return {
     link: { state: "connecting", reason: "", mends: true },
-    stats: { framesPerSecond: 0, bytesPerSecond: 0, latencyMs: 0, level: 0 },
+    stats: { framesPerSecond: 0, bytesPerSecond: 0, latencyMs: 0, level: 0, way: "frames" },
     model: null, layers: [], isolated: null, seeThrough: true, selected: null, hovered: null,
     scalar: "none", quality: null, poseSequence: 0n, theme: "auto",
   };
