@@ -39,6 +39,12 @@ Status handle_set_thresholds(Client& client, const v1::SetThresholds& wanted, co
 // probe.cpp
 Status handle_probe_points(Client& client, const v1::ProbePoints& probe, const Request& request);
 
+// radiograph.cpp
+Status handle_render_radiograph(Client& client, const v1::RenderRadiograph& render, const Request& request);
+
+// field.cpp
+Status handle_sample_field(Client& client, const v1::SampleField& sample, const Request& request);
+
 // ik.cpp
 Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& request);
 

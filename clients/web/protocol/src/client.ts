@@ -20,6 +20,7 @@ import { ClientHelloSchema, Feature, type ServerHello } from "./gen/ecorche/v1/h
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
 import { SubscribeSchema } from "./gen/ecorche/v1/stream_pb.js";
 import type { IkOptions } from "./ik.js";
+import { encodeField, encodeRadiograph, readField, readRadiograph, type Field, type FieldOptions, type Radiograph, type RadiographOptions } from "./inspect.js";
 import { MeshStream, type MeshOptions } from "./mesh_stream.js";
 import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
@@ -205,6 +206,18 @@ export class Client extends Emitter<ClientEvents> {
     const { message, payload } = encodeProbe(points, options);
     const answer = await this.ask(message, "probed", payload);
     return readProbe(answer.value, answer.payload);
+  }
+
+  /** A picture of the present pose as an X-ray source and a detector would make it. One at a time. */
+  async radiograph(options: RadiographOptions = {}): Promise<Radiograph> {
+    const { value, payload } = await this.ask(encodeRadiograph(options), "radiograph");
+    return readRadiograph(value, options.content ?? 0, payload);
+  }
+
+  /** A number for every vertex of tissues in the present pose. One at a time. */
+  async field(options: FieldOptions): Promise<Field> {
+    const { value, payload } = await this.ask(encodeField(options), "field");
+    return readField(value, payload);
   }
 
   /** Any other request of the protocol. `stream`: of a Subscribe whose frames are for it. */

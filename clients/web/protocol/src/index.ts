@@ -8,6 +8,8 @@ export { arrayOf, ProtocolError, type KnownScalar } from "./framing.js";
 export type { Statistics } from "./channel.js";
 export type { IkOptions } from "./ik.js";
 export { LinePolicy, type LineSeen } from "./line.js";
+export type { Field, FieldOptions, Radiograph, RadiographOptions } from "./inspect.js";
+export { RenderRadiograph_Content as RadiographContent, RenderRadiograph_View as RadiographView } from "./gen/ecorche/v1/inspect_pb.js";
 export type { MeshLayout, TissueRange } from "./layout.js";
 export { MeshStream, type BodyFrame, type MeshOptions } from "./mesh_stream.js";
 export { Policy, type Choice, type Observed } from "./policy.js";

@@ -140,6 +140,7 @@ export class Live {
         row, name: tissue.name, label: labelOf(tissue.name), group: tissue.group, segment: tissue.segment, vertices: Number(tissue.vertices),
       })),
       joints: opened.skeleton?.segments.map((segment) => segment.joint?.name || segment.name) ?? [],
+      segments: opened.skeleton?.segments.map(({ name }) => name) ?? [],
     };
     if (opened.topologyDigest === this.#topology) {
       this.store.set({ model });
@@ -150,7 +151,7 @@ export class Live {
       this.frame = null;
       this.history.clear();
       const layers = model.tissues.map(() => ({ visible: true, opacity: 1 }));
-      this.store.set({ model, layers, isolated: null, selected: null, hovered: null, scalar: "none", quality: null });
+      this.store.set({ model, layers, isolated: null, selected: null, hovered: null, scalar: "none", weightOf: 0, quality: null });
     }
     for (const listener of [...this.#listeners.opened]) listener({ client, model: opened });
   }

@@ -3,7 +3,7 @@
 // range of triangles per tissue. Nothing is converted on the way to the GPU; low and step of a frame are the group's matrix.
 import * as THREE from "three";
 import type { Look } from "./palette.js";
-import { depthMaterial, outlineMaterial, PickMaterial, sharedUniforms, TissueMaterial } from "./tissue_material.js";
+import { depthMaterial, outlineMaterial, PickMaterial, sharedUniforms, TissueMaterial, type SurfaceScalar } from "./tissue_material.js";
 
 export interface TissueRange {
   /** Row of ModelOpened.tissues. */
@@ -57,7 +57,8 @@ export class Body {
   #buffer: THREE.InterleavedBuffer | null = null;
   #rest: Positions | null = null;
   #outline: THREE.Mesh;
-  #scalar = false;
+  #scalar: SurfaceScalar = "none";
+  #values: Float32Array | null = null;
   #clipping: THREE.Plane[] = [];
 
   constructor(private readonly looks: (row: number) => Look) {
@@ -106,7 +107,7 @@ export class Body {
   /** The scanned body, of the same topology, for the distance from it. */
   setRest(rest: Positions | null): void {
     this.#rest = rest;
-    if (!rest) return this.setScalar(false);
+    if (!rest) return this.setScalar("none");
     this.shared.restBox.value.set(rest.low[0], rest.low[1], rest.low[2], rest.step);
     const buffer = new THREE.InterleavedBuffer(rest.numbers, STRIDE);
     for (const { geometry } of this.#parts.values()) {
@@ -114,13 +115,30 @@ export class Body {
     }
   }
 
-  /** Colours the surface by its distance from rest. */
-  setScalar(on: boolean): void {
-    this.#scalar = on && this.#rest !== null;
+  /** A number for each vertex of the topology, to colour the surface by; null: none. */
+  setValues(values: Float32Array | null): void {
+    this.#values = values;
+    if (!values) return this.#scalar === "values" ? this.setScalar("none") : undefined;
+    const attribute = new THREE.BufferAttribute(values, 1);
+    for (const { geometry } of this.#parts.values()) geometry.setAttribute("value", attribute);
+  }
+
+  get values(): Float32Array | null {
+    return this.#values;
+  }
+
+  /** Colours the surface by what there is of it. */
+  setScalar(kind: SurfaceScalar): void {
+    const there = { none: true, distance: this.#rest !== null, values: this.#values !== null }[kind];
+    this.#scalar = there ? kind : "none";
     for (const { mesh, pick } of this.#parts.values()) {
       mesh.material.setScalar(this.#scalar);
       pick.material.setScalar(this.#scalar);
     }
+  }
+
+  get scalar(): SurfaceScalar {
+    return this.#scalar;
   }
 
   setOpacity(row: number, opacity: number): void {
@@ -232,6 +250,7 @@ export class Body {
     this.#buffer = null;
     this.#positions = null;
     this.#rest = null;
+    this.#values = null;
   }
 }
 
