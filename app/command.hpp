@@ -49,6 +49,7 @@ using Declare = void (*)(CLI::App& app, Program& program, Run& chosen);
 
 // One file per subcommand: app/phantom.cpp, ...
 void declare_phantom(CLI::App& app, Program& program, Run& chosen);
+void declare_new(CLI::App& app, Program& program, Run& chosen);
 void declare_check(CLI::App& app, Program& program, Run& chosen);
 void declare_repair(CLI::App& app, Program& program, Run& chosen);
 void declare_preprocess(CLI::App& app, Program& program, Run& chosen);

@@ -38,6 +38,7 @@ const std::vector<std::pair<std::string, std::string>> kExamples{
 
 // Examples that need what a test cannot know beforehand.
 const std::vector<std::pair<std::string, std::string>> kMoreExamples{
+    {"new", "ecorche new ct.nii.gz segmentations -o my_patient --report my_patient.html"},
     {"probe", "ecorche probe patient.hdf --points points.csv --pose lib:sitting"},
     {"serve", "ecorche serve patient.hdf --http 127.0.0.1:8080"},
     {"stream", "ecorche stream 127.0.0.1:7070 --motion patient/motion/walk.bvh"},

@@ -10,6 +10,7 @@
 
 #include <ecorche/io/case_file.hpp>
 #include "app/command.hpp"
+#include "app/phantom_scan.hpp"
 #include "core/files/atomic_file.hpp"
 #include "io/motion/bvh.hpp"
 
@@ -23,6 +24,7 @@ struct PhantomSettings {
   std::uint64_t seed = 1;
   double voxel_mm = 0;
   bool bar = false;
+  std::string scan;  // empty: a case
 };
 
 phantom::Size size_of(const PhantomSettings& settings) {
@@ -50,6 +52,13 @@ int run(const Program& program, const PhantomSettings& settings) {
                                              : phantom::make(size_of(settings), settings.seed,
                                                              program.context("phantom"), settings.voxel_mm);
   const Case& patient = made.patient;
+  if (!settings.scan.empty()) {
+    write_phantom_scan(settings.folder, settings.scan, patient, program.context("write"));
+    files::write_text(settings.folder / "truth.yaml", io::skeleton_to_yaml(made.truth));
+    program.result(settings.folder.string() + ": a CT and its segmentation, as " + settings.scan + " has it",
+                   {{"folder", settings.folder.string()}, {"form", settings.scan}});
+    return 0;
+  }
   io::write_case(settings.folder, patient, program.context("write"));
   if (!made.clips.empty()) files::make_folder(settings.folder / "motion");
   for (const Clip& clip : made.clips) io::write_bvh(settings.folder / "motion" / (clip.name + ".bvh"), clip);
@@ -103,8 +112,14 @@ void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
                            ->add_option("--voxel", settings->voxel_mm,
                                         "edge of the scan's voxels, mm (default: 6, 4 or 2.5, by the size)")
                            ->check(CLI::Range(0.5, 20.0));
+  command
+      ->add_option(
+          "--scan", settings->scan,
+          "write what a hospital has instead of a case: the CT, and its segmentation as a program writes it")
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(scan_forms), std::end(scan_forms))));
   command->add_flag("--bar", settings->bar, "the bar of Sujar18 figure 7 instead of a patient")
-      ->excludes(voxel);
+      ->excludes(voxel)
+      ->excludes("--scan");
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });
 }

@@ -52,20 +52,27 @@ void Picture::ring(double x, double y, double radius, double thickness, const Co
   }
 }
 
-std::string data_uri(const Picture& picture) {
+std::string png_bytes(const Picture& picture) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(picture.width);
   image.height = static_cast<png_uint_32>(picture.height);
   image.format = PNG_FORMAT_RGB;
-  std::vector<unsigned char> png(PNG_IMAGE_PNG_SIZE_MAX(image));
+  std::string png(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
   png_alloc_size_t size = png.size();
   if (png_image_write_to_memory(&image, png.data(), &size, 0, picture.pixels.data(), 0, nullptr) == 0)
     throw Error(ErrorKind::internal, "report",
                 std::string("libpng cannot write the picture: ") + image.message, "report this");
-  std::string base64(4 * ((size + 2) / 3) + 1, '\0');
+  png.resize(size);
+  return png;
+}
+
+std::string data_uri(const Picture& picture) {
+  const std::string png = png_bytes(picture);
+  std::string base64(4 * ((png.size() + 2) / 3) + 1, '\0');
   const int length =
-      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()), png.data(), static_cast<int>(size));
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),
+                      reinterpret_cast<const unsigned char*>(png.data()), static_cast<int>(png.size()));
   base64.resize(static_cast<std::size_t>(length));
   return "data:image/png;base64," + base64;
 }

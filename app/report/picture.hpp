@@ -39,6 +39,9 @@ struct Picture {
   void ring(double x, double y, double radius, double thickness, const Colour& colour);
 };
 
+/// The picture as the bytes of a PNG. Throws Error{internal} where libpng fails.
+std::string png_bytes(const Picture& picture);
+
 /// The picture as `data:image/png;base64,...`. Throws Error{internal} where libpng fails.
 std::string data_uri(const Picture& picture);
 

@@ -15,6 +15,7 @@
 #include "io/case/yaml_reader.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/mask_folder.hpp"
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::io {
@@ -33,8 +34,8 @@ constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment"
 constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
                                                        "root", "labels", "side",  "within", "close_mm"};
 constexpr std::array<std::string_view, 5> kVolumeKeys{"name", "file", "background", "root", "form"};
-constexpr std::array<std::string_view, 6> kLabelKeys{"file", "table",        "root",
-                                                     "form", "mid_plane_mm", "apart"};
+constexpr std::array<std::string_view, 9> kLabelKeys{"file",     "table", "root",         "form", "except",
+                                                     "resample", "maps",  "mid_plane_mm", "apart"};
 constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
 
 Eigen::Matrix3d parse_axes(const Value& value) {
@@ -72,8 +73,9 @@ class CaseReader {
     step();
     const auto labels = root_.find("labels");
     if (labels) read_labels(*labels);
+    const bool options = labels && labels->kind() == Kind::map;  // a plain list of maps has none
     std::optional<double> mid_plane;
-    if (const auto plane = labels ? labels->find("mid_plane_mm") : std::nullopt) mid_plane = plane->number();
+    if (const auto plane = options ? labels->find("mid_plane_mm") : std::nullopt) mid_plane = plane->number();
     sources_.emplace(out_.labels ? &*out_.labels : nullptr, mid_plane,
                      [this](const Value& entry, const Value& file) {
                        return read_label_image(locate(entry, file), reading_, read_form(entry));
@@ -88,7 +90,7 @@ class CaseReader {
     for (const Value& entry : bones.items()) read_bone(entry);
     if (out_.bones.empty()) bones.fail("is empty", "list at least one bone");
     if (out_.generic) list_segments();
-    if (const auto apart = labels ? labels->find("apart") : std::nullopt)
+    if (const auto apart = options ? labels->find("apart") : std::nullopt)
       out_.labels->apart = sources_->read_apart(*apart, out_.skeleton);
     read_regions(placed.regions);
     check_named(placed.named, out_);
@@ -135,7 +137,7 @@ class CaseReader {
   }
 
   // Where an entry's file lies: beside the case, or in the data folder where the entry says `root: data`.
-  fs::path locate(const Value& entry, const Value& file) {
+  fs::path locate(const Value& entry, const Value& file, bool folders = false) {
     fs::path base = folder_;
     if (const auto root = entry.kind() == Kind::map ? entry.find("root") : std::nullopt) {
       if (root->text() != "data")
@@ -145,6 +147,11 @@ class CaseReader {
     }
     fs::path path = base / file.text();
     std::error_code ignored;
+    if (folders && fs::is_directory(path, ignored) && !is_dicom(path)) {
+      for (const fs::path& image : images_within(path))
+        digest(image, (fs::path(file.text()) / image.filename()).string());
+      return path;
+    }
     if (!fs::is_regular_file(path, ignored)) {
       if (is_dicom(path)) refuse_dicom(path);
       throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");
@@ -323,9 +330,10 @@ class CaseReader {
   }
 
   void read_labels(const Value& entry) {
-    entry.allow(kLabelKeys);
+    if (entry.kind() != Kind::list) entry.allow(kLabelKeys);
     out_.labels = read_label_map(
-        entry, [this](const Value& e, const Value& file) { return locate(e, file); }, reading_);
+        entry, [this](const Value& e, const Value& file, bool folders) { return locate(e, file, folders); },
+        reading_, context_);
     step();
   }
 

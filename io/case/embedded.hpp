@@ -7,6 +7,8 @@ namespace ecorche::io::embedded {
 extern const char* const poses;    ///< the pose library
 extern const char* const opensim;  ///< the motion map of OpenSim's coordinates
 
+extern const char* const structures;  ///< what labels of segmentations mean
+
 // Skeleton templates.
 extern const char* const human;
 extern const char* const hand;

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
 #include "core/values/identifier.hpp"
 #include "core/values/text.hpp"
 #include "io/image/label_table.hpp"
+#include "io/image/same_grid.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -27,29 +27,6 @@ std::optional<std::int64_t> whole_number(const std::string& text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return number;
-}
-
-bool same_place(const ImageGrid& a, const ImageGrid& b) {
-  if (a.size != b.size) return false;
-  const auto close = [](double x, double y) { return std::abs(x - y) <= 1e-3; };
-  for (const auto& corner : {std::array<double, 3>{0, 0, 0},
-                             {static_cast<double>(a.size[0]), 0, 0},
-                             {0, static_cast<double>(a.size[1]), 0},
-                             {0, 0, static_cast<double>(a.size[2])}}) {
-    const auto p = a.point(corner[0], corner[1], corner[2]), q = b.point(corner[0], corner[1], corner[2]);
-    if (!close(p[0], q[0]) || !close(p[1], q[1]) || !close(p[2], q[2])) return false;
-  }
-  return true;
-}
-
-std::string described(const ImageGrid& grid) {
-  std::string out;
-  for (std::size_t a = 0; a < 3; ++a) out += (a ? " x " : "") + std::to_string(grid.size[a]);
-  out += " voxels of ";
-  for (std::size_t a = 0; a < 3; ++a) out += (a ? " x " : "") + text::number(grid.spacing[a], 6);
-  out += " mm from [";
-  for (std::size_t a = 0; a < 3; ++a) out += (a ? ", " : "") + text::number(grid.origin[a], 6);
-  return out + "]";
 }
 
 // The name of the table that `word` means: itself, else the one that is the same identifier, as names out of

@@ -11,6 +11,7 @@
 #include "core/values/identifier.hpp"
 #include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
+#include "io/image/label_json.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -46,7 +47,7 @@ class TableReader {
       }
     } else {
       fields::refuse(path_, "'" + ending + "' tables cannot be read",
-                     "use .ctbl, .tsv, or .txt as ITK-SNAP writes it");
+                     "use .ctbl, .tsv, .json, or .txt as ITK-SNAP writes it");
     }
     if (names_.empty()) fields::refuse(path_, "names no label", "give a table of labels");
     names_.erase(0);
@@ -166,6 +167,7 @@ LabelNames make_identifiers(const std::map<std::int64_t, std::string>& names) {
 }
 
 LabelNames read_label_table(const Path& path) {
+  if (text::lower(path.extension().string()) == ".json") return make_identifiers(read_label_json(path).names);
   return TableReader(path).read();
 }
 

@@ -13,6 +13,8 @@
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/nifti_names.hpp"
+#include "io/image/terminology.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -24,7 +26,18 @@ struct Segment {
   std::string name;
   std::int64_t value = 1;
   std::int64_t layer = 0;
+  std::optional<SegmentCodes> code;
 };
+
+// `Segment0_Tags` holds `key:value|key:value|`; newer files may have the entry under a key of its own.
+std::optional<SegmentCodes> code_of(const std::string* tags, const std::string* entry) {
+  if (entry != nullptr) return parse_terminology(*entry);
+  constexpr std::string_view key = "TerminologyEntry:";
+  const std::size_t at = tags == nullptr ? std::string::npos : tags->find(key);
+  if (at == std::string::npos) return std::nullopt;
+  const std::string_view rest = std::string_view(*tags).substr(at + key.size());
+  return parse_terminology(rest.substr(0, rest.find('|')));
+}
 
 // From `Segment<i>_Name`, `_ID`, `_LabelValue` and `_Layer`, in the order of i. Files older than layers have
 // one component a segment and neither value nor layer.
@@ -39,6 +52,7 @@ std::vector<Segment> read_segments(const std::map<std::string, std::string>& key
     Segment segment;
     const std::string* name = value_of(i, "Name");
     segment.name = name != nullptr ? *name : *value_of(i, "ID");
+    segment.code = code_of(value_of(i, "Tags"), value_of(i, "TerminologyEntry"));
     segment.layer = layers > 1 ? static_cast<std::int64_t>(i) : 0;
     const std::string at = "Segment" + std::to_string(i);
     constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
@@ -120,6 +134,8 @@ void write_segmentation(const Path& path, const Segmentation& segmentation) {
       const std::string at = "Segment" + std::to_string(count++) + "_";
       keys += at + "ID:=" + name + "\n" + at + "Name:=" + name + "\n" + at +
               "LabelValue:=" + std::to_string(id) + "\n" + at + "Layer:=" + std::to_string(layer) + "\n";
+      if (const auto codes = segmentation.codes.find(id); codes != segmentation.codes.end())
+        keys += at + "Tags:=TerminologyEntry:" + terminology_entry(codes->second) + "|\n";
       break;
     }
   }
@@ -139,7 +155,9 @@ Segmentation read_segmentation(const Path& path, const files::ReadOptions& optio
   if (segments.empty() && image.components != 1) {
     refuse(path,
            "labels are " + std::string(scalar_name(image.type)) + " x " + std::to_string(image.components),
-           "labels are whole numbers, one a voxel");
+           image.components == 3 || image.components == 4
+               ? "it is a picture in colours: save the label map itself, one whole number a voxel"
+               : "labels are whole numbers, one a voxel");
   }
   std::map<std::int64_t, std::string> names;
   std::set<std::tuple<std::int64_t, std::int64_t>> seen;
@@ -151,6 +169,10 @@ Segmentation read_segmentation(const Path& path, const files::ReadOptions& optio
   Segmentation out;
   if (image.components == 1) {
     out.layers.push_back(std::move(image));
+    if (segments.empty()) names = read_nifti_names(path);
+    for (const Segment& segment : segments) {
+      if (segment.code) out.codes.emplace(segment.value, *segment.code);
+    }
     out.names = make_identifiers(names);
     return out;
   }
@@ -164,6 +186,7 @@ Segmentation read_segmentation(const Path& path, const files::ReadOptions& optio
     const auto id = static_cast<std::uint16_t>(unique ? segments[i].value : static_cast<std::int64_t>(i) + 1);
     ids[static_cast<std::size_t>(segments[i].layer)].emplace(segments[i].value, id);
     names.emplace(id, segments[i].name);
+    if (segments[i].code) out.codes.emplace(id, *segments[i].code);
   }
   for (int layer = 0; layer < image.components; ++layer)
     out.layers.push_back(renumber(take_layer(image, layer), ids[static_cast<std::size_t>(layer)]));

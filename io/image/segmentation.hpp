@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// 3D Slicer's segmentations: a NRRD that names its own segments, in layers where they overlap.
+// Segmentations that name their own segments, in layers where they overlap: 3D Slicer's NRRD, DICOM SEG.
 #pragma once
 
 #include <filesystem>
@@ -10,6 +10,7 @@
 #include "core/files/read_options.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/nifti_form.hpp"
+#include "io/image/segment_codes.hpp"
 
 namespace ecorche::io {
 
@@ -19,13 +20,20 @@ struct Segmentation {
   /// layer.
   std::vector<Image> layers;
   LabelNames names;  ///< empty where the file names no segment
+  /// Of DICOM SEG, whose segments keep their numbers as ids, and of a `.seg.nrrd` with terminology.
+  std::map<std::int64_t, SegmentCodes> codes = {};
+  /// Which share voxels. Nothing is lost: each segment lies whole in the first layer where it has room, in
+  /// the file's order, so that of two that overlap the earlier one lies in the earlier layer. Whoever wants
+  /// one map takes the first layer that is not 0.
+  std::vector<LabelOverlap> overlaps = {};
 };
 
 /// Reads any image that `read_image` reads as labels. Of a NRRD with `Segment0_Name`, ... the segments are
-/// named (by `make_identifiers`), and components are layers. Where two segments of different layers share a
-/// value, all are numbered anew from 1 in the file's order (u16), and values of no segment are dropped: an id
-/// means one thing. Throws Error{missing_input} or Error{data}: voxels that are no whole numbers, several
-/// components that are no layers, a segment whose layer is not there.
+/// named (by `make_identifiers`) and coded (terminology.hpp), and components are layers; of a NIfTI its
+/// header extension names them (nifti_names.hpp). Where two segments of different layers share a value, all
+/// are numbered anew from 1 in the file's order (u16), and values of no segment are dropped: an id means one
+/// thing. Throws Error{missing_input} or Error{data}: voxels that are no whole numbers, several components
+/// that are no layers, a segment whose layer is not there.
 Segmentation read_segmentation(const std::filesystem::path& path, const files::ReadOptions& options = {},
                                NiftiForm form = NiftiForm::either);
 

@@ -134,7 +134,26 @@ def schema():
     return "\n".join(out).rstrip()
 
 
-TABLES = {"metrics": metrics, "limits_hit": limits_hit, "exit_codes": exit_codes, "status_codes": status_codes, "schema": schema}
+def structures():
+    """io/case/data/structures.txt: what labels become."""
+    words = {"body": "the body, inside the skin", "shell": "the skin alone", "nothing": "left out"}
+    out = ["| structure | becomes | SNOMED CT | other names |", "|---|---|---|---|"]
+    for line in source("io/case/data/structures.txt").splitlines():
+        if not line or line.startswith("#"):
+            continue
+        name, becomes, code, *also = (cell.strip() for cell in line.split("|"))
+        kind, _, rest = becomes.partition(" ")
+        if kind == "bone":
+            becomes = f"bone of `{rest.replace('_*', '_left`, `' + rest.replace('_*', '_right'))}`"
+        elif kind == "background":
+            becomes = f"{rest}, behind others"
+        becomes = words.get(becomes, becomes)
+        coarse = " (coarse)" if name.startswith("~") else ""
+        out.append(f"| `{name.lstrip('~')}`{coarse} | {becomes} | {code} | {', '.join(f'`{word}`' for word in ' '.join(also).split())} |")
+    return "\n".join(out)
+
+
+TABLES = {"structures": structures, "metrics": metrics, "limits_hit": limits_hit, "exit_codes": exit_codes, "status_codes": status_codes, "schema": schema}
 
 
 def filled(text):

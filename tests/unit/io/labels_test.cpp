@@ -212,5 +212,64 @@ TEST(CaseLabels, TablesComeFromFilesOrFromTheImage) {
   EXPECT_EQ(again.labels->overlaps[0].bytes, layered.labels->overlaps[0].bytes);
 }
 
+TEST(CaseLabels, SeveralMapsHaveAnOrder) {
+  const Scratch scratch;
+  write_case(scratch.path(), small_case(), Context{});
+  const std::string head =
+      "name: a\nskeleton: skeleton.yaml\nskin: skin.stl\nbones:\n  - {name: pelvis_bone, file: "
+      "bones/pelvis_bone.stl, segment: pelvis}\n";
+  const auto read = [&](const std::string& labels) {
+    return read_case(scratch.put("case.yaml", head + "labels: " + labels + "\n"), {scratch.path(), ""},
+                     Context{});
+  };
+  const auto put = [&](const std::string& name, std::vector<std::uint8_t> voxels, double spacing = 1) {
+    ImageGrid grid;
+    grid.size = {static_cast<std::int32_t>(voxels.size()), 1, 1};
+    grid.spacing[0] = spacing;
+    Image image(grid, ScalarType::u8);
+    std::copy(voxels.begin(), voxels.end(), image.scalars<std::uint8_t>().begin());
+    std::filesystem::create_directories((scratch / name).parent_path());
+    write_image(scratch / name, image);
+  };
+  put("a.nrrd", {0, 1, 2, 0});
+  put("b.nrrd", {1, 1, 1, 0});
+  put("coarse.nrrd", {3, 4}, 2);
+  put("masks/liver.nii.gz", {0, 1, 0, 1});
+  put("masks/spleen.nii.gz", {0, 0, 0, 0});
+  const auto voxels = [](const Case& patient) {
+    const auto v = patient.labels->image.scalars<std::uint16_t>();
+    return std::vector<int>(v.begin(), v.end());
+  };
+  const std::string a = "{file: a.nrrd, table: {1: femur, 2: tibia}}", b = "{file: b.nrrd, table: {1: body}}";
+  const Case two = read("[" + a + ", " + b + "]");
+  EXPECT_EQ(two.labels->table, (LabelNames{{1, "femur"}, {2, "tibia"}, {3, "body"}}));
+  EXPECT_EQ(voxels(two), (std::vector<int>{3, 1, 2, 0}));
+  EXPECT_EQ(voxels(read("[" + b + ", " + a + "]")), (std::vector<int>{1, 1, 1, 0}));
+  EXPECT_EQ(voxels(read("{maps: [" + a + ", " + b + "], mid_plane_mm: 0}")), (std::vector<int>{3, 1, 2, 0}));
+  EXPECT_EQ(voxels(read("[{file: a.nrrd, table: {1: femur, 2: tibia}, except: [femur]}, " + b + "]")),
+            (std::vector<int>{2, 2, 1, 0}));
+  const Case folder = read("[{file: masks}, " + b + "]");
+  EXPECT_EQ(folder.labels->table, (LabelNames{{1, "liver"}, {2, "body"}}));
+  EXPECT_EQ(voxels(folder), (std::vector<int>{2, 1, 2, 1}));
+  EXPECT_TRUE(folder.input_digests.contains("masks/spleen.nii.gz"));
+  // What lies on another grid is refused, or resampled by request.
+  const std::string coarse = "{file: coarse.nrrd, table: {3: hip, 4: skin_fold}";
+  expect_error(
+      ErrorKind::config,
+      "case.yaml:6:labels[1]: its voxels are not those of the first label map: 2 x 1 x 1 voxels of 2 x 1 x 1 "
+      "mm "
+      "from [0, 0, 0], not 4 x 1 x 1 voxels of 1 x 1 x 1 mm from [0, 0, 0] (say resample: nearest here",
+      [&] { read("[" + a + ", " + coarse + "}]"); });
+  EXPECT_EQ(voxels(read("[" + a + ", " + coarse + ", resample: nearest}]")), (std::vector<int>{3, 1, 2, 0}));
+  const auto refused = [&](const std::string& labels, const std::string& what) {
+    expect_error(ErrorKind::config, what, [&] { read(labels); });
+  };
+  refused("[]", "case.yaml:6:labels: lists no label map, or more than 64 (list 1 to 64)");
+  refused("[{file: a.nrrd, table: {1: femur}, except: [femr]}]", "did you mean 'femur'?");
+  refused("{file: a.nrrd, maps: [" + a + "]}", "stands beside maps");
+  refused("[{file: masks, table: {1: x}}]", "does not apply to a folder");
+  refused("[{file: a.nrrd, table: {1: femur}, gap: 1}]", "gap");
+}
+
 }  // namespace
 }  // namespace ecorche::io

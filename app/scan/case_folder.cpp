@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/scan/case_folder.hpp"
+
+#include <algorithm>
+
+#include "app/scan/case_text.hpp"
+#include "app/scan/scan_picture.hpp"
+#include "core/files/atomic_file.hpp"
+#include "core/values/identifier.hpp"
+#include "io/image/image_file.hpp"
+
+namespace ecorche::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPicturePixels = 720;
+
+// A byte a voxel is enough for most.
+Image narrow(const Image& labels, std::size_t most) {
+  if (most > 255) return labels;
+  Image out(labels.grid, ScalarType::u8);
+  const auto from = labels.scalars<std::uint16_t>();
+  std::transform(from.begin(), from.end(), out.scalars<std::uint8_t>().begin(),
+                 [](std::uint16_t v) { return static_cast<std::uint8_t>(v); });
+  return out;
+}
+
+}  // namespace
+
+void check_case_target(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  std::error_code ignored;
+  for (const fs::path& input : inputs) {
+    if (fs::equivalent(input, folder, ignored))
+      throw Error(ErrorKind::usage, "--output", "'" + folder.string() + "' holds the input",
+                  "name another folder");
+  }
+  if (!fs::exists(folder, ignored)) return;
+  if (!fs::is_directory(folder, ignored))
+    throw Error(ErrorKind::cannot_create, folder.string(), "is a file", "name a folder with -o");
+  if (!fs::is_empty(folder, ignored))
+    throw Error(ErrorKind::cannot_create, folder.string(), "holds files",
+                "name a new or empty folder with -o");
+}
+
+WrittenCase write_scan_case(const fs::path& folder, const std::vector<fs::path>& inputs, const Scan& scan,
+                            const ScanCase& made, const Context& context) {
+  files::make_folder(folder);
+  io::write_image(folder / "labels.nrrd", narrow(made.labels, made.entries.size()));
+  context.report(0.4);
+  std::vector<CaseVolumeFile> volumes;
+  for (const ScanImage& image : scan.images) {
+    std::string name = image.ct ? "ct" : identifier_from(image.path.filename().stem().stem().string(), 40);
+    if (name.empty() || name == "labels" || name.starts_with("labels_")) name = "image";
+    const std::string first = name;
+    for (int number = 2;
+         std::any_of(volumes.begin(), volumes.end(), [&](const CaseVolumeFile& v) { return v.name == name; });
+         ++number)
+      name = first + "_" + std::to_string(number);
+    const std::string file = name + ".nrrd";
+    io::write_image(folder / file, image.image);
+    volumes.push_back({name, file, image.background});
+  }
+  context.report(0.9);
+  files::write_text(folder / "picture.png", report::png_bytes(both_views(made, kPicturePixels)));
+  std::vector<std::string> from;
+  for (const fs::path& input : inputs)
+    from.push_back(input.filename().empty() ? input.parent_path().filename().string()
+                                            : input.filename().string());
+  fs::path clean = folder.lexically_normal();
+  if (clean.filename().empty()) clean = clean.parent_path();
+  std::string name = identifier_from(clean.filename().string());
+  if (name.empty()) name = "patient";
+  files::write_text(folder / "case.yaml", case_text(made, name, clean.string(), from, volumes));
+  context.report(1);
+  return {name};
+}
+
+}  // namespace ecorche::app

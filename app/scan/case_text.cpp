@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/scan/case_text.hpp"
+
+#include <algorithm>
+
+#include "core/values/text.hpp"
+#include "io/case/yaml_text.hpp"
+
+namespace ecorche::app {
+namespace {
+
+using io::yaml::write_text;
+using Role = ScanEntry::Role;
+
+// One line of a comment: what stands in files is a stranger's.
+std::string plain(std::string_view text) {
+  std::string out;
+  for (const char c : text) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+  return out;
+}
+
+std::string comments(const char* title, const std::vector<std::string>& lines) {
+  if (lines.empty()) return {};
+  std::string out = std::string("#\n# ") + title + "\n";
+  for (const std::string& line : lines) out += "#   " + plain(line) + "\n";
+  return out;
+}
+
+std::string sure(const ScanEntry& entry) {
+  std::string out = "  # " + text::number(entry.confidence, 2) + ": " + plain(entry.how);
+  if (!entry.cut.empty()) out += "; cut by the " + text::joined(entry.cut, " and ") + " border";
+  return out + "\n";
+}
+
+}  // namespace
+
+std::string case_text(const ScanCase& scan, const std::string& name, const std::string& folder,
+                      const std::vector<std::string>& from, const std::vector<CaseVolumeFile>& volumes) {
+  std::string out = "# Written by `ecorche new` from " + plain(text::joined(from)) + ".\n" +
+                    "# Behind each line stands how sure it is, from 0 to 1, and why. picture.png shows it. "
+                    "Change what you know\n"
+                    "# better (docs/reference/case.md), then:\n#   ecorche check " +
+                    plain(folder) + "\n#   ecorche preprocess " + plain(folder) + " -o " + plain(folder) +
+                    ".hdf\n";
+  out += comments("To be looked at:", scan.doubts);
+  out += comments("Also:", scan.notes);
+  out += "name: " + write_text(name) + "\nskeleton: human\nlabels:\n  file: labels.nrrd\n  table:\n";
+  for (std::size_t e = 0; e < scan.entries.size(); ++e) {
+    if (scan.entries[e].voxels > 0)
+      out += "    " + std::to_string(e + 1) + ": " + write_text(scan.entries[e].name) + "\n";
+  }
+  out += "# " + text::number(scan.skin.confidence, 2) + ": " + plain(scan.skin.how) + "\n";
+  if (!scan.skin.caps.empty()) {
+    out += "# The image ends within the body, where the skin is cut flat. These caps are no skin:\n";
+    for (const std::string& cap : scan.skin.caps) out += "#   " + plain(cap) + "\n";
+  }
+  out += "skin: {labels: all}\nbones:\n";
+  for (const ScanEntry& entry : scan.entries) {
+    if (entry.role != Role::bone || !entry.drawn || entry.voxels == 0) continue;
+    out += "  - {name: " + entry.name + ", labels: [" + entry.name + "], segment: " + entry.segment + "}" +
+           sure(entry);
+  }
+  std::string tissues;
+  for (const ScanEntry& entry : scan.entries) {
+    if (entry.role != Role::tissue || !entry.drawn || entry.voxels == 0) continue;
+    tissues += "  - {name: " + entry.name + ", labels: [" + entry.name +
+               "], group: " + std::string(group_name(entry.group)) + "}" + sure(entry);
+  }
+  if (!tissues.empty()) out += "tissues:\n" + tissues;
+  if (!volumes.empty()) out += "volumes:\n";
+  for (const CaseVolumeFile& volume : volumes)
+    out += "  - {name: " + volume.name + ", file: " + write_text(volume.file) +
+           ", background: " + io::yaml::write_number(volume.background) + "}\n";
+  return out;
+}
+
+}  // namespace ecorche::app

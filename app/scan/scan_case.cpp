@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/scan/scan_case.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "app/scan/label_names.hpp"
+#include "app/scan/scan_borders.hpp"
+#include "app/scan/scan_sides.hpp"
+#include "core/values/text.hpp"
+#include "io/image/same_grid.hpp"
+#include "preprocess/scan/ct_body.hpp"
+#include "preprocess/scan/pieces.hpp"
+
+namespace ecorche::app {
+namespace {
+
+using io::Structure;
+using Becomes = Structure::Becomes;
+using Role = ScanEntry::Role;
+
+constexpr std::size_t kMostEntries = 65534;
+constexpr std::size_t kLeastVoxels = 20;  // of anything that becomes a surface
+constexpr double kSpeckShare = 0.01;      // of a structure's voxels: smaller pieces are specks
+constexpr double kCovered = 0.35;         // a structure that keeps less of itself is another one's
+constexpr double kBare = 0.1;             // share of bone that may lie outside of a body's label
+
+std::string place(const std::array<double, 3>& p) {
+  return "[" + text::number(p[0], 4) + ", " + text::number(p[1], 4) + ", " + text::number(p[2], 4) + "]";
+}
+
+class Decider {
+ public:
+  Decider(Scan& scan, const ScanOptions& options, const Context& context)
+      : scan_(scan), options_(options), context_(context) {}
+
+  ScanCase decide() {
+    out_.notes = scan_.notes;
+    if (scan_.labels.empty())
+      throw Error(ErrorKind::data, scan_.images.front().path.string(), "comes without labels",
+                  "segment it first (TotalSegmentator, MOOSE, 3D Slicer), and give the label maps with it");
+    on_one_grid();
+    names_ = name_labels(scan_);
+    merge();
+    context_.report(0.3);
+    drop_covered();
+    take_specks_off();
+    give_sides(out_, names_.named, pieces_, options_.side);
+    context_.report(0.6);
+    find_skin();
+    context_.report(0.9);
+    finish();
+    return std::move(out_);
+  }
+
+ private:
+  // That of the finest map.
+  void on_one_grid() {
+    const auto volume = [](const ScanLabels& l) {
+      const ImageGrid& g = l.map.layers.front().grid;
+      return g.spacing[0] * g.spacing[1] * g.spacing[2];
+    };
+    const auto finest =
+        std::min_element(scan_.labels.begin(), scan_.labels.end(),
+                         [&](const ScanLabels& a, const ScanLabels& b) { return volume(a) < volume(b); });
+    grid_ = finest->map.layers.front().grid;
+    for (ScanLabels& labels : scan_.labels) {
+      const ImageGrid own = labels.map.layers.front().grid;
+      if (io::same_place(own, grid_)) continue;
+      out_.doubts.push_back(labels.path.filename().string() + " has a grid of its own, " +
+                            io::described(own) + ": it is resampled by nearest neighbour to that of " +
+                            finest->path.filename().string());
+      for (Image& layer : labels.map.layers) layer = io::resampled_nearest(layer, grid_);
+    }
+  }
+
+  void merge() {
+    const std::size_t count = names_.named.size();
+    if (count > kMostEntries)
+      throw Error(ErrorKind::data, "labels", "there are more than 65534", "leave some out");
+    out_.labels = Image(grid_, ScalarType::u16);
+    const auto to = out_.labels.scalars<std::uint16_t>();
+    std::vector<std::uint8_t> rank(to.size(), 255);
+    body_.assign(to.size(), 0);
+    original_.assign(count, 0);
+    for (std::size_t m = 0; m < scan_.labels.size(); ++m) {
+      for (const Image& layer : scan_.labels[m].map.layers) {
+        context_.check_stop();
+        with_scalar_type(layer.type, [&](auto zero) {
+          merge_layer(layer.scalars<decltype(zero)>(), names_.of_map[m], to, rank);
+        });
+      }
+      scan_.labels[m].map.layers.clear();  // its memory is not needed any more
+    }
+    for (const Named& named : names_.named) {
+      ScanEntry entry;
+      entry.name = named.name;
+      entry.how = named.how;
+      entry.confidence = named.confidence;
+      entry.group = named.group;
+      const Becomes becomes = named.structure != nullptr ? named.structure->becomes : Becomes::tissue;
+      if (becomes == Becomes::bone) {
+        entry.role = Role::bone;
+        entry.segment = named.structure->segment;
+        if (named.structure->sided && named.side != Side::both)
+          entry.segment += named.side == Side::left ? "_left" : "_right";
+      } else if (becomes == Becomes::body || becomes == Becomes::shell) {
+        entry.role = Role::body;
+        entry.drawn = false;
+      }
+      out_.entries.push_back(std::move(entry));
+    }
+    recount();
+  }
+
+  template <class T>
+  void merge_layer(std::span<const T> from, const std::map<std::int64_t, std::size_t>& entries,
+                   std::span<std::uint16_t> to, std::vector<std::uint8_t>& rank) {
+    T last{};
+    std::size_t entry = LabelNames::no_entry;
+    std::uint8_t own = 255;
+    bool body = false;
+    for (std::size_t v = 0; v < from.size(); ++v) {
+      if (from[v] == T{}) continue;
+      if (from[v] != last) {
+        last = from[v];
+        const auto found = entries.find(static_cast<std::int64_t>(last));
+        entry = found == entries.end() ? LabelNames::no_entry : found->second;
+        if (entry == LabelNames::no_entry) continue;
+        own = static_cast<std::uint8_t>(names_.named[entry].rank);
+        body = own >= 8;
+      }
+      if (entry == LabelNames::no_entry) continue;
+      ++original_[entry];
+      if (body) body_[v] = 1;
+      if (own >= rank[v]) continue;
+      rank[v] = own;
+      to[v] = static_cast<std::uint16_t>(entry + 1);
+    }
+  }
+
+  void recount() {
+    for (ScanEntry& entry : out_.entries) entry.voxels = 0;
+    for (const std::uint16_t id : std::as_const(out_.labels).scalars<std::uint16_t>()) {
+      if (id != 0) ++out_.entries[id - 1U].voxels;
+    }
+  }
+
+  // Voxels of entries for which `gone` is not 0 become the body's, where there is one, else nothing.
+  void erase(const std::vector<std::uint8_t>& gone) {
+    std::uint16_t body = 0;
+    for (std::size_t e = 0; e < out_.entries.size(); ++e) {
+      if (out_.entries[e].role == Role::body && body == 0) body = static_cast<std::uint16_t>(e + 1);
+    }
+    std::size_t at = 0;
+    for (std::uint16_t& id : out_.labels.scalars<std::uint16_t>()) {
+      if (id != 0 && gone[id - 1U] != 0) id = body_[at] != 0 ? body : std::uint16_t{0};
+      ++at;
+    }
+  }
+
+  void drop_covered() {
+    std::vector<std::uint8_t> gone(out_.entries.size(), 0);
+    for (std::size_t e = 0; e < out_.entries.size(); ++e) {
+      const ScanEntry& entry = out_.entries[e];
+      if (entry.role == Role::body || original_[e] == 0 || names_.named[e].rank >= 5) continue;
+      if (static_cast<double>(entry.voxels) >= kCovered * static_cast<double>(original_[e])) continue;
+      gone[e] = 1;
+      left_out_[e] = "finer labels cover it";
+    }
+    erase(gone);
+    recount();
+  }
+
+  void take_specks_off() {
+    std::vector<std::uint8_t> wanted(out_.entries.size() + 1, 0);
+    for (std::size_t e = 0; e < out_.entries.size(); ++e) wanted[e + 1] = out_.entries[e].drawn ? 1 : 0;
+    pieces_ = scan::find_pieces(out_.labels, wanted, context_.quiet());
+    std::vector<std::uint8_t> speck(pieces_.pieces.size(), 0);
+    struct Count {
+      std::size_t pieces = 0, voxels = 0;
+      std::array<double, 3> first{0, 0, 0};
+    };
+    std::vector<Count> specks(out_.entries.size());
+    for (std::size_t p = 0; p < speck.size(); ++p) {
+      const scan::Piece& piece = pieces_.pieces[p];
+      const std::size_t e = piece.id - 1U;
+      if (static_cast<double>(piece.voxels) >= kSpeckShare * static_cast<double>(out_.entries[e].voxels))
+        continue;
+      speck[p] = 1;
+      if (specks[e].pieces++ == 0) specks[e].first = piece.centre;
+      specks[e].voxels += piece.voxels;
+    }
+    std::uint16_t body = 0;
+    for (std::size_t e = 0; e < out_.entries.size() && body == 0; ++e)
+      body = out_.entries[e].role == Role::body ? static_cast<std::uint16_t>(e + 1) : std::uint16_t{0};
+    const auto voxels = out_.labels.scalars<std::uint16_t>();
+    for (const scan::Run& run : pieces_.runs) {
+      if (speck[run.piece] == 0) continue;
+      const std::size_t begin = grid_.offset(run.begin, run.j, run.k);
+      for (std::size_t v = begin; v < begin + static_cast<std::size_t>(run.end - run.begin); ++v)
+        voxels[v] = body_[v] != 0 ? body : std::uint16_t{0};
+    }
+    for (std::size_t e = 0; e < specks.size(); ++e) {
+      if (specks[e].pieces == 0) continue;
+      out_.notes.push_back(out_.entries[e].name + ": " + std::to_string(specks[e].pieces) +
+                           (specks[e].pieces == 1 ? " speck" : " specks") + " of " +
+                           std::to_string(specks[e].voxels) + " voxels in all taken off, the first at " +
+                           place(specks[e].first));
+    }
+    // Pieces that are gone must not count below.
+    for (std::size_t p = 0; p < speck.size(); ++p) {
+      if (speck[p] != 0) pieces_.pieces[p].voxels = 0;
+    }
+    recount();
+  }
+
+  void find_skin() {
+    const auto labels = std::as_const(out_.labels).scalars<std::uint16_t>();
+    std::size_t bone = 0, bare = 0;
+    for (std::size_t v = 0; v < labels.size(); ++v) {
+      if (labels[v] == 0 || out_.entries[labels[v] - 1U].role != Role::bone) continue;
+      ++bone;
+      bare += body_[v] == 0 ? 1 : 0;
+    }
+    if (bone == 0)
+      throw Error(ErrorKind::data, scan_.labels.front().path.string(), "no label of a bone is known",
+                  "see the names that are known in docs/reference/structures.md, or write the case by hand");
+    bool body = false, shell = false;
+    for (std::size_t e = 0; e < out_.entries.size(); ++e) {
+      if (out_.entries[e].role != Role::body || original_[e] == 0) continue;
+      (names_.named[e].structure->becomes == Becomes::shell ? shell : body) = true;
+    }
+    if (body && static_cast<double>(bare) <= kBare * static_cast<double>(bone)) {
+      out_.skin = {"round the label of the body", 1, {}};
+      return;
+    }
+    if (shell && closes_round_bones(bone)) {
+      out_.skin = {"round the label of the skin, a shell, with what it encloses", 0.8, {}};
+      return;
+    }
+    if (body)
+      out_.doubts.push_back(
+          "the body's label leaves " +
+          std::to_string(std::lround(100.0 * static_cast<double>(bare) / static_cast<double>(bone))) +
+          " % of the bones outside: it is not used for the skin");
+    if (from_ct()) return;
+    const double exposed = exposed_bone();
+    if (exposed < 0.05) {
+      out_.skin = {"round all that is labelled", exposed < 0.01 ? 0.9 : 0.6, {}};
+      return;
+    }
+    throw Error(ErrorKind::data, scan_.labels.front().path.string(),
+                "nothing says where the skin is: " + std::to_string(std::lround(100 * exposed)) +
+                    " % of the outside of all that is labelled is bone",
+                "give the CT too, or a label of the whole body (TotalSegmentator -ta body), before or after "
+                "these files");
+  }
+
+  // Whether what all labels enclose holds the bones well inside: a shell is closed.
+  bool closes_round_bones(std::size_t) const { return exposed_bone() < 0.05; }
+
+  // The share of bone among the faces between labelled voxels and those that are not, without the image's
+  // borders.
+  double exposed_bone() const {
+    const auto labels = out_.labels.scalars<std::uint16_t>();
+    std::size_t faces = 0, bones = 0;
+    const auto& n = grid_.size;
+    const std::array<std::size_t, 3> step{1, static_cast<std::size_t>(n[0]),
+                                          static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1])};
+    std::size_t at = 0;
+    for (int k = 0; k < n[2]; ++k) {
+      for (int j = 0; j < n[1]; ++j) {
+        for (int i = 0; i < n[0]; ++i, ++at) {
+          const std::array<int, 3> index{i, j, k};
+          for (std::size_t a = 0; a < 3; ++a) {
+            if (index[a] + 1 == n[a]) continue;
+            const std::uint16_t here = labels[at], there = labels[at + step[a]];
+            if ((here == 0) == (there == 0)) continue;
+            ++faces;
+            bones += out_.entries[std::max(here, there) - 1U].role == Role::bone ? 1 : 0;
+          }
+        }
+      }
+    }
+    return faces == 0 ? 1 : static_cast<double>(bones) / static_cast<double>(faces);
+  }
+
+  bool from_ct() {
+    const auto ct =
+        std::find_if(scan_.images.begin(), scan_.images.end(), [](const ScanImage& i) { return i.ct; });
+    if (ct == scan_.images.end()) return false;
+    std::vector<std::uint8_t> known(grid_.voxels(), 0);
+    const auto labels = out_.labels.scalars<std::uint16_t>();
+    for (std::size_t v = 0; v < known.size(); ++v) known[v] = labels[v] != 0 ? 1 : 0;
+    const Image* image = &ct->image;
+    Image placed;
+    if (!io::same_place(ct->image.grid, grid_)) {
+      placed = io::resampled_nearest(ct->image, grid_);
+      image = &placed;
+    }
+    const scan::CtBody body =
+        scan::find_body(*image, options_.skin_hu, options_.bridge_mm, known, context_.quiet());
+    ScanEntry entry;
+    entry.name = "body";
+    entry.role = Role::body;
+    entry.drawn = false;
+    entry.how = "denser than " + text::number(options_.skin_hu) + " HU in the CT";
+    entry.confidence = 0.8;
+    for (int number = 2; std::any_of(out_.entries.begin(), out_.entries.end(),
+                                     [&](const ScanEntry& e) { return e.name == entry.name; });
+         ++number)
+      entry.name = "body_" + std::to_string(number);
+    out_.entries.push_back(entry);
+    const auto id = static_cast<std::uint16_t>(out_.entries.size());
+    for (std::size_t v = 0; v < labels.size(); ++v) {
+      if (body.inside[v] == 0) continue;
+      body_[v] = 1;
+      if (labels[v] == 0) labels[v] = id;
+    }
+    std::string how = "round what is denser than " + text::number(options_.skin_hu) + " HU in " +
+                      ct->path.filename().string();
+    if (body.taken_off_ml >= 1)
+      how += ", without " + text::number(body.taken_off_ml) +
+             " ml that are no part of the patient (table, clothes)";
+    out_.skin = {how, 0.8, {}};
+    return true;
+  }
+
+  // What became of each label; what is too small goes; what the borders cut is told.
+  void finish() {
+    recount();
+    std::vector<std::uint8_t> gone(out_.entries.size(), 0);
+    for (std::size_t e = 0; e < out_.entries.size(); ++e) {
+      const ScanEntry& entry = out_.entries[e];
+      if (!entry.drawn || entry.voxels >= kLeastVoxels) continue;
+      gone[e] = 1;
+      if (left_out_.contains(e) || sides_given(e)) continue;
+      left_out_[e] = "only " + std::to_string(entry.voxels) + " voxels of it are there";
+      out_.notes.push_back(entry.name + ": only " + std::to_string(entry.voxels) +
+                           " voxels of it are there: it is left out");
+    }
+    erase(gone);
+    for (std::size_t e = 0; e < gone.size(); ++e) {
+      if (gone[e] != 0) out_.entries[e].drawn = false;
+    }
+    recount();
+    tell_borders(out_, context_.quiet());
+    tell_missing(out_);
+    out_.fates = std::move(names_.fates);
+    for (std::size_t m = 0; m < names_.of_map.size(); ++m) {
+      for (const auto& [id, e] : names_.of_map[m]) {
+        if (e == LabelNames::no_entry) continue;
+        LabelFate& fate = out_.fates[names_.fate_of[m].at(id)];
+        fate.became = left_out_.contains(e) ? "left out: " + left_out_.at(e) : became(e);
+      }
+    }
+    if (std::none_of(out_.entries.begin(), out_.entries.end(),
+                     [](const ScanEntry& e) { return e.role == Role::bone && e.drawn; }))
+      throw Error(ErrorKind::data, scan_.labels.front().path.string(), "no bone is left",
+                  "see the notes above, and give --side where one limb alone was scanned");
+  }
+
+  // An entry without a side whose pieces went to those with one.
+  bool sides_given(std::size_t e) const {
+    return e < names_.named.size() && names_.named[e].structure != nullptr &&
+           names_.named[e].structure->sided && names_.named[e].side == Side::both;
+  }
+
+  std::string became(std::size_t e) const {
+    const ScanEntry& entry = out_.entries[e];
+    if (entry.role == Role::body) return "the body, for the skin";
+    if (sides_given(e)) {
+      std::string out;
+      for (const char* side : {"_left", "_right"}) {
+        const auto found = std::find_if(out_.entries.begin(), out_.entries.end(), [&](const ScanEntry& o) {
+          return o.name == entry.name + side && o.drawn && o.voxels > 0;
+        });
+        if (found != out_.entries.end()) out += (out.empty() ? "" : " and ") + found->name;
+      }
+      return out.empty() ? "left out: its side cannot be told" : out + ", bones";
+    }
+    if (entry.role == Role::bone) return entry.name + ", bone of " + entry.segment;
+    return entry.name + ", " + std::string(group_name(entry.group));
+  }
+
+  Scan& scan_;
+  const ScanOptions& options_;
+  const Context& context_;
+  ScanCase out_;
+  ImageGrid grid_;
+  LabelNames names_;
+  scan::Pieces pieces_;
+  std::vector<std::uint8_t> body_;     // of each voxel: a label of the body covers it
+  std::vector<std::size_t> original_;  // voxels of each entry before others were put over it
+  std::map<std::size_t, std::string> left_out_;
+};
+
+}  // namespace
+
+ScanCase decide(Scan& scan, const ScanOptions& options, const Context& context) {
+  return Decider(scan, options, context).decide();
+}
+
+}  // namespace ecorche::app

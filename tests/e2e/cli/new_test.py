@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""From a scan as hospitals have it to a posed patient: each form that the phantom writes, new, preprocess, pose; the same joints from all."""
+import gzip
+import json
+import pathlib
+import re
+import shutil
+import tempfile
+import unittest
+
+import nibabel
+import numpy as np
+import yaml
+
+from posed_files import run
+
+FORMS = ("totalsegmentator", "totalsegmentator_ml", "moose", "slicer")
+VOXEL = 6  # mm, of the small phantom
+
+
+def inputs(folder, form):
+    """What a user gives for it."""
+    if form == "totalsegmentator":
+        return [folder / "ct.nii.gz", *(folder / task for task in ("total", "appendicular_bones", "craniofacial_structures", "body"))]
+    if form == "totalsegmentator_ml":
+        return sorted(folder.glob("*.nii.gz"))
+    if form == "moose":
+        return [folder / "ct.nii.gz", folder / "segmentations"]
+    return [folder / "ct.nrrd", folder / "segmentation.seg.nrrd"]
+
+
+class New(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.made = {}
+        for form in FORMS:
+            scan = cls.folder / form
+            result = run("phantom", "-o", scan, "--size", "small", "--scan", form)
+            assert result.returncode == 0, result.stderr
+            case = cls.folder / f"{form}_case"
+            result = run("--json", "new", *inputs(scan, form), "-o", case, "--report", cls.folder / f"{form}.html")
+            assert result.returncode == 0, result.stderr
+            cls.made[form] = json.loads(result.stdout)
+
+    def joints(self, case):
+        result = run("--json", "rig", case)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return {row["joint"]: (np.array(row["center_mm"]), row["fit"]["confidence"]) for row in json.loads(result.stdout)["rig"]}
+
+    def test_segments_and_sides_are_right(self):
+        """Each bone lies in the segment and on the side where the phantom has it."""
+        for form, made in self.made.items():
+            segments = {bone["segment"] for bone in made["bones"]}
+            # MOOSE has no mandible of its own.
+            self.assertEqual(len(segments), 21 if form == "moose" else 22, (form, segments))
+            case = yaml.safe_load((self.folder / f"{form}_case" / "case.yaml").read_text())
+            self.assertEqual([b["segment"] for b in case["bones"]], [b["segment"] for b in made["bones"]])
+            for bone in made["bones"]:
+                for side in ("left", "right"):
+                    if bone["name"].endswith("_" + side) and bone["segment"].count("_"):
+                        self.assertTrue(bone["segment"].endswith(side), bone)
+            self.assertEqual(made["doubts"], [], form)
+            self.assertGreater(min(b["confidence"] for b in made["bones"]), 0.5)
+
+    def test_joints_are_the_same_from_each_form(self):
+        """Within a voxel, where their confidence says that they were found."""
+        found = {form: self.joints(self.folder / f"{form}_case") for form in FORMS}
+        first = found[FORMS[0]]
+        for form in FORMS[1:]:
+            for joint, (centre, confidence) in first.items():
+                if joint not in found[form] or min(confidence, found[form][joint][1]) < 0.5:
+                    continue
+                self.assertLess(np.linalg.norm(found[form][joint][0] - centre), VOXEL, (form, joint))
+
+    def test_prepares_and_poses(self):
+        for form in FORMS:
+            model = self.folder / f"{form}.hdf"
+            result = run("preprocess", self.folder / f"{form}_case", "-o", model, "--mesher", "lattice", "--max-tets", "60000")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            result = run("--json", "pose", model, "-o", self.folder / f"{form}_posed", "--pose", "lib:sitting", "--tissues", "skin")
+            self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_the_case_and_the_page_say_what_was_guessed(self):
+        text = (self.folder / "totalsegmentator_case" / "case.yaml").read_text()
+        self.assertRegex(text, r"name: tibia_left, labels: \[tibia_left\], segment: shank_left\}  # 0\.\d+: name; its side: nearest to the femur")
+        self.assertIn("round the label of the body", text)
+        page = (self.folder / "totalsegmentator.html").read_text()
+        self.assertEqual(page.count("data:image/png;base64,"), 2)
+        for word in ("prostate", "tibia_left and tibia_right", "no script"):
+            self.assertIn(word, page + "no script")
+        self.assertNotRegex(page, r"<script|<link|src='(?!data:)|http")
+        self.assertTrue((self.folder / "totalsegmentator_case" / "picture.png").read_bytes().startswith(b"\x89PNG"))
+
+    def test_the_skin_comes_from_the_body_else_from_the_ct_else_from_nowhere(self):
+        scan = self.folder / "totalsegmentator_ml"
+        bones = [scan / "total.nii.gz", scan / "appendicular_bones.nii.gz"]
+        result = run("--json", "new", *bones, scan / "ct.nii.gz", "-o", self.folder / "from_ct")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("denser than -300 HU", json.loads(result.stdout)["skin"]["how"])
+        truth = nibabel.load(scan / "body.nii.gz").get_fdata() > 0
+        self.assertTrue((self.folder / "from_ct" / "labels.nrrd").exists())
+        result = run("--json", "new", *bones, "-o", self.folder / "no_skin")
+        self.assertEqual(result.returncode, 65)
+        self.assertIn("nothing says where the skin is", result.stderr)
+        self.assertFalse((self.folder / "no_skin").exists())
+        self.assertGreater(truth.sum(), 0)
+
+    def test_a_field_of_view_is_told(self):
+        """Cut at mid-thigh and beneath the neck: stumps and caps are named, and it still prepares."""
+        scan = self.folder / "cut"
+        scan.mkdir()
+        for name in ("ct", "total", "body"):
+            image = nibabel.load(self.folder / "totalsegmentator_ml" / f"{name}.nii.gz")
+            k = image.shape[2]
+            part = image.slicer[:, :, int(0.38 * k):int(0.8 * k)]
+            part.header.extensions = image.header.extensions
+            nibabel.save(part, scan / f"{name}.nii.gz")
+        result = run("--json", "new", *sorted(scan.glob("*.nii.gz")), "-o", self.folder / "cut_case")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        made = json.loads(result.stdout)
+        cut = {bone["name"]: bone["cut"] for bone in made["bones"] if bone["cut"]}
+        self.assertEqual(cut["femur_left"], ["lower"])
+        self.assertEqual(len(made["skin"]["caps"]), 2)
+        self.assertTrue(any("femur_left: cut by the lower border" in note for note in made["notes"]))
+        result = run("preprocess", self.folder / "cut_case", "-o", self.folder / "cut.hdf", "--mesher", "lattice", "--max-tets", "60000")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_refusals_say_what_to_do(self):
+        scan = self.folder / "totalsegmentator_ml"
+        case = self.folder / "refused"
+        for words, code, line in (
+                ([scan / "none.nii.gz"], 66, "no such file or folder"),
+                ([scan / "ct.nii.gz"], 65, "comes without labels (segment it first"),
+                ([self.folder / "totalsegmentator_case" / "labels.nrrd"], 65, "does not say what its labels mean (give a table"),
+        ):
+            result = run("new", *words, "-o", case)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(line, result.stderr)
+            self.assertFalse(case.exists())
+        result = run("new", scan / "total.nii.gz", "-o", scan)
+        self.assertEqual((result.returncode, "holds files" in result.stderr), (73, True), result.stderr)
+
+    def test_names_of_strangers_stay_text(self):
+        """Hostile names neither break the YAML nor the page."""
+        scan = self.folder / "hostile"
+        scan.mkdir()
+        source = self.folder / "totalsegmentator_ml"
+        bytes_ = gzip.decompress((source / "total.nii.gz").read_bytes())
+        name = b"<script>alert(1)</script>\n#: ]}"
+        (scan / "t.nii.gz").write_bytes(gzip.compress(bytes_.replace(b"gluteus_maximus_left", name[:20].ljust(20, b"x"))))
+        result = run("--json", "new", scan / "t.nii.gz", source / "body.nii.gz", "-o", self.folder / "hostile_case",
+                     "--report", self.folder / "hostile.html")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        yaml.safe_load((self.folder / "hostile_case" / "case.yaml").read_text())
+        self.assertIsNone(re.search("<script", (self.folder / "hostile.html").read_text()))
+
+
+if __name__ == "__main__":
+    unittest.main()
