@@ -14,6 +14,7 @@
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/image/dicom.hpp"
+#include "io/image/dicom_image.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 
@@ -32,9 +33,10 @@ constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment"
                                                      "root", "labels", "side",    "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
                                                        "root", "labels", "side",  "within", "close_mm"};
-constexpr std::array<std::string_view, 5> kVolumeKeys{"name", "file", "background", "root", "form"};
-constexpr std::array<std::string_view, 6> kLabelKeys{"file", "table",        "root",
-                                                     "form", "mid_plane_mm", "apart"};
+constexpr std::array<std::string_view, 7> kVolumeKeys{"name", "file",   "background", "root",
+                                                      "form", "series", "phase"};
+constexpr std::array<std::string_view, 8> kLabelKeys{"file",         "table", "root",   "form",
+                                                     "mid_plane_mm", "apart", "series", "phase"};
 constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
 
 Eigen::Matrix3d parse_axes(const Value& value) {
@@ -76,7 +78,7 @@ class CaseReader {
     if (const auto plane = labels ? labels->find("mid_plane_mm") : std::nullopt) mid_plane = plane->number();
     sources_.emplace(out_.labels ? &*out_.labels : nullptr, mid_plane,
                      [this](const Value& entry, const Value& file) {
-                       return read_label_image(locate(entry, file), reading_, read_form(entry));
+                       return read_label_image(locate_image(entry, file), reading_, read_choice(entry));
                      });
     if (labels && !root_.find("skin")) {
       names_.emplace(out_.skin_name, labels->where());
@@ -135,21 +137,31 @@ class CaseReader {
   }
 
   // Where an entry's file lies: beside the case, or in the data folder where the entry says `root: data`.
+  fs::path base_of(const Value& entry) const {
+    const auto root = entry.kind() == Kind::map ? entry.find("root") : std::nullopt;
+    if (!root) return folder_;
+    if (root->text() != "data")
+      root->fail("'" + root->text() + "' is no root", "write root: data, or leave it out");
+    if (options_.data.empty()) root->fail("the data folder is not known", "name it with --data DIR");
+    return options_.data;
+  }
+
   fs::path locate(const Value& entry, const Value& file) {
-    fs::path base = folder_;
-    if (const auto root = entry.kind() == Kind::map ? entry.find("root") : std::nullopt) {
-      if (root->text() != "data")
-        root->fail("'" + root->text() + "' is no root", "write root: data, or leave it out");
-      if (options_.data.empty()) root->fail("the data folder is not known", "name it with --data DIR");
-      base = options_.data;
-    }
-    fs::path path = base / file.text();
+    fs::path path = base_of(entry) / file.text();
     std::error_code ignored;
-    if (!fs::is_regular_file(path, ignored)) {
-      if (is_dicom(path)) refuse_dicom(path);
+    if (!fs::is_regular_file(path, ignored))
       throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");
-    }
     digest(path, file.text());
+    return path;
+  }
+
+  // The same of an image, which may be a folder of DICOM: each of its files is an input.
+  fs::path locate_image(const Value& entry, const Value& file) {
+    const fs::path path = base_of(entry) / file.text();
+    std::error_code ignored;
+    if (!fs::is_directory(path, ignored) || !is_dicom(path)) return locate(entry, file);
+    for (const fs::path& slice : dicom_files(path))
+      digest(slice, (fs::path(file.text()) / slice.lexically_relative(path)).generic_string());
     return path;
   }
 
@@ -317,7 +329,7 @@ class CaseReader {
         name.fail("another volume is named '" + volume.name + "'", "give it another name");
     }
     if (const auto background = entry.find("background")) volume.background = background->number();
-    volume.image = read_image(locate(entry, entry.at("file")), reading_, read_form(entry));
+    volume.image = read_image(locate_image(entry, entry.at("file")), reading_, read_choice(entry));
     out_.volumes.push_back(std::move(volume));
     step();
   }
@@ -325,7 +337,7 @@ class CaseReader {
   void read_labels(const Value& entry) {
     entry.allow(kLabelKeys);
     out_.labels = read_label_map(
-        entry, [this](const Value& e, const Value& file) { return locate(e, file); }, reading_);
+        entry, [this](const Value& e, const Value& file) { return locate_image(e, file); }, reading_);
     step();
   }
 

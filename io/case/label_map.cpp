@@ -3,6 +3,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 
 #include "io/image/label_table.hpp"
 #include "io/image/segmentation.hpp"
@@ -37,12 +38,21 @@ LabelNames read_table(const Value& entry, const Value& table, const Locate& loca
 
 }  // namespace
 
-NiftiForm read_form(const Value& entry) {
+ImageChoice read_choice(const Value& entry) {
+  ImageChoice out;
+  if (const auto series = entry.find("series")) out.series = series->text();
+  if (const auto phase = entry.find("phase")) {
+    const double number = phase->number();
+    if (!(number >= 1 && number <= 10000) || number != std::floor(number))
+      phase->fail("is no phase", "phases are counted from 1");
+    out.phase = static_cast<int>(number);
+  }
   const auto form = entry.find("form");
-  if (!form) return NiftiForm::either;
-  if (form->text() == "qform") return NiftiForm::qform;
-  if (form->text() == "sform") return NiftiForm::sform;
-  form->fail("'" + form->text() + "' is no form of a NIfTI", "write qform or sform");
+  if (!form) return out;
+  if (form->text() != "qform" && form->text() != "sform")
+    form->fail("'" + form->text() + "' is no form of a NIfTI", "write qform or sform");
+  out.form = form->text() == "qform" ? NiftiForm::qform : NiftiForm::sform;
+  return out;
 }
 
 CaseLabels read_label_map(const Value& entry, const Locate& locate, const files::ReadOptions& options) {
@@ -50,7 +60,7 @@ CaseLabels read_label_map(const Value& entry, const Locate& locate, const files:
   const auto table = entry.find("table");
   if (table) labels.table = read_table(entry, *table, locate);
   const Value file = entry.at("file");
-  Segmentation read = read_segmentation(locate(entry, file), options, read_form(entry));
+  Segmentation read = read_segmentation(locate(entry, file), options, read_choice(entry));
   if (!table) {
     if (read.names.empty())
       entry.fail("lacks 'table', and its file names no segments",

@@ -8,7 +8,7 @@
 #include <ecorche/values/case.hpp>
 #include "core/files/read_options.hpp"
 #include "io/case/yaml_reader.hpp"
-#include "io/image/nifti_form.hpp"
+#include "io/image/image_choice.hpp"
 
 namespace ecorche::io {
 
@@ -19,7 +19,7 @@ using Locate = std::function<std::filesystem::path(const yaml::Value& entry, con
 /// absent, and then the image's own (`.seg.nrrd`). Throws Error{config}, Error{missing_input} or Error{data}.
 CaseLabels read_label_map(const yaml::Value& entry, const Locate& locate, const files::ReadOptions& options);
 
-/// What an entry with an image says under `form`: qform, sform, or nothing.
-NiftiForm read_form(const yaml::Value& entry);
+/// What an entry with an image says under `form` (qform, sform), `series` and `phase`.
+ImageChoice read_choice(const yaml::Value& entry);
 
 }  // namespace ecorche::io

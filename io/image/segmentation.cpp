@@ -133,8 +133,9 @@ void write_segmentation(const Path& path, const Segmentation& segmentation) {
   files::write_text(path, bytes);
 }
 
-Segmentation read_segmentation(const Path& path, const files::ReadOptions& options, NiftiForm form) {
-  Image image = read_label_image(path, options, form);
+Segmentation read_segmentation(const Path& path, const files::ReadOptions& options,
+                               const ImageChoice& choice) {
+  Image image = read_label_image(path, options, choice);
   const std::vector<Segment> segments = read_segments(read_nrrd_keys(path), image.components, path);
   if (segments.empty() && image.components != 1) {
     refuse(path,

@@ -8,8 +8,8 @@
 
 #include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
+#include "io/image/image_choice.hpp"
 #include "io/image/label_table.hpp"
-#include "io/image/nifti_form.hpp"
 #include "io/image/segment_codes.hpp"
 
 namespace ecorche::io {
@@ -34,7 +34,7 @@ struct Segmentation {
 /// means one thing. Throws Error{missing_input} or Error{data}: voxels that are no whole numbers, several
 /// components that are no layers, a segment whose layer is not there.
 Segmentation read_segmentation(const std::filesystem::path& path, const files::ReadOptions& options = {},
-                               NiftiForm form = NiftiForm::either);
+                               const ImageChoice& choice = {});
 
 /// Writes a `.seg.nrrd` that names its segments (those ids of `names` that a layer holds), one component a
 /// layer; atomically. Layers are of one grid and type. Throws Error{usage} for another ending,
