@@ -123,7 +123,9 @@ class Parser {
     const auto known =
         std::find_if(kKnown.begin(), kKnown.end(), [&](const KnownSyntax& one) { return one.uid == uid; });
     if (uid.empty() || known == kKnown.end()) {
-      refuse(set_.path, "its transfer syntax " + (uid.empty() ? "is not told" : uid) + " cannot be read",
+      refuse(set_.path,
+             uid.empty() ? std::string("does not tell its transfer syntax")
+                         : "its transfer syntax " + uid + " cannot be read",
              "unpack it: gdcmconv --raw IN OUT, or dcmconv +te IN OUT");
     }
     return known->syntax;

@@ -15,16 +15,11 @@ namespace {
 
 using fields::refuse;
 namespace fs = std::filesystem;
-using Vector = std::array<double, 3>;
 
 constexpr double kSamePlace = 1e-3;  // mm: positions are written to six digits at least
 constexpr double kEven = 0.01;       // of the distance between slices
 constexpr double kMissing = 0.1;     // the same, of a gap from a multiple
 constexpr double kWidest = 4;        // distances: what is wider is not filled by interpolation
-
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 std::string at(const Slice& slice) {
   const auto digit = [&](std::size_t k) { return text::number(slice.position[k], 7); };

@@ -15,6 +15,12 @@
 
 namespace ecorche::io::dicom {
 
+using Vector = std::array<double, 3>;
+
+inline double dot(const Vector& a, const Vector& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 /// How the pixels of a file are stored.
 struct StoredPixels {
   std::uint32_t columns = 0, rows = 0;
@@ -52,7 +58,7 @@ struct Slice {
   std::array<double, 5> when{};
   std::string stack;  ///< what beside its geometry tells it from the others of its series
 
-  std::array<double, 3> normal() const;
+  Vector normal() const;
   std::string name() const;  ///< file and frame, for messages
 };
 
@@ -60,6 +66,9 @@ struct Slice {
 /// Throws Error{data} for one that cannot become a volume: colours, frames without a place, values behind a
 /// table.
 std::vector<Slice> slices_of(const DataSet& set);
+
+/// One for each frame, whatever they show. Throws Error{data} for frames without a place.
+std::vector<Slice> framed_slices(const DataSet& set);
 
 /// How pixels are stored. Throws Error{data} where that makes no sense.
 StoredPixels stored_pixels(const DataSet& set);

@@ -12,7 +12,6 @@ namespace ecorche::io::dicom {
 namespace {
 
 using fields::refuse;
-using Vector = std::array<double, 3>;
 
 constexpr Tag kImageType = 0x00080008, kSamples = 0x00280002, kPhotometric = 0x00280004, kRows = 0x00280010,
               kColumns = 0x00280011, kAllocated = 0x00280100, kStored = 0x00280101, kHigh = 0x00280102,
@@ -23,10 +22,6 @@ constexpr Tag kImageType = 0x00080008, kSamples = 0x00280002, kPhotometric = 0x0
               kNumber = 0x00200013, kStackId = 0x00209056, kEcho = 0x00180086;
 constexpr std::uint32_t kMostFrames = 1 << 20;
 constexpr double kUnit = 1e-3;  // how far written directions are from length 1 and right angles
-
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 Vector scaled(Vector v, double factor) {
   for (double& x : v) x *= factor;
@@ -169,9 +164,8 @@ StoredPixels stored_pixels(const DataSet& set) {
   return out;
 }
 
-std::vector<Slice> slices_of(const DataSet& set) {
+std::vector<Slice> framed_slices(const DataSet& set) {
   const Item& top = set.top;
-  if (set.pixels_at == 0 || top.text(kClass) == kSegmentationClass) return {};
   auto file = std::make_shared<SliceFile>();
   file->path = set.path;
   file->bytes = set.file_bytes;
@@ -183,35 +177,42 @@ std::vector<Slice> slices_of(const DataSet& set) {
   file->pixels = stored_pixels(set);
   const std::string type = text::lower(top.text(kImageType));
   file->localizer = type.find("localizer") != type.npos;
-  const std::string colours = top.text(kPhotometric);
-  file->monochrome1 = colours == "MONOCHROME1";
+  file->monochrome1 = top.text(kPhotometric) == "MONOCHROME1";
+  if (const auto padding = top.whole(kPadding)) {
+    const auto stored = static_cast<std::uint16_t>(*padding);
+    file->padding = file->pixels.is_signed ? static_cast<std::int16_t>(stored) : stored;
+  }
+  const Element* own = top.find(kFrameGroups);
+  const std::string frames = std::to_string(file->pixels.frames);
+  if (own == nullptr && file->pixels.frames > 1) {
+    refuse(set.path, "has " + frames + " frames and does not say where each lies",
+           "export the series as single slices, or as Enhanced CT or MR");
+  }
+  if (own != nullptr && own->items.size() < file->pixels.frames) {
+    refuse(set.path, "describes " + std::to_string(own->items.size()) + " of its " + frames + " frames",
+           "export it again");
+  }
+  std::vector<Slice> out;
+  for (std::uint32_t f = 0; f < file->pixels.frames; ++f)
+    out.push_back(slice_of(set, file, f, own == nullptr ? nullptr : &own->items[f]));
+  return out;
+}
+
+std::vector<Slice> slices_of(const DataSet& set) {
+  const Item& top = set.top;
+  if (set.pixels_at == 0 || top.text(kClass).starts_with(kSegmentationClass.substr(0, 26))) return {};
   // Screenshots and dose reports lie with their series; nothing says where.
   const bool placed = top.find(kPosition) != nullptr || top.find(kSharedGroups) != nullptr;
   if (!placed && top.find(kFrameGroups) == nullptr) return {};
+  const std::string colours = top.text(kPhotometric);
   if (top.whole(kSamples).value_or(1) != 1 || colours.starts_with("RGB") || colours.starts_with("YBR") ||
       colours.starts_with("PALETTE")) {
     refuse(set.path, "is a picture in colours (" + colours + ")",
            "choose the series of grey values that it was made from");
   }
-  if (top.only(kLookup) != nullptr || file->pixels.allocated == 1)
+  if (top.only(kLookup) != nullptr || stored_pixels(set).allocated == 1)
     refuse(set.path, "its values lie behind a table (Modality LUT), or are single bits", "export it as CT");
-  if (const auto padding = top.whole(kPadding))
-    file->padding =
-        file->pixels.is_signed ? static_cast<std::int16_t>(*padding) : static_cast<double>(*padding);
-  const Element* own = top.find(kFrameGroups);
-  std::vector<Slice> out;
-  if (own == nullptr && file->pixels.frames > 1)
-    refuse(set.path,
-           "has " + std::to_string(file->pixels.frames) + " frames and does not say where each lies",
-           "export the series as single slices, or as Enhanced CT or MR");
-  if (own != nullptr && own->items.size() < file->pixels.frames)
-    refuse(set.path,
-           "describes " + std::to_string(own->items.size()) + " of its " +
-               std::to_string(file->pixels.frames) + " frames",
-           "export it again");
-  for (std::uint32_t f = 0; f < file->pixels.frames; ++f)
-    out.push_back(slice_of(set, file, f, own == nullptr ? nullptr : &own->items[f]));
-  return out;
+  return framed_slices(set);
 }
 
 }  // namespace ecorche::io::dicom

@@ -28,11 +28,12 @@ struct Segmentation {
   std::vector<LabelOverlap> overlaps = {};
 };
 
-/// Reads any image that `read_image` reads as labels. Of a NRRD with `Segment0_Name`, ... the segments are
-/// named (by `make_identifiers`), and components are layers. Where two segments of different layers share a
-/// value, all are numbered anew from 1 in the file's order (u16), and values of no segment are dropped: an id
-/// means one thing. Throws Error{missing_input} or Error{data}: voxels that are no whole numbers, several
-/// components that are no layers, a segment whose layer is not there.
+/// Reads any image that `read_image` reads as labels, and DICOM SEG (dicom_segmentation.hpp). Of a NRRD with
+/// `Segment0_Name`, ... the segments are named (by `make_identifiers`), and components are layers. Where two
+/// segments of different layers share a value, all are numbered anew from 1 in the file's order (u16), and
+/// values of no segment are dropped: an id means one thing. Throws Error{missing_input} or Error{data}:
+/// voxels that are no whole numbers, several components that are no layers, a segment whose layer is not
+/// there.
 Segmentation read_segmentation(const std::filesystem::path& path, const files::ReadOptions& options = {},
                                const ImageChoice& choice = {});
 

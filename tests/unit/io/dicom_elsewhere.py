@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """DICOM series as pydicom and GDCM's tools write them: what is read, what is said, what is refused."""
+import json
 import shutil
 import subprocess
 import unittest
@@ -9,8 +10,8 @@ import numpy
 import pydicom
 from pydicom.uid import ExplicitVRBigEndian, ImplicitVRLittleEndian
 
-from described import Described
-from dicom_made import ENHANCED_CT, item, new_file, set_pixels, text, write_series
+from described import IO_FILES, TYPES, Described
+from dicom_made import ENHANCED_CT, item, new_file, segment, set_pixels, text, write_segmentation, write_series
 
 AXIAL = numpy.array([[0.7, 0, 0, -10], [0, 0.8, 0, -20], [0, 0, 1.5, 30], [0, 0, 0, 1.0]])
 
@@ -245,6 +246,102 @@ class Series(Described):
         meta = b"\x02\x00\x10\x00UI\x14\x00" + b"1.2.840.10008.1.2.1\0"
         one.write_bytes(b"\0" * 128 + b"DICM" + meta + nested)
         self.refused(self.place, "sequences lie 16 deep in each other at byte")
+
+
+RIGHT = ("24028007", "Right")
+FEMUR, TIBIA, LIVER = ("71341001", "Femur"), ("12611008", "Tibia"), ("10200004", "Liver")
+
+
+class Segments(Described):
+    def setUp(self):
+        super().setUp()
+        self.path = self.folder / "seg.dcm"
+        shape = (9, 7, 12)  # 63 pixels a frame: bits run on from frame to frame
+        self.masks = {n: (self.random.random(shape) < 0.3).astype("u1") for n in (1, 2, 5)}
+        self.masks[2] *= 1 - self.masks[1]
+        for mask in self.masks.values():
+            mask[:, :, [0, 4, 5]] = 0
+        self.masks[1][:, :, 11] = self.masks[2][:, :, 11] = self.masks[5][:, :, 11] = 0
+        self.segments = [segment(1, "Femur", FEMUR, RIGHT), segment(2, "tibia_left", TIBIA), segment(5, "", LIVER)]
+
+    def read(self, path=None, *words):
+        raw = self.folder / "raw"
+        done = subprocess.run([IO_FILES, "segments", str(path or self.path), str(raw), *words], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        told = json.loads(done.stdout)
+        voxels = numpy.frombuffer(raw.read_bytes(), TYPES[told["type"]])
+        return told, voxels.reshape([*told["size"], told["layers"]], order="F")
+
+    def refused_segments(self, part, path=None):
+        done = subprocess.run([IO_FILES, "segments", str(path or self.path), str(self.folder / "raw")], capture_output=True, text=True)
+        self.assertEqual((done.returncode, len(done.stderr.splitlines())), (65, 1), done.stderr)
+        self.assertIn(part, done.stderr)
+
+    def assert_masks(self, voxels, planes=slice(1, 11)):
+        for number, mask in self.masks.items():
+            numpy.testing.assert_array_equal((voxels == number).any(axis=3), mask[:, :, planes] > 0)
+
+    def test_binary_with_overlaps_and_empty_frames(self):
+        for affine in (AXIAL, turned(AXIAL)):
+            write_segmentation(self.path, self.masks, self.segments, affine)
+            told, voxels = self.read()
+            self.assertEqual(told["names"], {"1": "femur_right", "2": "tibia_left", "5": "liver"})
+            self.assertEqual(told["codes"]["1"], ["Femur", ["SCT", "91723000", "Anatomical Structure"],
+                                                  ["SCT", *FEMUR], ["SCT", *RIGHT]])
+            self.assertEqual(told["codes"]["2"][3], ["", "", ""])
+            self.assert_masks(voxels)
+            self.assert_frame(told, affine @ numpy.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1.0]]), atol=1e-6)
+            # 1 and 2 share nothing and a layer; 5 overlaps both and lies behind them.
+            self.assertEqual(told["layers"], 2)
+            self.assertEqual(set(numpy.unique(voxels[..., 0])), {0, 1, 2})
+            shared = [int((self.masks[n] * self.masks[5]).sum()) for n in (1, 2)]
+            self.assertEqual(told["overlaps"], [[1, 5, shared[0]], [2, 5, shared[1]]])
+        # The same in a folder, beside the series that it is of.
+        place = self.folder / "both"
+        write_series(place, numpy.zeros((9, 7, 12), "i2"), AXIAL)
+        shutil.copy(self.path, place)
+        self.assertEqual(self.read(place)[0]["names"], told["names"])
+
+    def test_fractional(self):
+        for most in (255, 4, 1):
+            soft = {n: numpy.round(mask * self.random.integers(0, most + 1, mask.shape)).astype("u1") for n, mask in self.masks.items()}
+            for mask in soft.values():
+                mask[0, 0, [1, 10]] = most
+            write_segmentation(self.path, soft, self.segments, AXIAL, "FRACTIONAL", most=most)
+            told, voxels = self.read()
+            self.assertIn("is fractional", told["notes"][0])
+            self.masks = {n: mask >= max(most / 2, 1) for n, mask in soft.items()}
+            self.assert_masks(voxels)
+        subprocess.run(["gdcmconv", "--rle", str(self.path), str(self.folder / "p.dcm")], check=True)
+        self.assert_masks(self.read(self.folder / "p.dcm")[1])
+
+    def test_refused(self):
+        def written(**more):
+            return write_segmentation(self.path, self.masks, more.pop("segments", self.segments), AXIAL, **more)
+        written(segments=self.segments[:2])
+        self.refused_segments("shows segment 5, which is not described")
+        written(change=lambda data: data.SegmentSequence.clear())
+        self.refused_segments("describes no segment")
+        written(change=lambda data: data.PerFrameFunctionalGroupsSequence.pop())
+        self.refused_segments(" frames (export it again)")
+
+        def moved(data):
+            data.PerFrameFunctionalGroupsSequence[3].PlanePositionSequence[0].ImagePositionPatient = [5, 5, 5]
+        written(change=moved)
+        self.refused_segments("frame 4 does not lie over frame 1")
+
+        def far(data):
+            data.PerFrameFunctionalGroupsSequence[3].PlanePositionSequence[0].ImagePositionPatient = text([-10, -20, 1.5e6])
+        written(change=far)
+        self.refused_segments("its Image Position is 1.5e+06")
+        written(change=lambda data: setattr(data, "PixelData", data.PixelData[:20]))
+        self.refused_segments("of its pixels")
+        shutil.copy(written(), self.folder / "again.dcm")
+        self.refused_segments("holds 2 segmentations: 1.2.3.4.8 'Bones'; 1.2.3.4.8 'Bones'", self.folder)
+        place = self.folder / "alone"
+        place.mkdir()
+        shutil.move(self.path, place)
+        self.refused(place, "holds a segmentation (seg.dcm), and no picture (name it under labels)")
 
 
 if __name__ == "__main__":

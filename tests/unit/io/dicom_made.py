@@ -79,3 +79,47 @@ def item(**values):
 
 def code(value, meaning, scheme="SCT"):
     return item(CodeValue=value, CodingSchemeDesignator=scheme, CodeMeaning=meaning)
+
+
+def segment(number, label, type_code, side=None, category=("91723000", "Anatomical Structure")):
+    kind = code(*type_code)
+    if side:
+        kind.SegmentedPropertyTypeModifierCodeSequence = [code(*side)]
+    return item(SegmentNumber=number, SegmentLabel=label, SegmentAlgorithmType="AUTOMATIC", SegmentAlgorithmName="made",
+                SegmentedPropertyCategoryCodeSequence=[code(*category)], SegmentedPropertyTypeCodeSequence=[kind])
+
+
+def write_segmentation(path, masks, segments, affine, kind="BINARY", series="1.2.3.4.8", change=None, most=255):
+    """`masks`: number to (i, j, k) of 0 and 1, or of 0 to `most` where fractional; empty planes have no frame."""
+    data = new_file(path, SEG)
+    data.Modality, data.SeriesInstanceUID, data.SeriesDescription, data.SegmentationType = "SEG", series, "Bones", kind
+    data.SegmentSequence = segments
+    spacing = numpy.linalg.norm(affine[:3, :3], axis=0)
+    ways = affine[:3, :3] / spacing
+    data.SharedFunctionalGroupsSequence = [item(
+        PixelMeasuresSequence=[item(PixelSpacing=text([spacing[1], spacing[0]]), SliceThickness=text(spacing[2])[0],
+                                    SpacingBetweenSlices=text(spacing[2])[0])],
+        PlaneOrientationSequence=[item(ImageOrientationPatient=text([ways[:, 0], ways[:, 1]]))])]
+    frames, planes = [], []
+    for number, mask in masks.items():
+        for k in range(mask.shape[2]):
+            if mask[:, :, k].any():
+                planes.append(mask[:, :, k].T)
+                frames.append(item(
+                    PlanePositionSequence=[item(ImagePositionPatient=text((affine @ [0, 0, k, 1])[:3]))],
+                    SegmentIdentificationSequence=[item(ReferencedSegmentNumber=number)]))
+    data.PerFrameFunctionalGroupsSequence = frames
+    data.NumberOfFrames = len(frames)
+    array = numpy.stack(planes).astype("u1")
+    set_pixels(data, array, False, 8)
+    if kind == "BINARY":
+        data.BitsAllocated = data.BitsStored = 1
+        data.HighBit = 0
+        bits = numpy.packbits(array.ravel(), bitorder="little").tobytes()
+        data.PixelData = bits + b"\0" * (len(bits) % 2)
+    else:
+        data.MaximumFractionalValue, data.SegmentationFractionalType = most, "PROBABILITY"
+    if change:
+        change(data)
+    data.save_as(path, write_like_original=False)
+    return path
