@@ -155,13 +155,16 @@ class CaseReader {
     return path;
   }
 
-  // The same of an image, which may be a folder of DICOM: each of its files is an input.
+  // The same of an image, which may be a folder of DICOM. Its files' names, which may name the patient, stay
+  // out of the model.
   fs::path locate_image(const Value& entry, const Value& file) {
     const fs::path path = base_of(entry) / file.text();
     std::error_code ignored;
     if (!fs::is_directory(path, ignored) || !is_dicom(path)) return locate(entry, file);
+    std::uint64_t all = 0;
     for (const fs::path& slice : dicom_files(path))
-      digest(slice, (fs::path(file.text()) / slice.lexically_relative(path)).generic_string());
+      all = (all ^ file_digest(slice, context_)) * 0x9e3779b97f4a7c15ULL;
+    out_.input_digests[file.text()] = all;
     return path;
   }
 

@@ -344,5 +344,119 @@ class Segments(Described):
         self.refused(place, "holds a segmentation (seg.dcm), and no picture (name it under labels)")
 
 
+class Written(Described):
+    """What we write, by pydicom's eyes and dciodvfy's, and read back."""
+
+    def write(self, image, name, *words, refused=None):
+        done = subprocess.run([IO_FILES, "write_dicom", str(image), str(self.folder / name), *words], capture_output=True, text=True)
+        if refused:
+            self.assertIn(refused, done.stderr)
+        self.assertEqual(done.returncode != 0, bool(refused), done.stderr)
+        return done.stdout
+
+    def verify(self, path, kind):
+        """Against the standard's own tables."""
+        done = subprocess.run(["dciodvfy", str(path)], capture_output=True, text=True)
+        errors = [line for line in done.stderr.splitlines() if line.startswith("Error")]
+        self.assertEqual(errors, [])
+        self.assertIn(kind, done.stderr)
+
+    def nrrd(self, volume, affine, name="in.nrrd"):
+        names = {"i2": "short", "u2": "ushort", "i4": "int", "f4": "float", "u1": "uchar"}
+        columns = " ".join("(" + ",".join(repr(float(x)) for x in affine[:3, c]) + ")" for c in range(3))
+        head = (f"NRRD0004\ntype: {names[volume.dtype.str[1:]]}\ndimension: 3\nspace: left-posterior-superior\n"
+                f"sizes: {volume.shape[0]} {volume.shape[1]} {volume.shape[2]}\nspace directions: {columns}\nkinds: domain domain domain\n"
+                f"endian: little\nencoding: raw\nspace origin: ({','.join(repr(float(x)) for x in affine[:3, 3])})\n\n")
+        path = self.folder / name
+        path.write_bytes(head.encode() + volume.tobytes(order="F"))
+        return path
+
+    def test_a_series_comes_back_voxel_for_voxel(self):
+        affine = turned(numpy.array([[0.123456789, 0, 0, -110.0625], [0, 1 / 3, 0, -20], [0, 0, 0.7, 1030.1], [0, 0, 0, 1.0]]))
+        shape = (9, 7, 12)
+        for number, (kind, low, high) in enumerate([("i2", -32768, 32767), ("u2", 0, 65535), ("i4", 90000, 150000), ("u1", 0, 255)]):
+            volume = self.random.integers(low, high, shape, endpoint=True).astype(kind)
+            name = f"{number}.dicom"
+            self.assertEqual(self.write(self.nrrd(volume, affine), name), "")
+            grid, voxels = self.describe(self.folder / name)
+            self.assert_frame(grid, affine, atol=1e-6)
+            numpy.testing.assert_array_equal(voxels[0], volume)
+        volume = self.random.random(shape).astype("f4") * 1e5
+        self.assertIn("its values need more than 16 bits: written in steps of 1.5", self.write(self.nrrd(volume, affine), "f.dicom"))
+        numpy.testing.assert_allclose(self.describe(self.folder / "f.dicom")[1][0], volume, atol=1.6 / 2)
+        # A left-handed grid has its slices the other way round.
+        mirror = affine @ numpy.diag([1.0, 1, -1, 1])
+        self.write(self.nrrd(volume.astype("i4").astype("i2"), mirror), "m.dicom")
+        grid, voxels = self.describe(self.folder / "m.dicom")
+        self.assert_frame(grid, mirror @ numpy.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 11], [0, 0, 0, 1.0]]), atol=1e-6)
+        numpy.testing.assert_array_equal(voxels[0], volume.astype("i4").astype("i2")[:, :, ::-1])
+        self.write(self.folder / "in.nrrd", "m.dicom", refused="is there already, and holds files")
+
+    def test_who_was_scanned_is_dropped_unless_kept(self):
+        source = write_series(self.folder / "scan", self.random.integers(0, 100, (9, 7, 12)).astype("i2"), AXIAL)
+        image = self.nrrd(self.random.integers(-9, 9, (9, 7, 12)).astype("i2"), AXIAL)
+        self.write(image, "a.dicom", f"source={source}")
+        self.write(image, "b.dicom", f"source={source}", "keep")
+        self.write(image, "c.dicom", f"source={source}")
+        dropped = [path.read_bytes() for path in sorted((self.folder / "a.dicom").iterdir())]
+        self.assertEqual(dropped, [path.read_bytes() for path in sorted((self.folder / "c.dicom").iterdir())])
+        for word in (b"Doe", b"4711", b"19700101", b"20200101", b"House", b"1.2.3.4", b"1.2.826"):
+            self.assertFalse(any(word in one for one in dropped), word)
+        slices = [pydicom.dcmread(path) for path in sorted((self.folder / "a.dicom").iterdir())]
+        self.assertEqual(len(slices), 12)
+        self.assertEqual(len({data.SOPInstanceUID for data in slices}), 12)
+        for data in slices:
+            self.assertEqual((data.KVP, data.PatientName, data.PatientIdentityRemoved), (120, "ECORCHE^MODEL", "YES"))
+            self.assertEqual(data.ImageType, ["DERIVED", "SECONDARY", "AXIAL"])
+            self.assertEqual((data.DerivationDescription, data.SeriesDescription), ("Posed", "ct, arms_up"))
+        self.verify(self.folder / "a.dicom" / "IM0001.dcm", "CTImage")
+        kept = pydicom.dcmread(self.folder / "b.dicom" / "IM0003.dcm")
+        scanned = [pydicom.dcmread(path) for path in source.iterdir()]
+        for key in ("PatientName", "PatientID", "PatientBirthDate", "PatientSex", "StudyInstanceUID", "StudyDate", "AccessionNumber"):
+            self.assertEqual(kept[key].value, scanned[0][key].value)
+        self.assertEqual({one.ReferencedSOPInstanceUID for one in kept.SourceImageSequence}, {one.SOPInstanceUID for one in scanned})
+        self.assertNotIn(kept.SeriesInstanceUID, {one.SeriesInstanceUID for one in scanned})
+        self.assertNotEqual(kept.FrameOfReferenceUID, scanned[0].FrameOfReferenceUID)
+        self.assertNotIn("PatientIdentityRemoved", kept)
+        self.verify(self.folder / "b.dicom" / "IM0003.dcm", "CTImage")
+
+    def test_labels_come_back_with_names_codes_and_overlaps(self):
+        shape = (9, 7, 12)
+        masks = {n: (self.random.random(shape) < 0.3).astype("u1") for n in (1, 2, 300)}
+        masks[300][:, :, 4:8] = 0
+        segments = [segment(1, "Femur", FEMUR, RIGHT), segment(2, "own name", ("X1", "Thing")), segment(300, "liver", LIVER)]
+        affine = turned(AXIAL)
+        first = write_segmentation(self.folder / "first.dcm", masks, segments, affine)
+        self.write(first, "again.dcm")
+        for path in (first, self.folder / "again.dcm"):
+            done = subprocess.run([IO_FILES, "segments", str(path), str(self.folder / "raw")], capture_output=True, text=True, check=True)
+            told = json.loads(done.stdout)
+            voxels = numpy.frombuffer((self.folder / "raw").read_bytes(), "u2").reshape([*shape, 3], order="F")
+            for number, mask in masks.items():
+                numpy.testing.assert_array_equal((voxels == number).any(axis=3), mask > 0)
+            self.assertEqual(told["names"], {"1": "femur_right", "2": "own_name", "300": "liver"})
+            self.assertEqual(told["codes"]["1"][1:], [["SCT", "91723000", "Anatomical Structure"], ["SCT", *FEMUR], ["SCT", *RIGHT]])
+            self.assertEqual(len(told["overlaps"]), 3)
+            self.assert_frame(told, affine, atol=1e-6)
+        data = pydicom.dcmread(self.folder / "again.dcm")
+        self.assertEqual(data.NumberOfFrames, 12 + 12 + 8)
+        self.assertEqual([one.SegmentLabel for one in data.SegmentSequence], ["Femur", "own name", "liver"])
+        frame = data.PerFrameFunctionalGroupsSequence[30]
+        self.assertEqual(frame.SegmentIdentificationSequence[0].ReferencedSegmentNumber, 300)
+        numpy.testing.assert_array_equal(data.pixel_array[30].T, masks[300][:, :, 10])
+        self.verify(self.folder / "again.dcm", "Segmentation")
+        # Without codes: of our own, with the side of the name.
+        labels = numpy.zeros(shape, "u1")
+        labels[2:4] = 7
+        self.nrrd(labels, affine, "l.nrrd")
+        self.write(self.folder / "l.nrrd", "l.dcm")
+        data = pydicom.dcmread(self.folder / "l.dcm")
+        self.assertEqual([one.SegmentNumber for one in data.SegmentSequence], [7])
+        self.assertEqual(data.SegmentSequence[0].SegmentedPropertyTypeCodeSequence[0].CodingSchemeDesignator, "99ECORCHE")
+        self.verify(self.folder / "l.dcm", "Segmentation")
+        self.nrrd(numpy.zeros(shape, "u1"), affine, "l.nrrd")
+        self.write(self.folder / "l.nrrd", "none.dcm", refused="no voxel is labelled")
+
+
 if __name__ == "__main__":
     unittest.main()

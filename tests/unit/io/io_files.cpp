@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <ecorche/values/error.hpp>
+#include "io/image/dicom_writer.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/segmentation.hpp"
 #include "io/surface/surface_file.hpp"
@@ -74,6 +75,28 @@ void segments(const char* path, const char* raw, const std::vector<std::string>&
   std::printf("%s\n", out.dump().c_str());
 }
 
+// An image as a DICOM series, or a segmentation as a DICOM SEG, as `pose` writes them: `source=DIR`, `keep`.
+void write_dicom(const std::filesystem::path& from, const std::filesystem::path& to,
+                 const std::vector<std::string>& words) {
+  DicomFacts facts;
+  facts.patient = "ECORCHE-1";
+  facts.pose = "pose";
+  facts.words = "arms_up";
+  facts.derivation = "Posed";
+  facts.program = "1.0";
+  for (const std::string& word : words) {
+    if (word.starts_with("source=")) facts.origin = read_dicom_origin(word.substr(7), {}, {});
+    if (word == "keep") facts.keep_identity = true;
+  }
+  if (to.extension() == ".dcm") {
+    write_dicom_segmentation(to, read_segmentation(from), "labels", facts);
+  } else {
+    const files::ReadOptions note{
+        {}, [](std::string_view line) { std::printf("%s\n", std::string(line).c_str()); }};
+    write_dicom_series(to, read_image(from), "ct", facts, note);
+  }
+}
+
 // A row of cubes, six tets each around a diagonal, in three regions, in every format.
 void tets(const std::filesystem::path& folder) {
   constexpr int cubes = 9;
@@ -107,14 +130,16 @@ int run(int argc, char** argv) {
     describe(argv[2], argv[3], {argv + 4, argv + argc});
   } else if (what == "segments") {
     segments(argv[2], argv[3], {argv + 4, argv + argc});
+  } else if (what == "write_dicom") {
+    write_dicom(argv[2], argv[3], {argv + 4, argv + argc});
   } else if (what == "copy") {
     write_image(argv[3], read_image(argv[2]));
   } else if (what == "tets") {
     tets(argv[2]);
   } else {
-    std::fprintf(
-        stderr,
-        "usage: io_files describe IMAGE RAW | segments IMAGE RAW | copy IMAGE IMAGE | tets FOLDER .\n");
+    std::fprintf(stderr,
+                 "usage: io_files describe IMAGE RAW | segments IMAGE RAW | write_dicom IMAGE TO | copy "
+                 "IMAGE IMAGE | tets FOLDER .\n");
     return 64;
   }
   return 0;
