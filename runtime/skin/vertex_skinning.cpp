@@ -304,7 +304,7 @@ std::vector<TissueSkinning> fold_to_vertices(const BodyPoser& poser, std::span<c
   return out;
 }
 
-std::vector<Pose> limit_poses(const Skeleton& skeleton) {
+std::vector<Pose> halfway_poses(const Skeleton& skeleton) {
   constexpr double unlimited = 1;  // radians
   std::vector<Pose> poses;
   for (const double side : {-1.0, 1.0}) {
@@ -316,7 +316,7 @@ std::vector<Pose> limit_poses(const Skeleton& skeleton) {
       for (std::size_t a = 0; a < 3; ++a) {
         const AngleAxis& axis = joint.sequence[a];
         const double limit = side < 0 ? axis.min : axis.max;
-        angles[a] = std::isfinite(limit) ? limit : axis.rest + side * unlimited;
+        angles[a] = axis.rest + (std::isfinite(limit) ? limit - axis.rest : side * unlimited) / 2;
       }
       pose.rotation[s] = kinematics::rotation_from_angles(joint, angles);
     }

@@ -58,7 +58,8 @@ inline constexpr double fold_error_mm = 0.5;
 std::vector<TissueSkinning> fold_to_vertices(const BodyPoser& poser, std::span<const std::uint32_t> tissues,
                                              std::span<const Pose> poses, SkinningError& error);
 
-/// Poses that reach the limits of every joint of a rig, one way and the other; for where no others are known.
-std::vector<Pose> limit_poses(const Skeleton& skeleton);
+/// Every joint of a rig turned halfway to its limits, one way and the other: poses of a library leave out
+/// joints.
+std::vector<Pose> halfway_poses(const Skeleton& skeleton);
 
 }  // namespace ecorche::runtime

@@ -77,9 +77,9 @@ SkinningTables::SkinningTables(const Skeleton& rig, std::vector<NamedPose> measu
     names_.push_back(std::move(pose.name));
     poses_.push_back(std::move(pose.pose));
   }
-  if (!poses_.empty()) return;
-  names_ = {"limits_low", "limits_high"};
-  poses_ = runtime::limit_poses(rig);
+  // Poses of a library leave out joints.
+  names_.insert(names_.end(), {"halfway_low", "halfway_high"});
+  for (Pose& pose : runtime::halfway_poses(rig)) poses_.push_back(std::move(pose));
 }
 
 void SkinningTables::make(const runtime::BodyPoser& poser, const LevelOf& level_of,

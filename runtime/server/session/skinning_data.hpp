@@ -30,7 +30,7 @@ class SkinningTables {
   /// Of a level of a tissue, 0 to `coarsest_level`; null: all its vertices.
   using LevelOf = std::function<const MeshRows*(std::uint32_t level, std::uint32_t tissue)>;
 
-  /// Without `measured` the limits of the rig's joints do.
+  /// Beside `measured` every joint is turned halfway to its limits.
   SkinningTables(const Skeleton& rig, std::vector<NamedPose> measured);
 
   /// Appends what `tissues` need, making it where it is not at hand, which takes seconds for a large body: on

@@ -15,7 +15,7 @@ namespace {
 
 struct Folded {
   BodyPoser poser{std::make_shared<const Model>(test::fine_toy_model(5))};
-  std::vector<Pose> poses = limit_poses(poser.model().rig.skeleton);
+  std::vector<Pose> poses = halfway_poses(poser.model().rig.skeleton);
   SkinningError error;
   std::vector<TissueSkinning> tissues = fold_to_vertices(poser, poser.all_tissues(), poses, error);
 };
@@ -68,7 +68,7 @@ TEST(VertexSkinning, WeightsAreWholeAndTheHeaviestFirst) {
   }
 }
 
-TEST(VertexSkinning, PosesReachTheLimits) {
+TEST(VertexSkinning, PosesTurnEveryWay) {
   const Folded folded;
   ASSERT_EQ(folded.poses.size(), 2U);
   double turned = 0;

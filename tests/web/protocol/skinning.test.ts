@@ -58,7 +58,7 @@ test("in every pose and method that the server measured, no vertex is further of
   const own = await client.subscribeMesh({ encoding: Encoding.U16, normals: true }), skinned = await client.subscribeMesh({ motions: true });
   const poses = presets(parse(library) as Library, rigOf(client.model!.skeleton!)), { skinning } = skinned;
   assert.ok(skinning);
-  assert.deepEqual([...skinning.measured].sort(), poses.map(({ name }) => name).sort());
+  assert.deepEqual([...skinning.measured].sort(), [...poses.map(({ name }) => name), "halfway_low", "halfway_high"].sort());
   assert.ok(skinning.largestError > 0 && skinning.largestError <= 0.55, `${skinning.largestError} mm`);
   const hung = skinning.hungNodes.length / 4;
   t.diagnostic(`${skinning.vertexCount} vertices, ${hung} hung on ${skinning.pointCount - skinning.vertexCount} nodes, ${skinning.influences} influences: `
@@ -85,7 +85,7 @@ test("in every pose and method that the server measured, no vertex is further of
       worst.usual = Math.max(worst.usual, usual);
     }
   }
-  assert.ok(worst.mm > 0.5 * skinning.largestError, `what it states is what is there: ${worst.mm} of ${skinning.largestError} mm`);
+  assert.ok(worst.mm > 0.3 * skinning.largestError, `what it states is what is there: ${worst.mm} of ${skinning.largestError} mm`);
   for (const stream of [own, skinned]) await client.closeMesh(stream);
 });
 

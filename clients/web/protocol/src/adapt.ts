@@ -40,13 +40,14 @@ export function adapt(client: Client, stream: MeshStream, onChoice: (choice: Ada
   const vertices = client.model?.tissues.reduce((sum, tissue) => sum + Number(tissue.vertices), 0) ?? 0;
   const { policy = new Policy(), adaptive = false, line = new LinePolicy(vertices, client.hello.features.includes(Feature.SKINNING)) } = options;
   let drawMs = 0, moving = false, pose = stream.latest?.poseSequence, rest: ReturnType<typeof setTimeout> | undefined;
-  let held = options.held ?? {}, work = Promise.resolve(), coarserBy = 0;
+  let held = options.held ?? {}, work = Promise.resolve(), coarserBy = 0, servedMs = 0;
   let newest = 0n, counted: bigint | undefined, stirred = 0, still = 0;  // of what the body took up
   let applied = choose({ adaptive: stream.options.adaptive ?? false, held: {} });
 
   function choose(by: { adaptive: boolean; held: Held } = { adaptive, held }): AdaptedOptions {
     const motions = by.held.motions ?? line.skins !== undefined, choice = policy.choice(moving);
-    const level = by.held.level ?? (motions ? Math.max(line.skins ?? 0, choice.level) : choice.level);
+    // Another level is another table: what is skinned keeps the one that it has, however the body moves.
+    const level = by.held.level ?? (motions ? line.skins ?? 0 : choice.level);
     return { ...choice, level, motions, adaptive: by.adaptive && !motions && by.held.level === undefined };
   }
 
@@ -73,7 +74,8 @@ export function adapt(client: Client, stream: MeshStream, onChoice: (choice: Ada
   }
 
   const offs = [
-    stream.on("frame", ({ poseSequence, level }) => {
+    stream.on("frame", ({ poseSequence, level, timings }) => {
+      servedMs = Math.max(servedMs, timings ? Number(timings.waited + timings.posed + timings.encoded) / 1000 : 0);
       coarserBy = level - (stream.options.level ?? 0);
       stir(poseSequence);
       if (poseSequence === pose) return;
@@ -87,7 +89,8 @@ export function adapt(client: Client, stream: MeshStream, onChoice: (choice: Ada
       const active = performance.now() - stirred < 1500, posesPerSecond = Number(newest - (counted ?? newest));
       counted = newest;
       if (moving) policy.observe({ ...statistics, drawMs });
-      if (active && !applied.motions) line.observe({ ...statistics, posesPerSecond, coarserBy });
+      if (active && !applied.motions) line.observe({ ...statistics, posesPerSecond, coarserBy, busyMs: Math.max(statistics.lagMs, servedMs) });
+      servedMs = 0;
       still = active ? 0 : still + 1;
       if (still >= FINER_AFTER_SECONDS && held.level === undefined) {
         still = 0;

@@ -40,6 +40,8 @@ export interface Statistics {
   latencyMs: number;
   /** Mean of the last second's frames. */
   decodeMs: number;
+  /** How late the thread that receives was: it had no processor for so long. */
+  lagMs: number;
 }
 
 export type ToClient =

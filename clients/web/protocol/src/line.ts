@@ -13,9 +13,11 @@ export interface LineSeen {
   latencyMs: number;
   /** Of the newest frame, beside what was asked for. */
   coarserBy: number;
+  /** How long this client or the server had no processor, or worked at a pose: then waiting says nothing of the line. */
+  busyMs: number;
 }
 
-const LATE_MS = 150, ENOUGH_FRAMES = 30, BEHIND = 0.6, SLOW_SECONDS = 2;
+const LATE_MS = 150, BUSY_MS = 60, ENOUGH_FRAMES = 30, BEHIND = 0.6, SLOW_SECONDS = 2;
 /** What skinning brings must come within so long; a coarser level comes first. */
 const BYTES_PER_VERTEX = 20, PATIENCE_SECONDS = 6;
 const COARSEST = 3, PER_LEVEL = 4;
@@ -30,10 +32,10 @@ export class LinePolicy {
   constructor(private readonly vertices: number, private readonly canSkin: boolean) {}
 
   /** Once a second while the body moves. */
-  observe({ framesPerSecond, posesPerSecond, bytesPerSecond, latencyMs, coarserBy }: LineSeen): void {
+  observe({ framesPerSecond, posesPerSecond, bytesPerSecond, latencyMs, coarserBy, busyMs }: LineSeen): void {
     if (!this.canSkin || this.skins !== undefined) return;
     const behind = framesPerSecond < BEHIND * Math.min(ENOUGH_FRAMES, posesPerSecond);
-    if (!(latencyMs > LATE_MS) || !(behind || coarserBy > 0)) {
+    if (!(latencyMs > LATE_MS) || busyMs > BUSY_MS || !(behind || coarserBy > 0)) {
       this.slow = this.most = 0;
       return;
     }

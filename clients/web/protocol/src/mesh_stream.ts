@@ -52,6 +52,18 @@ export interface BodyFrame extends Quantisation {
   decodeMs: number;
 }
 
+function sameLayout(one: MeshLayout, other: MeshLayout): boolean {
+  return one.level === other.level && one.vertexCount === other.vertexCount && one.indices.length === other.indices.length
+    && one.ranges.length === other.ranges.length && one.ranges.every(({ tissue, firstVertex, firstIndex }, i) =>
+      tissue === other.ranges[i].tissue && firstVertex === other.ranges[i].firstVertex && firstIndex === other.ranges[i].firstIndex
+      && sameNumbers(one.ranges[i].rows, other.ranges[i].rows))
+    && sameNumbers(one.indices, other.indices);
+}
+
+function sameNumbers(one: Uint32Array | undefined, other: Uint32Array | undefined): boolean {
+  return one === other || (one?.length === other?.length && one !== undefined && one.every((value, i) => value === other![i]));
+}
+
 type Placed = Pick<BodyFrame, "vertices" | "skinned" | "scale" | "offset">;
 
 export interface MeshEvents {
@@ -79,7 +91,8 @@ export class MeshStream extends Emitter<MeshEvents> {
   }
 
   arrange(layouts: MeshLayout[], skinning?: Skinning): void {
-    this.layouts = layouts;
+    // What is the same stays the same object, so that nothing is built anew for it.
+    this.layouts = layouts.map((layout) => this.layouts.find((before) => sameLayout(before, layout)) ?? layout);
     this.skinning = skinning;
     this.table = undefined;
     this.latest = undefined;

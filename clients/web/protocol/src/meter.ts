@@ -2,6 +2,9 @@
 // What arrives, counted by the second, and how long a ping takes there and back.
 import type { Statistics } from "./channel.js";
 
+/** Of second(). */
+const PERIOD_MS = 1000;
+
 export class Meter {
   private frames = 0;
   private bytes = 0;
@@ -46,6 +49,6 @@ export class Meter {
     const latencyMs = this.askedAt === undefined ? this.latencyMs : Math.max(now - this.askedAt, this.latencyMs || 0);
     this.frames = this.bytes = this.decodeMs = 0;
     this.since = now;
-    return { framesPerSecond: frames / seconds, bytesPerSecond: bytes / seconds, latencyMs, decodeMs: frames > 0 ? decodeMs / frames : 0 };
+    return { framesPerSecond: frames / seconds, bytesPerSecond: bytes / seconds, latencyMs, decodeMs: frames > 0 ? decodeMs / frames : 0, lagMs: Math.max(0, 1000 * seconds - PERIOD_MS) };
   }
 }

@@ -55,6 +55,7 @@ export class Body {
   #topology: Topology | null = null;
   #positions: Positions | null = null;
   #buffer: THREE.InterleavedBuffer | null = null;
+  #gpu: WebGLBuffer | null = null;
   #rest: Positions | null = null;
   #outline: THREE.Mesh;
   #scalar: SurfaceScalar = "none";
@@ -98,6 +99,10 @@ export class Body {
     }
     if (this.#parts.size === 0) {
       this.#build(positions);
+    } else if ((positions.gpu ?? null) !== this.#gpu) {
+      // It comes another way now.
+      const vertex = this.#source(positions);
+      for (const { geometry } of this.#parts.values()) geometry.setAttribute("vertex", vertex);
     } else if (this.#buffer) {
       this.#buffer.array = positions.numbers;
       this.#buffer.needsUpdate = true;
@@ -214,8 +219,7 @@ export class Body {
   #build(positions: Positions): void {
     const topology = this.#topology;
     if (!topology) return;
-    if (!positions.gpu) this.#buffer = new THREE.InterleavedBuffer(positions.numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
-    const vertex = this.#buffer ? integers(this.#buffer) : resident(positions.gpu!, topology.vertices);
+    const vertex = this.#source(positions);
     const index = new THREE.BufferAttribute(topology.indices, 1);
     const depth = depthMaterial();
     for (const range of topology.ranges) {
@@ -237,6 +241,13 @@ export class Body {
     }
   }
 
+  #source(positions: Positions): THREE.InterleavedBufferAttribute | THREE.BufferAttribute {
+    const { gpu } = positions;
+    this.#gpu = gpu ?? null;
+    this.#buffer = gpu ? null : new THREE.InterleavedBuffer(positions.numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
+    return gpu ? resident(gpu, this.#topology!.vertices) : integers(this.#buffer!);
+  }
+
   #clear(): void {
     for (const { geometry, mesh, prepass, pick } of this.#parts.values()) {
       geometry.dispose();
@@ -247,7 +258,7 @@ export class Body {
     }
     this.#parts.clear();
     this.#outline.visible = false;
-    this.#buffer = null;
+    this.#buffer = this.#gpu = null;
     this.#positions = null;
     this.#rest = null;
     this.#values = null;
