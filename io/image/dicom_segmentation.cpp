@@ -51,7 +51,7 @@ Described described(const DataSet& set) {
     if (!number || *number > std::numeric_limits<std::uint16_t>::max())
       refuse(set.path, "has a segment without a number", "export it again");
     if (*number == 0) continue;  // the background of a label map
-    SegmentCodes codes{item.text(kLabel), code_of(item, kCategory), code_of(item, kType), {}};
+    SegmentCodes codes{item.text(kLabel), code_of(item, kCategory), code_of(item, kType), {}, {}, {}};
     if (const Item* type = item.only(kType)) codes.side = code_of(*type, kModifier);
     if (codes.side.empty()) codes.side = code_of(item, kModifier);
     std::string name = codes.label.empty() ? codes.type.meaning : codes.label;

@@ -56,7 +56,7 @@ std::vector<Held> held_segments(const Segmentation& segmentation) {
 
 // From the name alone: a code of our own, and the side.
 SegmentCodes own_codes(const std::string& name) {
-  SegmentCodes out{name, {"SCT", "123037004", "Anatomical Structure"}, {"99ECORCHE", name, name}, {}};
+  SegmentCodes out{name, {"SCT", "123037004", "Anatomical Structure"}, {"99ECORCHE", name, name}, {}, {}, {}};
   if (name.ends_with("_right")) out.side = {"SCT", "24028007", "Right"};
   if (name.ends_with("_left")) out.side = {"SCT", "7771000", "Left"};
   return out;
