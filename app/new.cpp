@@ -105,6 +105,8 @@ void declare_new(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::Range(-1000.0, 200.0))
       ->capture_default_str();
   add_image_choice(*command, settings->choice);
+  command->add_flag("--skin-from-labels", settings->options.skin_from_labels,
+                    "draw the skin round all labels, where neither a label nor a CT shows it");
   add_read_budget(*command, settings->limits);
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

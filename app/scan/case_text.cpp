@@ -54,7 +54,9 @@ std::string case_text(const ScanCase& scan, const std::string& name, const std::
     out += "# The image ends within the body, where the skin is cut flat. These caps are no skin:\n";
     for (const std::string& cap : scan.skin.caps) out += "#   " + plain(cap) + "\n";
   }
-  out += "skin: {labels: all}\nbones:\n";
+  out += scan.skin.close_mm > 0 ? "skin: {labels: all, close_mm: " + text::number(scan.skin.close_mm) + "}\n"
+                                : "skin: {labels: all}\n";
+  out += "bones:\n";
   for (const ScanEntry& entry : scan.entries) {
     if (entry.role != Role::bone || !entry.drawn || entry.voxels == 0) continue;
     out += "  - {name: " + entry.name + ", labels: [" + entry.name + "], segment: " + entry.segment + "}" +

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/values/text.hpp"
+#include "preprocess/scan/pieces.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -82,6 +83,36 @@ void tell_borders(ScanCase& out, const Context& context) {
                           " border of the image: what is left is a stump, whose joint there is found from "
                           "what is seen, or not at all");
   }
+}
+
+double exposed_bone(const ScanCase& out, const Context& context) {
+  const ImageGrid& grid = out.labels.grid;
+  const auto labels = out.labels.scalars<std::uint16_t>();
+  const scan::Pieces air = scan::find_pieces(out.labels, {1}, context);
+  std::vector<std::uint8_t> around(air.pieces.size(), 0);
+  for (std::size_t p = 0; p < around.size(); ++p) {
+    for (const std::size_t on : air.pieces[p].on_border) around[p] |= on > 0 ? 1 : 0;
+  }
+  std::size_t faces = 0, bones = 0;
+  const auto look = [&](int i, int j, int k) {
+    if (i < 0 || j < 0 || k < 0 || i >= grid.size[0] || j >= grid.size[1] || k >= grid.size[2]) return;
+    const std::uint16_t id = labels[grid.offset(i, j, k)];
+    if (id == 0) return;
+    ++faces;
+    bones += out.entries[id - 1U].role == Role::bone ? 1 : 0;
+  };
+  for (const scan::Run& run : air.runs) {
+    if (around[run.piece] == 0) continue;
+    look(run.begin - 1, run.j, run.k);
+    look(run.end, run.j, run.k);
+    for (int i = run.begin; i < run.end; ++i) {
+      for (const int step : {-1, 1}) {
+        look(i, run.j + step, run.k);
+        look(i, run.j, run.k + step);
+      }
+    }
+  }
+  return faces == 0 ? 1 : static_cast<double>(bones) / static_cast<double>(faces);
 }
 
 void tell_missing(ScanCase& out) {

@@ -24,6 +24,7 @@ constexpr std::size_t kMostEntries = 65534;
 constexpr std::size_t kLeastVoxels = 20;  // of anything that becomes a surface
 constexpr double kSpeckShare = 0.01;      // of a structure's voxels: smaller pieces are specks
 constexpr double kCovered = 0.35;         // a structure that keeps less of itself is another one's
+constexpr double kExposed = 0.05;         // share of bone on the outside of what is a body
 constexpr double kBare = 0.1;             // share of bone that may lie outside of a body's label
 
 std::string place(const std::array<double, 3>& p) {
@@ -236,7 +237,8 @@ class Decider {
       out_.skin = {"round the label of the body", 1, {}};
       return;
     }
-    if (shell && closes_round_bones(bone)) {
+    const double exposed = exposed_bone(out_, context_.quiet());
+    if (shell && exposed < kExposed) {
       out_.skin = {"round the label of the skin, a shell, with what it encloses", 0.8, {}};
       return;
     }
@@ -246,9 +248,13 @@ class Decider {
           std::to_string(std::lround(100.0 * static_cast<double>(bare) / static_cast<double>(bone))) +
           " % of the bones outside: it is not used for the skin");
     if (from_ct()) return;
-    const double exposed = exposed_bone();
-    if (exposed < 0.05) {
+    if (exposed < kExposed) {
       out_.skin = {"round all that is labelled", exposed < 0.01 ? 0.9 : 0.6, {}};
+      return;
+    }
+    if (options_.skin_from_labels) {
+      out_.skin = {
+          "round all that is labelled, with gaps up to 10 mm closed, as --skin-from-labels asks", 0.3, {}, 5};
       return;
     }
     throw Error(ErrorKind::data, scan_.labels.front().path.string(),
@@ -256,35 +262,6 @@ class Decider {
                     " % of the outside of all that is labelled is bone",
                 "give the CT too, or a label of the whole body (TotalSegmentator -ta body), before or after "
                 "these files");
-  }
-
-  // Whether what all labels enclose holds the bones well inside: a shell is closed.
-  bool closes_round_bones(std::size_t) const { return exposed_bone() < 0.05; }
-
-  // The share of bone among the faces between labelled voxels and those that are not, without the image's
-  // borders.
-  double exposed_bone() const {
-    const auto labels = out_.labels.scalars<std::uint16_t>();
-    std::size_t faces = 0, bones = 0;
-    const auto& n = grid_.size;
-    const std::array<std::size_t, 3> step{1, static_cast<std::size_t>(n[0]),
-                                          static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1])};
-    std::size_t at = 0;
-    for (int k = 0; k < n[2]; ++k) {
-      for (int j = 0; j < n[1]; ++j) {
-        for (int i = 0; i < n[0]; ++i, ++at) {
-          const std::array<int, 3> index{i, j, k};
-          for (std::size_t a = 0; a < 3; ++a) {
-            if (index[a] + 1 == n[a]) continue;
-            const std::uint16_t here = labels[at], there = labels[at + step[a]];
-            if ((here == 0) == (there == 0)) continue;
-            ++faces;
-            bones += out_.entries[std::max(here, there) - 1U].role == Role::bone ? 1 : 0;
-          }
-        }
-      }
-    }
-    return faces == 0 ? 1 : static_cast<double>(bones) / static_cast<double>(faces);
   }
 
   bool from_ct() {

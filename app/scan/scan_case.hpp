@@ -13,9 +13,10 @@
 namespace ecorche::app {
 
 struct ScanOptions {
-  Side side = Side::both;  ///< of a scan of one limb
-  double skin_hu = -300;   ///< denser than this is the patient, where no label says so
-  double bridge_mm = 6;    ///< what hangs on the patient by less is no part
+  Side side = Side::both;         ///< of a scan of one limb
+  double skin_hu = -300;          ///< denser than this is the patient, where no label says so
+  bool skin_from_labels = false;  ///< round all labels, where nothing better is there
+  double bridge_mm = 6;           ///< what hangs on the patient by less is no part
 };
 
 /// What one label of the input became.
@@ -45,6 +46,7 @@ struct ScanSkin {
   std::string how;  ///< where it comes from
   double confidence = 1;
   std::vector<std::string> caps;  ///< `the upper border: 312.5 cm2 at [..]`: flat there, and no skin
+  double close_mm = 0;            ///< as the case says it
 };
 
 /// The whole case.

@@ -2,6 +2,7 @@
 #include "app/scan/scan_input.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "core/values/text.hpp"
@@ -50,6 +51,21 @@ std::optional<std::set<std::int64_t>> label_values(const Image& image) {
   if (!fits) return std::nullopt;
   seen.erase(0);
   return seen;
+}
+
+// Whether neighbours differ as they do in pictures: labels come in areas.
+bool looks_grey(const Image& image, std::size_t values) {
+  if (values < 32) return false;
+  std::size_t pairs = 0, differ = 0;
+  with_scalar_type(image.type, [&](auto zero) {
+    const auto voxels = image.scalars<decltype(zero)>();
+    for (std::size_t v = 1; v < voxels.size(); ++v) {
+      if (voxels[v] == zero || voxels[v - 1] == zero) continue;
+      ++pairs;
+      differ += voxels[v] != voxels[v - 1] ? 1 : 0;
+    }
+  });
+  return 2 * differ > pairs;
 }
 
 ScanImage grey(const fs::path& path, Image image) {
@@ -157,7 +173,7 @@ class Reader {
       masks_[path.parent_path()].push_back(path);
       return;
     }
-    const bool labels = values && (!names.empty() || table_for(path) || values->size() <= 255);
+    const bool labels = values && (!names.empty() || table_for(path) || !looks_grey(image, values->size()));
     if (!labels) {
       add_grey(path, std::move(image));
       return;

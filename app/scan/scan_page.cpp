@@ -26,13 +26,13 @@ h1{font-size:1.9rem;margin:0;overflow-wrap:anywhere}h2{font-size:1.2rem;margin:2
 img{max-width:100%;height:auto;max-height:42rem;border-radius:4px;display:block}
 figcaption,.soft{color:var(--soft);font-size:.87rem}li{margin:.35rem 0;overflow-wrap:anywhere}
 table{border-collapse:collapse;width:100%}th{text-align:left;font-weight:600;color:var(--soft)}
-td,th{padding:.2rem .8rem .2rem 0;vertical-align:top;border-bottom:1px solid var(--line);overflow-wrap:anywhere}
+td,th{padding:.2rem .8rem .2rem 0;vertical-align:top;border-bottom:1px solid var(--line)}td:last-child,td:nth-last-child(2){overflow-wrap:anywhere}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .bad{color:var(--bad);font-weight:600}.fair{color:var(--fair)}.good{color:var(--good)}
 .key span{display:inline-block;margin:0 .9rem .2rem 0;white-space:nowrap}.key i{display:inline-block;width:.85em;height:.85em;border-radius:2px;margin-right:.35em;vertical-align:-.08em}
 @media(max-width:40rem){body{margin:1rem auto;padding:0 .8rem}table,tbody,tr,td{display:block}th{display:none}
 td{border:0;padding:0}td.n{text-align:left}tr{border-bottom:1px solid var(--line);padding:.45rem 0}
-td[data-of]::before{content:attr(data-of) ': ';color:var(--soft)}td:first-child{font-weight:600}}
+td[data-of]::before{content:attr(data-of) ': ';color:var(--soft)}td:first-child{font-weight:600}tr:first-child{border:0;padding:0}td{overflow-wrap:anywhere}}
 )";
 
 std::string picture(const report::Picture& drawn, const std::string& caption) {

@@ -203,17 +203,20 @@ Recognised by_name(std::string_view name) {
     out.how = "name without '" + std::string(last) + "'";
     return out;
   }
-  for (std::size_t count = fewer.size(); count-- > 1;) {
-    const Words begin(fewer.begin(), fewer.begin() + static_cast<std::ptrdiff_t>(count));
-    if ((out.structure = find(begin, out.confidence)) == nullptr) continue;
-    // `patella_ligament` is no patella: what a later word calls something else is that.
-    if (out.structure->becomes == Becomes::bone && group_of(fewer) != Group::other) break;
-    out.confidence = 0.6;
-    out.how = "its name begins with '" + text::joined(begin, "_") + "'";
-    return out;
+  // `patellar_ligament` is no patella: what a word of the name calls something else is that.
+  const Group told = group_of(words);
+  for (const Words* all : {&words, &fewer}) {
+    for (std::size_t count = all->size(); count-- > 1;) {
+      const Words begin(all->begin(), all->begin() + static_cast<std::ptrdiff_t>(count));
+      if ((out.structure = find(begin, out.confidence)) == nullptr) continue;
+      if (told != Group::other && told != out.structure->group) break;
+      out.confidence = 0.6;
+      out.how = "its name begins with '" + text::joined(begin, "_") + "'";
+      return out;
+    }
   }
   out.structure = nullptr;
-  out.group = group_of(words);
+  out.group = told;
   out.confidence = out.group == Group::other ? 0 : 0.5;
   out.how = out.group == Group::other ? "not known" : "a word of its name";
   return out;

@@ -32,7 +32,7 @@ Image labels(std::vector<std::uint8_t> voxels) {
 }
 
 template <class T>
-std::vector<int> values(const Image& image) {
+std::vector<int> voxels_as(const Image& image) {
   const auto voxels = image.scalars<T>();
   return {voxels.begin(), voxels.end()};
 }
@@ -82,7 +82,7 @@ TEST(NiftiNames, ComeBackAsTheyWereWritten) {
   const auto file = scratch.path() / "ml.nii.gz";
   write_named_nifti(file, labels({0, 1, 2, 117}), names);
   EXPECT_EQ(read_nifti_names(file), names);
-  EXPECT_EQ(values<std::uint8_t>(read_segmentation(file).layers[0]), (std::vector<int>{0, 1, 2, 117}));
+  EXPECT_EQ(voxels_as<std::uint8_t>(read_segmentation(file).layers[0]), (std::vector<int>{0, 1, 2, 117}));
 }
 
 TEST(NiftiNames, ForeignExtensionsNameNothing) {
@@ -149,8 +149,8 @@ TEST(Masks, AreOneLabelAFileAndEmptyOnesAreAbsent) {
   EXPECT_EQ(read.names, (LabelNames{{1, "body"}, {2, "femur_left"}, {3, "hip"}}));
   // What overlaps lies in another layer: nothing is lost.
   ASSERT_EQ(read.layers.size(), 2u);
-  EXPECT_EQ(values<std::uint16_t>(read.layers[0]), (std::vector<int>{1, 1, 1, 1}));
-  EXPECT_EQ(values<std::uint16_t>(read.layers[1]), (std::vector<int>{3, 2, 2, 0}));
+  EXPECT_EQ(voxels_as<std::uint16_t>(read.layers[0]), (std::vector<int>{1, 1, 1, 1}));
+  EXPECT_EQ(voxels_as<std::uint16_t>(read.layers[1]), (std::vector<int>{3, 2, 2, 0}));
 }
 
 std::string refusal(const std::filesystem::path& folder) {
@@ -180,12 +180,12 @@ TEST(MergedLabels, EarlierMapsComeFirstAndIdsMeanOneThing) {
       b{{labels({2, 2, 0, 1, 0})}, {{1, "tibia"}, {2, "femur"}}}, c{{labels({9, 9, 9, 9, 0})}, {{9, "body"}}};
   const Segmentation all = merged({std::move(a), std::move(b), std::move(c)});
   EXPECT_EQ(all.names, (LabelNames{{1, "femur"}, {2, "tibia"}, {3, "femur"}, {4, "body"}}));
-  EXPECT_EQ(values<std::uint16_t>(all.layers[0]), (std::vector<int>{3, 1, 1, 2, 0}));
+  EXPECT_EQ(voxels_as<std::uint16_t>(all.layers[0]), (std::vector<int>{3, 1, 1, 2, 0}));
   Segmentation one{{labels({5, 6})}, {{5, "x"}, {6, "y"}}};
   leave_out(one, {5});
   EXPECT_EQ(one.names, (LabelNames{{6, "y"}}));
   const Segmentation same = merged({std::move(one)});
-  EXPECT_EQ(values<std::uint8_t>(same.layers[0]), (std::vector<int>{0, 6}));  // alone it keeps its ids
+  EXPECT_EQ(voxels_as<std::uint8_t>(same.layers[0]), (std::vector<int>{0, 6}));  // alone it keeps its ids
 }
 
 TEST(MergedLabels, LayersOfOneMapStayWhole) {
@@ -194,8 +194,8 @@ TEST(MergedLabels, LayersOfOneMapStayWhole) {
   a.names[2] = "nodule";
   Segmentation b{{labels({7, 7, 7})}, {{7, "body"}}};
   const Segmentation all = merged({std::move(a), std::move(b)});
-  EXPECT_EQ(values<std::uint16_t>(all.layers[0]), (std::vector<int>{1, 1, 3}));
-  EXPECT_EQ(values<std::uint16_t>(all.layers[1]), (std::vector<int>{0, 2, 0}));
+  EXPECT_EQ(voxels_as<std::uint16_t>(all.layers[0]), (std::vector<int>{1, 1, 3}));
+  EXPECT_EQ(voxels_as<std::uint16_t>(all.layers[1]), (std::vector<int>{0, 2, 0}));
 }
 
 TEST(SameGrid, NearestIsTheObviousOne) {
@@ -228,7 +228,7 @@ TEST(Terminology, ComesBackAndIsReadFromSlicersTags) {
   const SegmentCodes codes = parse_terminology(
       "Segmentation category and type - DICOM master list~SCT^123037004^Anatomical "
       "Structure~SCT^272673000^Bone~^^~Anatomic "
-      "codes~SCT^71341001^Femur~SCT^7771000^Left|");
+      "codes~SCT^71341001^Femur~SCT^7771000^Left");
   EXPECT_EQ(codes.type.meaning, "Bone");
   EXPECT_EQ(codes.region.value, "71341001");
   EXPECT_EQ(codes.region_side.value, "7771000");

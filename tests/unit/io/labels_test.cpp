@@ -164,7 +164,8 @@ TEST(LabelTable, EveryMistakeIsNamed) {
   const auto refused = [&](const std::string& name, const std::string& text, const std::string& part) {
     expect_error(ErrorKind::data, part, [&] { read_label_table(scratch.put(name, text)); });
   };
-  refused("a.csv", "x", "'.csv' tables cannot be read (use .ctbl, .tsv, or .txt as ITK-SNAP writes it)");
+  refused("a.csv", "x",
+          "'.csv' tables cannot be read (use .ctbl, .tsv, .json, or .txt as ITK-SNAP writes it)");
   refused("a.ctbl", "# nothing\n", "names no label");
   refused("a.ctbl", "1 a 0 0 0 0\none b 0 0 0 0\n", "a.ctbl:2: 'one' is no label id (ids are whole numbers)");
   refused("a.ctbl", "1 a 0 0 0 0\n1 b 0 0 0 0\n", "a.ctbl:2: label 1 stands twice (keep one)");

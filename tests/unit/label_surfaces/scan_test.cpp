@@ -103,11 +103,11 @@ SidedPiece rod(const std::string& structure, const std::string& segment, Side si
 
 TEST(Sides, CrossedLegsKeepTheirOwn) {
   // The left shank and foot lie on the right of the body, and the other way round.
-  const std::vector<SidedPiece> pieces{rod("femur", "thigh", Side::left, {80, 0, 800}, {30, 0, 420}),
-                                       rod("femur", "thigh", Side::right, {-80, 0, 800}, {-30, 0, 420}),
+  const std::vector<SidedPiece> pieces{rod("femur", "thigh", Side::left, {80, 0, 800}, {60, 0, 420}),
+                                       rod("femur", "thigh", Side::right, {-80, 0, 800}, {-60, 0, 420}),
                                        rod("tarsal", "foot", Side::both, {-120, 0, 30}, {-120, -100, 30}),
-                                       rod("tibia", "shank", Side::both, {20, -40, 400}, {-120, -40, 50}),
-                                       rod("tibia", "shank", Side::both, {-22, 40, 400}, {120, 40, 50}),
+                                       rod("tibia", "shank", Side::both, {55, -20, 400}, {-120, -40, 50}),
+                                       rod("tibia", "shank", Side::both, {-55, 20, 400}, {120, 40, 50}),
                                        rod("tarsal", "foot", Side::both, {120, 0, 30}, {120, -100, 30})};
   const auto found = find_sides(pieces, kLegs, Side::both);
   EXPECT_EQ(found[2].side, Side::left);
