@@ -55,8 +55,8 @@ std::string name_of(const fs::path& file) {
 // What was DICOM comes back as NRRD: on the way its frame of reference has changed twice.
 fs::path back_name(const fs::path& file) {
   const fs::path name = file.filename();
-  return io::is_dicom(file) ? name.stem().string() + (name.extension() == ".dcm" ? ".seg.nrrd" : ".nrrd")
-                            : name;
+  if (!io::is_dicom(file)) return name;
+  return name.stem().string() + (name.extension() == ".dcm" ? ".seg.nrrd" : ".nrrd");
 }
 
 // A file that is to come back.

@@ -4,8 +4,6 @@
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcpixseq.h>
 #include <dcmtk/dcmdata/dcpxitem.h>
-#include <dcmtk/dcmdata/dcrleccd.h>
-#include <dcmtk/dcmdata/dcrlecp.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmjpeg/djcparam.h>
 #include <dcmtk/dcmjpeg/djdecbas.h>
@@ -15,11 +13,14 @@
 #include <dcmtk/dcmjpeg/djdecsps.h>
 #include <dcmtk/dcmjpeg/djdecsv1.h>
 #include <dcmtk/dcmjpeg/djrploss.h>
+#include <dcmtk/dcmjpeg/djutils.h>
 #include <dcmtk/dcmjpls/djcodecd.h>
 #include <dcmtk/dcmjpls/djcparam.h>
+#include <dcmtk/dcmjpls/djlsutil.h>
 #include <openjpeg.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <memory>
 
@@ -78,6 +79,26 @@ void check_size(const StreamSize& said, const StoredPixels& pixels, const Path& 
              std::to_string(pixels.allocated));
 }
 
+// DCMTK's codecs write what they meet on std::cerr: kept quiet, until the call is over.
+class Quiet {
+ public:
+  Quiet() {
+    for (std::size_t i = 0; i < loggers_.size(); ++i) {
+      before_[i] = loggers_[i]->getLogLevel();
+      loggers_[i]->setLogLevel(OFLogger::OFF_LOG_LEVEL);
+    }
+  }
+  ~Quiet() {
+    for (std::size_t i = 0; i < loggers_.size(); ++i) loggers_[i]->setLogLevel(before_[i]);
+  }
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+ private:
+  std::array<OFLogger*, 3> loggers_{&DCM_dcmdataLogger, &DCM_dcmjpegLogger, &DCM_dcmjplsLogger};
+  std::array<dcmtk::log4cplus::LogLevel, 3> before_{};
+};
+
 // What DCMTK's codecs ask of the data set.
 void describe(DcmDataset& set, const StoredPixels& pixels) {
   set.putAndInsertUint16(DCM_SamplesPerPixel, 1);
@@ -93,6 +114,7 @@ void describe(DcmDataset& set, const StoredPixels& pixels) {
 
 void decode(const DcmCodec& codec, const DcmCodecParameter& parameter, std::string_view packed,
             const StoredPixels& pixels, std::span<std::byte> out, const Path& path) {
+  const Quiet quiet;
   DcmDataset set;
   describe(set, pixels);
   DcmPixelSequence sequence(DcmTag(DCM_PixelData, EVR_OB));
@@ -222,10 +244,8 @@ void unpack_jpeg_2000(std::string_view packed, const StoredPixels& pixels, std::
 
 void unpack(std::string_view packed, const StoredPixels& pixels, std::span<std::byte> out, const Path& path) {
   switch (pixels.syntax.packing) {
-    case Packing::rle: {
-      const DcmRLECodecDecoder codec;
-      return decode(codec, DcmRLECodecParameter(), packed, pixels, out, path);
-    }
+    case Packing::rle:
+      return unpack_rle(packed, pixels, out, path);
     case Packing::jpeg_ls: {
       check_size(jpeg_size(packed), pixels, path);
       const DJLSNearLosslessDecoder codec;

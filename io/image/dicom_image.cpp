@@ -199,7 +199,8 @@ Image read_dicom(const fs::path& path, const files::ReadOptions& options, const 
            "resample the label map by nearest neighbour");
   files::Budget budget = files::Budget::of_image(bytes, options.limits, path.string());
   Image image = read_slices(stack, budget, path);
-  return interpolated ? resampled(image, stack, budget) : image;
+  if (interpolated) return resampled(image, stack, budget);
+  return image;
 }
 
 }  // namespace ecorche::io

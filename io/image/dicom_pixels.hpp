@@ -51,4 +51,8 @@ class PixelFile {
 void unpack(std::string_view packed, const StoredPixels& pixels, std::span<std::byte> out,
             const std::filesystem::path& path);
 
+/// The same of RLE alone.
+void unpack_rle(std::string_view packed, const StoredPixels& pixels, std::span<std::byte> out,
+                const std::filesystem::path& path);
+
 }  // namespace ecorche::io::dicom

@@ -46,11 +46,8 @@ std::vector<Held> held_segments(const Segmentation& segmentation) {
     for (auto& [id, in] : planes) out.push_back({id, 0, layer, std::move(in)});
   }
   std::stable_sort(out.begin(), out.end(), [](const Held& a, const Held& b) { return a.id < b.id; });
-  bool own = out.size() < 65536;
-  for (std::size_t i = 0; i < out.size(); ++i)
-    own = own && out[i].id > 0 && out[i].id < 65536 && (i == 0 || out[i].id != out[i - 1].id);
-  for (std::size_t i = 0; i < out.size(); ++i)
-    out[i].number = static_cast<std::uint16_t>(own ? out[i].id : static_cast<std::int64_t>(i) + 1);
+  // One after the other, as the standard wants it.
+  for (std::size_t i = 0; i < out.size(); ++i) out[i].number = static_cast<std::uint16_t>(i + 1);
   return out;
 }
 
@@ -153,6 +150,8 @@ void write_dicom_segmentation(const std::filesystem::path& path, const Segmentat
   const std::size_t frames =
       std::accumulate(all.begin(), all.end(), std::size_t{0},
                       [](std::size_t sum, const Held& one) { return sum + one.planes.size(); });
+  if (all.size() > 65535)
+    throw Error(ErrorKind::data, path.string(), "a DICOM SEG has 65535 segments at most", "use .nrrd");
   if (frames == 0)
     throw Error(ErrorKind::data, path.string(), "no voxel is labelled, and a DICOM SEG has one at least",
                 "write the labels as .nrrd");

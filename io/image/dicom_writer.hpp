@@ -20,7 +20,7 @@ void write_dicom_series(const std::filesystem::path& folder, const Image& image,
 
 /// One file, binary, with a frame for each plane of each segment that has a voxel there; segments of all
 /// layers side by side. What `segmentation.codes` does not code has a code of our own, from its name, with
-/// the side that the name ends in. Ids become numbers from 1 where they are no such numbers themselves.
+/// the side that the name ends in. Ids become numbers from 1, in their order.
 /// Throws Error{data} where no voxel is labelled, Error{cannot_create, io}.
 void write_dicom_segmentation(const std::filesystem::path& path, const Segmentation& segmentation,
                               const std::string& name, const DicomFacts& facts);

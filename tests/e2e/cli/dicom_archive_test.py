@@ -70,14 +70,14 @@ class Archive(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         sent = {pydicom.dcmread(path, stop_before_pixels=True).SOPInstanceUID: path
                 for path in [*(posed / "ct.dicom").iterdir(), posed / "labels.dcm"]}
-        self.tool("storescu", "-aec", "ARCHIVE", "+sd", "+r", "+sp", "*.dcm", "127.0.0.1", self.dicom, posed)
+        self.tool("storescu", "-R", "-aec", "ARCHIVE", "+sd", "+r", "+sp", "*.dcm", "127.0.0.1", self.dicom, posed)
         self.assertEqual(json.loads(self.rest("/statistics"))["CountInstances"], len(sent))
         data = pydicom.dcmread(posed / "labels.dcm", stop_before_pixels=True)
         peer = ("-aec", "ARCHIVE", "-S", "-k", "QueryRetrieveLevel=SERIES", "-k", f"StudyInstanceUID={data.StudyInstanceUID}")
         found = self.tool("findscu", "-v", *peer, "-k", "SeriesInstanceUID", "-k", "Modality", "127.0.0.1", self.dicom)
         self.assertIn(data.SeriesInstanceUID, found)
         self.assertIn("[CT]", found)
-        self.assertIn("[SEG]", found)
+        self.assertIn("[SEG ]", found)
         got = self.folder / "got"
         got.mkdir()
         for modality in ("CT", "SEG"):

@@ -58,16 +58,17 @@ class Dicom(unittest.TestCase):
         labels, origin, edge = image(self.folder / "nrrd" / "labels.nrrd")
         seg = pydicom.dcmread(posed / "labels.dcm")
         self.assertEqual(seg.FrameOfReferenceUID, slices[0].FrameOfReferenceUID)
+        told = json.loads((self.folder / "nrrd" / "posed.json").read_text())
+        table = next(one for one in told["files"] if one["file"] == "labels.nrrd")["labels"]
+        table = {name: int(i) for i, name in table.items() if int(i) in set(np.unique(labels))}
+        self.assertEqual([one.SegmentLabel for one in seg.SegmentSequence], sorted(table, key=table.get))
+        names = {one.SegmentNumber: one.SegmentLabel for one in seg.SegmentSequence}
         again = np.zeros_like(labels)
         for frame, bits in zip(seg.PerFrameFunctionalGroupsSequence, seg.pixel_array):
             at = np.array(frame.PlanePositionSequence[0].ImagePositionPatient, float)
             number = frame.SegmentIdentificationSequence[0].ReferencedSegmentNumber
-            again[round((at[2] - origin[2]) / edge)][bits > 0] = number
+            again[round((at[2] - origin[2]) / edge)][bits > 0] = table[names[number]]
         np.testing.assert_array_equal(again, labels)
-        names = {one.SegmentNumber: one.SegmentLabel for one in seg.SegmentSequence}
-        told = json.loads((self.folder / "nrrd" / "posed.json").read_text())
-        table = next(one for one in told["files"] if one["file"] == "labels.nrrd")["labels"]
-        self.assertEqual(names, {int(i): name for i, name in table.items() if int(i) in set(np.unique(labels))})
 
     def test_the_way_back_is_that_of_nrrd(self):
         for name in ("nrrd", "dicom"):
@@ -93,8 +94,10 @@ class Dicom(unittest.TestCase):
 
     def test_refill_reads_and_writes_a_series(self):
         scan = self.folder / "dicom" / "ct.dicom"
-        self.ok("refill", MODEL, scan, "-o", self.folder / "full.dicom", "--series", "ct, pose")
-        self.ok("refill", MODEL, self.folder / "nrrd" / "ct.nrrd", "-o", self.folder / "full.nrrd")
+        thin = self.folder / "thin.vtp"
+        self.ok("thin", self.folder / "nrrd" / "labels.nrrd", "-o", thin)
+        self.ok("refill", thin, scan, "-o", self.folder / "full.dicom", "--series", "ct, pose")
+        self.ok("refill", thin, self.folder / "nrrd" / "ct.nrrd", "-o", self.folder / "full.nrrd")
         values = image(self.folder / "full.nrrd")[0]
         slices = sorted((self.folder / "full.dicom").iterdir())
         self.assertEqual(len(slices), len(values))

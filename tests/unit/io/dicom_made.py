@@ -3,11 +3,20 @@
 import pathlib
 
 import numpy
-import pydicom
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
 from pydicom.uid import UID, ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian, generate_uid
 
 CT, ENHANCED_CT, SEG = (UID("1.2.840.10008.5.1.4.1.1." + end) for end in ("2", "2.1", "66.4"))
+
+AXIAL = numpy.array([[0.7, 0, 0, -10], [0, 0.8, 0, -20], [0, 0, 1.5, 30], [0, 0, 0, 1.0]])
+
+
+def turned(affine):
+    """About two axes: oblique to all."""
+    (c, s), (d, t) = ((numpy.cos(a), numpy.sin(a)) for a in (0.3, -0.5))
+    out = numpy.eye(4)
+    out[:3, :3] = numpy.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ numpy.array([[1, 0, 0], [0, d, -t], [0, t, d]])
+    return out @ affine
 
 
 def text(numbers):
