@@ -52,6 +52,8 @@ constexpr std::array kMessages{
     MessageRow{E::kAskControl, "control", kModel, kStatus, call<&E::ask_control, handle_ask_control>},
     MessageRow{E::kGiveControl, "control", kControl, kStatus, call<&E::give_control, handle_give_control>},
     MessageRow{E::kSteerClip, "clip", kControl, kStatus, call<&E::steer_clip, handle_steer_clip>},
+    MessageRow{E::kGetSpheres, "spheres", kModel, kStatus, call<&E::get_spheres, handle_get_spheres>},
+    MessageRow{E::kHangSpheres, "spheres", kControl, kStatus, call<&E::hang_spheres, handle_hang_spheres>},
     MessageRow{E::kPing, "ping", kHello, kStatus, call<&E::ping, handle_ping>},
     MessageRow{E::kPong, "pong", kHello, kStatus, call<&E::pong, handle_pong>},
     MessageRow{E::kStatus, "status", kHello, kStatus, call<&E::status, handle_status>},
