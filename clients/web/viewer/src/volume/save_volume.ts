@@ -10,7 +10,7 @@ import { writeNifti } from "./nifti.js";
 /** Beyond, a page may lose its memory while it packs. */
 const MOST_BYTES = 1 << 30;
 
-export async function saveVolume(app: App, name: string): Promise<void> {
+export async function saveVolume(app: App, name: string, bySpheres = false): Promise<void> {
   const { client } = app.live, volume = client?.model?.volumes.find((each) => each.name === name);
   if (!client || !volume) return app.say(`The model holds no volume ${name}`);
   const abort = new AbortController();
@@ -19,11 +19,11 @@ export async function saveVolume(app: App, name: string): Promise<void> {
     const { size } = gridOf(volume.grid), at = size[0] * size[1] * size[2];
     if (at > MOST_BYTES) throw new Error(`${at} voxels are too many for a page (\`ecorche pose\` writes them)`);
     job.say("Posing on the server");
-    const { image, poseSequence }: VolumeShown = await fetchVolume(client, { volume: name }, app.store.state.poseSequence, abort.signal);
+    const { image, poseSequence }: VolumeShown = await fetchVolume(client, { volume: name, bySpheres }, app.store.state.poseSequence, abort.signal);
     if (image.voxels.byteLength > MOST_BYTES) throw new Error(`${image.voxels.byteLength} bytes are too many for a page (\`ecorche pose\` writes them)`);
     job.say("Packing");
     const blob = await writeNifti(image, (share) => job.progress(share), abort.signal);
-    download(blob, `${client.model!.model}_${name}_pose_${poseSequence}.nii.gz`);
+    download(blob, `${client.model!.model}_${name}_pose_${poseSequence}${bySpheres ? "_by_balls" : ""}.nii.gz`);
     app.say(`Saved ${name}, ${image.grid.size.join(" x ")} voxels`);
   } catch (error) {
     app.say(abort.signal.aborted ? `${name} was not saved: cancelled` : `${name} was not saved: ${wordsOf(error)}`);
