@@ -14,6 +14,7 @@ export { fetchVolume, VolumeStream, type VolumeOptions, type VolumeShown } from 
 export { Policy, type Choice, type Observed } from "./policy.js";
 export type { Pose } from "./pose_sender.js";
 export type { Probed, ProbeOptions } from "./probe.js";
+export type { Spheres } from "./spheres.js";
 export type { ConnectionState, ControlState, StateChange } from "./states.js";
 export { NO_NORMAL, STRIDE, type Quantisation } from "./decode/packed.js";
 export * from "./gen/ecorche/v1/common_pb.js";

@@ -5,6 +5,7 @@ import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
 import { addSlices } from "./slices/index.js";
+import { addBalls } from "./spheres/index.js";
 import { addVolume } from "./volume/index.js";
 import { addHeadset } from "./xr/index.js";
 import { wordsOf } from "./errors.js";
@@ -20,6 +21,7 @@ try {
   // After posing, whose tab is open at first.
   addSlices(app);
   addVolume(app);
+  addBalls(app, posing);
   const headset = addHeadset(app, posing);
   // For the browser's console, and for tests.
   Object.assign(window, { ecorche: Object.assign(app, { posing, headset }) });
