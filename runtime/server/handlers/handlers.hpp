@@ -53,6 +53,10 @@ Status handle_list_clips(Client& client, const v1::ListClips& list, const Reques
 Status handle_play_clip(Client& client, const v1::PlayClip& play, const Request& request);
 Status handle_steer_clip(Client& client, const v1::SteerClip& steer, const Request& request);
 
+// spheres.cpp
+Status handle_get_spheres(Client& client, const v1::GetSpheres& get, const Request& request);
+Status handle_hang_spheres(Client& client, const v1::HangSpheres& hang, const Request& request);
+
 // recording.cpp
 Status handle_record(Client& client, const v1::Record& record, const Request& request);
 

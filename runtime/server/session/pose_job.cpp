@@ -231,8 +231,8 @@ Status show_volume(const PoseJob& job, const Subscription& subscription, const r
   Context context;
   context.stop = job.stop;
   Status status = guarded("pose", [&] {
-    return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
-                                      frame, *payload, context);
+    return subscription.volume->write({*job.model, job.hung, body}, job.volume_voxels,
+                                      (subscription.keyframes & 1) != 0, frame, *payload, context);
   });
   if (status.code == StatusCode::cancelled) return status;
   if (!status.ok()) {

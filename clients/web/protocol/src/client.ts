@@ -26,6 +26,7 @@ import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
 import { Redial } from "./redial.js";
 import { encode, Requests, type Answer, type Case, type Message } from "./requests.js";
+import { encodeHang, readSpheres, type Spheres } from "./spheres.js";
 import type { ControlState, StateChange } from "./states.js";
 
 /** None of these mends itself by dialling again. */
@@ -218,6 +219,18 @@ export class Client extends Emitter<ClientEvents> {
   async field(options: FieldOptions): Promise<Field> {
     const { value, payload } = await this.ask(encodeField(options), "field");
     return readField(value, payload);
+  }
+
+  /** The balls that pose a volume by spheres, as they hang in this session. */
+  async spheres(volume: string): Promise<Spheres> {
+    const { value, payload } = await this.ask({ case: "getSpheres", value: { $typeName: "ecorche.v1.GetSpheres", volume } }, "spheres");
+    return readSpheres(value, payload as Uint8Array<ArrayBuffer>, this.model?.skeleton?.segments.length ?? 0);
+  }
+
+  /** Hangs them otherwise, or about other joints, in this session; null: as the model has it. */
+  async hangSpheres(volume: string, segment: Int32Array | null, joints: Float64Array | null): Promise<void> {
+    const { message, payload } = encodeHang(volume, segment, joints);
+    await this.ask(message, "status", payload);
   }
 
   /** Any other request of the protocol. `stream`: of a Subscribe whose frames are for it. */

@@ -181,6 +181,10 @@ export class Body {
     for (const part of this.#parts.values()) this.#clip(part);
   }
 
+  get clipping(): THREE.Plane[] {
+    return this.#clipping;
+  }
+
   /** Triangles of a tissue, in numbers of the present frame. */
   geometry(row: number): THREE.BufferGeometry | undefined {
     return this.#parts.get(row)?.geometry;
