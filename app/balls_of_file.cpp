@@ -41,6 +41,15 @@ void hang_on(const fs::path& path, const std::vector<std::string>& names, const 
   }
 }
 
+// Where the file has them; the names are segments of the rig.
+void move_joints(const io::VolumetricSkeletonFile& file, Rig& rig) {
+  for (std::size_t s = 0; s < file.joints.size(); ++s) {
+    const std::int32_t row = rig.skeleton.find_segment(file.segments[s]);
+    rig.skeleton.segments[static_cast<std::size_t>(row)].joint.center =
+        Eigen::Vector3d(file.joints[s].data());
+  }
+}
+
 }  // namespace
 
 Rig read_placed_rig(const fs::path& path) {
@@ -61,6 +70,7 @@ std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const fs::path& skeleto
     if (rig.empty()) return {std::move(file.skeleton), Rig()};
     Rig moved_by = read_placed_rig(rig);
     hang_on(skeleton, file.segments, moved_by, file.skeleton);
+    move_joints(file, moved_by);
     return {std::move(file.skeleton), std::move(moved_by)};
   }
   Model model = model_file::read(skeleton, {});

@@ -21,7 +21,8 @@ Rig read_placed_rig(const std::filesystem::path& path);
 
 /// A skeleton by itself (.vtp), or the first of a model (.hdf); and the rig that moves it: of `rig`, a
 /// skeleton file whose every centre is given (.yaml) or a model, else of the model that the skeleton came
-/// from, else empty. With a rig the voxels hang on its rows, matched by the names of segments. Throws as the
+/// from, else empty. With a rig the voxels hang on its rows, matched by the names of segments, and its joints
+/// are where the file has them, if it does. Throws as the
 /// readers do; Error{config} for a joint without its centre, a segment that the rig lacks, a model without
 /// spheres; Error{data} for a skeleton that hangs on no segments although a rig is given.
 std::pair<VolumetricSkeleton, Rig> read_skeleton_and_rig(const std::filesystem::path& skeleton,

@@ -19,6 +19,7 @@ struct NewSettings {
   std::string side;
   ScanOptions options;
   files::ReadLimits limits;
+  io::ImageChoice choice;
 };
 
 nlohmann::json entry_json(const ScanEntry& entry) {
@@ -38,7 +39,8 @@ nlohmann::json entry_json(const ScanEntry& entry) {
 int run(const Program& program, NewSettings& settings) {
   if (!settings.side.empty()) settings.options.side = settings.side == "left" ? Side::left : Side::right;
   check_case_target(settings.output, settings.scan);
-  Scan scan = read_scan(settings.scan, reading(program, settings.limits), program.context("read"));
+  Scan scan =
+      read_scan(settings.scan, reading(program, settings.limits), settings.choice, program.context("read"));
   const ScanCase made = decide(scan, settings.options, program.context("labels"));
   const WrittenCase written =
       write_scan_case(settings.output, settings.scan, scan, made, program.context("write"));
@@ -85,9 +87,10 @@ void declare_new(CLI::App& app, Program& program, Run& chosen) {
   CLI::App* command =
       app.add_subcommand("new", "write the case of a scan: its CT and what programs segmented in it");
   command
-      ->add_option("SCAN", settings->scan,
-                   "images, label maps with names, tables of names, folders of masks or label maps; of "
-                   "labels that overlap the first file's count")
+      ->add_option(
+          "SCAN", settings->scan,
+          "images, label maps with names, tables of names, folders of masks or label maps, DICOM series and "
+          "DICOM SEG; of labels that overlap the first file's count")
       ->required();
   command->add_option("-o,--output", settings->output, "the folder for the case; new, or empty")->required();
   command->add_option("--report", settings->report,
@@ -101,6 +104,7 @@ void declare_new(CLI::App& app, Program& program, Run& chosen) {
                    "HU: what is denser is the patient, where no label shows the body")
       ->check(CLI::Range(-1000.0, 200.0))
       ->capture_default_str();
+  add_image_choice(*command, settings->choice);
   command->add_flag("--skin-from-labels", settings->options.skin_from_labels,
                     "draw the skin round all labels, where neither a label nor a CT shows it");
   add_read_budget(*command, settings->limits);

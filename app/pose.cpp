@@ -16,14 +16,15 @@
 #include "app/command.hpp"
 #include "app/measured_pose.hpp"
 #include "app/pose_frames.hpp"
+#include "app/pose_plan.hpp"
 #include "app/pose_report.hpp"
 #include "app/posed_case.hpp"
+#include "app/posed_dicom.hpp"
 #include "app/posed_folder.hpp"
 #include "app/posed_tets.hpp"
 #include "app/tet_regions.hpp"
-#include "app/unknown_name.hpp"
-#include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "runtime/spheres/pose_volume.hpp"
@@ -34,82 +35,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// As the command line says it.
-struct PoseSettings {
-  fs::path model, output;
-  FrameChoice frames;
-  std::string skinning = "cor";
-  std::vector<std::string> tissues, volumes;
-  std::vector<std::string> formats{"stl"};
-  std::string volume_format = "nrrd";
-  std::string sampling = "trilinear";
-  std::string grid = "posed";
-  std::string deformer = "tets";
-  bool tets = false, field = false, as_case = false, bridge = true, unfold = false;
-  std::vector<std::string> tet_formats{"vtu"};
-
-  bool chooses() const { return !tissues.empty() || !volumes.empty() || tets || field; }
-};
-
 runtime::Sampling sampling_of(const PoseSettings& settings) {
   return settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
-}
-
-// What to write, in rows of the model.
-struct Plan {
-  std::vector<std::uint32_t> tissues, volumes;
-  bool tets = false, field = false;
-  std::map<std::string, runtime::VolumeBalls> balls;  // of volumes that are refilled, by name
-};
-
-// `all`, `none` or names -> rows of `items`, ascending.
-template <class Items>
-std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::string>& names,
-                                   const std::string& option) {
-  std::vector<std::uint32_t> rows;
-  for (const std::string& name : names) {
-    if (name == "none" && names.size() == 1) return {};
-    bool found = name == "all" && names.size() == 1;
-    for (std::size_t i = 0; i < items.size(); ++i) {
-      if (name != "all" && items[i].name != name) continue;
-      rows.push_back(static_cast<std::uint32_t>(i));
-      found = true;
-    }
-    if (!found) throw unknown_name(option, name, items);
-  }
-  std::sort(rows.begin(), rows.end());
-  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-  return rows;
-}
-
-// What is not named is not written; naming nothing writes everything.
-Plan plan_of(const PoseSettings& settings, const Model& model) {
-  if (!settings.bridge && settings.deformer != "spheres")
-    usage_error("--no-bridge", "tets open no gaps", "add --deformer spheres");
-  if (settings.as_case) {
-    if (settings.chooses())
-      usage_error("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");
-    if (settings.formats != PoseSettings{}.formats || settings.volume_format != PoseSettings{}.volume_format)
-      usage_error("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
-    if (settings.deformer != "tets")
-      usage_error("--as-case", "a case's surfaces and volumes follow the same tets", "leave out --deformer");
-    return {{}, {}, true, false, {}};  // the case itself, and the tets beside it
-  }
-  const std::vector<std::string> all{"all"};
-  const bool everything = !settings.chooses();
-  Plan plan;
-  plan.tissues = rows_of(model.tissues, everything ? all : settings.tissues, "--tissues");
-  plan.volumes = rows_of(model.volumes, everything ? all : settings.volumes, "--volumes");
-  plan.tets = everything || settings.tets;
-  plan.field = everything || settings.field;
-  for (const std::uint32_t v : plan.volumes) {
-    const std::string& name = model.volumes[v].name;
-    if (plan.field && (name == "displacement" || name == "mask")) {
-      usage_error("--field", "volume '" + name + "' would be written over by the displacement field",
-                  "name the other volumes by --volumes");
-    }
-  }
-  return plan;
 }
 
 // Writes one posed body. Every file is checked for a stop request before it is begun.
@@ -128,10 +55,23 @@ class FrameWriter {
         folder_(std::move(folder)),
         context_(context) {}
 
+  /// Volumes become DICOM.
+  void use_dicom(const Program& program, io::DicomFacts facts) {
+    dicom_.emplace(program, std::move(facts), [this](const std::string& name) { return next(name); });
+  }
+
   json write(const json& quality) {
     for (const std::uint32_t row : plan_.tissues) write_tissue(row);
     if (plan_.tets || plan_.field) write_tets();
-    for (const std::uint32_t row : plan_.volumes) write_volume(model_.volumes[row]);
+    if (dicom_) {
+      for (const std::uint32_t row : plan_.volumes)
+        dicom_->add(model_.volumes[row], posed(model_.volumes[row]));
+      dicom_->finish();
+    } else {
+      for (const std::uint32_t row : plan_.volumes)
+        io::write_image(next(model_.volumes[row].name + "." + settings_.volume_format),
+                        posed(model_.volumes[row]));
+    }
     if (plan_.field) write_field();
     files::write_text(next("quality.json"), quality.dump(2) + "\n");
     return written_;
@@ -192,10 +132,9 @@ class FrameWriter {
     return settings_.grid == "rest" ? rest : runtime::grow_to(rest, body_.nodes);
   }
 
-  void write_volume(const ModelVolume& volume) {
+  Image posed(const ModelVolume& volume) const {
     const auto balls = plan_.balls.find(volume.name);
-    const Image posed = balls == plan_.balls.end() ? drawn(volume) : refilled(volume, balls->second);
-    io::write_image(next(volume.name + "." + settings_.volume_format), posed);
+    return balls == plan_.balls.end() ? drawn(volume) : refilled(volume, balls->second);
   }
 
   Image drawn(const ModelVolume& volume) const {
@@ -218,8 +157,8 @@ class FrameWriter {
     runtime::InverseMap map;
     runtime::locate(model_, body_.nodes, grid_for(field_grid()), map, context_);
     const auto field = runtime::inverse_displacement(model_, body_.nodes, map);
-    io::write_image(next("displacement." + settings_.volume_format), field.vectors);
-    io::write_image(next("mask." + settings_.volume_format), field.mask);
+    io::write_image(next("displacement." + settings_.field_format()), field.vectors);
+    io::write_image(next("mask." + settings_.field_format()), field.mask);
   }
 
   // The first volume's lattice; without volumes one around the rest body of at most about 4 million cubic
@@ -248,7 +187,17 @@ class FrameWriter {
   fs::path stage_, folder_;          // where to write, and what that becomes
   const Context& context_;
   json written_ = json::array();
+  std::optional<PosedDicom> dicom_;
 };
+
+// Of one pose.
+io::DicomFacts facts_of(io::DicomFacts facts, const PoseSettings& settings, const Frame& frame,
+                        const Rig& rig) {
+  facts.pose = io::pose_to_yaml(frame.pose, rig) + settings.skinning + settings.deformer +
+               (settings.unfold ? "unfolded" : "");
+  facts.words = frame.name.empty() ? fs::path(settings.frames.pose).stem().string() : frame.name;
+  return facts;
+}
 
 int run(const Program& program, const PoseSettings& settings) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
@@ -269,6 +218,11 @@ int run(const Program& program, const PoseSettings& settings) {
   const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model);
   const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
   MeasuredPose posed(poser);
+  io::DicomFacts dicom;
+  if (settings.writes_dicom())
+    dicom = dicom_facts(program, settings.dicom, "ECORCHE-" + text::hex(identity),
+                        "Posed by ecorche: the values of the scan, moved with the body's tissues (" +
+                            settings.sampling + "). For training and education.");
 
   json result{{"ok", true}, {"model", settings.model.string()}, {"skinning", settings.skinning}};
   std::string text;
@@ -296,6 +250,7 @@ int run(const Program& program, const PoseSettings& settings) {
                      posed_case(volumes, body, {sampling_of(settings), settings.grid == "posed"}, context),
                      context);
     FrameWriter writer(settings, plan, volumes, body, det_f, target.stage(), folder, context);
+    if (settings.writes_dicom()) writer.use_dicom(program, facts_of(dicom, settings, frame, model->rig));
     json written = writer.write(quality);
     if (settings.as_case) written.push_back((folder / "case.yaml").string());
     const PosedAs as{identity, settings.skinning, settings.deformer, settings.unfold, plan.field};
@@ -357,9 +312,12 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       ->capture_default_str();
   command->add_option("--volumes", s->volumes, "volumes to write: all, none, or names with commas between")
       ->delimiter(',');
-  command->add_option("--volume-format", s->volume_format, "of volumes and fields: nrrd, mha or nii.gz")
-      ->check(CLI::IsMember({"nrrd", "mha", "nii.gz"}))
+  command
+      ->add_option("--volume-format", s->volume_format,
+                   "of volumes and fields: nrrd, mha or nii.gz; dicom: a CT series each, labels as DICOM SEG")
+      ->check(CLI::IsMember({"nrrd", "mha", "nii.gz", "dicom"}))
       ->capture_default_str();
+  add_dicom_options(*command, s->dicom);
   command
       ->add_option("--sampling", s->sampling, "of volumes: nearest or trilinear; labels are always nearest")
       ->check(CLI::IsMember({"nearest", "trilinear"}))

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/pose_warnings.hpp"
+#include "core/kinematics/angle_limits.hpp"
 #include "core/values/degrees.hpp"
 
 #include <fmt/format.h>
@@ -10,7 +11,6 @@
 #include <numbers>
 #include <optional>
 
-#include <ecorche/kinematics/angles.hpp>
 #include <ecorche/runtime/verdict.hpp>
 
 namespace ecorche::app {
@@ -198,7 +198,7 @@ json clamped_json(const Skeleton& skeleton, const Pose& pose, std::span<const Cl
     const Joint& joint = skeleton.segments[row].joint;
     json limits = json::array();
     if (joint.sequence.size() == 3) {
-      const std::array<double, 3> angles = kinematics::angles_from_rotation(joint, pose.rotation[row]);
+      const std::array<double, 3> angles = kinematics::angles_within_limits(joint, pose.rotation[row]);
       for (std::size_t i = 0; i < 3; ++i) {
         const AngleAxis& axis = joint.sequence[i];
         for (const double limit : {std::min(axis.min, axis.rest), std::max(axis.max, axis.rest)}) {

@@ -56,6 +56,7 @@ class Naming {
       out.kind = PosedKind::surface;
       out.of = tissue->name;
     }
+    if (ending == ".dcm") return of_dicom(file, std::move(out));
     if (!kImageEndings.contains(ending)) return out;
     if (field_ && (stem == "displacement" || stem == "mask")) {
       out.kind = PosedKind::field;
@@ -68,6 +69,18 @@ class Naming {
   }
 
  private:
+  // `labels.dcm`, and the slices in `ct.dicom`.
+  PosedFile of_dicom(const fs::path& file, PosedFile out) const {
+    const std::string stem = (file.has_parent_path() ? file.parent_path() : file).stem().string();
+    const ModelVolume* volume = named(model_.volumes, stem);
+    out.kind = file.has_parent_path() ? PosedKind::image : PosedKind::labels;
+    out.of = stem;
+    for (const ModelVolume& one : model_.volumes) {
+      if (one.labels && out.kind == PosedKind::labels) out.labels.insert(one.table.begin(), one.table.end());
+    }
+    if (volume == nullptr && out.kind == PosedKind::image) out.kind = PosedKind::other;
+    return out;
+  }
   template <class T>
   static const T* named(const std::vector<T>& items, const std::string& name) {
     const auto found =

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche radiograph`: the picture that an X-ray source and a detector would make of a posed body.
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/model_file/model_file.hpp>
-#include <ecorche/runtime/resample.hpp>
-#include <ecorche/runtime/volume_poser.hpp>
+#include <ecorche/runtime/radiograph_scan.hpp>
 #include <ecorche/version.hpp>
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/radiograph_setup.hpp"
 #include "app/unknown_name.hpp"
 #include "app/usage_error.hpp"
+#include "core/values/degrees.hpp"
 #include "core/values/text.hpp"
 #include "io/image/grey_picture.hpp"
 #include "io/image/image_file.hpp"
@@ -26,13 +27,10 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using runtime::Exposure;
 
-// Darker than any tissue: a volume whose outside is this is one of Hounsfield units.
-constexpr double kSurelyAir = -500;
-
 struct RadiographSettings {
   fs::path model, output;
   std::string pose, skinning = "cor", volume, scale = "log";
-  SetupChoice setup;
+  SetupOptions setup;
   double kev = runtime::Attenuation::usual_kev;
   std::vector<double> window;  // empty: from 0 to the largest integral
   bool surfaces = false;
@@ -51,7 +49,6 @@ Kind kind_of(const fs::path& path) {
 
 void check(const RadiographSettings& settings) {
   const Kind kind = kind_of(settings.output);
-  check_setup(settings.setup);
   if (settings.surfaces && !settings.volume.empty())
     usage_error("--surfaces", "it does nothing beside --volume", "leave out one of them");
   if (kind == Kind::integrals && (!settings.window.empty() || settings.scale != "log"))
@@ -66,12 +63,7 @@ void check(const RadiographSettings& settings) {
 // Null: the body has no scan, or is not to be seen by it.
 const ModelVolume* volume_of(const RadiographSettings& settings, const Model& model) {
   if (settings.surfaces) return nullptr;
-  if (settings.volume.empty()) {
-    for (const ModelVolume& volume : model.volumes) {
-      if (!volume.labels && volume.image.components == 1 && volume.background <= kSurelyAir) return &volume;
-    }
-    return nullptr;
-  }
+  if (settings.volume.empty()) return runtime::scan_of(model);
   for (const ModelVolume& volume : model.volumes) {
     if (volume.name != settings.volume) continue;
     if (volume.labels)
@@ -89,47 +81,33 @@ Pose pose_of(const Program& program, const RadiographSettings& settings, const M
   return read_frames(program, choice, model.rig).front().pose;
 }
 
-// As long as the stages took, milliseconds.
-class Clock {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - start_).count();
-    start_ = now;
-    return std::round(10 * ms) / 10;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 struct Traced {
   std::vector<float> integrals;
   json times;  // ms
 };
+
+double tenths(double ms) {
+  return std::round(10 * ms) / 10;
+}
 
 Traced trace(const Program& program, const RadiographSettings& settings, const ModelVolume* volume,
              const std::shared_ptr<const Model>& model, const runtime::PosedBody& body,
              const runtime::XRaySetup& setup) {
   const runtime::Attenuation attenuation(settings.kev);
   const Context context = program.context("radiograph");
-  Clock clock;
-  Traced out;
   if (volume == nullptr) {
-    out.integrals = runtime::line_integrals(*model, body, attenuation, setup, context);
-    out.times["trace"] = clock.lap();
+    const auto start = std::chrono::steady_clock::now();
+    Traced out{runtime::line_integrals(*model, body, attenuation, setup, context), {}};
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    out.times["trace"] = tenths(took.count());
     return out;
   }
   const runtime::VolumePoser poser(model);
-  runtime::VolumePoser::Scratch scratch;
-  Image posed;
-  const ImageGrid grid = runtime::grow_to(volume->image.grid, body.nodes);
-  poser.pose(body.nodes, *volume, runtime::Sampling::trilinear, grid, posed, scratch, context);
-  out.times["pose_volume"] = clock.lap();
-  const runtime::AttenuationMap map = runtime::attenuation_map(posed, attenuation, context);
-  out.times["attenuation"] = clock.lap();
-  out.integrals = runtime::line_integrals(map, setup, context);
-  out.times["trace"] = clock.lap();
+  runtime::ScanScratch scratch;
+  Traced out{runtime::line_integrals(poser, body.nodes, *volume, attenuation, setup, scratch, context), {}};
+  out.times = {{"pose_volume", tenths(scratch.times.pose_volume)},
+               {"attenuation", tenths(scratch.times.attenuation)},
+               {"trace", tenths(scratch.times.trace)}};
   return out;
 }
 
@@ -156,9 +134,9 @@ Image integral_image(const runtime::Detector& detector, const std::vector<float>
   return out;
 }
 
-std::string view_letters(const std::optional<runtime::View>& view) {
-  if (!view) return "";
-  switch (*view) {
+std::string view_letters(const std::optional<runtime::Beam>& beam) {
+  if (!beam || beam->turn != 0) return "";
+  switch (beam->view) {
     case runtime::View::ap:
       return "AP";
     case runtime::View::pa:
@@ -172,10 +150,11 @@ std::string view_letters(const std::optional<runtime::View>& view) {
 }
 
 io::RadiographFacts facts_of(const RadiographSettings& settings, const Model& model,
-                             const ModelVolume* volume, const ChosenSetup& setup, const Exposure& exposure) {
+                             const ModelVolume* volume, const runtime::ChosenSetup& setup,
+                             const Exposure& exposure) {
   io::RadiographFacts facts;
   facts.patient = "ECORCHE-" + text::hex(model_file::identity(model));
-  facts.view = view_letters(setup.view);
+  facts.view = view_letters(setup.beam);
   facts.series =
       (facts.view.empty() ? "" : facts.view + " ") + setup.target +
       (settings.pose.empty() ? ", as scanned" : ", " + fs::path(settings.pose).filename().string());
@@ -196,7 +175,7 @@ io::RadiographFacts facts_of(const RadiographSettings& settings, const Model& mo
   return facts;
 }
 
-json setup_json(const ChosenSetup& setup) {
+json setup_json(const runtime::ChosenSetup& setup) {
   const runtime::Detector& detector = setup.here.detector;
   json out{{"source", array_of(setup.here.source)},
            {"detector",
@@ -207,12 +186,14 @@ json setup_json(const ChosenSetup& setup) {
              {"pixels", detector.pixels}}},
            {"source_to_detector_mm", setup.here.source_to_detector()},
            {"source_to_target_mm", setup.source_to_target}};
-  if (setup.view) out["view"] = runtime::view_name(*setup.view);
+  if (setup.beam) out["view"] = runtime::view_name(setup.beam->view);
+  if (setup.beam && setup.beam->turn != 0) out["turn_deg"] = setup.beam->turn * degrees_per_radian;
   return out;
 }
 
 int run(const Program& program, const RadiographSettings& settings) {
   check(settings);
+  const runtime::SetupChoice choice = choice_of(settings.setup);
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   const ModelVolume* volume = volume_of(settings, *model);
   const Pose pose = pose_of(program, settings, *model);
@@ -225,7 +206,7 @@ int run(const Program& program, const RadiographSettings& settings) {
                 runtime::NodesOf::body, runtime::Root::still);
   if (code != StatusCode::ok) throw Error(ErrorKind::data, "pose", what, "mend the pose");
   const RigidTransform root = kinematics::forward(model->rig, body.pose)[0];
-  const ChosenSetup setup = setup_of(settings.setup, *model, body, root);
+  const runtime::ChosenSetup setup = chosen_setup(choice, *model, body, root);
   Traced traced = trace(program, settings, volume, model, body, setup.still);
 
   Exposure exposure;

@@ -6,6 +6,7 @@
 
 #include "app/command.hpp"
 #include "core/files/read_options.hpp"
+#include "io/image/image_choice.hpp"
 
 namespace ecorche::app {
 
@@ -20,6 +21,14 @@ inline void add_read_budget(CLI::App& command, files::ReadLimits& limits) {
           },
           "MiB of memory that reading one file may take, beyond 64 times its own size [256; 2048 for images]")
       ->check(CLI::Range(1.0, most));
+}
+
+/// `--series`, `--phase`. `choice` must outlive the command line's parsing.
+inline void add_image_choice(CLI::App& command, io::ImageChoice& choice) {
+  command.add_option("--series", choice.series,
+                     "which series of a DICOM folder, by UID, the end of one, or description");
+  command.add_option("--phase", choice.phase, "which volume of a DICOM series in time, from 1")
+      ->check(CLI::Range(1, 10000));
 }
 
 /// Readers tell on stderr what they had to change.

@@ -10,9 +10,12 @@
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
+#include "app/posed_dicom.hpp"
 #include "app/read_budget.hpp"
 #include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/values/text.hpp"
+#include "io/case/digest.hpp"
 #include "io/image/image_file.hpp"
 #include "io/surface/surface_file.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
@@ -32,6 +35,8 @@ using nlohmann::json;
 
 struct RefillSettings {
   fs::path skeleton, volume, output, rig, object;
+  io::ImageChoice choice;  // of `volume`
+  DicomSettings dicom;
   FrameChoice frames;
   std::vector<double> region;
   double voxel_mm = 0;
@@ -41,6 +46,7 @@ struct RefillSettings {
   bool melt = false, back = false, bridge = true;
   std::vector<std::string> morph;
 
+  bool writes_dicom() const { return output.extension() == ".dicom"; }
   bool poses() const { return !frames.pose.empty() || !frames.motion.file.empty(); }
   runtime::Sampling how() const {
     return sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
@@ -48,6 +54,7 @@ struct RefillSettings {
 };
 
 void check(const RefillSettings& s) {
+  check_dicom_options(s.dicom, s.writes_dicom(), "name the output NAME.dicom");
   const bool rigged = !s.rig.empty() || s.skeleton.extension() == ".hdf";
   if (s.poses() && !rigged)
     usage_error("--rig", "a pose needs a rig", "add --rig SKELETON.yaml or MODEL.hdf");
@@ -94,9 +101,32 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// An image as the name of its file says.
+class Output {
+ public:
+  Output(const Program& program, const RefillSettings& s) : program_(program) {
+    if (!s.writes_dicom()) return;
+    DicomSettings from = s.dicom;
+    std::error_code ignored;
+    if (from.source.empty() && fs::is_directory(s.volume, ignored)) from = {s.volume, s.choice.series, false};
+    facts_ = dicom_facts(program, from, "ECORCHE-" + text::hex(io::file_digest(s.skeleton, {})),
+                         "Filled again around its volumetric skeleton by ecorche refill. For training and "
+                         "education.");
+    facts_->words = "refilled";
+  }
+  void write(const fs::path& path, const Image& image) const {
+    facts_ ? io::write_dicom_series(path, image, path.stem().string(), *facts_, reading(program_, {}))
+           : io::write_image(path, image);
+  }
+
+ private:
+  const Program& program_;
+  std::optional<io::DicomFacts> facts_;
+};
+
 // What one frame wrote.
 json write_frame(const RefillSettings& s, const runtime::BallSet& set, const Image& volume,
-                 const fs::path& path, const Context& context) {
+                 const fs::path& path, const Output& output, const Context& context) {
   const auto start = std::chrono::steady_clock::now();
   json out{{"file", path.string()}, {"balls", set.balls.size()}};
   if (io::writes_surface(s.output)) {
@@ -118,12 +148,12 @@ json write_frame(const RefillSettings& s, const runtime::BallSet& set, const Ima
   out["seconds"] = seconds_since(start);
   out["size"] = image.grid.size;
   out["held_voxels"] = runtime::covered_voxels(set, box, context);
-  io::write_image(path, image);
+  output.write(path, image);
   return out;
 }
 
 json run_morph(const RefillSettings& s, const VolumetricSkeleton& skeleton, const Image& volume,
-               const Image& target, const Context& context) {
+               const Image& target, const Output& output, const Context& context) {
   const VolumetricSkeleton other = read_skeleton_and_rig(s.morph[0], {}).first;
   const runtime::BallSet from = runtime::balls_at_rest(skeleton, skeleton.grid);
   const runtime::BallSet to = runtime::balls_at_rest(other, other.grid);
@@ -133,7 +163,7 @@ json run_morph(const RefillSettings& s, const VolumetricSkeleton& skeleton, cons
            {"balls", from.balls.size() + to.balls.size()},
            {"size", image.grid.size},
            {"seconds", seconds_since(start)}};
-  io::write_image(s.output, image);
+  output.write(s.output, image);
   return out;
 }
 
@@ -197,12 +227,13 @@ int run(const Program& program, const RefillSettings& s) {
   if (skeleton.size() == 0)
     throw Error(ErrorKind::data, s.skeleton.string(), "it has no voxel", "thin at a lower TP");
   const files::ReadOptions options = reading(program, s.frames.motion.limits);
-  const Image volume = s.volume.empty() ? Image() : io::read_image(s.volume, options);
+  const Output output(program, s);
+  const Image volume = s.volume.empty() ? Image() : io::read_image(s.volume, options, s.choice);
   json result{{"ok", true}, {"frames", json::array()}};
   if (!s.object.empty()) result["loss"] = loss(s, skeleton, options, program.context("loss"));
   if (!s.morph.empty()) {
-    result["frames"].push_back(
-        run_morph(s, skeleton, volume, io::read_image(s.morph[1], options), program.context("morph")));
+    result["frames"].push_back(run_morph(s, skeleton, volume, io::read_image(s.morph[1], options), output,
+                                         program.context("morph")));
   } else {
     const ImageGrid lattice = lattice_for(s, skeleton, volume);
     runtime::Seams seams;
@@ -219,7 +250,8 @@ int run(const Program& program, const RefillSettings& s) {
       if (clamped > 0) program.note("note: limits held back " + std::to_string(clamped) + " joint(s)");
       apply_effects(s, rig, set);
       if (s.back) set = runtime::way_back(set);
-      result["frames"].push_back(write_frame(s, set, volume, output_of(s, frame), program.context("refill")));
+      result["frames"].push_back(
+          write_frame(s, set, volume, output_of(s, frame), output, program.context("refill")));
     }
   }
   result["seconds"] = seconds_since(start);
@@ -239,10 +271,12 @@ void declare_refill(CLI::App& app, Program& program, Run& chosen) {
       ->required();
   command->add_option("VOLUME", s->volume, "the values to fill with; without it: 1 in every ball");
   command
-      ->add_option(
-          "-o,--output", s->output,
-          "an image (.nrrd .mha .nii.gz), or a surface (.glb .vtp .stl ...) of a few spheres to preview")
+      ->add_option("-o,--output", s->output,
+                   "an image (.nrrd .mha .nii.gz, or a folder of CT slices, .dicom), or a surface (.glb .vtp "
+                   ".stl ...) of a few spheres to preview")
       ->required();
+  add_image_choice(*command, s->choice);
+  add_dicom_options(*command, s->dicom);
   command->add_option("--rig", s->rig,
                       "the rig that the skeleton hangs on: a skeleton file (.yaml) or a model (.hdf)");
   add_frame_options(*command, s->frames);

@@ -9,6 +9,7 @@
 #include <stop_token>
 #include <vector>
 
+#include <ecorche/io/pose_library.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
@@ -45,10 +46,24 @@ std::string model_name(const std::string& path) {
   return std::filesystem::path(path).stem().string();
 }
 
+// Of the library, those that the rig can take. A part of a body may have none of a pose's joints.
+std::vector<server::NamedPose> fitting_poses(const Rig& rig) {
+  std::vector<server::NamedPose> poses;
+  for (const std::string& name : io::library_poses()) {
+    try {
+      poses.push_back({name, io::library_pose(name, rig).pose});
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::config) throw;
+    }
+  }
+  return poses;
+}
+
 server::ModelParts read_model(const std::string& path, const std::string& clips, const Program& program,
                               const Context& context) {
   server::ModelParts parts{.model = std::make_shared<const Model>(model_file::read(path, context))};
   if (!clips.empty()) parts.clips = read_clips(program, clips, parts.model->rig);
+  parts.poses = fitting_poses(parts.model->rig);
   return parts;
 }
 
@@ -60,7 +75,8 @@ std::vector<server::NamedModel> read_models(const ServeSettings& settings, const
     const auto read_again = [path, clips = settings.clips, &program] {
       return read_model(path, clips, program, Context{});
     };
-    models.push_back({model_name(path), std::move(parts.model), std::move(parts.clips), read_again});
+    models.push_back({model_name(path), std::move(parts.model), std::move(parts.clips), read_again,
+                      std::move(parts.poses)});
   }
   return models;
 }

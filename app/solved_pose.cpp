@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/solved_pose.hpp"
+#include "core/kinematics/angle_limits.hpp"
 #include "core/values/degrees.hpp"
 
 #include <fmt/format.h>
 
-#include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>
 #include "io/case/ik_file.hpp"
 
@@ -25,7 +25,7 @@ json angles_json(const Rig& rig, const Pose& pose) {
   for (std::size_t row = 0; row < rig.skeleton.segments.size(); ++row) {
     const Joint& joint = rig.skeleton.segments[row].joint;
     if (joint.sequence.empty()) continue;
-    const std::array<double, 3> angles = kinematics::angles_from_rotation(joint, pose.rotation[row]);
+    const std::array<double, 3> angles = kinematics::angles_within_limits(joint, pose.rotation[row]);
     for (std::size_t a = 0; a < joint.sequence.size() && a < angles.size(); ++a)
       out[joint.name][joint.sequence[a].name + "_deg"] = angles[a] * degrees_per_radian;
   }

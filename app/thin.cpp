@@ -37,6 +37,7 @@ struct ThinSettings {
   fs::path distance_map;
   HangSettings hang;
   files::ReadLimits limits;
+  io::ImageChoice choice;
   std::vector<std::string> for_images;  // options that were given and have no meaning for a skeleton
 };
 
@@ -115,8 +116,9 @@ VolumetricSkeleton from_image(const Program& program, const ThinSettings& settin
   thin::Segmentation how = settings.segmentation;
   read_threshold(settings.threshold, how);
   how.boundary = settings.boundary == 6 ? thin::Boundary::faces_6 : thin::Boundary::all_26;
-  Image image =
-      clock.time("read", [&] { return io::read_image(settings.input, reading(program, settings.limits)); });
+  Image image = clock.time("read", [&] {
+    return io::read_image(settings.input, reading(program, settings.limits), settings.choice);
+  });
   if (!settings.distance_map.empty())
     clock.time("distance_map", [&] { return write_distances(program, image, how, settings.distance_map); });
   const int components = image.components;
@@ -213,6 +215,7 @@ void declare_thin(CLI::App& app, Program& program, Run& chosen) {
       ->required();
   command->add_option("-o,--output", s->output, "the skeleton to write, ending in .vtp")->required();
   add_read_budget(*command, s->limits);
+  add_image_choice(*command, s->choice);
   command->add_option("--threshold", s->threshold,
                       "LOW:HIGH, values of the object with both ends; one may be left out");
   command

@@ -14,7 +14,9 @@
 #include "app/unpose_report.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/files/staged_folder.hpp"
+#include "io/image/dicom.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/segmentation.hpp"
 #include "io/surface/surface_file.hpp"
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/mapping/carry_back.hpp"
@@ -36,7 +38,7 @@ struct UnposeSettings {
 const std::set<std::string> kImages{".nrrd", ".mha", ".gz"};
 
 bool is_body(const fs::path& file) {
-  return io::writes_surface(file) || kImages.contains(file.extension().string());
+  return io::writes_surface(file) || kImages.contains(file.extension().string()) || io::is_dicom(file);
 }
 
 // `labels`, `labels_2`, ... and what the user names.
@@ -48,6 +50,13 @@ bool is_labels(const std::string& name, const UnposeSettings& settings) {
 std::string name_of(const fs::path& file) {
   const std::string name = file.filename().string();
   return name.substr(0, name.find('.'));
+}
+
+// What was DICOM comes back as NRRD: on the way its frame of reference has changed twice.
+fs::path back_name(const fs::path& file) {
+  const fs::path name = file.filename();
+  if (!io::is_dicom(file)) return name;
+  return name.stem().string() + (name.extension() == ".dcm" ? ".seg.nrrd" : ".nrrd");
 }
 
 // A file that is to come back.
@@ -82,12 +91,12 @@ class Source {
       if (!is_body(file))
         throw Error(ErrorKind::usage, file.string(),
                     "is neither a surface nor an image that can be carried back",
-                    "give .stl, .obj, .ply, .off, .vtp, .glb, .nrrd, .mha or .nii.gz");
+                    "give .stl, .obj, .ply, .off, .vtp, .glb, .nrrd, .mha, .nii.gz or DICOM");
       std::error_code ignored;
       const fs::path below = fs::relative(file, root_, ignored);
       const PosedFile* known = manifest_ ? manifest_->find(below.generic_string()) : nullptr;
       if (known != nullptr && !is_as_written(root_, *known, context_)) known = nullptr;
-      out.push_back({file, settings_.output / file.filename(), known});
+      out.push_back({file, settings_.output / back_name(file), known});
     }
     return out;
   }
@@ -99,7 +108,7 @@ class Source {
                   "holds no " + std::string(kManifest) + ", so nothing says what its files are",
                   "pose again into a new folder, or name the files that are to come back");
     for (const fs::path& file : files::files_within(root_)) {
-      if (is_body(file) && manifest_->find(file.generic_string()) == nullptr)
+      if (is_body(root_ / file) && manifest_->find(file.generic_string()) == nullptr)
         throw Error(ErrorKind::data, (root_ / file).string(), "is not of this posed body",
                     "move it elsewhere, or name it to bring it back with what lies around it");
     }
@@ -111,7 +120,11 @@ class Source {
       if (image && manifest_->deformer != "tets")
         throw Error(ErrorKind::data, (root_ / file.file).string(), "was filled by " + manifest_->deformer,
                     "bring it back by ecorche refill --back, and name the other files here");
-      out.push_back({root_ / file.file, settings_.output / file.file, &file});
+      // All slices of one series lie in one folder, and come back as one image.
+      const fs::path name(file.file),
+          whole = name.parent_path().extension() == ".dicom" ? name.parent_path() : name;
+      if (!out.empty() && out.back().from == root_ / whole) continue;
+      out.push_back({root_ / whole, settings_.output / back_name(root_ / whole), &file});
     }
     return out;
   }
@@ -213,6 +226,7 @@ class WayBack {
   }
 
   void image(const Item& item) {
+    if (item.to.filename().string().ends_with(".seg.nrrd") && io::is_dicom(item.from)) return segments(item);
     const std::string name = name_of(item.from);
     const bool labels =
         is_labels(name, settings_) || (item.known != nullptr && item.known->kind == PosedKind::labels);
@@ -231,6 +245,22 @@ class WayBack {
         told.against_scan = held_against(*model_, *volume, back);
     }
     report_.images.push_back(std::move(told));
+  }
+
+  // Of a DICOM SEG, layer by layer.
+  void segments(const Item& item) {
+    io::Segmentation read = io::read_segmentation(item.from);
+    for (Image& layer : read.layers) layer = images_.bring(layer, true, runtime::Sampling::nearest);
+    io::write_segmentation(item.to, read);
+    const runtime::VoxelTrip trip = images_.trip();
+    report_.images.push_back({item.to,
+                              mask_for(read.layers.front().grid, trip),
+                              trip.voxels,
+                              trip.elsewhere,
+                              trip.mean_mm,
+                              trip.mean_voxels,
+                              trip.max_mm,
+                              {}});
   }
 
   // One for each lattice.

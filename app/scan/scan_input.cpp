@@ -6,6 +6,8 @@
 #include <set>
 
 #include "core/values/text.hpp"
+#include "io/image/dicom.hpp"
+#include "io/image/dicom_segmentation.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/label_json.hpp"
 #include "io/image/label_table.hpp"
@@ -97,7 +99,8 @@ std::string table_stem(const fs::path& table) {
 
 class Reader {
  public:
-  Reader(const files::ReadOptions& options, const Context& context) : options_(options), context_(context) {}
+  Reader(const files::ReadOptions& options, const io::ImageChoice& choice, const Context& context)
+      : options_(options), choice_(choice), context_(context) {}
 
   Scan read(const std::vector<fs::path>& paths) {
     std::vector<fs::path> files;
@@ -105,7 +108,7 @@ class Reader {
       std::error_code ignored;
       if (!fs::exists(path, ignored))
         throw Error(ErrorKind::missing_input, path.string(), "no such file or folder", "mend the path");
-      if (fs::is_directory(path, ignored)) {
+      if (fs::is_directory(path, ignored) && !io::is_dicom(path)) {
         list_folder(path, files);
       } else if (is_table_name(path)) {
         tables_.push_back(path);
@@ -122,7 +125,7 @@ class Reader {
     name_labels();
     if (out_.labels.empty() && out_.images.empty())
       throw Error(ErrorKind::data, paths.front().string(), "holds no image",
-                  "give a CT and its segmentation: .nii.gz, .nrrd or .mha, or a folder of masks");
+                  "give a CT and its segmentation: .nii.gz, .nrrd, .mha or DICOM, or a folder of masks");
     return std::move(out_);
   }
 
@@ -138,7 +141,7 @@ class Reader {
     std::sort(tables_.begin(), tables_.end());
     if (images.empty())
       throw Error(ErrorKind::data, folder.string(), "holds no image that can be read",
-                  "name a folder of .nii.gz, .nrrd or .mha");
+                  "name a folder of .nii.gz, .nrrd, .mha or DICOM");
     files.insert(files.end(), images.begin(), images.end());
     folders_.insert(folder);
   }
@@ -146,6 +149,14 @@ class Reader {
   // A folder's masks are read again, together: only whether it is one is looked at here.
   void read_file(const fs::path& path) {
     context_.check_stop();
+    if (io::is_dicom(path)) {
+      if (std::optional<io::Segmentation> map = io::read_dicom_segmentation(path, options_, {})) {
+        out_.labels.push_back({path, std::move(*map), "its segments"});
+      } else {
+        add_grey(path, io::read_image(path, options_, choice_));
+      }
+      return;
+    }
     const bool nrrd = text::lower(path.filename().string()).ends_with(".seg.nrrd");
     if (nrrd) {
       io::Segmentation map = io::read_segmentation(path, options_);
@@ -154,13 +165,7 @@ class Reader {
       return;
     }
     Image image = io::read_image(path, options_);
-    if (image.components != 1) {
-      const bool colours = image.components == 3 || image.components == 4;
-      throw Error(ErrorKind::data, path.string(),
-                  "has " + std::to_string(image.components) + " numbers a voxel",
-                  colours ? "it is a picture in colours: save the grey values, or the label map"
-                          : "save one number a voxel");
-    }
+    check_components(path, image);
     const auto values = label_values(image);
     const auto names = io::read_nifti_names(path);
     const bool in_folder = folders_.contains(path.parent_path());
@@ -170,7 +175,7 @@ class Reader {
     }
     const bool labels = values && (!names.empty() || table_for(path) || !looks_grey(image, values->size()));
     if (!labels) {
-      out_.images.push_back(grey(path, std::move(image)));
+      add_grey(path, std::move(image));
       return;
     }
     if (values->empty()) {
@@ -186,6 +191,20 @@ class Reader {
       return;
     }
     out_.labels.push_back({path, std::move(map), named ? "its header" : ""});
+  }
+
+  static void check_components(const fs::path& path, const Image& image) {
+    if (image.components == 1) return;
+    const bool colours = image.components == 3 || image.components == 4;
+    throw Error(ErrorKind::data, path.string(),
+                "has " + std::to_string(image.components) + " numbers a voxel",
+                colours ? "it is a picture in colours: save the grey values, or the label map"
+                        : "save one number a voxel");
+  }
+
+  void add_grey(const fs::path& path, Image image) {
+    check_components(path, image);
+    out_.images.push_back(grey(path, std::move(image)));
   }
 
   void read_mask_groups() {
@@ -255,6 +274,7 @@ class Reader {
   }
 
   const files::ReadOptions& options_;
+  const io::ImageChoice& choice_;
   const Context& context_;
   Scan out_;
   std::vector<fs::path> tables_;
@@ -265,8 +285,8 @@ class Reader {
 }  // namespace
 
 Scan read_scan(const std::vector<fs::path>& paths, const files::ReadOptions& options,
-               const Context& context) {
-  return Reader(options, context).read(paths);
+               const io::ImageChoice& choice, const Context& context) {
+  return Reader(options, choice, context).read(paths);
 }
 
 }  // namespace ecorche::app

@@ -33,10 +33,11 @@ struct Scan {
   std::vector<std::string> notes;  ///< what a user should know, a line each
 };
 
-/// Reads all of `paths`: images, label maps, folders of masks or of label maps, and tables of names, which go
-/// with the label map of their name or with the only one that lacks names. Which is which, the files tell.
-/// Throws Error{usage}, Error{missing_input} or Error{data}.
+/// Reads all of `paths`: images, label maps, folders of masks or of label maps, DICOM series and DICOM SEG,
+/// and tables of names, which go with the label map of their name or with the only one that lacks names.
+/// Which is which, the files tell; `choice` says which of several series a DICOM folder is read for. Throws
+/// Error{usage}, Error{missing_input} or Error{data}.
 Scan read_scan(const std::vector<std::filesystem::path>& paths, const files::ReadOptions& options,
-               const Context& context);
+               const io::ImageChoice& choice, const Context& context);
 
 }  // namespace ecorche::app

@@ -164,6 +164,37 @@ class Client:
         parts = {"points": probed.points, "gradient": probed.deformation_gradient, "tissue": probed.tissue, "values": probed.values}
         return {name: array(part, found) for name, part in parts.items() if part.components}
 
+    def radiograph(self, view="ap", target="", content="integrals", size=(430.0, 430.0), pixels=(512, 512), **more):
+        """A picture of the present pose as an X-ray source and a detector would make it: (rows by columns, the v1.Radiograph).
+        `content`: integrals, grey_16 or grey_8. `view`: ap, pa, lateral_left, lateral_right, or None where `source` and `detector`
+        (its middle), mm, LPS, say where they are. `more`: other fields of RenderRadiograph, as energy=80, surfaces=True."""
+        request = envelope_pb2.Envelope()
+        render = request.render_radiograph
+        for name in ("source", "detector"):
+            if name in more:
+                corner = getattr(render.placed, name)
+                corner.x, corner.y, corner.z = map(float, more.pop(name))
+        if not render.HasField("placed"):
+            render.view = render.View.Value(f"VIEW_{(view or 'ap').upper()}")
+        render.target, render.content = target, render.Content.Value(f"CONTENT_{content.upper()}")
+        (render.width, render.height), (render.columns, render.rows) = size, pixels
+        for name, value in more.items():
+            setattr(render, name, value)
+        answer, payload = self._call(request)
+        made = answer.radiograph
+        return array(made.picture, payload).reshape(made.rows, made.columns), made
+
+    def field(self, segment=None, tissues=()):
+        """A number for every vertex in the present pose: a dictionary of arrays by tissue. How much it follows `segment` (a row of the
+        skeleton), or without one the determinant of the deformation gradient about it."""
+        request = envelope_pb2.Envelope()
+        sample = request.sample_field
+        sample.kind = sample.KIND_DET_F if segment is None else sample.KIND_WEIGHT
+        sample.segment = segment or 0
+        sample.tissues.extend(tissues)
+        answer, payload = self._call(request)
+        return {self.body.tissues[part.tissue]: array(part.values, payload)[:, 0] for part in answer.field.parts}
+
     def clips(self):
         """Motion that the server can play on this body: a list of v1.ClipSummary."""
         request = envelope_pb2.Envelope()

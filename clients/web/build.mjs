@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bundles viewer/index.html with what it names, and the worker of the protocol, into OUT: hashed names, everything gzipped beside, and
+// Bundles viewer/index.html with what it names, and the workers of the protocol, into OUT: hashed names, everything gzipped beside, and
 // the licences of what went in. Run by scripts/viewer.
 //
 //     node build.mjs OUT
@@ -18,7 +18,7 @@ async function bundle(entryPoints, define) {
   const { metafile } = await build({
     absWorkingDir: here, entryPoints, define, outdir: out, entryNames: "[name]-[hash]", assetNames: "[name]-[hash]",
     bundle: true, splitting: true, chunkNames: "[name]-[hash]", minify: true, format: "esm", target: "es2022", metafile: true, legalComments: "none", logLevel: "warning",
-    loader: { ".svg": "file", ".png": "file", ".woff2": "file", ".yaml": "text" },
+    loader: { ".svg": "file", ".png": "file", ".woff2": "file", ".yaml": "text", ".glsl": "text" },
   });
   const outputs = Object.entries(metafile.outputs);
   const nameOf = (entry) => path.basename(outputs.find(([, output]) => output.entryPoint === entry)[0]);
@@ -45,17 +45,18 @@ if (!fs.existsSync(page)) fail("clients/web/viewer/index.html is missing");
 fs.rmSync(out, { recursive: true, force: true });
 fs.mkdirSync(out, { recursive: true });
 
-const workerEntry = "protocol/src/worker.ts";
-const worker = fs.existsSync(path.join(here, workerEntry)) ? await bundle([workerEntry], {}) : undefined;
+const WORKERS = { ECORCHE_WORKER: "protocol/src/worker.ts", ECORCHE_VOLUME_WORKER: "protocol/src/volume/worker.ts" };
+const workers = await bundle(Object.values(WORKERS), {});
+const workerNames = Object.fromEntries(Object.entries(WORKERS).map(([define, entry]) => [define, JSON.stringify(workers.names.get(entry))]));
 
 // The page names its sources (`src="src/main.ts"`, `href="src/style.css"`): each becomes a bundle, whose name takes the source's place.
 let html = fs.readFileSync(page, "utf8");
 const sources = [...html.matchAll(/(?:src|href)="((?!\w+:)[^"#?]+\.(?:ts|css))"/g)].map(([, source]) => path.posix.join("viewer", source));
 if (sources.length === 0) fail("clients/web/viewer/index.html names no source");
-const viewer = await bundle([...new Set(sources)], worker ? { ECORCHE_WORKER: JSON.stringify(worker.names.get(workerEntry)) } : {});
+const viewer = await bundle([...new Set(sources)], workerNames);
 for (const [source, name] of viewer.names) html = html.replaceAll(`"${path.posix.relative("viewer", source)}"`, `"${name}"`);
 fs.writeFileSync(path.join(out, "index.html"), html);
-fs.writeFileSync(path.join(out, "licences.txt"), licences([...viewer.inputs, ...(worker?.inputs ?? [])]));
+fs.writeFileSync(path.join(out, "licences.txt"), licences([...viewer.inputs, ...workers.inputs]));
 
 let total = 0;
 for (const name of fs.readdirSync(out).sort()) {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>
+#include "core/kinematics/angle_limits.hpp"
 
 namespace ecorche::kinematics {
 namespace {
@@ -48,7 +48,7 @@ Skeleton posed_rest(const Rig& rig, const Pose& pose) {
   for (std::size_t s = 0; s < posed.segments.size(); ++s) {
     Joint& joint = posed.segments[s].joint;
     if (!joint.sequence.empty()) {
-      const std::array<double, 3> angles = angles_from_rotation(joint, pose.rotation[s]);
+      const std::array<double, 3> angles = angles_within_limits(joint, pose.rotation[s]);
       for (std::size_t a = 0; a < joint.sequence.size(); ++a)
         joint.sequence[a].rest = within(joint.sequence[a], angles[a]);
     }

@@ -14,6 +14,7 @@
 #include "io/case/skeleton_file.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/image/dicom.hpp"
+#include "io/image/dicom_image.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/mask_folder.hpp"
 #include "io/surface/surface_file.hpp"
@@ -33,9 +34,11 @@ constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment"
                                                      "root", "labels", "side",    "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
                                                        "root", "labels", "side",  "within", "close_mm"};
-constexpr std::array<std::string_view, 5> kVolumeKeys{"name", "file", "background", "root", "form"};
-constexpr std::array<std::string_view, 9> kLabelKeys{"file",     "table", "root",         "form", "except",
-                                                     "resample", "maps",  "mid_plane_mm", "apart"};
+constexpr std::array<std::string_view, 7> kVolumeKeys{"name", "file",   "background", "root",
+                                                      "form", "series", "phase"};
+constexpr std::array<std::string_view, 11> kLabelKeys{"file",   "table",        "root",   "form",
+                                                      "series", "phase",        "except", "resample",
+                                                      "maps",   "mid_plane_mm", "apart"};
 constexpr std::array<std::string_view, 2> kFileKeys{"file", "root"};
 
 Eigen::Matrix3d parse_axes(const Value& value) {
@@ -78,7 +81,7 @@ class CaseReader {
     if (const auto plane = options ? labels->find("mid_plane_mm") : std::nullopt) mid_plane = plane->number();
     sources_.emplace(out_.labels ? &*out_.labels : nullptr, mid_plane,
                      [this](const Value& entry, const Value& file) {
-                       return read_label_image(locate(entry, file), reading_, read_form(entry));
+                       return read_label_image(locate_image(entry, file), reading_, read_choice(entry));
                      });
     if (labels && !root_.find("skin")) {
       names_.emplace(out_.skin_name, labels->where());
@@ -137,26 +140,40 @@ class CaseReader {
   }
 
   // Where an entry's file lies: beside the case, or in the data folder where the entry says `root: data`.
-  fs::path locate(const Value& entry, const Value& file, bool folders = false) {
-    fs::path base = folder_;
-    if (const auto root = entry.kind() == Kind::map ? entry.find("root") : std::nullopt) {
-      if (root->text() != "data")
-        root->fail("'" + root->text() + "' is no root", "write root: data, or leave it out");
-      if (options_.data.empty()) root->fail("the data folder is not known", "name it with --data DIR");
-      base = options_.data;
-    }
-    fs::path path = base / file.text();
+  fs::path base_of(const Value& entry) const {
+    const auto root = entry.kind() == Kind::map ? entry.find("root") : std::nullopt;
+    if (!root) return folder_;
+    if (root->text() != "data")
+      root->fail("'" + root->text() + "' is no root", "write root: data, or leave it out");
+    if (options_.data.empty()) root->fail("the data folder is not known", "name it with --data DIR");
+    return options_.data;
+  }
+
+  fs::path locate(const Value& entry, const Value& file) {
+    fs::path path = base_of(entry) / file.text();
     std::error_code ignored;
-    if (folders && fs::is_directory(path, ignored) && !is_dicom(path)) {
+    if (!fs::is_regular_file(path, ignored))
+      throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");
+    digest(path, file.text());
+    return path;
+  }
+
+  // The same of an image, which may be a folder of DICOM, or of masks. The names of DICOM files, which may
+  // name the patient, stay out of the model.
+  fs::path locate_image(const Value& entry, const Value& file, bool masks = false) {
+    const fs::path path = base_of(entry) / file.text();
+    std::error_code ignored;
+    if (!fs::is_directory(path, ignored)) return locate(entry, file);
+    if (!is_dicom(path)) {
+      if (!masks) return locate(entry, file);
       for (const fs::path& image : images_within(path))
         digest(image, (fs::path(file.text()) / image.filename()).string());
       return path;
     }
-    if (!fs::is_regular_file(path, ignored)) {
-      if (is_dicom(path)) refuse_dicom(path);
-      throw Error(ErrorKind::missing_input, file.where(), "no such file: " + path.string(), "mend the path");
-    }
-    digest(path, file.text());
+    std::uint64_t all = 0;
+    for (const fs::path& slice : dicom_files(path))
+      all = (all ^ file_digest(slice, context_)) * 0x9e3779b97f4a7c15ULL;
+    out_.input_digests[file.text()] = all;
     return path;
   }
 
@@ -324,7 +341,7 @@ class CaseReader {
         name.fail("another volume is named '" + volume.name + "'", "give it another name");
     }
     if (const auto background = entry.find("background")) volume.background = background->number();
-    volume.image = read_image(locate(entry, entry.at("file")), reading_, read_form(entry));
+    volume.image = read_image(locate_image(entry, entry.at("file")), reading_, read_choice(entry));
     out_.volumes.push_back(std::move(volume));
     step();
   }
@@ -332,7 +349,10 @@ class CaseReader {
   void read_labels(const Value& entry) {
     if (entry.kind() != Kind::list) entry.allow(kLabelKeys);
     out_.labels = read_label_map(
-        entry, [this](const Value& e, const Value& file, bool folders) { return locate(e, file, folders); },
+        entry,
+        [this](const Value& e, const Value& file, bool image) {
+          return image ? locate_image(e, file, true) : locate(e, file);
+        },
         reading_, context_);
     step();
   }

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <optional>
 
+#include "io/image/dicom.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/mask_folder.hpp"
 #include "io/image/merge_labels.hpp"
@@ -18,7 +20,8 @@ using yaml::Kind;
 using yaml::Value;
 
 constexpr std::array<std::string_view, 2> kTableFileKeys{"file", "root"};
-constexpr std::array<std::string_view, 6> kMapKeys{"file", "table", "root", "form", "except", "resample"};
+constexpr std::array<std::string_view, 8> kMapKeys{"file",   "table", "root",   "form",
+                                                   "series", "phase", "except", "resample"};
 constexpr std::size_t kMostMaps = 64;
 
 LabelNames read_ids(const Value& table) {
@@ -47,10 +50,10 @@ Segmentation read_map(const Value& entry, const Locate& locate, const files::Rea
   std::optional<LabelNames> names;
   if (table) names = read_table(entry, *table, locate);
   const std::filesystem::path path = locate(entry, entry.at("file"), true);
-  const bool folder = std::filesystem::is_directory(path);
+  const bool folder = std::filesystem::is_directory(path) && !is_dicom(path);
   if (folder && table) table->fail("does not apply to a folder", "its masks have the names of their files");
   Segmentation read = folder ? read_masks(images_within(path), options, context.quiet())
-                             : read_segmentation(path, options, read_form(entry));
+                             : read_segmentation(path, options, read_choice(entry));
   if (names) {
     read.names = std::move(*names);
     read.codes.clear();
@@ -91,12 +94,21 @@ void place(const Value& entry, Segmentation& map, const ImageGrid& grid, const f
 
 }  // namespace
 
-NiftiForm read_form(const Value& entry) {
+ImageChoice read_choice(const Value& entry) {
+  ImageChoice out;
+  if (const auto series = entry.find("series")) out.series = series->text();
+  if (const auto phase = entry.find("phase")) {
+    const double number = phase->number();
+    if (!(number >= 1 && number <= 10000) || number != std::floor(number))
+      phase->fail("is no phase", "phases are counted from 1");
+    out.phase = static_cast<int>(number);
+  }
   const auto form = entry.find("form");
-  if (!form) return NiftiForm::either;
-  if (form->text() == "qform") return NiftiForm::qform;
-  if (form->text() == "sform") return NiftiForm::sform;
-  form->fail("'" + form->text() + "' is no form of a NIfTI", "write qform or sform");
+  if (!form) return out;
+  if (form->text() != "qform" && form->text() != "sform")
+    form->fail("'" + form->text() + "' is no form of a NIfTI", "write qform or sform");
+  out.form = form->text() == "qform" ? NiftiForm::qform : NiftiForm::sform;
+  return out;
 }
 
 std::vector<Value> label_maps(const Value& entry) {
@@ -104,7 +116,7 @@ std::vector<Value> label_maps(const Value& entry) {
   if (entry.kind() == Kind::list) {
     maps = entry.items();
   } else if (const auto list = entry.find("maps")) {
-    for (const char* key : {"file", "table", "root", "form", "except", "resample"}) {
+    for (const std::string_view key : kMapKeys) {
       if (const auto value = entry.find(key)) value->fail("stands beside maps", "say it of one of the maps");
     }
     maps = list->items();

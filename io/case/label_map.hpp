@@ -10,7 +10,7 @@
 #include <ecorche/values/context.hpp>
 #include "core/files/read_options.hpp"
 #include "io/case/yaml_reader.hpp"
-#include "io/image/nifti_form.hpp"
+#include "io/image/image_choice.hpp"
 
 namespace ecorche::io {
 
@@ -19,7 +19,7 @@ namespace ecorche::io {
 using Locate =
     std::function<std::filesystem::path(const yaml::Value& entry, const yaml::Value& file, bool folders)>;
 
-/// The entry's label maps, each a map `{file, table, root, form, except, resample}`: of a list all, in its
+/// The entry's label maps, each a map `{file, table, root, form, series, phase, except, resample}`: of a list all, in its
 /// order; of a map with `maps` those; else the entry itself.
 std::vector<yaml::Value> label_maps(const yaml::Value& entry);
 
@@ -30,7 +30,7 @@ std::vector<yaml::Value> label_maps(const yaml::Value& entry);
 CaseLabels read_label_map(const yaml::Value& entry, const Locate& locate, const files::ReadOptions& options,
                           const Context& context);
 
-/// What an entry with an image says under `form`: qform, sform, or nothing.
-NiftiForm read_form(const yaml::Value& entry);
+/// What an entry with an image says under `form` (qform, sform), `series` and `phase`.
+ImageChoice read_choice(const yaml::Value& entry);
 
 }  // namespace ecorche::io

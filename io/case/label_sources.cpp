@@ -17,7 +17,7 @@ using yaml::Value;
 
 constexpr std::size_t kMostIds = 65536;
 constexpr double kWidestGap = 100;  // mm; wider ones fill the space between the legs
-constexpr std::array<std::string_view, 4> kWithinKeys{"file", "ids", "root", "form"};
+constexpr std::array<std::string_view, 6> kWithinKeys{"file", "ids", "root", "form", "series", "phase"};
 constexpr std::array<std::string_view, 2> kApartKeys{"gap_mm", "limbs"};
 constexpr std::array<std::string_view, 3> kLimbsKeys{"labels", "segments", "joints"};
 constexpr std::array<std::string_view, 4> kRestKeys{"labels", "except", "group", "groups"};

@@ -7,14 +7,13 @@
 #include <string_view>
 
 #include "core/values/text.hpp"
-#include "io/image/header_fields.hpp"
 
 namespace ecorche::io {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLookedAt = 64;  // files of a folder: a series lies with its like
+constexpr int kLookedAt = 256;  // files of a folder: a series lies with its like
 
 bool is_file_of_dicom(const fs::path& path) {
   const std::string ending = text::lower(path.extension().string());
@@ -31,24 +30,12 @@ bool is_dicom(const fs::path& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) return fs::is_regular_file(path, error) && is_file_of_dicom(path);
   int looked_at = 0;
-  for (fs::directory_iterator at(path, error); !error && at != fs::directory_iterator();
+  for (fs::recursive_directory_iterator at(path, error); !error && at != fs::recursive_directory_iterator();
        at.increment(error)) {
     if (++looked_at > kLookedAt) break;
     if (at->is_regular_file(error) && is_file_of_dicom(at->path())) return true;
   }
   return false;
-}
-
-void refuse_dicom(const fs::path& path) {
-  std::error_code error;
-  const bool folder = fs::is_directory(path, error);
-  if (is_dicom(path)) {
-    fields::refuse(
-        path, folder ? "is a folder of DICOM files" : "is a DICOM file",
-        "make one file of the series first: dcm2niix -z y -o OUT FOLDER, or 3D Slicer; then name its .nii.gz "
-        "or .nrrd");
-  }
-  if (folder) fields::refuse(path, "is a folder, no image", "name a .nrrd, .mha or .nii.gz");
 }
 
 }  // namespace ecorche::io

@@ -5,11 +5,8 @@
 
 namespace ecorche::io {
 
-/// Whether `path` is a DICOM file (its magic, or its ending), or a folder among whose first files is one.
+/// Whether `path` is a DICOM file (its magic, or its ending), or a folder with one among its first files and
+/// those of the folders within.
 bool is_dicom(const std::filesystem::path& path);
-
-/// Throws Error{data} where `path`, which a user gave for an image, is DICOM or a folder: says what it is and
-/// how it becomes one file.
-void refuse_dicom(const std::filesystem::path& path);
 
 }  // namespace ecorche::io

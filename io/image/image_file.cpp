@@ -8,6 +8,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/values/text.hpp"
 #include "io/image/dicom.hpp"
+#include "io/image/dicom_image.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/itk_images.hpp"
@@ -84,8 +85,18 @@ Image opinion(const ImageHeader& declared, const Path& path, Format format, bool
 }
 
 // As the file has it.
-Image read_stored(const Path& path, const files::ReadOptions& options, NiftiForm form) {
-  refuse_dicom(path);
+Image read_stored(const Path& path, const files::ReadOptions& options, const ImageChoice& choice,
+                  bool labels) {
+  if (is_dicom(path)) {
+    if (choice.form != NiftiForm::either)
+      refuse(path, "has neither qform nor sform: it is no NIfTI", "leave out form");
+    return read_dicom(path, options, choice, labels);
+  }
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored))
+    refuse(path, "is a folder without DICOM files, no image", "name a .nrrd, .mha or .nii.gz");
+  if (!choice.series.empty() || choice.phase != 0)
+    refuse(path, "is no DICOM, which alone has series and phases", "leave out series and phase");
   Format format = Format::nrrd;
   if (ends_with(path, ".mha") || ends_with(path, ".mhd")) {
     format = Format::meta;
@@ -95,12 +106,12 @@ Image read_stored(const Path& path, const files::ReadOptions& options, NiftiForm
     refuse(path, "'" + path.extension().string() + "' images cannot be read",
            "convert it to .nrrd, .mha or .nii.gz");
   }
-  if (form != NiftiForm::either && format != Format::nifti)
+  if (choice.form != NiftiForm::either && format != Format::nifti)
     refuse(path, "has neither qform nor sform: it is no NIfTI", "leave out form");
   const std::string head = read_head(path);
   ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
                          : format == Format::meta ? parse_meta_header(head, path)
-                                                  : parse_nifti(head, path, form);
+                                                  : parse_nifti(head, path, choice.form);
   const bool skewed = declared.grid && degrees_off(*declared.grid) > kItkDegrees;
   if (declared.grid) check_grid(*declared.grid, path, options);
   place_data(declared);
@@ -129,14 +140,14 @@ std::string read_head(const Path& path) {
   return head;
 }
 
-Image read_image(const Path& path, const files::ReadOptions& options, NiftiForm form) {
-  Image image = read_stored(path, options, form);
+Image read_image(const Path& path, const files::ReadOptions& options, const ImageChoice& choice) {
+  Image image = read_stored(path, options, choice, false);
   replace_non_finite(image, path, options);
   return image;
 }
 
-Image read_label_image(const Path& path, const files::ReadOptions& options, NiftiForm form) {
-  return whole_labels(read_stored(path, options, form), path);
+Image read_label_image(const Path& path, const files::ReadOptions& options, const ImageChoice& choice) {
+  return whole_labels(read_stored(path, options, choice, true), path);
 }
 
 void write_image(const Path& path, const Image& image, bool compress) {

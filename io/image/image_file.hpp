@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images as files, LPS mm; read and written by ITK behind plain values.
+// Images as files and DICOM folders, LPS mm; read and written by ITK behind plain values.
 #pragma once
 
 #include <filesystem>
 
 #include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
-#include "io/image/nifti_form.hpp"
+#include "io/image/image_choice.hpp"
 
 namespace ecorche::io {
 
 /// Reads `.nrrd`, `.mha` (raw or gzip), their detached forms `.nhdr`, `.mhd`, whose voxels must lie in one
 /// file beside them, and NIfTI-1 (`.nii`, `.nii.gz`; stored integers with a scale become float): 3-D, scalar
 /// type and direction kept whole (also a left-handed one), one or several components; integers of 64 bits
-/// become i32. Before any voxel is allocated the size that the header declares is held against 2^33 bytes,
-/// the budget, and the file's own size (raw) or what its stream inflates to (gzip). Axes a little off right
-/// angles are mended (right_angles.hpp), values that are not finite replaced (non_finite.hpp); both are said.
-/// Throws Error{missing_input} or Error{data}.
+/// become i32; and DICOM, a folder or a file (dicom_image.hpp). Before any voxel is allocated the size that
+/// the header declares is held against 2^33 bytes, the budget, and the file's own size (raw) or what its
+/// stream inflates to (gzip). Axes a little off right angles are mended (right_angles.hpp), values that are
+/// not finite replaced (non_finite.hpp); both are said. Throws Error{missing_input} or Error{data}.
 Image read_image(const std::filesystem::path& path, const files::ReadOptions& options = {},
-                 NiftiForm form = NiftiForm::either);
+                 const ImageChoice& choice = {});
 
 /// The same for labels: real voxels that hold whole numbers become integers (whole_labels.hpp). Throws
 /// Error{data} for those that do not.
 Image read_label_image(const std::filesystem::path& path, const files::ReadOptions& options = {},
-                       NiftiForm form = NiftiForm::either);
+                       const ImageChoice& choice = {});
 
 /// Writes `.nrrd`, `.mha` or `.nii.gz`, atomically; compressed where `compress`.
 /// Throws Error{usage} for another extension, Error{cannot_create}, Error{io}.

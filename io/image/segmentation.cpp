@@ -10,6 +10,8 @@
 
 #include "core/files/atomic_file.hpp"
 #include "core/values/text.hpp"
+#include "io/image/dicom.hpp"
+#include "io/image/dicom_segmentation.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/image_file.hpp"
@@ -149,8 +151,13 @@ void write_segmentation(const Path& path, const Segmentation& segmentation) {
   files::write_text(path, bytes);
 }
 
-Segmentation read_segmentation(const Path& path, const files::ReadOptions& options, NiftiForm form) {
-  Image image = read_label_image(path, options, form);
+Segmentation read_segmentation(const Path& path, const files::ReadOptions& options,
+                               const ImageChoice& choice) {
+  if (is_dicom(path)) {
+    if (std::optional<Segmentation> read = read_dicom_segmentation(path, options, choice))
+      return std::move(*read);
+  }
+  Image image = read_label_image(path, options, choice);
   const std::vector<Segment> segments = read_segments(read_nrrd_keys(path), image.components, path);
   if (segments.empty() && image.components != 1) {
     refuse(path,

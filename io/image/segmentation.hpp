@@ -8,8 +8,8 @@
 
 #include <ecorche/values/image.hpp>
 #include "core/files/read_options.hpp"
+#include "io/image/image_choice.hpp"
 #include "io/image/label_table.hpp"
-#include "io/image/nifti_form.hpp"
 #include "io/image/segment_codes.hpp"
 
 namespace ecorche::io {
@@ -28,14 +28,14 @@ struct Segmentation {
   std::vector<LabelOverlap> overlaps = {};
 };
 
-/// Reads any image that `read_image` reads as labels. Of a NRRD with `Segment0_Name`, ... the segments are
-/// named (by `make_identifiers`) and coded (terminology.hpp), and components are layers; of a NIfTI its
-/// header extension names them (nifti_names.hpp). Where two segments of different layers share a value, all
-/// are numbered anew from 1 in the file's order (u16), and values of no segment are dropped: an id means one
-/// thing. Throws Error{missing_input} or Error{data}: voxels that are no whole numbers, several components
-/// that are no layers, a segment whose layer is not there.
+/// Reads any image that `read_image` reads as labels, and DICOM SEG (dicom_segmentation.hpp). Of a NRRD with
+/// `Segment0_Name`, ... the segments are named (by `make_identifiers`) and coded (terminology.hpp), and
+/// components are layers; of a NIfTI its header extension names them (nifti_names.hpp). Where two segments of
+/// different layers share a value, all are numbered anew from 1 in the file's order (u16), and values of no
+/// segment are dropped: an id means one thing. Throws Error{missing_input} or Error{data}: voxels that are no
+/// whole numbers, several components that are no layers, a segment whose layer is not there.
 Segmentation read_segmentation(const std::filesystem::path& path, const files::ReadOptions& options = {},
-                               NiftiForm form = NiftiForm::either);
+                               const ImageChoice& choice = {});
 
 /// Writes a `.seg.nrrd` that names its segments (those ids of `names` that a layer holds), one component a
 /// layer; atomically. Layers are of one grid and type. Throws Error{usage} for another ending,

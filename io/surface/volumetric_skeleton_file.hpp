@@ -2,6 +2,7 @@
 // A volumetric skeleton as a `.vtp` that ParaView opens: a point a voxel, the tree as lines.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -16,6 +17,8 @@ namespace ecorche::io {
 struct VolumetricSkeletonFile {
   VolumetricSkeleton skeleton;
   std::vector<std::string> segments;  ///< by row, as VolumetricSkeleton::segment has them; may be empty
+  /// Where the joint of each segment is, LPS mm, where it was moved by hand; else empty: the rig says.
+  std::vector<std::array<double, 3>> joints;
 };
 
 /// Writes XML PolyData, atomically, raw appended: points LPS mm (float32), point arrays `ijk`, `distance`,

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::size_t kLargestSkeletonFile = std::size_t{1} << 33;
 constexpr std::uint64_t kMostNames = 65536;
-constexpr double kOffVoxel = 0.01;  // of a voxel: points are float32
+constexpr double kFarthestJoint = 1e6;  // mm
+constexpr double kOffVoxel = 0.01;      // of a voxel: points are float32
 
 class SkeletonReader {
  public:
@@ -96,6 +97,18 @@ class SkeletonReader {
       refuse("its metric is '" + metric.substr(0, 40) + "'");
     s.metric = metric == "euclidean" ? DistanceMetric::euclidean : DistanceMetric::chamfer345;
     if (document_.fields.contains("segments")) out_.segments = words("segments", kMostNames);
+    if (document_.fields.contains("joints")) read_joints();
+  }
+
+  void read_joints() {
+    const std::vector<double> places = field("joints", 3 * out_.segments.size());
+    for (std::size_t at = 0; at < places.size(); at += 3) {
+      const std::array<double, 3> joint{places[at], places[at + 1], places[at + 2]};
+      for (const double x : joint) {
+        if (!(std::abs(x) <= kFarthestJoint)) refuse("its field 'joints' holds " + text::shortest(x));
+      }
+      out_.joints.push_back(joint);
+    }
   }
 
   const vtk_xml::Piece& piece() const { return document_.pieces[0]; }

@@ -62,6 +62,8 @@ void check(const std::filesystem::path& path, const VolumetricSkeletonFile& file
   if (defect.empty() && !segment.empty() && !file.segments.empty() &&
       *std::max_element(segment.begin(), segment.end()) >= std::ssize(file.segments))
     defect = "a voxel hangs on a segment without a name";
+  if (defect.empty() && !file.joints.empty() && file.joints.size() != file.segments.size())
+    defect = "not every segment has its joint";
   if (!defect.empty()) throw Error(ErrorKind::internal, path.string(), defect, "report how it was thinned");
 }
 
@@ -94,6 +96,11 @@ std::string encode(const VolumetricSkeletonFile& file) {
       << numbers("Float64", "thinness", std::array{s.thinness})
       << numbers("UInt8", "tree", std::array{s.parent.empty() ? 0.0 : 1.0});
   if (!file.segments.empty()) xml << strings("segments", file.segments);
+  if (!file.joints.empty()) {
+    std::vector<double> places;
+    for (const auto& joint : file.joints) places.insert(places.end(), joint.begin(), joint.end());
+    xml << numbers("Float64", "joints", places);
+  }
   xml << "</FieldData>\n<Piece NumberOfPoints=\"" << s.size() << "\" NumberOfVerts=\"0\" NumberOfLines=\""
       << ends.size() << "\" NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<PointData Scalars=\"deficit\">\n"
       << appended.tag("UInt16", "ijk", 3, ijk) << appended.tag("UInt32", "distance", 1, s.distance)

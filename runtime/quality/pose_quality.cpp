@@ -19,19 +19,6 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kTetsPerBlock = 8192;
 
-Vector3d point(std::span<const float> points, std::size_t row) {
-  return {static_cast<double>(points[3 * row]), static_cast<double>(points[3 * row + 1]),
-          static_cast<double>(points[3 * row + 2])};
-}
-
-double det_of(const Tets& tets, std::span<const float> nodes, std::size_t t) {
-  const auto node = [&](int c) {
-    return point(nodes, static_cast<std::size_t>(tets(static_cast<Eigen::Index>(t), c)));
-  };
-  const Vector3d a = node(0);
-  return (node(1) - a).cross(node(2) - a).dot(node(3) - a);
-}
-
 // Sums over a block of tets; blocks are added in order, so that threads change nothing.
 struct TetSums {
   double rest = 0, posed = 0, changed = 0;  // determinants; of changes without their signs

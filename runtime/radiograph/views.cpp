@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ecorche/runtime/radiograph_views.hpp>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -14,6 +15,11 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::array<std::string_view, 4> kNames{"ap", "pa", "lateral_left", "lateral_right"};
+
+// About the long axis of the body, upwards.
+Vector3d turned(const Vector3d& v, double angle) {
+  return angle == 0 ? v : Vector3d(Eigen::AngleAxisd(angle, Vector3d::UnitZ()) * v);
+}
 
 // The segment that a node follows most.
 int leader(const Weights& weights, std::size_t node) {
@@ -48,11 +54,11 @@ Extent extent_of(const Model& model, const PosedBody& body, Wanted&& wanted) {
   return out;
 }
 
-// The beam runs along an axis of the body, so that a box says how far it reaches.
-RadiographTarget about(const Vector3d& centre, const Extent& extent, View view) {
-  const Vector3d way = beam(view);
-  const double low = way.dot(extent.low - centre), high = way.dot(extent.high - centre);
-  return {centre, std::max(0.0, -std::min(low, high)), std::max(0.0, std::max(low, high))};
+// How far the box reaches along the beam; oblique, to its farthest corner.
+RadiographTarget about(const Vector3d& centre, const Extent& extent, const Beam& beam) {
+  const Eigen::Array3d way = beam.way();
+  const Eigen::Array3d low = way * (extent.low - centre).array(), high = way * (extent.high - centre).array();
+  return {centre, std::max(0.0, -low.min(high).sum()), std::max(0.0, low.max(high).sum())};
 }
 
 Extent whole(const Model& model, const PosedBody& body) {
@@ -73,34 +79,53 @@ View view_from_name(std::string_view name) {
   return static_cast<View>(found - kNames.begin());
 }
 
-Vector3d beam(View view) {
-  switch (view) {
-    case View::ap:
-      return Vector3d::UnitY();
-    case View::pa:
-      return -Vector3d::UnitY();
-    case View::lateral_left:
-      return Vector3d::UnitX();
-    case View::lateral_right:
-      break;
-  }
-  return -Vector3d::UnitX();
+Vector3d Beam::way() const {
+  const auto along = [this]() -> Vector3d {
+    switch (view) {
+      case View::ap:
+        return Vector3d::UnitY();
+      case View::pa:
+        return -Vector3d::UnitY();
+      case View::lateral_left:
+        return Vector3d::UnitX();
+      case View::lateral_right:
+        break;
+    }
+    return -Vector3d::UnitX();
+  };
+  return turned(along(), turn);
 }
 
-RadiographTarget target_body(const Model& model, const PosedBody& body, View view) {
+Vector3d Beam::right() const {
+  const auto along = [this]() -> Vector3d {
+    switch (view) {
+      case View::ap:
+      case View::pa:
+        return Vector3d::UnitX();
+      case View::lateral_left:  // the front on the left
+        return Vector3d::UnitY();
+      case View::lateral_right:
+        break;
+    }
+    return -Vector3d::UnitY();
+  };
+  return turned(along(), turn);
+}
+
+RadiographTarget target_body(const Model& model, const PosedBody& body, const Beam& beam) {
   const Extent extent = whole(model, body);
-  return about(extent.middle(), extent, view);
+  return about(extent.middle(), extent, beam);
 }
 
-RadiographTarget target_segment(const Model& model, const PosedBody& body, View view, int segment) {
+RadiographTarget target_segment(const Model& model, const PosedBody& body, const Beam& beam, int segment) {
   const Extent extent =
       extent_of(model, body, [&](std::size_t n) { return leader(model.weights, n) == segment; });
   if (!extent.low.allFinite())  // it has no flesh of its own
-    return target_joint(model, body, view, segment);
-  return about(extent.middle(), extent, view);
+    return target_joint(model, body, beam, segment);
+  return about(extent.middle(), extent, beam);
 }
 
-RadiographTarget target_joint(const Model& model, const PosedBody& body, View view, int segment) {
+RadiographTarget target_joint(const Model& model, const PosedBody& body, const Beam& beam, int segment) {
   const auto row = static_cast<std::size_t>(segment);
   const Vector3d centre = body.segments[row] * model.rig.skeleton.segments[row].joint.center;
   const int parent = model.rig.skeleton.segments[row].parent;
@@ -109,14 +134,15 @@ RadiographTarget target_joint(const Model& model, const PosedBody& body, View vi
     return leads == segment || leads == parent;
   });
   extent.add(centre);
-  return about(centre, extent, view);
+  return about(centre, extent, beam);
 }
 
-RadiographTarget target_point(const Model& model, const PosedBody& body, View view, const Vector3d& point) {
-  return about(point, whole(model, body), view);
+RadiographTarget target_point(const Model& model, const PosedBody& body, const Beam& beam,
+                              const Vector3d& point) {
+  return about(point, whole(model, body), beam);
 }
 
-XRaySetup positioned(View view, const RadiographTarget& target, double sid_mm, double oid_mm,
+XRaySetup positioned(const Beam& beam, const RadiographTarget& target, double sid_mm, double oid_mm,
                      const Detector& detector) {
   // A negative distance would turn the picture round.
   if (!(oid_mm >= 0 && sid_mm - oid_mm >= 1)) {
@@ -128,19 +154,8 @@ XRaySetup positioned(View view, const RadiographTarget& target, double sid_mm, d
   XRaySetup out;
   out.detector = detector;
   out.detector.down = -Vector3d::UnitZ();
-  const Vector3d way = beam(view);
-  switch (view) {
-    case View::ap:
-    case View::pa:
-      out.detector.right = Vector3d::UnitX();
-      break;
-    case View::lateral_left:  // the front on the left
-      out.detector.right = Vector3d::UnitY();
-      break;
-    case View::lateral_right:
-      out.detector.right = -Vector3d::UnitY();
-      break;
-  }
+  out.detector.right = beam.right();
+  const Vector3d way = beam.way();
   out.detector.centre = target.centre + oid_mm * way;
   out.source = out.detector.centre - sid_mm * way;
   return out;

@@ -81,7 +81,12 @@ BallSet balls_at_rest(const VolumetricSkeleton& skeleton, const ImageGrid& latti
 }
 
 void move_balls(const VolumetricSkeleton& skeleton, std::span<const RigidTransform> motions, BallSet& set) {
-  if (skeleton.segment.size() != skeleton.size()) {
+  move_balls(skeleton, skeleton.segment, motions, set);
+}
+
+void move_balls(const VolumetricSkeleton& skeleton, std::span<const std::int32_t> segment,
+                std::span<const RigidTransform> motions, BallSet& set) {
+  if (segment.size() != skeleton.size()) {
     bad(skeleton, "its voxels hang on no segments", "attach it to a rig");
   }
   const Affine index = to_index(set.lattice), space = to_space(set.lattice);
@@ -94,7 +99,7 @@ void move_balls(const VolumetricSkeleton& skeleton, std::span<const RigidTransfo
     // The lattice is cubic: a rotation there too, whose inverse is its transpose.
     back = forth[s].linear.transpose().unaryExpr([](double x) { return snapped(x); });
   }
-  for (const std::int32_t s : skeleton.segment) {
+  for (const std::int32_t s : segment) {
     if (s < 0) bad(skeleton, "some of its voxels hang on no segment", "attach it to a rig");
     if (static_cast<std::size_t>(s) >= motions.size()) {
       bad(skeleton, "segment " + std::to_string(s) + " of a rig of " + std::to_string(motions.size()),
@@ -104,7 +109,7 @@ void move_balls(const VolumetricSkeleton& skeleton, std::span<const RigidTransfo
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, set.balls.size(), 4096), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       Ball& ball = set.balls[i];
-      ball.motion = skeleton.segment[i];
+      ball.motion = segment[i];
       const Affine& move = forth[static_cast<std::size_t>(ball.motion)];
       ball.centre = snapped(move * Vector3d(ball.rest[0], ball.rest[1], ball.rest[2]));
     }

@@ -50,5 +50,8 @@ BallSet balls_at_rest(const VolumetricSkeleton& skeleton, const ImageGrid& latti
 /// within 1e-9 voxel of whole numbers become whole, so that rest is exact. Throws Error{data} where a voxel
 /// hangs on no segment, or on one that the rig lacks.
 void move_balls(const VolumetricSkeleton& skeleton, std::span<const RigidTransform> motions, BallSet& set);
+/// The same, with the balls hung on other segments than the skeleton's own.
+void move_balls(const VolumetricSkeleton& skeleton, std::span<const std::int32_t> segment,
+                std::span<const RigidTransform> motions, BallSet& set);
 
 }  // namespace ecorche::runtime

@@ -27,14 +27,29 @@ ImageGrid posed_lattice(const VolumetricSkeleton& skeleton, const ModelVolume& v
 
 VolumeBalls::VolumeBalls(const Model& model, const ModelVolume& volume, bool bridged, const Context& context)
     : skeleton_(spheres_for(model, volume)),
+      model_(model),
       rest_(balls_at_rest(skeleton_, posed_lattice(skeleton_, volume))) {
   if (bridged) seams_ = seams_of(rest_, skeleton_.segment, model.rig.skeleton, context);
 }
 
+VolumeBalls::VolumeBalls(const Model& model, const ModelVolume& volume, const Hanging& by_hand,
+                         const Context& context)
+    : skeleton_(spheres_for(model, volume)),
+      model_(model),
+      by_hand_(&by_hand),
+      rest_(balls_at_rest(skeleton_, posed_lattice(skeleton_, volume))),
+      seams_(seams_of(rest_, by_hand.segment, with_joints(model.rig.skeleton, by_hand.joint), context)) {}
+
 BallSet VolumeBalls::at(std::span<const RigidTransform> segments) const {
   BallSet set = rest_;
-  move_balls(skeleton_, segments, set);
-  bridge(seams_, segments, set);
+  if (!by_hand_) {
+    move_balls(skeleton_, segments, set);
+    bridge(seams_, segments, set);
+    return set;
+  }
+  const std::vector<RigidTransform> motions = about_joints(model_.rig.skeleton, by_hand_->joint, segments);
+  move_balls(skeleton_, by_hand_->segment, motions, set);
+  bridge(seams_, motions, set);
   return set;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 
 #include <ecorche/values/model.hpp>
+#include "runtime/spheres/hanging.hpp"
 #include "runtime/spheres/refill.hpp"
 #include "runtime/spheres/seams.hpp"
 
@@ -32,12 +33,18 @@ class VolumeBalls {
   /// `bridged`: fill what opens between segments (seams.hpp). Throws as spheres_for.
   VolumeBalls(const Model& model, const ModelVolume& volume, bool bridged = true,
               const Context& context = {});
+  /// Bridged, and hung as `by_hand` says; keeps a reference to that, too. Its sizes must be those of the
+  /// skeleton and the rig.
+  VolumeBalls(const Model& model, const ModelVolume& volume, const Hanging& by_hand,
+              const Context& context = {});
 
   /// `segments`: as PosedBody has them. Throws as move_balls.
   BallSet at(std::span<const RigidTransform> segments) const;
 
  private:
   const VolumetricSkeleton& skeleton_;
+  const Model& model_;
+  const Hanging* by_hand_ = nullptr;
   BallSet rest_;
   Seams seams_;
 };

@@ -10,8 +10,8 @@ from google.protobuf import descriptor_pb2
 from documentation.pages import ROOT, slug
 
 FOLDER = ROOT / "proto"
-ORDER = ["hello", "model", "stream", "command", "record", "common"]
-TITLES = {"hello": "Connection messages", "model": "Model messages", "stream": "Stream messages", "command": "Command messages",
+ORDER = ["hello", "model", "stream", "command", "inspect", "record", "common"]
+TITLES = {"hello": "Connection messages", "model": "Model messages", "stream": "Stream messages", "command": "Command messages", "inspect": "Looking messages",
           "record": "Recording messages", "common": "Shared messages"}
 TYPES = descriptor_pb2.FieldDescriptorProto
 NOTICE = "<!-- SPDX-License-Identifier: Apache-2.0 -->\n<!-- Made by scripts/reference from proto/ecorche/v1. Edit those files, then run it again. -->\n"

@@ -13,6 +13,7 @@
 #include "io/case/ik_file.hpp"
 #include "io/case/motion_map.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/segmentation.hpp"
 #include "io/surface/gltf.hpp"
 #include "io/surface/obj.hpp"
 #include "io/surface/off.hpp"
@@ -139,6 +140,10 @@ ECORCHE_SURFACE(gltf_mesh,
 ECORCHE_IMAGE(nrrd, place().put("a.nrrd", text))
 ECORCHE_IMAGE(mha, place().put("a.mha", text))
 ECORCHE_IMAGE(nifti, put_nifti(text))
+ECORCHE_IMAGE(dicom, place().put("a.dcm", text))
+ECORCHE_READER(dicom_segmentation, kBesideImage, kLimits.per_byte,
+               look_at(io::read_segmentation(place().put("s.dcm", text), {limits, {}}).layers.at(0)),
+               ErrorKind::data, ErrorKind::missing_input)
 ECORCHE_YAML(case_yaml, kBesideImage, io::read_case(place().put("case.yaml", text), {{}, {}, limits}, {}))
 ECORCHE_YAML(skeleton_yaml, kBeside, io::read_skeleton(place().put("skeleton.yaml", text)))
 ECORCHE_YAML(pose_yaml, kBeside, io::read_pose(place().put("pose.yaml", text), rig()))

@@ -88,6 +88,7 @@ void Client::on_goodbye() {
 
 void Client::on_closed() {
   closed_ = true;
+  if (pending_.radiograph) pending_.radiograph->request_stop();
   output_.wake().cancel();
   leave_place();
   try {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,6 +34,8 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   std::uint64_t number() const override { return number_; }  ///< of its connection
   /// address_of() its peer.
   const std::string& address() const { return address_; }
+  /// Of what all keep; see Member.
+  std::shared_ptr<const Pool> kept_share() const override { return kept_share_; }
   /// For what is made for it on other threads.
   const std::shared_ptr<Account>& account() const { return account_; }
   ClientOutput& output() { return output_; }
@@ -98,7 +101,8 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   /// What is under way for it on other threads.
   struct Pending {
     std::size_t subscriptions = 0;
-    int ik = 0, probes = 0;
+    int ik = 0, probes = 0, fields = 0;
+    std::optional<std::stop_source> radiograph;  ///< of the one that is being made
   };
   Pending& pending() { return pending_; }
 
@@ -137,7 +141,6 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   bool may_take(std::uint32_t subscription, std::uint64_t bytes) override;
   void tell(const std::shared_ptr<const wire::EncodedFrame>& news) override;
   void control_given() override;
-  std::shared_ptr<const Pool> kept_share() const override { return kept_share_; }
 
   void acknowledge(const PoseOutcome& outcome, const Skipped& skipped);
   void leave_place();

@@ -39,6 +39,12 @@ Status handle_set_thresholds(Client& client, const v1::SetThresholds& wanted, co
 // probe.cpp
 Status handle_probe_points(Client& client, const v1::ProbePoints& probe, const Request& request);
 
+// radiograph.cpp
+Status handle_render_radiograph(Client& client, const v1::RenderRadiograph& render, const Request& request);
+
+// field.cpp
+Status handle_sample_field(Client& client, const v1::SampleField& sample, const Request& request);
+
 // ik.cpp
 Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& request);
 
@@ -46,6 +52,10 @@ Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& 
 Status handle_list_clips(Client& client, const v1::ListClips& list, const Request& request);
 Status handle_play_clip(Client& client, const v1::PlayClip& play, const Request& request);
 Status handle_steer_clip(Client& client, const v1::SteerClip& steer, const Request& request);
+
+// spheres.cpp
+Status handle_get_spheres(Client& client, const v1::GetSpheres& get, const Request& request);
+Status handle_hang_spheres(Client& client, const v1::HangSpheres& hang, const Request& request);
 
 // recording.cpp
 Status handle_record(Client& client, const v1::Record& record, const Request& request);

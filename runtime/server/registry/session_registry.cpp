@@ -46,8 +46,8 @@ SessionRegistry::SessionRegistry(net::io_context& io, Workers& workers, Options 
   for (NamedModel& model : models) {
     if (!sources_.emplace(model.name, std::move(model.read_again)).second)
       throw Error(ErrorKind::config, model.name, "two models have this name", "rename one of the files");
-    models_.push_back(
-        std::make_shared<const ServedModel>(model.name, std::move(model.model), std::move(model.clips)));
+    models_.push_back(std::make_shared<const ServedModel>(model.name, std::move(model.model),
+                                                          std::move(model.clips), std::move(model.poses)));
     // The first frame of all will want it.
     executor_.submit(Service::frames, [served = models_.back()] { warm_up(*served); });
     make_levels(models_.back());
@@ -271,7 +271,8 @@ void SessionRegistry::reload(const std::string& name, std::function<void(const S
   const auto work = [reading, read = source->second, name] {
     try {
       ModelParts parts = read();
-      reading->model = std::make_shared<const ServedModel>(name, parts.model, std::move(parts.clips));
+      reading->model = std::make_shared<const ServedModel>(name, parts.model, std::move(parts.clips),
+                                                           std::move(parts.poses));
       warm_up(*reading->model);
     } catch (const std::bad_alloc&) {
       until_memory([&] {

@@ -52,6 +52,7 @@ std::uint64_t FramePlanner::frame_bytes(const StreamSpec& spec) const {
     return pixels * scalar_bytes(scan.type) * static_cast<std::uint64_t>(scan.components);
   }
   const MeshSpec& mesh = std::get<MeshSpec>(spec);
+  if (mesh.motions) return model.segment_count() * 7 * sizeof(double);
   std::uint64_t vertices = 0;
   for (const std::uint32_t t : mesh.tissues)
     vertices += static_cast<std::uint64_t>(model.tissues[t].V.rows());

@@ -25,6 +25,14 @@ v1::MeshArray& add_array(v1::MeshFrame& frame, std::uint32_t tissue, v1::MeshArr
   return array;
 }
 
+void set_box(const runtime::QuantiseBox& from, v1::MeshFrame& frame) {
+  v1::QuantiseBox& box = *frame.mutable_box();
+  box.set_low_x(from.low[0]);
+  box.set_low_y(from.low[1]);
+  box.set_low_z(from.low[2]);
+  box.set_step(from.step);
+}
+
 // The rows of `part` of an array of three per vertex.
 template <class T>
 std::vector<T> picked(const std::vector<T>& all, const MeshRows& part) {
@@ -131,6 +139,19 @@ void MeshStream::write_nodes(const runtime::PosedBody& body, v1::MeshFrame& fram
       wire::append(payload, std::span<const double>(motions), 12);
 }
 
+void MeshStream::write_motions(const runtime::PosedBody& body, v1::MeshFrame& frame,
+                               wire::Payload& payload) const {
+  payload.clear();
+  std::vector<double> motions;
+  for (const RigidTransform& segment : body.segments) {
+    motions.insert(motions.end(), {segment.q.w(), segment.q.x(), segment.q.y(), segment.q.z(), segment.t.x(),
+                                   segment.t.y(), segment.t.z()});
+  }
+  *add_array(frame, 0, v1::MeshArray::KIND_MOTIONS).mutable_array() =
+      wire::append(payload, std::span<const double>(motions), 7);
+  set_box(body.box, frame);
+}
+
 bool MeshStream::keyframe_due(std::uint64_t frame) const {
   // The last keyframe was never made ready for deltas: its job found no memory.
   if (unsettled_) return true;
@@ -149,12 +170,12 @@ bool MeshStream::write(const runtime::PosedBody& body, bool boxed, bool keyframe
     write_nodes(body, frame, payload);
     return true;
   }
+  if (spec_.motions) {
+    write_motions(body, frame, payload);
+    return true;
+  }
   if (encoding != v1::ENCODING_F32) {
-    v1::QuantiseBox& box = *frame.mutable_box();
-    box.set_low_x(body.box.low[0]);
-    box.set_low_y(body.box.low[1]);
-    box.set_low_z(body.box.low[2]);
-    box.set_step(body.box.step);
+    set_box(body.box, frame);
     gather(body);
   } else {
     frame.clear_box();

@@ -37,7 +37,8 @@ class MeshStream {
 
   /// What the frame needs of the posed body.
   bool needs_numbers() const { return spec_.encoding != v1::ENCODING_F32; }
-  bool needs_positions() const { return spec_.encoding == v1::ENCODING_F32 && !spec_.control_nodes; }
+  bool needs_positions() const { return spec_.encoding == v1::ENCODING_F32 && !moved_by_client(); }
+  bool moved_by_client() const { return spec_.control_nodes || spec_.motions; }
 
   /// Whether its frames' payload is positions just as they are posed.
   bool plain() const { return needs_positions() && !parts_ && !spec_.normals; }
@@ -54,6 +55,7 @@ class MeshStream {
   void settle(const runtime::PosedBody& body);
 
  private:
+  void write_motions(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) const;
   void write_nodes(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload) const;
   bool write_deltas(const runtime::PosedBody& body, v1::MeshFrame& frame, wire::Payload& payload);
   void pack_normals(const runtime::PosedBody& body, std::size_t t, std::vector<std::int8_t>& packed) const;

@@ -53,7 +53,7 @@ void describe_binding(const Model& model, std::uint32_t tissue, const std::vecto
 }  // namespace
 
 bool takes_long(const MeshSpec& spec) {
-  return spec.level > 0 || spec.adaptive || spec.region || spec.control_nodes;
+  return spec.level > 0 || spec.adaptive || spec.region || spec.control_nodes || spec.motions;
 }
 
 std::vector<std::shared_ptr<MeshStream>> open_streams(const ServedModel& model, const MeshSpec& spec) {
@@ -99,6 +99,7 @@ std::shared_ptr<const wire::Payload> describe(const ServedModel& model,
       for (const std::uint32_t t : spec.tissues)
         describe_binding(model.model(), t, row, *out.add_bindings(), *payload);
     }
+    if (spec.motions) model.describe_skinning(spec.tissues, spec.level, *out.mutable_skinning(), *payload);
     if (!stream->parts()) continue;
     v1::MeshLevel& level = *out.add_levels();
     level.set_level(stream->level());

@@ -30,7 +30,7 @@ struct Wanted {
   // `measured`: its quality is.
   void add(const MeshStream& stream, bool measured) {
     // Who moves the vertices itself needs the nodes alone.
-    if (stream.spec().control_nodes && !measured) return;
+    if (stream.moved_by_client() && !measured) return;
     for (const std::uint32_t tissue : stream.spec().tissues) {
       shown[tissue] = true;
       if (stream.needs_positions() || measured) positions[tissue] = true;
@@ -161,6 +161,14 @@ std::shared_ptr<const Positions> at_rest(const PoseJob& job, const Subscription&
   return shown;
 }
 
+// Motions are few bytes, and the quality more than they: what was told before is told again now and then, for
+// who missed it.
+bool tells_quality(const PoseJob& job, const MeshStream& stream, const Judged& judged) {
+  constexpr std::uint64_t again = 16;  // frames
+  return !stream.spec().motions || judged.now || judged.quality->pose_sequence() == job.request.sequence ||
+         job.number % again == 0;
+}
+
 PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std::size_t at,
                       runtime::PosedBody& body, const v1::ServerTimings& timings, const Judged& judged) {
   MeshStream& stream = *subscription.streams[at];
@@ -171,7 +179,8 @@ PosedFrame mesh_frame(const PoseJob& job, const Subscription& subscription, std:
   frame.set_pose_sequence(job.request.sequence);
   frame.set_topology_digest(job.model->opened.topology_digest());
   *frame.mutable_timings() = timings;
-  *frame.mutable_quality() = *judged.quality;
+  if (tells_quality(job, stream, judged)) *frame.mutable_quality() = *judged.quality;
+  if (stream.spec().motions) frame.set_skinning(skinning_to_proto(job.request.skinning));
   frame.mutable_timings()->set_measured(judged.took);
   for (const ClampedJoint& clamped : body.clamped) {
     describe(clamped, job.model->model().rig.skeleton, *frame.add_clamped());
@@ -222,8 +231,8 @@ Status show_volume(const PoseJob& job, const Subscription& subscription, const r
   Context context;
   context.stop = job.stop;
   Status status = guarded("pose", [&] {
-    return subscription.volume->write(*job.model, body, job.volume_voxels, (subscription.keyframes & 1) != 0,
-                                      frame, *payload, context);
+    return subscription.volume->write({*job.model, job.hung, body}, job.volume_voxels,
+                                      (subscription.keyframes & 1) != 0, frame, *payload, context);
   });
   if (status.code == StatusCode::cancelled) return status;
   if (!status.ok()) {

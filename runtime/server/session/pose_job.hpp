@@ -14,6 +14,7 @@
 #include <ecorche/wire/framing.hpp>
 #include "runtime/server/net/asio.hpp"
 #include "runtime/server/resources/memory_budget.hpp"
+#include "runtime/server/session/hung_spheres.hpp"
 #include "runtime/server/session/served_model.hpp"
 #include "runtime/server/session/subscription.hpp"
 
@@ -66,6 +67,7 @@ struct PoseJob {
   PoseRequest request;
   std::uint64_t number = 0;  ///< of the frames
   std::vector<Subscription> subscriptions;
+  HungSpheres hung;
   std::uint64_t volume_voxels = 0;  ///< Limits
   runtime::QualityThresholds thresholds;
   bool judge = false;  ///< every frame with its own pose's quality; else Subscription::quality may be told

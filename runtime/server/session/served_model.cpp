@@ -96,10 +96,11 @@ struct ServedModel::Made {
   }
 };
 
-ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves)
-    : ServedModel(Made(std::move(name), model, std::move(moves))) {}
+ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves,
+                         std::vector<NamedPose> poses)
+    : ServedModel(Made(std::move(name), model, std::move(moves)), std::move(poses)) {}
 
-ServedModel::ServedModel(Made made)
+ServedModel::ServedModel(Made made, std::vector<NamedPose> poses)
     : summary(std::move(made.summary)),
       opened(std::move(made.opened)),
       triangles(std::move(made.triangles)),
@@ -108,7 +109,8 @@ ServedModel::ServedModel(Made made)
       bodies(*poser_),
       background_bodies(*poser_),
       levels_(model().tissues.size()),
-      balls_(model().volumes.size()) {
+      balls_(model().volumes.size()),
+      skinning_(model().rig.skeleton, std::move(poses)) {
   for (Clip& clip : made.clips) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
   runtime::PosedBody body = poser_->make_frame({.positions = false});
   const Pose rest = Pose::rest(model().segment_count());
@@ -148,6 +150,14 @@ void ServedModel::make_levels(const std::vector<std::uint32_t>& tissues) const {
       row.made = true;
     });
   }
+}
+
+void ServedModel::describe_skinning(const std::vector<std::uint32_t>& tissues, std::uint32_t detail,
+                                    v1::SkinningData& out, wire::Payload& payload) const {
+  make_levels(tissues);
+  skinning_.describe(
+      *poser_, [this](std::uint32_t l, std::uint32_t t) { return &level(l, t); }, tissues, detail, out,
+      payload);
 }
 
 const runtime::Probe& ServedModel::probe() const {

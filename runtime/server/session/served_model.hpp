@@ -19,6 +19,7 @@
 #include "runtime/server/session/clip.hpp"
 #include "runtime/server/session/mesh_rows.hpp"
 #include "runtime/server/session/rest_pose.hpp"
+#include "runtime/server/session/skinning_data.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::server {
@@ -32,8 +33,10 @@ struct VolumeScratch {
 /// Shared by every thread. Does not change after construction, but for what takes long to make and not every
 /// client wants, which is made when it is first asked for.
 struct ServedModel {
-  /// `name` is what OpenModel asks for; `clips` are of the model's rig.
-  ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> clips = {});
+  /// `name` is what OpenModel asks for; `clips` are of the model's rig, and so are `poses`, by which the
+  /// skinning of clients is measured.
+  ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> clips = {},
+              std::vector<NamedPose> poses = {});
 
   const runtime::BodyPoser& poser() const { return *poser_; }
   const Model& model() const { return poser_->model(); }
@@ -49,6 +52,9 @@ struct ServedModel {
   const runtime::QualityMeter& meter() const;
   const runtime::VolumePoser& volumes() const;
   const runtime::Probe& probe() const;
+  /// What a client skins these tissues by at this level of detail. Appends to `payload`.
+  void describe_skinning(const std::vector<std::uint32_t>& tissues, std::uint32_t level,
+                         v1::SkinningData& out, wire::Payload& payload) const;
   /// Of a row of Model::volumes, bridged; throws as VolumeBalls, too.
   const runtime::VolumeBalls& balls(std::size_t volume) const;
 
@@ -61,7 +67,7 @@ struct ServedModel {
 
  private:
   struct Made;
-  explicit ServedModel(Made made);
+  ServedModel(Made made, std::vector<NamedPose> poses);
   std::unique_ptr<const runtime::BodyPoser> poser_;
 
  public:
@@ -92,6 +98,7 @@ struct ServedModel {
   mutable std::once_flag meter_made_, volumes_made_;
   mutable std::unique_ptr<const runtime::QualityMeter> meter_;
   mutable std::unique_ptr<const runtime::VolumePoser> volumes_;
+  mutable SkinningTables skinning_;
   mutable std::once_flag probe_made_;
   mutable std::unique_ptr<const runtime::Probe> probe_;
 };

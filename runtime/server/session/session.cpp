@@ -162,6 +162,27 @@ void Session::set_thresholds(const runtime::QualityThresholds& thresholds) {
   start_jobs();
 }
 
+bool Session::hang(std::size_t row, std::optional<runtime::Hanging> hanging) {
+  std::shared_ptr<const HungSkeleton> hung;
+  if (hanging) {
+    const std::uint64_t bytes = kept_by_hung(model_->model(), row);
+    const std::shared_ptr<const Pool>& pool = owner_.kept ? owner_.kept : memory_.kept_pool();
+    // What it replaces goes once the jobs under way are over.
+    if (pool->full(bytes)) {
+      metrics_.hit("kept");
+      return false;
+    }
+    hung = std::make_shared<const HungSkeleton>(model_, std::move(*hanging),
+                                                MemoryBudget::Reservation(pool, bytes));
+  }
+  hung_.set(row, std::move(hung));
+  const auto now = Clock::now();
+  table_.wait(kVolumes | kPlanes, now, now, true);
+  set_alarm();
+  start_jobs();
+  return true;
+}
+
 void Session::probe(ProbeQueue::Ready ready, bool many) {
   probes_.ask(std::move(ready), many, Clock::now());
   if (probes_.anybody_waits()) start_jobs();

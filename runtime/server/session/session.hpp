@@ -18,6 +18,7 @@
 #include "runtime/server/session/clip.hpp"
 #include "runtime/server/session/control.hpp"
 #include "runtime/server/session/frame_planner.hpp"
+#include "runtime/server/session/hung_spheres.hpp"
 #include "runtime/server/session/job_pacer.hpp"
 #include "runtime/server/session/job_reporter.hpp"
 #include "runtime/server/session/news.hpp"
@@ -104,6 +105,12 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   const runtime::QualityThresholds& thresholds() const { return quality_.thresholds(); }
   void set_thresholds(const runtime::QualityThresholds& thresholds);
 
+  /// How the balls of volumes hang.
+  const HungSpheres& hung() const { return hung_; }
+  /// A row of Model::spheres hung otherwise, or null: as the model has it. Volumes by it are made again.
+  /// False where there is no memory to keep it.
+  bool hang(std::size_t row, std::optional<runtime::Hanging> hanging);
+
   /// See ProbeQueue::ask().
   void probe(ProbeQueue::Ready ready, bool many);
   /// Lets go of what probes need, where none has come of late, or nobody is here.
@@ -187,6 +194,7 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   VolumeJobs volumes_;
   ProbeQueue probes_;
   QualityTracker quality_;
+  HungSpheres hung_;
   SessionRecorder recorder_;
   std::shared_ptr<ClipPlayer> player_;
   Presence presence_;

@@ -84,6 +84,7 @@ std::shared_ptr<PoseJob> Session::make_job() {
   auto job = std::make_shared<PoseJob>();
   job->model = model_;
   job->number = ++frames_;
+  job->hung = hung_;
   job->volume_voxels = limits_.volume_voxels;
   job->thresholds = quality_.thresholds();
   job->digests = recorder_.running();

@@ -49,6 +49,7 @@ Status read_mesh(const v1::MeshSelection& mesh, const Model& model, MeshSpec& ou
   out.level = mesh.level();
   out.adaptive = mesh.adaptive();
   out.control_nodes = mesh.control_nodes();
+  out.motions = mesh.motions();
   out.pose = mesh.pose();
   if (out.level > coarsest_level) {
     return {StatusCode::invalid_argument, "subscribe: level " + std::to_string(out.level) +
@@ -61,6 +62,10 @@ Status read_mesh(const v1::MeshSelection& mesh, const Model& model, MeshSpec& ou
       (out.encoding != v1::ENCODING_F32 || out.normals || out.region || out.level != 0 || out.adaptive))
     return {StatusCode::invalid_argument,
             "subscribe: control nodes are float32 and whole (ask for nothing else)"};
+  if (out.motions &&
+      (out.encoding != v1::ENCODING_F32 || out.normals || out.region || out.adaptive || out.control_nodes))
+    return {StatusCode::invalid_argument,
+            "subscribe: motions are those of all segments (ask for a level, and for nothing else)"};
   for (const std::string& name : mesh.tissues()) {
     const int row = find_row(model.tissues, name);
     if (row < 0)

@@ -26,8 +26,9 @@ struct MeshSpec {
   std::uint32_t level = 0;                ///< of detail
   bool adaptive = false;                  ///< coarser levels too, where the network asks for it
   bool control_nodes = false;
-  bool pose = false;    ///< told with every frame
-  double max_rate = 0;  ///< frames per second; 0: every pose
+  bool motions = false;  ///< of segments, for who skins
+  bool pose = false;     ///< told with every frame
+  double max_rate = 0;   ///< frames per second; 0: every pose
   bool operator==(const MeshSpec&) const = default;
 };
 

@@ -33,19 +33,17 @@ void append_brick(const Image& image, const runtime::VoxelRange& range, std::vec
 
 }  // namespace
 
-Status VolumeStream::write(const ServedModel& served, const runtime::PosedBody& body,
-                           std::uint64_t most_voxels, bool keyframe, v1::VolumeFrame& frame,
-                           wire::Payload& payload, const Context& context) {
+Status VolumeStream::write(const Shown& shown, std::uint64_t most_voxels, bool keyframe,
+                           v1::VolumeFrame& frame, wire::Payload& payload, const Context& context) {
   payload.clear();
   // Until it is whole: what moved meanwhile would be forgotten.
   const std::uint64_t last_keyframe = std::exchange(keyframe_, 0);
   if (!spec_.slices.empty()) {
-    write_slices(served, body, frame, payload, context);
+    write_slices(shown, frame, payload, context);
     return {};
   }
   const Bounds bounds{most_voxels, context};
-  if (Status status = spec_.by_spheres ? by_spheres(served, body, bounds) : by_tets(served, body, bounds);
-      !status.ok())
+  if (Status status = spec_.by_spheres ? by_spheres(shown, bounds) : by_tets(shown, bounds); !status.ok())
     return status;
   wire::to_proto(posed_.image->grid, *frame.mutable_grid());
   if (spec_.changed_bricks) {
@@ -76,8 +74,8 @@ Status VolumeStream::reserve(const Model& model, const ImageGrid& grid, const Bo
   return {};
 }
 
-Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody& body,
-                             const Bounds& bounds) {
+Status VolumeStream::by_tets(const Shown& shown, const Bounds& bounds) {
+  const auto& [served, hung, body] = shown;
   const ModelVolume& volume = served.model().volumes[spec_.volume];
   const ImageGrid& rest = volume.image.grid;
   const ImageGrid grid = spec_.region
@@ -90,10 +88,10 @@ Status VolumeStream::by_tets(const ServedModel& served, const runtime::PosedBody
   return {};
 }
 
-Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedBody& body,
-                                const Bounds& bounds) {
+Status VolumeStream::by_spheres(const Shown& shown, const Bounds& bounds) {
+  const auto& [served, hung, body] = shown;
   const ModelVolume& volume = served.model().volumes[spec_.volume];
-  runtime::BallSet set = served.balls(spec_.volume).at(body.segments);
+  runtime::BallSet set = hung.balls(served, spec_.volume).at(body.segments);
   const runtime::LatticeBox box = runtime::box_for(set, spec_.region);
   if (Status status = reserve(served.model(), grid_of(set.lattice, box), bounds); !status.ok()) return status;
   runtime::follow(std::move(set), box, volume, spec_.sampling, refilled_, bounds.context);
@@ -101,11 +99,12 @@ Status VolumeStream::by_spheres(const ServedModel& served, const runtime::PosedB
   return {};
 }
 
-void VolumeStream::write_slices(const ServedModel& served, const runtime::PosedBody& body,
-                                v1::VolumeFrame& frame, wire::Payload& payload, const Context& context) {
+void VolumeStream::write_slices(const Shown& shown, v1::VolumeFrame& frame, wire::Payload& payload,
+                                const Context& context) {
+  const auto& [served, hung, body] = shown;
   const ModelVolume& volume = served.model().volumes[spec_.volume];
   std::optional<runtime::BallSet> set;
-  if (spec_.by_spheres) set = served.balls(spec_.volume).at(body.segments);
+  if (spec_.by_spheres) set = hung.balls(served, spec_.volume).at(body.segments);
   const std::shared_ptr<VolumeScratch> scratch = served.volume_scratch->take();
   Image& slice = scratch->slice;
   const std::size_t pixel =

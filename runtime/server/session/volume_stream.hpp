@@ -11,6 +11,7 @@
 #include <ecorche/wire/framing.hpp>
 #include "runtime/server/resources/memory_budget.hpp"
 #include "runtime/server/resources/payload_pool.hpp"
+#include "runtime/server/session/hung_spheres.hpp"
 #include "runtime/server/session/served_model.hpp"
 #include "runtime/server/session/subscription.hpp"
 #include "runtime/spheres/refilled_volume.hpp"
@@ -37,12 +38,18 @@ class VolumeStream {
   /// To write() into.
   std::shared_ptr<wire::Payload> payload() const { return payloads_->take(); }
 
+  /// What a frame shows.
+  struct Shown {
+    const ServedModel& model;
+    const HungSpheres& hung;
+    const runtime::PosedBody& body;
+  };
   /// Fills grid, voxels, bricks, content and keyframe of `frame`, whose number is set. `keyframe`: somebody
   /// needs one. resource_exhausted beyond `most_voxels`, and where the lattice has grown since the rest pose
   /// and its pool lets no more be kept. Error{interrupted} on a stop. Whatever it throws, the next frame
   /// holds everything.
-  Status write(const ServedModel& model, const runtime::PosedBody& body, std::uint64_t most_voxels,
-               bool keyframe, v1::VolumeFrame& frame, wire::Payload& payload, const Context& context = {});
+  Status write(const Shown& shown, std::uint64_t most_voxels, bool keyframe, v1::VolumeFrame& frame,
+               wire::Payload& payload, const Context& context = {});
 
  private:
   struct Bounds {
@@ -50,11 +57,11 @@ class VolumeStream {
     const Context& context;
   };
   // The whole posed volume, or its region, into posed_.
-  Status by_tets(const ServedModel& model, const runtime::PosedBody& body, const Bounds& bounds);
-  Status by_spheres(const ServedModel& model, const runtime::PosedBody& body, const Bounds& bounds);
+  Status by_tets(const Shown& shown, const Bounds& bounds);
+  Status by_spheres(const Shown& shown, const Bounds& bounds);
   Status reserve(const Model& model, const ImageGrid& grid, const Bounds& bounds);
-  void write_slices(const ServedModel& model, const runtime::PosedBody& body, v1::VolumeFrame& frame,
-                    wire::Payload& payload, const Context& context);
+  void write_slices(const Shown& shown, v1::VolumeFrame& frame, wire::Payload& payload,
+                    const Context& context);
   void write_bricks(bool keyframe, std::uint64_t last_keyframe, v1::VolumeFrame& frame,
                     wire::Payload& payload);
   void put(std::span<const std::byte> voxels, const Image& like, v1::VolumeFrame& frame,

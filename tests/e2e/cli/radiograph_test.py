@@ -215,7 +215,7 @@ class Radiograph(unittest.TestCase):
         self.refused(64, "a side of no length", "--size", "430,-1")
         self.refused(64, "--sid: -5 mm (more than 0, at most 1e5)", "--sid", "-5")
         self.refused(64, "--oid: 1200 mm (from 0 to less than the distance of the source)", "--oid", "1200")
-        self.refused(64, "would not stand before it (give a greater --sid", "--view", "lateral_left", "--sid", "200")
+        self.refused(64, "would not stand before it (give a greater sid, or an oid)", "--view", "lateral_left", "--sid", "200")
         self.refused(64, "energy: 10 keV (from 20 to 150 keV; a tube's effective energy is about half of its peak voltage)", "--energy", "10")
         self.refused(64, "--window: no two ascending numbers", "--window", "4,2")
         self.refused(64, "line integrals have no --scale", "--window", "0,4", out="no.nrrd")

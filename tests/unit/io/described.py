@@ -36,7 +36,7 @@ class Described(unittest.TestCase):
         for part in parts:
             self.assertIn(part, done.stderr)
 
-    def assert_frame(self, grid, affine):
+    def assert_frame(self, grid, affine, atol=2e-5):
         """`affine` brings voxels to LPS."""
         for key, index in (("origin", [0, 0, 0]), ("i", [1, 0, 0]), ("j", [0, 1, 0]), ("k", [0, 0, 1])):
-            numpy.testing.assert_allclose(grid[key], (affine @ [*index, 1])[:3], atol=2e-5)
+            numpy.testing.assert_allclose(grid[key], (affine @ [*index, 1])[:3], atol=atol)

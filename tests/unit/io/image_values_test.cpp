@@ -226,18 +226,16 @@ TEST(ImageAxes, FurtherOffIsOneLineWithARemedy) {
 TEST(ImageDicom, SaysWhatItIsAndWhatToDo) {
   const Scratch scratch;
   const std::string slice = std::string(128, '\0') + "DICM" + std::string(64, '\1');
-  const std::string mend =
-      " (make one file of the series first: dcm2niix -z y -o OUT FOLDER, or 3D Slicer; then name its .nii.gz "
-      "or .nrrd)";
   scratch.put("series/IM000001", slice);
   scratch.put("old/slice.dcm", "no magic");
   scratch.put("other/notes.txt", "x");
-  expect_error(ErrorKind::data, "series: is a folder of DICOM files" + mend,
+  expect_error(ErrorKind::data, "IM000001: does not tell its transfer syntax",
                [&] { read_image(scratch / "series"); });
-  expect_error(ErrorKind::data, "old: is a folder of DICOM files", [&] { read_image(scratch / "old"); });
-  expect_error(ErrorKind::data, "IM000001: is a DICOM file" + mend,
-               [&] { read_segmentation(scratch / "series" / "IM000001"); });
-  expect_error(ErrorKind::data, "other: is a folder, no image (name a .nrrd, .mha or .nii.gz)",
+  expect_error(ErrorKind::data, "old: holds 0 DICOM files, and no slices of an image",
+               [&] { read_image(scratch / "old"); });
+  expect_error(ErrorKind::data, "slice.dcm: is no DICOM file",
+               [&] { read_segmentation(scratch / "old" / "slice.dcm"); });
+  expect_error(ErrorKind::data, "other: is a folder without DICOM files, no image",
                [&] { read_image(scratch / "other"); });
   EXPECT_FALSE(is_dicom(scratch / "none"));
 }

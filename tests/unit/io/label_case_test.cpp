@@ -131,12 +131,17 @@ TEST_F(LabelCase, NamesMayBeThoseOfTheTablesFile) {
                [&] { read(changed(changed(inlined, "vertebrae_S1", "a_b"), "femur_left", "a-b")); });
 }
 
-TEST_F(LabelCase, AFolderOfDicomIsNamed) {
+TEST_F(LabelCase, AFolderOfDicomIsAnImage) {
   scratch_.put("ct/IM0001", std::string(128, '\0') + "DICM");
-  const std::string text = kCase + "volumes:\n  - {name: ct, file: ct}\n";
-  expect_error(ErrorKind::data,
-               "/ct: is a folder of DICOM files (make one file of the series first: dcm2niix",
-               [&] { read(text); });
+  const auto volume = [](const std::string& more) {
+    return kCase + "volumes:\n  - {name: ct, file: ct" + more + "}\n";
+  };
+  expect_error(ErrorKind::data, "/ct/IM0001: does not tell its transfer syntax", [&] { read(volume("")); });
+  expect_error(ErrorKind::config, "phase: is no phase (phases are counted from 1)",
+               [&] { read(volume(", phase: 0")); });
+  scratch_.put("notes/a.txt", "x");
+  expect_error(ErrorKind::missing_input, "no such file",
+               [&] { read(changed(volume(""), "file: ct", "file: notes")); });
 }
 
 TEST_F(LabelCase, BecomesSurfaces) {

@@ -72,6 +72,30 @@ TEST(PosedRest, NamedAnglesMeanTheSameStance) {
   }
 }
 
+// Raised beyond a right angle: of the two triples the one that the limits allow.
+TEST(PosedRest, TellsTheAnglesThatTheLimitsMean) {
+  Rig rig = test::chain(2);
+  Joint& shoulder = rig.skeleton.segments[1].joint;
+  shoulder.sequence = test::sequence({0, 1, 2}, {1, -1, 1});
+  for (AngleAxis& angle : shoulder.sequence) angle.min = -0.9, angle.max = 0.9;
+  shoulder.sequence[1].min = -3;
+  const std::array<double, 3> raised{0.2, -1.9, 0.3};
+  Pose pose = Pose::rest(2);
+  pose.rotation[1] = rotation_from_angles(shoulder, raised);
+  const auto rest = [&] {
+    const Skeleton posed = posed_rest(rig, pose);
+    const auto& sequence = posed.segments[1].joint.sequence;
+    return std::array{sequence[0].rest, sequence[1].rest, sequence[2].rest};
+  };
+  for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(rest()[a], raised[a], 1e-9) << a;
+  // Where neither is within them, the one that is less outside: by one angle, not by three.
+  shoulder.sequence[1].min = -0.5;
+  for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(rest()[a], raised[a], 1e-9) << a;
+  // Without limits each angle but the middle one turns all the way: the plain triple.
+  shoulder.sequence = test::sequence({0, 1, 2}, {1, -1, 1});
+  EXPECT_LT(std::abs(rest()[1]), 1.6);
+}
+
 // A knee that rolls back as it bends, scanned bent: stretched again it lies where it did.
 TEST(PosedRest, SlidesGoOnAlongTheParent) {
   std::mt19937 random(6);

@@ -48,7 +48,7 @@ TEST(Views, AreHungAsRadiologistsDo) {
     const Eigen::Vector2d up = in_picture(setup, head);
     EXPECT_NEAR(up.x(), 0, 1e-9);
     EXPECT_NEAR(up.y(), -10 * 1000.0 / 850, 1e-9);
-    EXPECT_GT((setup.detector.centre - target.centre).dot(beam(view)), 0);
+    EXPECT_GT((setup.detector.centre - target.centre).dot(Beam(view).way()), 0);
     // The patient's left is on the picture's right, from front and back.
     if (view == View::ap || view == View::pa) {
       EXPECT_GT(in_picture(setup, left).x(), 5);

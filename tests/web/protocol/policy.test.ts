@@ -2,7 +2,7 @@
 // What a client asks for by what arrives: on paper, and applied to a stream of the real server.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { adapt, Client, Encoding, Policy, type Choice, type Observed } from "../../../clients/web/protocol/src/index.js";
+import { adapt, Client, Encoding, LinePolicy, Policy, type Choice, type LineSeen, type Observed } from "../../../clients/web/protocol/src/index.js";
 import { bendingPose } from "../support/poses.js";
 import { Server, within } from "../support/server.js";
 
@@ -71,6 +71,36 @@ test("frames that cannot be drawn are not asked for", () => {
   assert.deepEqual(policy.choice(true), { level: 0, encoding: Encoding.U16_DELTA, maxRate: 0 }, "no frame tells nothing");
 });
 
+const crowded: LineSeen = { framesPerSecond: 4, posesPerSecond: 25, bytesPerSecond: 100e3, latencyMs: 400, coarserBy: 0, busyMs: 0 };
+const watch = (line: LinePolicy, seen: LineSeen, seconds: number) => { for (let i = 0; i < seconds; ++i) line.observe(seen); };
+
+test("a slow line makes the client skin, of the level that comes soon, and finer ones while it rests", () => {
+  for (const [bytesPerSecond, level] of [[100e6, 0], [2e6, 1], [700e3, 2], [1e3, 3]]) {
+    const line = new LinePolicy(1_000_000, true);
+    watch(line, { ...crowded, bytesPerSecond }, 1);
+    assert.equal(line.skins, undefined, "one slow second");
+    watch(line, { ...crowded, bytesPerSecond }, 1);
+    assert.equal(line.skins, level);
+    for (let i = 0; i < 5; ++i) line.rest();
+    assert.equal(line.skins, 0);
+  }
+});
+
+test("what only looks like a slow line changes nothing", () => {
+  const others: Partial<LineSeen>[] = [{ latencyMs: 100 }, { latencyMs: NaN }, { framesPerSecond: 24 }, { posesPerSecond: 4 }, { busyMs: 200 }];
+  for (const other of others) {
+    const line = new LinePolicy(1000, true);
+    watch(line, { ...crowded, ...other }, 30);
+    assert.equal(line.skins, undefined, JSON.stringify(other));
+  }
+  const line = new LinePolicy(1000, false);
+  watch(line, crowded, 30);
+  assert.equal(line.skins, undefined, "an older server");
+  const coarse = new LinePolicy(1000, true);
+  watch(coarse, { ...crowded, framesPerSecond: 25, coarserBy: 2 }, 2);
+  assert.equal(coarse.skins, 0, "coarser levels alone are a reason");
+});
+
 test("a stream follows: coarse in motion, whole at rest", async (t) => {
   const server = await Server.start();
   t.after(() => server.stop());
@@ -79,7 +109,7 @@ test("a stream follows: coarse in motion, whole at rest", async (t) => {
   const model = await client.open();
   const stream = await client.subscribeMesh();  // not `adaptive`: then the server would choose, too
   const choices: Choice[] = [], policy = new Policy();
-  const adaptation = adapt(client, stream, (choice) => choices.push(choice), policy);
+  const adaptation = adapt(client, stream, (choice) => choices.push(choice), { policy });
   adaptation.drawn(200);
   let angle = 0;
   const moving = setInterval(() => client.setPose(bendingPose(model, angle += 0.01)), 40);

@@ -18,7 +18,7 @@ const tissues = ["skin", "femur_left", "biceps_brachii_left", "liver"].map((name
 function withBody(): { store: Store<AppState>; layers: Layers; history: History; clock: { now: number } } {
   const clock = { now: 0 }, history = new History(() => clock.now);
   const store = new Store<AppState>({
-    ...firstState(), model: { name: "body", session: "", controls: true, tissues, joints: [] }, layers: tissues.map(() => ({ visible: true, opacity: 1 })),
+    ...firstState(), model: { name: "body", session: "", controls: true, tissues, joints: [], segments: [] }, layers: tissues.map(() => ({ visible: true, opacity: 1 })),
   });
   return { store, history, clock, layers: new Layers(store, history) };
 }

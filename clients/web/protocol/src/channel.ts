@@ -3,6 +3,8 @@
 // decoded (MeshFrame.arrays is left out of the envelope).
 import type { Quantisation } from "./decode/packed.js";
 import type { MeshLayout } from "./layout.js";
+import type { Motions } from "./skinning/motions.js";
+import type { Skinning } from "./skinning/skinning.js";
 
 export type ToLink =
   | { kind: "dial"; url: string; hello: Uint8Array }
@@ -27,6 +29,8 @@ export interface FrameNote extends Quantisation {
   word?: number;
   /** Else the vertices themselves, to be returned. */
   buffer?: ArrayBuffer;
+  /** Else what they are skinned by. */
+  motions?: Motions;
 }
 
 export interface Statistics {
@@ -36,11 +40,13 @@ export interface Statistics {
   latencyMs: number;
   /** Mean of the last second's frames. */
   decodeMs: number;
+  /** How late the thread that receives was: it had no processor for so long. */
+  lagMs: number;
 }
 
 export type ToClient =
   | { kind: "message"; envelope: Uint8Array; payload: Uint8Array }
-  | { kind: "layouts"; stream: number; layouts: MeshLayout[] }
+  | { kind: "layouts"; stream: number; layouts: MeshLayout[]; skinning?: Skinning }
   /** Where a level's frames will be, once and before the first. */
   | { kind: "slots"; stream: number; level: number; slots: Uint16Array[]; control: Int32Array }
   | FrameNote

@@ -20,11 +20,13 @@ import { ClientHelloSchema, Feature, type ServerHello } from "./gen/ecorche/v1/h
 import { OpenModelSchema, Role, type ModelOpened, type ModelSummary } from "./gen/ecorche/v1/model_pb.js";
 import { SubscribeSchema } from "./gen/ecorche/v1/stream_pb.js";
 import type { IkOptions } from "./ik.js";
+import { encodeField, encodeRadiograph, readField, readRadiograph, type Field, type FieldOptions, type Radiograph, type RadiographOptions } from "./inspect.js";
 import { MeshStream, type MeshOptions } from "./mesh_stream.js";
 import { PoseSender, type Pose } from "./pose_sender.js";
 import { encodeProbe, readProbe, type ProbeOptions, type Probed } from "./probe.js";
 import { Redial } from "./redial.js";
 import { encode, Requests, type Answer, type Case, type Message } from "./requests.js";
+import { encodeHang, readSpheres, type Spheres } from "./spheres.js";
 import type { ControlState, StateChange } from "./states.js";
 
 /** None of these mends itself by dialling again. */
@@ -87,13 +89,14 @@ export class Client extends Emitter<ClientEvents> {
 
   /** No `model`: the server's first. No `session`: one of its own. Streams that there are go on with the new body. */
   async open(model = "", session = ""): Promise<ModelOpened> {
+    const streams = [...this.streams.values()];  // not those that are asked for while the answer is on its way
     const { value } = await this.ask({ case: "openModel", value: create(OpenModelSchema, { model, session }) }, "modelOpened");
     this.model = value;
     this.poses.restart(value.lastSequence);
     this.setControl({ role: value.role, vacant: false, reservedSeconds: 0 });
     this.emit("opened", value);
     this.tellShown(value.pose);
-    for (const stream of this.streams.values()) await this.subscribe(stream);
+    for (const stream of streams) await this.subscribe(stream);
     return value;
   }
 
@@ -206,6 +209,30 @@ export class Client extends Emitter<ClientEvents> {
     return readProbe(answer.value, answer.payload);
   }
 
+  /** A picture of the present pose as an X-ray source and a detector would make it. One at a time. */
+  async radiograph(options: RadiographOptions = {}): Promise<Radiograph> {
+    const { value, payload } = await this.ask(encodeRadiograph(options), "radiograph");
+    return readRadiograph(value, options.content ?? 0, payload);
+  }
+
+  /** A number for every vertex of tissues in the present pose. One at a time. */
+  async field(options: FieldOptions): Promise<Field> {
+    const { value, payload } = await this.ask(encodeField(options), "field");
+    return readField(value, payload);
+  }
+
+  /** The balls that pose a volume by spheres, as they hang in this session. */
+  async spheres(volume: string): Promise<Spheres> {
+    const { value, payload } = await this.ask({ case: "getSpheres", value: { $typeName: "ecorche.v1.GetSpheres", volume } }, "spheres");
+    return readSpheres(value, payload as Uint8Array<ArrayBuffer>, this.model?.skeleton?.segments.length ?? 0);
+  }
+
+  /** Hangs them otherwise, or about other joints, in this session; null: as the model has it. */
+  async hangSpheres(volume: string, segment: Int32Array | null, joints: Float64Array | null): Promise<void> {
+    const { message, payload } = encodeHang(volume, segment, joints);
+    await this.ask(message, "status", payload);
+  }
+
   /** Any other request of the protocol. `stream`: of a Subscribe whose frames are for it. */
   ask<C extends Case>(message: Message, expected: C, payload?: Uint8Array, stream?: number): Promise<Answer<C>> {
     if (this.state.state !== "open" && message.case !== "clientHello" && !this.restoring) {
@@ -224,9 +251,13 @@ export class Client extends Emitter<ClientEvents> {
   }
 
   private async subscribe(stream: MeshStream): Promise<void> {
-    const { tissues = [], level = 0, adaptive = false, encoding = Encoding.U16_DELTA, normals = false, quality = false, maxRate = 0 } = stream.options;
+    const { tissues = [], level = 0, adaptive = false, encoding = Encoding.U16_DELTA, normals = false, quality = false, maxRate = 0, motions = false } = stream.options;
     const value = create(SubscribeSchema, {
-      what: { case: "mesh", value: { tissues, level, adaptive, encoding, normals, quality, pose: true } }, maxRate,
+      what: {
+        case: "mesh",
+        value: motions ? { tissues, level, quality, motions, pose: true, encoding: Encoding.F32 } : { tissues, level, adaptive, encoding, normals, quality, pose: true },
+      },
+      maxRate,
     });
     const answer = await this.ask({ case: "subscribe", value }, "subscribed", undefined, stream.handle);
     stream.subscription = answer.value.subscription;
@@ -257,7 +288,7 @@ export class Client extends Emitter<ClientEvents> {
     switch (message.kind) {
       case "message": return this.handle(fromBinary(EnvelopeSchema, message.envelope), message.payload);
       case "frame": return this.show(message);
-      case "layouts": return this.streams.get(message.stream)?.arrange(message.layouts);
+      case "layouts": return this.streams.get(message.stream)?.arrange(message.layouts, message.skinning);
       case "statistics": return this.emit("statistics", message.statistics);
       case "closed": return this.lost(this.ending ?? new ConnectionError(message.reason || `the connection ended (${message.code})`));
       case "refused": return this.lost(new ConnectionError(message.message));

@@ -62,6 +62,10 @@ const TYPES = {
 } as const;
 type Types = typeof TYPES;
 export type KnownScalar = keyof Types;
+/** An array of any of them. */
+export type Numbers =
+  | Uint8Array<ArrayBuffer> | Int8Array<ArrayBuffer> | Uint16Array<ArrayBuffer> | Int16Array<ArrayBuffer>
+  | Uint32Array<ArrayBuffer> | Int32Array<ArrayBuffer> | Float32Array<ArrayBuffer> | Float64Array<ArrayBuffer>;
 
 /** The numbers that `description` names: a view of the payload, which they must lie within and be of this type and width. */
 export function arrayOf<T extends KnownScalar>(

@@ -9,6 +9,7 @@ import { Encoding, ScalarType } from "./gen/ecorche/v1/common_pb.js";
 import { EnvelopeSchema } from "./gen/ecorche/v1/envelope_pb.js";
 import { MeshArray_Kind, type MeshArray, type MeshFrame } from "./gen/ecorche/v1/stream_pb.js";
 import type { MeshLayout, TissueRange } from "./layout.js";
+import type { Skinning } from "./skinning/skinning.js";
 import { makeControl, Pool, SharedWriter, SLOTS } from "./publisher.js";
 
 export interface FeedOptions {
@@ -19,9 +20,13 @@ export interface FeedOptions {
   makeKernel: MakeKernel;
   /** Frames go through memory that threads share. */
   shared: boolean;
+  /** Frames bring motions alone. */
+  skinning?: Skinning | undefined;
 }
 
-type Waiting = Omit<FrameNote, "buffer" | "word">;
+const MOTION_NUMBERS = 7, UNIT = 1e-6;
+
+type Waiting = Omit<FrameNote, "buffer" | "word" | "motions">;
 
 /** What is kept for one level from frame to frame. */
 interface Level {
@@ -43,11 +48,18 @@ export class MeshFeed {
     const layout = this.options.layouts.find(({ level }) => level === frame.level);
     if (!layout) throw new ProtocolError(`a frame of level ${frame.level}, which was not subscribed to`);
     if (frame.topologyDigest !== this.options.topology) throw new ProtocolError("a frame of another topology");
-    const [level, quantisation] = this.decode(frame, payload, layout), decodeMs = performance.now() - start;
-    this.publish(level, {
+    const note = (quantisation: Quantisation, decodeMs: number): Waiting => ({
       kind: "frame", stream: this.options.stream, level: frame.level, bytes: payload.buffer.byteLength, decodeMs, ...quantisation,
       envelope: toBinary(EnvelopeSchema, create(EnvelopeSchema, { message: { case: "meshFrame", value: { ...frame, arrays: [] } } })),
     });
+    const { skinning } = this.options;
+    if (skinning) {
+      const segments = motionsOf(frame, payload, skinning.segments), box = boxOf(frame), decodeMs = performance.now() - start;
+      this.post({ ...note(box, decodeMs), motions: { segments, method: frame.skinning, box } }, [segments.buffer]);
+      return decodeMs;
+    }
+    const [level, quantisation] = this.decode(frame, payload, layout), decodeMs = performance.now() - start;
+    this.publish(level, note(quantisation, decodeMs));
     return decodeMs;
   }
 
@@ -136,6 +148,18 @@ function rowsOf<T extends ScalarType.F32 | ScalarType.U16>(array: MeshArray, pay
   const rows = arrayOf(array.array, payload, type, 3);
   if (rows.length !== 3 * range.vertexCount) throw new ProtocolError(`${rows.length / 3} positions for ${range.vertexCount} vertices`);
   return rows;
+}
+
+function motionsOf(frame: MeshFrame, payload: Uint8Array<ArrayBuffer>, segments: number): Float64Array<ArrayBuffer> {
+  const found = frame.arrays.filter(({ kind }) => kind === MeshArray_Kind.MOTIONS);
+  if (found.length !== 1 || frame.arrays.length !== 1) throw new ProtocolError("a frame without the motions that were asked for");
+  const rows = arrayOf(found[0].array, payload, ScalarType.F64, MOTION_NUMBERS);
+  if (rows.length !== MOTION_NUMBERS * segments) throw new ProtocolError(`motions of ${rows.length / MOTION_NUMBERS} segments, not of ${segments}`);
+  for (let at = 0; at < rows.length; at += MOTION_NUMBERS) {
+    const length = Math.hypot(rows[at], rows[at + 1], rows[at + 2], rows[at + 3]);
+    if (!(Math.abs(length - 1) < UNIT) || ![4, 5, 6].every((i) => Number.isFinite(rows[at + i]))) throw new ProtocolError("a motion that is none");
+  }
+  return rows.slice();
 }
 
 function boxOf(frame: MeshFrame): Quantisation {

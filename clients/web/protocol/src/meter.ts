@@ -2,6 +2,9 @@
 // What arrives, counted by the second, and how long a ping takes there and back.
 import type { Statistics } from "./channel.js";
 
+/** Of second(). */
+const PERIOD_MS = 1000;
+
 export class Meter {
   private frames = 0;
   private bytes = 0;
@@ -41,9 +44,11 @@ export class Meter {
   /** Of the time since it was last called. */
   second(): Statistics {
     const now = performance.now(), seconds = Math.max((now - this.since) / 1000, 1e-3);
-    const { frames, bytes, decodeMs, latencyMs } = this;
+    const { frames, bytes, decodeMs } = this;
+    // A ping that waits behind frames tells of them before it is answered.
+    const latencyMs = this.askedAt === undefined ? this.latencyMs : Math.max(now - this.askedAt, this.latencyMs || 0);
     this.frames = this.bytes = this.decodeMs = 0;
     this.since = now;
-    return { framesPerSecond: frames / seconds, bytesPerSecond: bytes / seconds, latencyMs, decodeMs: frames > 0 ? decodeMs / frames : 0 };
+    return { framesPerSecond: frames / seconds, bytesPerSecond: bytes / seconds, latencyMs, decodeMs: frames > 0 ? decodeMs / frames : 0, lagMs: Math.max(0, 1000 * seconds - PERIOD_MS) };
   }
 }

@@ -31,7 +31,7 @@ const PER_LEVEL = 4, ROOM = 0.6;
 const SLOW_SECONDS = 2, PATIENCE = 2, MOST_PATIENCE = 16;
 /** Shares of the time that frames take, above and below which their rate is held back and let go. */
 const BUSY = 0.9, AIM = 0.8, IDLE = 0.4;
-const LEAST_RATE = 5;
+const LEAST_RATE = 5, STEP = 0.25;
 /** Deltas take a third of the bytes and, without SIMD, ten times the time. */
 const DELTA_SHARE = 1 / 3, SLOW_DECODE_MS = 10, NEAR_MS = 5, FAR_MS = 20, LINE_BYTES_PER_SECOND = 200e6;
 
@@ -84,7 +84,9 @@ export class Policy {
 
   private chooseRate(cost: number, framesPerSecond: number): void {
     const busy = (framesPerSecond * cost) / 1000;
-    if (busy > BUSY) this.maxRate = Math.max(LEAST_RATE, Math.floor((1000 * AIM) / cost));
+    const rate = Math.max(LEAST_RATE, Math.floor((1000 * AIM) / cost));
+    // Every other rate is another subscription: small steps are not worth it.
+    if (busy > BUSY && Math.abs(rate - this.maxRate) > STEP * this.maxRate) this.maxRate = rate;
     else if (busy < IDLE) this.maxRate = 0;
   }
 }

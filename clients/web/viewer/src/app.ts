@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer, wired: state, scene, panels and the line to the server. Other parts (posing) hook in through what is public here.
 import * as THREE from "three";
+import { Arrival } from "./arrival.js";
 import { Keys } from "./keys.js";
 import { Live } from "./live.js";
 import { PanelHost } from "./panels/host.js";
@@ -39,7 +40,7 @@ export class App {
   /** The client of the protocol, and what it opened. */
   readonly live: Live;
   /** Of the pointer, for the name beside it: `inside` the picture, not over a panel. */
-  readonly pointer = new Store<{ x: number; y: number; fromRest: number; inside: boolean }>({ x: 0, y: 0, fromRest: 0, inside: false });
+  readonly pointer = new Store<{ x: number; y: number; scalar: number; inside: boolean }>({ x: 0, y: 0, scalar: 0, inside: false });
   /** What say() said last. */
   readonly said = new Store<{ text: string; count: number }>({ text: "", count: 0 });
   /** More parts of the help; each is asked when it opens. */
@@ -64,7 +65,7 @@ export class App {
     });
     this.panels = new PanelHost(places.root, (insets) => this.stage.setInsets(insets));
     this.#says = places.root.querySelector<HTMLElement>("#says")!;
-    this.live = new Live(this.store, this.history, this.body);
+    this.live = new Live(this.store, this.history, this.body, new Arrival(this.stage, (text) => this.say(text)));
     this.live.onBody((first) => this.#bodyCame(first));
     this.#draw();
   }
@@ -127,7 +128,7 @@ export class App {
       if (!this.#hoverAt) return;
       const { x, y } = this.#hoverAt;
       const picked = this.#hoverAt.pick();
-      this.pointer.set({ x, y, fromRest: picked?.fromRest ?? 0, inside: true });
+      this.pointer.set({ x, y, scalar: picked?.scalar ?? 0, inside: true });
       this.store.set({ hovered: picked?.row ?? null });
     });
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The line to the server: connects, opens the model that the address names, and puts what comes into the state and the scene.
-import { Client, Code, ConnectionError, Role, ServerError, type BodyFrame, type MeshLayout, type MeshOptions, type MeshStream, type ModelOpened } from "../../protocol/src/index.js";
+import { Client, Code, ConnectionError, Role, ServerError, type BodyFrame, type MeshLayout, type MeshStream, type ModelOpened } from "../../protocol/src/index.js";
+import { Arrival } from "./arrival.js";
 import { hashParameters, takeToken } from "./hash.js";
 import { restNumbers } from "./rest.js";
 import type { Body, Positions } from "./scene/body.js";
@@ -12,7 +13,6 @@ import type { Store } from "./state/store.js";
 import { wordsOf } from "./errors.js";
 
 const RETRY_MS = 2000;
-const LEVELS_AFTER_MS = 1500;
 /** Whoever opens the server's address comes into the same session, and sees the same body. */
 const SHARED_SESSION = "shared";
 
@@ -32,12 +32,11 @@ export class Live {
   #layout: MeshLayout | null = null;
   #token: string | undefined;
   #topology = 0n;
-  #mesh: MeshOptions = { normals: true };
-  #level: number | null = null;
   #whole: Promise<WholeBody> | null = null;
-  #changing: Promise<void> = Promise.resolve();
 
-  constructor(private readonly store: Store<AppState>, private readonly history: History, private readonly body: Body) {}
+  constructor(
+    private readonly store: Store<AppState>, private readonly history: History, private readonly body: Body, readonly arrival: Arrival,
+  ) {}
 
   /** A model is open: at first, after the server forgot this client, and after the model was read again. At once, too, where one is. */
   onOpened(listener: (opened: Opened) => void): () => void {
@@ -107,22 +106,6 @@ export class Live {
     }
   }
 
-  /** One level of detail and no other, 0 being all; null: as the line bears it. */
-  async setLevel(level: number | null): Promise<void> {
-    if (level === this.#level) return;
-    this.#level = level;
-    await this.#subscribe();
-  }
-
-  /** One change after the other: each ends the subscription before it. */
-  #subscribe(): Promise<void> {
-    this.#changing = this.#changing.catch(() => {}).then(async () => {
-      const options = this.#level === null ? this.#mesh : { ...this.#mesh, adaptive: false, level: this.#level };
-      if (this.client && this.stream) await this.client.changeMesh(this.stream, options);
-    });
-    return this.#changing;
-  }
-
   async #connect(): Promise<void> {
     const client = await Client.connect(address(), {
       token: this.#token, name: "ecorche viewer", person: localStorage.getItem("ecorche.name") ?? "",
@@ -132,7 +115,7 @@ export class Live {
     });
     this.client = client;
     client.on("statistics", ({ framesPerSecond, bytesPerSecond, latencyMs }) => {
-      this.store.set({ stats: { framesPerSecond, bytesPerSecond, latencyMs, level: this.frame?.level ?? 0 } });
+      this.store.set({ stats: { framesPerSecond, bytesPerSecond, latencyMs, level: this.frame?.level ?? 0, way: this.frame?.skinned ? "skinning" : "frames" } });
     });
     client.on("control", ({ role }) => this.#patchModel({ controls: role === Role.CONTROLLER }));
     client.on("opened", (model) => this.#opened(client, model));
@@ -140,20 +123,14 @@ export class Live {
       this.store.set({ link: { state: "closed", reason: reasonOf(error), mends: false } });
     }));
     const asked = hashParameters();
-    const models = await client.listModels();
-    if (models.length === 0) throw new Error("the server holds no model (give `ecorche serve` one)");
     performance.mark("ecorche connected");
-    await client.open(asked.get("model") ?? models[0]!.name, asked.get("session") ?? SHARED_SESSION);
-    performance.mark("ecorche opened");
-    const stream = await client.subscribeMesh(this.#mesh);
+    // In one go: the server answers in order, and nobody waits for the way there and back between them. No name: its first model.
+    const opened = client.open(asked.get("model") ?? "", asked.get("session") ?? SHARED_SESSION).then(() => performance.mark("ecorche opened"));
+    const [stream] = await Promise.all([client.subscribeMesh(Arrival.first), opened]);
     this.stream = stream;
     stream.on("frame", (frame) => this.#show(frame));
     if (stream.latest) this.#show(stream.latest);
-    // Coarser levels are for later, and many bytes: the first picture does not wait for them.
-    setTimeout(() => {
-      this.#mesh = { ...this.#mesh, adaptive: true };
-      if (this.#level === null) void this.#subscribe().catch(() => {});
-    }, LEVELS_AFTER_MS);
+    this.arrival.follow(client, stream);
   }
 
   #opened(client: Client, opened: ModelOpened): void {
@@ -163,6 +140,7 @@ export class Live {
         row, name: tissue.name, label: labelOf(tissue.name), group: tissue.group, segment: tissue.segment, vertices: Number(tissue.vertices),
       })),
       joints: opened.skeleton?.segments.map((segment) => segment.joint?.name || segment.name) ?? [],
+      segments: opened.skeleton?.segments.map(({ name }) => name) ?? [],
     };
     if (opened.topologyDigest === this.#topology) {
       this.store.set({ model });
@@ -173,7 +151,7 @@ export class Live {
       this.frame = null;
       this.history.clear();
       const layers = model.tissues.map(() => ({ visible: true, opacity: 1 }));
-      this.store.set({ model, layers, isolated: null, selected: null, hovered: null, scalar: "none", quality: null });
+      this.store.set({ model, layers, isolated: null, selected: null, hovered: null, scalar: "none", weightOf: 0, quality: null });
     }
     for (const listener of [...this.#listeners.opened]) listener({ client, model: opened });
   }
@@ -191,7 +169,7 @@ export class Live {
         ranges: ranges.map(({ tissue, firstVertex, vertexCount: count, firstIndex, indexCount }) => ({ row: tissue, firstVertex, vertexCount: count, firstIndex, indexCount })),
       });
     }
-    this.body.setPositions({ numbers: frame.vertices, low: frame.offset, step: frame.scale });
+    this.body.setPositions(this.arrival.positionsOf(frame));
     if (changed) for (const listener of [...this.#listeners.topology]) listener();
     const quality = frame.quality ? qualityOf(frame.quality, this.store.state.model) : this.store.state.quality;
     if (quality !== this.store.state.quality || frame.poseSequence !== this.store.state.poseSequence) {

@@ -4,7 +4,10 @@ import { App } from "./app.js";
 import { showCover } from "./panels/cover.js";
 import { addPanels } from "./panels/index.js";
 import { addPosing } from "./posing/index.js";
+import { addRadiograph } from "./radiograph/index.js";
 import { addSlices } from "./slices/index.js";
+import { addBalls } from "./spheres/index.js";
+import { addVolume } from "./volume/index.js";
 import { addHeadset } from "./xr/index.js";
 import { wordsOf } from "./errors.js";
 
@@ -18,6 +21,9 @@ try {
   const posing = addPosing(app);
   // After posing, whose tab is open at first.
   addSlices(app);
+  addRadiograph(app, posing);
+  addVolume(app);
+  addBalls(app, posing);
   const headset = addHeadset(app, posing);
   // For the browser's console, and for tests.
   Object.assign(window, { ecorche: Object.assign(app, { posing, headset }) });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scanned body in the order of another layout's vertices.
+// What whole tissues have, the scanned body or numbers of vertices, in the order of another layout's vertices.
 import { STRIDE, type BodyFrame, type MeshLayout } from "../../protocol/src/index.js";
 
 /** `whole` holds every tissue with all of its vertices; of those come the ones that `layout` has. */
@@ -14,4 +14,15 @@ export function restNumbers(whole: Pick<BodyFrame, "vertices" | "layout">, layou
     }
   }
   return numbers;
+}
+
+/** A number for each vertex of `layout`, of those of whole tissues. */
+export function valuesOf(whole: ReadonlyMap<number, Float32Array>, layout: MeshLayout): Float32Array {
+  const values = new Float32Array(layout.vertexCount);
+  for (const { tissue, firstVertex, vertexCount, rows } of layout.ranges) {
+    const from = whole.get(tissue);
+    if (!from) throw new Error(`tissue ${tissue} is missing among the numbers of the vertices`);
+    for (let vertex = 0; vertex < vertexCount; vertex++) values[firstVertex + vertex] = from[rows ? rows[vertex]! : vertex]!;
+  }
+  return values;
 }

@@ -26,8 +26,18 @@ enum class View : std::uint8_t {
 std::string_view view_name(View view);
 View view_from_name(std::string_view name);
 
-/// Unit vector from source to detector, LPS of the body as scanned.
-Eigen::Vector3d beam(View view);
+/// A view, and how far the source goes round the body from there: radians about its long axis, from the front
+/// to the left.
+struct Beam {
+  View view;
+  double turn;
+
+  Beam(View from = View::ap, double turned_by = 0) : view(from), turn(turned_by) {}
+  /// Unit vector from source to detector, LPS of the body as scanned.
+  Eigen::Vector3d way() const;
+  /// Unit vector along the rows of the picture, likewise.
+  Eigen::Vector3d right() const;
+};
 
 /// What the central ray meets, and how far the part of the body that is pictured reaches along the beam.
 struct RadiographTarget {
@@ -37,19 +47,19 @@ struct RadiographTarget {
 };
 
 /// The middle of the box around the posed body, of its nodes.
-RadiographTarget target_body(const Model& model, const PosedBody& body, View view);
+RadiographTarget target_body(const Model& model, const PosedBody& body, const Beam& beam);
 /// The middle of the box around the nodes that follow that segment most.
-RadiographTarget target_segment(const Model& model, const PosedBody& body, View view, int segment);
+RadiographTarget target_segment(const Model& model, const PosedBody& body, const Beam& beam, int segment);
 /// Where that segment's joint has gone, with the segments on both its sides about it.
-RadiographTarget target_joint(const Model& model, const PosedBody& body, View view, int segment);
+RadiographTarget target_joint(const Model& model, const PosedBody& body, const Beam& beam, int segment);
 /// A point, with the whole body about it.
-RadiographTarget target_point(const Model& model, const PosedBody& body, View view,
+RadiographTarget target_point(const Model& model, const PosedBody& body, const Beam& beam,
                               const Eigen::Vector3d& point);
 
 /// Source, target and the detector's centre on one line, the detector `sid_mm` from the source and `oid_mm`
 /// behind the target; its size and pixels are those of `detector`. Throws Error{usage} where the source does
 /// not stand before the target.
-XRaySetup positioned(View view, const RadiographTarget& target, double sid_mm, double oid_mm,
+XRaySetup positioned(const Beam& beam, const RadiographTarget& target, double sid_mm, double oid_mm,
                      const Detector& detector);
 
 }  // namespace ecorche::runtime

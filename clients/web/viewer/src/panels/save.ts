@@ -15,7 +15,21 @@ export function saveMenu(app: App): HTMLElement {
     entry("Tissues shown, with colours", "GLB", () => saveMeshes(app, "glb")),
     entry("Tissues shown, to print", "STL", () => saveMeshes(app, "stl")),
   );
+  let volumes: HTMLElement[] = [];
+  app.live.onOpened(({ model }) => {
+    for (const button of volumes) button.remove();
+    volumes = model.volumes.map(({ name }) => entry(`Posed volume ${name}`, "NIfTI", () => saveVolume(app, name)));
+    menu.append(...volumes);
+  });
   return menu;
+}
+
+async function saveVolume(app: App, name: string): Promise<void> {
+  try {
+    await (await import("../volume/save_volume.js")).saveVolume(app, name);
+  } catch (error) {
+    app.say(`${name} was not saved: ${wordsOf(error)}`);
+  }
 }
 
 async function saveMeshes(app: App, ending: "glb" | "stl"): Promise<void> {

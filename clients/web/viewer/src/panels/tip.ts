@@ -2,18 +2,19 @@
 // The name of the tissue under the pointer, beside it.
 import type { App } from "../app.js";
 import { h } from "./dom.js";
+import { SCALARS } from "./scalars.js";
 
 const OFFSET = 16;
 
 export function addTip(app: App): void {
   const tip = app.places.root.querySelector<HTMLElement>("#tip")!;
   const update = () => {
-    const { hovered, model, scalar } = app.store.state;
-    const { x, y, fromRest, inside } = app.pointer.state;
+    const { hovered, model } = app.store.state, shown = app.store.state.scalar;
+    const { x, y, scalar, inside } = app.pointer.state;
     const tissue = hovered === null || !inside ? undefined : model?.tissues[hovered];
     tip.hidden = !tissue;
     if (!tissue) return;
-    tip.replaceChildren(tissue.label, scalar === "distance" ? h("small", {}, `${fromRest.toFixed(1)} mm from rest`) : h("small", {}, tissue.group));
+    tip.replaceChildren(tissue.label, h("small", {}, shown === "none" ? tissue.group : SCALARS[shown].say(scalar)));
     const { clientWidth, clientHeight } = app.places.root;
     const left = x + OFFSET + tip.offsetWidth > clientWidth ? x - OFFSET - tip.offsetWidth : x + OFFSET;
     const top = y + OFFSET + tip.offsetHeight > clientHeight ? y - OFFSET - tip.offsetHeight : y + OFFSET;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Above the picture: which body it is, how far the pose is to be believed, and how the line is.
 import type { App } from "../app.js";
-import type { LinkState, Quality } from "../state/app_state.js";
+import { wordsOf } from "../errors.js";
+import type { LinkState, Quality, Way } from "../state/app_state.js";
 import { h, icon, setText } from "./dom.js";
 import { popover } from "./popover.js";
 
@@ -74,25 +75,51 @@ const STATES: Record<LinkState, string> = { connecting: "Connecting", open: "Liv
 
 function readout(app: App): HTMLElement {
   const sign = h("span", { class: "sign" }), word = h("span", {});
-  const numbers = { fps: h("dd", {}), latency: h("dd", {}), rate: h("dd", {}), level: h("dd", {}) };
+  const numbers = { fps: h("dd", {}), latency: h("dd", {}), rate: h("dd", {}) };
   const cell = (name: string, value: HTMLElement, label: string) => h("div", { title: label, class: name }, h("dt", {}, unit[name]!), value);
-  const unit: Record<string, string> = { fps: "fps", latency: "ms", rate: "", level: "" };
+  const unit: Record<string, string> = { fps: "fps", latency: "ms", rate: "" };
   const box = h("div", { class: "readout float", role: "group", aria: { label: "Connection" } },
     h("span", { class: "state" }, sign, word),
     h("dl", {}, cell("fps", numbers.fps, "Frames a second that arrive"), cell("latency", numbers.latency, "There and back to the server, milliseconds"),
-      cell("rate", numbers.rate, "What arrives, a second"), cell("level", numbers.level, "Level of detail")));
+      cell("rate", numbers.rate, "What arrives, a second")), arrival(app));
   app.store.watch((state) => state.link, ({ state }) => {
     box.dataset["state"] = state;
     sign.replaceChildren(icon(state === "open" ? "live" : "broken"));
     setText(word, STATES[state]);
   }, true);
-  app.store.watch((state) => state.stats, ({ framesPerSecond, bytesPerSecond, latencyMs, level }) => {
+  app.store.watch((state) => state.stats, ({ framesPerSecond, bytesPerSecond, latencyMs }) => {
     setText(numbers.fps, framesPerSecond.toFixed(0));
     setText(numbers.latency, Number.isFinite(latencyMs) ? latencyMs.toFixed(latencyMs < 10 ? 1 : 0) : "…");
     setText(numbers.rate, bytesText(bytesPerSecond));
-    setText(numbers.level, level === 0 ? "full detail" : `1/${4 ** level} detail`);
   }, true);
   return box;
+}
+
+const WAYS: readonly { way: Way | null; name: string; text: string }[] = [
+  { way: null, name: "Chosen by itself", text: "from what arrives: in full at rest, coarser or skinned here where the line is slow" },
+  { way: "frames", name: "Frames", text: "the server's own vertices, pose by pose" },
+  { way: "skinning", name: "Skinned here", text: "the bones' motions alone, some 2 kB a pose; this device moves the vertices" },
+];
+
+/** How the body comes, and a menu to hold one way. */
+function arrival(app: App): HTMLElement {
+  const word = h("span", {}), how = h("p", { class: "how" });
+  const button = h("button", { type: "button", class: "arrival", title: "How the body comes" }, word);
+  const choices = WAYS.map(({ way, name, text }) => {
+    const input = h("input", { type: "radio", name: "way", value: way ?? "auto", checked: app.live.arrival.way === way });
+    input.addEventListener("change", () => app.live.arrival.setWay(way).catch((error: unknown) => app.say(`That way is not to be had: ${wordsOf(error)}`)));
+    return h("label", {}, input, h("span", {}, h("b", {}, name), h("span", { class: "text" }, text)));
+  });
+  const menu = h("div", { class: "ways" }, h("fieldset", {}, h("legend", {}, "How the body comes"), ...choices), how);
+  popover(button, menu, "How the body comes");
+  app.store.watch((state) => state.stats, ({ level, way }) => {
+    const detail = level === 0 ? "full detail" : `1/${4 ** level} detail`;
+    setText(word, way === "skinning" ? `${detail}, skinned here` : detail);
+    const { skinning } = app.live.stream ?? {};
+    setText(how, way === "skinning" && skinning
+      ? `Within ${skinning.largestError.toFixed(2)} mm of the server's vertices in ${skinning.measured.length} poses that it measured.` : "");
+  }, true);
+  return h("div", { class: "arrival-place" }, button, menu);
 }
 
 export function bytesText(bytesPerSecond: number): string {

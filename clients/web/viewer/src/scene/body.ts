@@ -3,7 +3,7 @@
 // range of triangles per tissue. Nothing is converted on the way to the GPU; low and step of a frame are the group's matrix.
 import * as THREE from "three";
 import type { Look } from "./palette.js";
-import { depthMaterial, outlineMaterial, PickMaterial, sharedUniforms, TissueMaterial } from "./tissue_material.js";
+import { depthMaterial, outlineMaterial, PickMaterial, sharedUniforms, TissueMaterial, type SurfaceScalar } from "./tissue_material.js";
 
 export interface TissueRange {
   /** Row of ModelOpened.tissues. */
@@ -23,7 +23,10 @@ export interface Topology {
 
 /** p = low + step * number, mm, LPS. Four numbers a vertex: x, y, z and the normal. */
 export interface Positions {
+  /** Of positions that lie on the GPU read back when they are asked for. */
   readonly numbers: Uint16Array;
+  /** Where they lie on the GPU already. */
+  readonly gpu?: WebGLBuffer;
   readonly low: readonly [number, number, number];
   readonly step: number;
 }
@@ -52,9 +55,11 @@ export class Body {
   #topology: Topology | null = null;
   #positions: Positions | null = null;
   #buffer: THREE.InterleavedBuffer | null = null;
+  #gpu: WebGLBuffer | null = null;
   #rest: Positions | null = null;
   #outline: THREE.Mesh;
-  #scalar = false;
+  #scalar: SurfaceScalar = "none";
+  #values: Float32Array | null = null;
   #clipping: THREE.Plane[] = [];
 
   constructor(private readonly looks: (row: number) => Look) {
@@ -92,18 +97,22 @@ export class Body {
       group.matrix.makeScale(step, step, step).setPosition(low[0], low[1], low[2]);
       group.matrixWorldNeedsUpdate = true;
     }
-    if (!this.#buffer) {
-      this.#build(positions.numbers);
-      return;
+    if (this.#parts.size === 0) {
+      this.#build(positions);
+    } else if ((positions.gpu ?? null) !== this.#gpu) {
+      // It comes another way now.
+      const vertex = this.#source(positions);
+      for (const { geometry } of this.#parts.values()) geometry.setAttribute("vertex", vertex);
+    } else if (this.#buffer) {
+      this.#buffer.array = positions.numbers;
+      this.#buffer.needsUpdate = true;
     }
-    this.#buffer.array = positions.numbers;
-    this.#buffer.needsUpdate = true;
   }
 
   /** The scanned body, of the same topology, for the distance from it. */
   setRest(rest: Positions | null): void {
     this.#rest = rest;
-    if (!rest) return this.setScalar(false);
+    if (!rest) return this.setScalar("none");
     this.shared.restBox.value.set(rest.low[0], rest.low[1], rest.low[2], rest.step);
     const buffer = new THREE.InterleavedBuffer(rest.numbers, STRIDE);
     for (const { geometry } of this.#parts.values()) {
@@ -111,13 +120,30 @@ export class Body {
     }
   }
 
-  /** Colours the surface by its distance from rest. */
-  setScalar(on: boolean): void {
-    this.#scalar = on && this.#rest !== null;
+  /** A number for each vertex of the topology, to colour the surface by; null: none. */
+  setValues(values: Float32Array | null): void {
+    this.#values = values;
+    if (!values) return this.#scalar === "values" ? this.setScalar("none") : undefined;
+    const attribute = new THREE.BufferAttribute(values, 1);
+    for (const { geometry } of this.#parts.values()) geometry.setAttribute("value", attribute);
+  }
+
+  get values(): Float32Array | null {
+    return this.#values;
+  }
+
+  /** Colours the surface by what there is of it. */
+  setScalar(kind: SurfaceScalar): void {
+    const there = { none: true, distance: this.#rest !== null, values: this.#values !== null }[kind];
+    this.#scalar = there ? kind : "none";
     for (const { mesh, pick } of this.#parts.values()) {
       mesh.material.setScalar(this.#scalar);
       pick.material.setScalar(this.#scalar);
     }
+  }
+
+  get scalar(): SurfaceScalar {
+    return this.#scalar;
   }
 
   setOpacity(row: number, opacity: number): void {
@@ -155,6 +181,10 @@ export class Body {
     for (const part of this.#parts.values()) this.#clip(part);
   }
 
+  get clipping(): THREE.Plane[] {
+    return this.#clipping;
+  }
+
   /** Triangles of a tissue, in numbers of the present frame. */
   geometry(row: number): THREE.BufferGeometry | undefined {
     return this.#parts.get(row)?.geometry;
@@ -190,11 +220,10 @@ export class Body {
     return box;
   }
 
-  #build(numbers: Uint16Array): void {
+  #build(positions: Positions): void {
     const topology = this.#topology;
     if (!topology) return;
-    this.#buffer = new THREE.InterleavedBuffer(numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
-    const vertex = integers(this.#buffer);
+    const vertex = this.#source(positions);
     const index = new THREE.BufferAttribute(topology.indices, 1);
     const depth = depthMaterial();
     for (const range of topology.ranges) {
@@ -216,6 +245,13 @@ export class Body {
     }
   }
 
+  #source(positions: Positions): THREE.InterleavedBufferAttribute | THREE.BufferAttribute {
+    const { gpu } = positions;
+    this.#gpu = gpu ?? null;
+    this.#buffer = gpu ? null : new THREE.InterleavedBuffer(positions.numbers, STRIDE).setUsage(THREE.StreamDrawUsage);
+    return gpu ? resident(gpu, this.#topology!.vertices) : integers(this.#buffer!);
+  }
+
   #clear(): void {
     for (const { geometry, mesh, prepass, pick } of this.#parts.values()) {
       geometry.dispose();
@@ -226,10 +262,18 @@ export class Body {
     }
     this.#parts.clear();
     this.#outline.visible = false;
-    this.#buffer = null;
+    this.#buffer = this.#gpu = null;
     this.#positions = null;
     this.#rest = null;
+    this.#values = null;
   }
+}
+
+/** The same of numbers that are on the GPU. */
+function resident(buffer: WebGLBuffer, count: number): THREE.BufferAttribute {
+  const attribute = new THREE.GLBufferAttribute(buffer, WebGL2RenderingContext.UNSIGNED_SHORT, STRIDE, 2, count);
+  // three.js draws from it as from any other, though its types do not say so.
+  return Object.assign(attribute, { gpuType: THREE.IntType }) as unknown as THREE.BufferAttribute;
 }
 
 /** An attribute that the shader reads as `uvec4`. */

@@ -4,7 +4,8 @@
 // Why integers: graphics cards read them as they are. Three u16 that become floats are no format of theirs, and the driver would
 // convert the whole buffer after every frame, once for each tissue.
 
-const VERTEX = /* glsl */ `
+/** bodyPosition(): numbers of the present frame. */
+export const VERTEX = /* glsl */ `
 attribute uvec4 vertex;
 vec3 bodyPosition() { return vec3(vertex.xyz); }
 `;
@@ -22,19 +23,24 @@ vec3 bodyNormal() {
 }
 `;
 
-/** How far a vertex is from where it was scanned, mm. */
-const FROM_REST = /* glsl */ `
+/** What a vertex is coloured by: a number of its own, or how far it is from where it was scanned, mm. */
+const SCALAR = /* glsl */ `
+#ifdef SCALAR_VALUES
+attribute float value;
+float scalar() { return value; }
+#else
 attribute uvec4 rest;
 uniform vec4 restBox;   // low, step
 uniform vec4 poseBox;
-float fromRest() { return length((bodyPosition() * poseBox.w + poseBox.xyz) - (vec3(rest.xyz) * restBox.w + restBox.xyz)); }
+float scalar() { return length((bodyPosition() * poseBox.w + poseBox.xyz) - (vec3(rest.xyz) * restBox.w + restBox.xyz)); }
+#endif
 `;
 
 export const TISSUE_VERTEX = /* glsl */ `
 #include <common>
 ${VERTEX}${NORMAL}
 #ifdef SCALAR
-${FROM_REST}
+${SCALAR}
 varying float vScalar;
 #endif
 centroid varying vec3 vNormal;
@@ -46,7 +52,7 @@ void main() {
   vNormal = normalMatrix * bodyNormal();
   vView = mvPosition.xyz;
   #ifdef SCALAR
-  vScalar = fromRest();
+  vScalar = scalar();
   #endif
   gl_Position = projectionMatrix * mvPosition;
   #include <clipping_planes_vertex>
@@ -69,7 +75,14 @@ centroid varying vec3 vNormal;
 centroid varying vec3 vView;
 #ifdef SCALAR
 uniform vec2 scalarRange;
+uniform bool scalarDiverges;
 varying float vScalar;
+// Blue below the middle, red above it, white between; what is below all is inside out.
+vec3 divergingColor(float t) {
+  if (t < 0.0) return vec3(0.55, 0.0, 0.55);
+  t = clamp(t, 0.0, 1.0) * 2.0;
+  return t < 1.0 ? mix(vec3(0.01, 0.06, 0.35), vec3(0.85), t) : mix(vec3(0.85), vec3(0.42, 0.01, 0.02), t - 1.0);
+}
 // Five stops of viridis, dark to light, so that the order survives without colour.
 vec3 scalarColor(float t) {
   vec3 a = vec3(0.058, 0.0003, 0.088), b = vec3(0.046, 0.081, 0.259), c = vec3(0.014, 0.279, 0.263);
@@ -103,7 +116,8 @@ void main() {
 
   vec3 base = color;
   #ifdef SCALAR
-  base = scalarColor((vScalar - scalarRange.x) / max(scalarRange.y - scalarRange.x, 1e-6));
+  float share = (vScalar - scalarRange.x) / max(scalarRange.y - scalarRange.x, 1e-6);
+  base = scalarDiverges ? divergingColor(share) : scalarColor(share);
   #endif
 
   vec3 toKey = normalize(vec3(-0.45, 0.65, 0.75));
@@ -168,10 +182,10 @@ void main() {
 }
 `;
 
-/** Picking: the tissue's row and how far it is from rest, and where the surface is, in one pixel of four u32. */
+/** Picking: the tissue's row and its scalar (a share of the range, or sixteenths of a millimetre from rest), and where the surface is, in one pixel of four u32. */
 export const PICK_VERTEX = /* glsl */ `
 ${VERTEX}#ifdef SCALAR
-${FROM_REST}
+${SCALAR}
 varying float vScalar;
 #endif
 uniform vec4 box;   // low and step, mm
@@ -180,7 +194,7 @@ varying vec3 vPlace;
 void main() {
   vPlace = bodyPosition() * box.w + box.xyz;
   #ifdef SCALAR
-  vScalar = fromRest();
+  vScalar = scalar();
   #endif
   vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
   gl_Position = projectionMatrix * mvPosition;
@@ -193,6 +207,7 @@ precision highp float;
 precision highp int;
 uniform uint tissue;
 #ifdef SCALAR
+uniform vec2 scalarRange;
 varying float vScalar;
 #endif
 varying vec3 vPlace;
@@ -201,7 +216,9 @@ layout(location = 0) out highp uvec4 picked;
 void main() {
   #include <clipping_planes_fragment>
   uint scalar = 0u;
-  #ifdef SCALAR
+  #ifdef SCALAR_VALUES
+  scalar = uint(clamp((vScalar - scalarRange.x) / (scalarRange.y - scalarRange.x), 0.0, 1.0) * 65535.0 + 0.5);
+  #elif defined(SCALAR)
   scalar = uint(clamp(vScalar * 16.0, 0.0, 65535.0));
   #endif
   picked = uvec4((tissue + 1u) | (scalar << 16), floatBitsToUint(vPlace.x), floatBitsToUint(vPlace.y), floatBitsToUint(vPlace.z));

@@ -9,8 +9,9 @@ export interface Picked {
   readonly row: number;
   /** Where on its surface, mm, LPS. */
   readonly point: THREE.Vector3;
-  /** mm from rest, in steps of a sixteenth; only while that is shown. */
-  readonly fromRest: number;
+  /** What colours the surface there: mm from rest in steps of a sixteenth, or the vertices' own number, within the range that is shown.
+   *  0 while there is none. */
+  readonly scalar: number;
 }
 
 export class Picker {
@@ -84,7 +85,8 @@ export class Picker {
     const tissue = this.#pixel[0]! & 0xffff;
     if (tissue === 0) return null;
     const point = new THREE.Vector3(this.#floats[1]!, this.#floats[2]!, this.#floats[3]!);
-    return { row: tissue - 1, point, fromRest: (this.#pixel[0]! >>> 16) / 16 };
+    const coded = this.#pixel[0]! >>> 16, { x: low, y: high } = this.body.shared.scalarRange.value;
+    return { row: tissue - 1, point, scalar: this.body.scalar === "values" ? low + (coded / 65535) * (high - low) : coded / 16 };
   }
 
   dispose(): void {

@@ -11,6 +11,8 @@ export interface SharedUniforms {
   readonly restBox: THREE.IUniform<THREE.Vector4>;
   /** What the darkest and the lightest colour of a scalar stand for. */
   readonly scalarRange: THREE.IUniform<THREE.Vector2>;
+  /** Two colours that part in the middle of the range. */
+  readonly scalarDiverges: THREE.IUniform<boolean>;
   readonly accent: THREE.IUniform<THREE.Color>;
   /** Pixels of the picture. */
   readonly viewport: THREE.IUniform<THREE.Vector2>;
@@ -19,10 +21,13 @@ export interface SharedUniforms {
 export function sharedUniforms(): SharedUniforms {
   return {
     poseBox: { value: new THREE.Vector4() }, restBox: { value: new THREE.Vector4() },
-    scalarRange: { value: new THREE.Vector2(0, 1) }, accent: { value: new THREE.Color(0x2f8fff) },
+    scalarRange: { value: new THREE.Vector2(0, 1) }, scalarDiverges: { value: false }, accent: { value: new THREE.Color(0x2f8fff) },
     viewport: { value: new THREE.Vector2(1, 1) },
   };
 }
+
+/** What colours the surface: nothing but the tissue, its distance from rest, or a number of each vertex. */
+export type SurfaceScalar = "none" | "distance" | "values";
 
 export class TissueMaterial extends THREE.ShaderMaterial {
   constructor(look: Look, shared: SharedUniforms) {
@@ -32,7 +37,7 @@ export class TissueMaterial extends THREE.ShaderMaterial {
         color: { value: new THREE.Color(look.color) }, scatter: { value: new THREE.Color(look.scatter) },
         wrap: { value: look.wrap }, roughness: { value: look.roughness }, shine: { value: look.shine },
         opacity: { value: 1 }, glow: { value: 0 },
-        accent: shared.accent, scalarRange: shared.scalarRange, poseBox: shared.poseBox, restBox: shared.restBox,
+        accent: shared.accent, scalarRange: shared.scalarRange, scalarDiverges: shared.scalarDiverges, poseBox: shared.poseBox, restBox: shared.restBox,
       },
     });
   }
@@ -54,8 +59,8 @@ export class TissueMaterial extends THREE.ShaderMaterial {
     this.uniforms["glow"]!.value = glow;
   }
 
-  setScalar(on: boolean): void {
-    setDefine(this, "SCALAR", on);
+  setScalar(kind: SurfaceScalar): void {
+    setScalar(this, kind);
   }
 }
 
@@ -89,13 +94,18 @@ export class PickMaterial extends THREE.ShaderMaterial {
     super({
       glslVersion: THREE.GLSL3, vertexShader: PICK_VERTEX, fragmentShader: PICK_FRAGMENT, side: THREE.DoubleSide,
       blending: THREE.NoBlending, toneMapped: false, clipping: true,
-      uniforms: { tissue: { value: row }, box: shared.poseBox, poseBox: shared.poseBox, restBox: shared.restBox },
+      uniforms: { tissue: { value: row }, box: shared.poseBox, poseBox: shared.poseBox, restBox: shared.restBox, scalarRange: shared.scalarRange },
     });
   }
 
-  setScalar(on: boolean): void {
-    setDefine(this, "SCALAR", on);
+  setScalar(kind: SurfaceScalar): void {
+    setScalar(this, kind);
   }
+}
+
+function setScalar(material: THREE.ShaderMaterial, kind: SurfaceScalar): void {
+  setDefine(material, "SCALAR", kind !== "none");
+  setDefine(material, "SCALAR_VALUES", kind === "values");
 }
 
 function setDefine(material: THREE.ShaderMaterial, name: string, on: boolean): void {

@@ -19,7 +19,12 @@ export interface Stats {
   readonly latencyMs: number;
   /** 0 is all; each next one has about a quarter of the triangles. */
   readonly level: number;
+  /** How the body comes: its vertices, or what they are skinned by here. */
+  readonly way: Way;
 }
+
+/** `frames`: the server's vertices; `skinning`: the segments' motions. */
+export type Way = "frames" | "skinning";
 
 export interface Tissue {
   /** Row of ModelOpened.tissues. */
@@ -39,6 +44,8 @@ export interface Model {
   readonly tissues: readonly Tissue[];
   /** Names of the joints, by row. */
   readonly joints: readonly string[];
+  /** Names of the segments, likewise. */
+  readonly segments: readonly string[];
 }
 
 export interface Layer {
@@ -61,7 +68,8 @@ export interface Quality {
   readonly poseSequence: bigint;
 }
 
-export type Scalar = "none" | "distance";
+/** What colours the surface beside the tissues. */
+export type Scalar = "none" | "distance" | "det F" | "weight";
 export type Theme = "auto" | "light" | "dark";
 
 export interface AppState {
@@ -77,6 +85,8 @@ export interface AppState {
   readonly selected: number | null;
   readonly hovered: number | null;
   readonly scalar: Scalar;
+  /** Row of the segment whose weights are shown. */
+  readonly weightOf: number;
   readonly quality: Quality | null;
   /** The pose that is in the picture. */
   readonly poseSequence: bigint;
@@ -86,8 +96,8 @@ export interface AppState {
 export function firstState(): AppState {
   return {
     link: { state: "connecting", reason: "", mends: true },
-    stats: { framesPerSecond: 0, bytesPerSecond: 0, latencyMs: 0, level: 0 },
+    stats: { framesPerSecond: 0, bytesPerSecond: 0, latencyMs: 0, level: 0, way: "frames" },
     model: null, layers: [], isolated: null, seeThrough: true, selected: null, hovered: null,
-    scalar: "none", quality: null, poseSequence: 0n, theme: "auto",
+    scalar: "none", weightOf: 0, quality: null, poseSequence: 0n, theme: "auto",
   };
 }

@@ -136,13 +136,13 @@ export class Headset {
     for (const words of [this.#name, this.#residual, this.#message, this.#plate]) words.dispose();
     posing.scene.shown = true;
     app.stage.surface();
-    app.live.setLevel(null).catch((error: unknown) => app.say(`Full detail did not come back: ${wordsOf(error)}`));
+    app.live.arrival.setLevel(null).catch((error: unknown) => app.say(`Full detail did not come back: ${wordsOf(error)}`));
     this.#gone();
   }
 
   async #setLevel(): Promise<void> {
     try {
-      await this.app.live.setLevel(this.level);
+      await this.app.live.arrival.setLevel(this.level);
     } catch (error) {
       this.#say(`Another level of detail did not come: ${wordsOf(error)}`);
     }

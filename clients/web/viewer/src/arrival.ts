@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the body comes: chosen by itself from what arrives, or held by hand; and what a frame is to the scene, whichever way it came.
+import { adapt, type Adaptation, type BodyFrame, type Client, type GpuSkinner, type Held, type MeshOptions, type MeshStream } from "../../protocol/src/index.js";
+import type { Positions } from "./scene/body.js";
+import type { Stage } from "./scene/stage.js";
+import type { Way } from "./state/app_state.js";
+import { wordsOf } from "./errors.js";
+
+/** Coarser levels and other ways are for later, and many bytes: the first picture does not wait for them. */
+const CHOOSE_AFTER_MS = 1500;
+const KEY = "ecorche.way";
+
+export class Arrival {
+  /** null: by itself. */
+  way: Way | null = null;
+  #level: number | null = null;
+  #adaptation: Adaptation | null = null;
+  #make: typeof GpuSkinner | null = null;
+  #skinner: GpuSkinner | null = null;
+  #drawStart = 0;
+  /** The GPU does not take it: frames, then, as long as this page lives. */
+  #fault: string | null = null;
+
+  constructor(private readonly stage: Stage, private readonly say: (text: string) => void) {
+    const kept = localStorage.getItem(KEY);
+    if (kept === "frames" || kept === "skinning") this.way = kept;
+    stage.onBeforeDraw(() => { this.#drawStart = performance.now(); });
+    stage.onAfterDraw(() => this.#adaptation?.drawn(performance.now() - this.#drawStart));
+    // What the GPU held is lost with its context: the next frame brings it anew.
+    stage.canvas.addEventListener("webglcontextlost", () => { this.#skinner = null; });
+  }
+
+  /** What the first picture comes by. */
+  static readonly first: MeshOptions = { normals: true };
+
+  follow(client: Client, stream: MeshStream): void {
+    this.#adaptation?.stop();
+    this.#adaptation = null;
+    setTimeout(() => {
+      // Whoever skins has the code ready before the first motions come.
+      const begin = async () => {
+        this.#make = (await import("../../protocol/src/skinning/gpu.js")).GpuSkinner;
+        this.#adaptation = adapt(client, stream, undefined, { adaptive: true, held: this.#held });
+      };
+      begin().catch((error: unknown) => this.say(`The body goes on coming as frames: ${wordsOf(error)}`));
+    }, CHOOSE_AFTER_MS);
+  }
+
+  /** Held until another is; null: by itself. */
+  async setWay(way: Way | null): Promise<void> {
+    this.way = way;
+    if (way) localStorage.setItem(KEY, way);
+    else localStorage.removeItem(KEY);
+    await this.#adaptation?.hold(this.#held);
+  }
+
+  /** One level of detail and no other, 0 being all; null: as the line bears it. */
+  async setLevel(level: number | null): Promise<void> {
+    this.#level = level;
+    await this.#adaptation?.hold(this.#held);
+  }
+
+  get #held(): Held {
+    const way = this.#fault ? "frames" : this.way;
+    return { ...(this.#level !== null && { level: this.#level }), ...(way !== null && { motions: way === "skinning" }) };
+  }
+
+  positionsOf(frame: BodyFrame): Positions {
+    const { skinned } = frame;
+    if (skinned && !this.#fault) {
+      try {
+        return this.#skin(skinned);
+      } catch (error) {
+        this.#fault = wordsOf(error);
+        this.say(`The body comes as frames: ${this.#fault}`);
+        this.#adaptation?.hold(this.#held).catch(() => {});
+      }
+    }
+    return { numbers: frame.vertices, low: frame.offset, step: frame.scale };
+  }
+
+  #skin({ skinning, motions }: NonNullable<BodyFrame["skinned"]>): Positions {
+    const { renderer } = this.stage;
+    if (this.#skinner?.skinning !== skinning) {
+      this.#skinner?.dispose();
+      this.#skinner = new this.#make!(renderer.getContext() as WebGL2RenderingContext, skinning);
+    }
+    const skinner = this.#skinner;
+    skinner.skin(motions);
+    renderer.resetState();
+    let numbers: Uint16Array | undefined;
+    return {
+      gpu: skinner.buffer, low: skinner.box.offset, step: skinner.box.scale,
+      get numbers() { return numbers ??= skinner.read(); },
+    };
+  }
+}
