@@ -19,8 +19,8 @@ namespace ecorche::io {
 using Locate =
     std::function<std::filesystem::path(const yaml::Value& entry, const yaml::Value& file, bool folders)>;
 
-/// The entry's label maps, each a map `{file, table, root, form, series, phase, except, resample}`: of a list all, in its
-/// order; of a map with `maps` those; else the entry itself.
+/// The entry's label maps, each a map `{file, table, root, form, series, phase, except, resample}`: of a list
+/// all, in its order; of a map with `maps` those; else the entry itself.
 std::vector<yaml::Value> label_maps(const yaml::Value& entry);
 
 /// Reads them and makes them one (merge_labels.hpp). `table` is a map of ids to names, a file that

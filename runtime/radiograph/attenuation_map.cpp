@@ -88,6 +88,16 @@ struct Steps {
   }
 };
 
+// The blocks of a line of voxels that are not empty.
+void mark(const std::uint16_t* line, std::int32_t size, std::uint8_t* occupied) {
+  for (std::int32_t i = 0; i < size; i += AttenuationMap::block) {
+    const std::int32_t end = std::min(i + AttenuationMap::block, size);
+    std::uint16_t any = 0;
+    for (std::int32_t at = i; at < end; ++at) any = static_cast<std::uint16_t>(any | line[at]);
+    if (any != 0) occupied[i / AttenuationMap::block] = 1;
+  }
+}
+
 // Every number of `out` is written, those of the border as well: its memory may be old.
 template <class T>
 void fill(const Image& hu, const Attenuation& attenuation, const Index3& first, AttenuationMap& out,
@@ -98,18 +108,24 @@ void fill(const Image& hu, const Attenuation& attenuation, const Index3& first, 
   const auto border = [&padded](std::size_t a, std::int32_t at) {
     return at < kBelow || at >= padded[a] - kAbove;
   };
-  each_slice(padded[2], context, [&](std::int32_t k) {
-    for (std::int32_t j = 0; j < padded[1]; ++j) {
-      std::uint16_t* to = &out.steps[out.grid.offset(0, j, k)];
-      if (out.step == 0 || border(2, k) || border(1, j)) {
-        std::fill_n(to, padded[0], std::uint16_t{0});
-        continue;
+  // A layer of blocks is one thread's.
+  each_slice(out.blocks[2], context, [&](std::int32_t layer) {
+    const std::int32_t end = std::min((layer + 1) * AttenuationMap::block, padded[2]);
+    for (std::int32_t k = layer * AttenuationMap::block; k < end; ++k) {
+      for (std::int32_t j = 0; j < padded[1]; ++j) {
+        std::uint16_t* const line = &out.steps[out.grid.offset(0, j, k)];
+        if (out.step == 0 || border(2, k) || border(1, j)) {
+          std::fill_n(line, padded[0], std::uint16_t{0});
+          continue;
+        }
+        const std::int32_t wide = padded[0] - kBelow - kAbove;
+        const T* row = values + hu.grid.offset(first[0], first[1] + j - kBelow, first[2] + k - kBelow);
+        std::uint16_t* const to = std::fill_n(line, kBelow, std::uint16_t{0});
+        for (std::int32_t i = 0; i < wide; ++i) to[i] = steps_of(static_cast<float>(row[i]));
+        std::fill_n(to + wide, kAbove, std::uint16_t{0});
+        const std::int32_t blocks = (layer * out.blocks[1] + j / AttenuationMap::block) * out.blocks[0];
+        mark(line, padded[0], &out.occupied[static_cast<std::size_t>(blocks)]);
       }
-      const std::int32_t wide = padded[0] - kBelow - kAbove;
-      const T* row = values + hu.grid.offset(first[0], first[1] + j - kBelow, first[2] + k - kBelow);
-      to = std::fill_n(to, kBelow, std::uint16_t{0});
-      for (std::int32_t i = 0; i < wide; ++i) to[i] = steps_of(static_cast<float>(row[i]));
-      std::fill_n(to + wide, kAbove, std::uint16_t{0});
     }
   });
   std::fill_n(&out.steps[out.grid.voxels()], kSlack, std::uint16_t{0});
@@ -144,6 +160,12 @@ void attenuation_map(const Image& hu, const Attenuation& attenuation, Attenuatio
       out.steps = std::make_unique_for_overwrite<std::uint16_t[]>(count);
       out.room = count;
     }
+    std::size_t blocks = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+      out.blocks[a] = (out.grid.size[a] + AttenuationMap::block - 1) / AttenuationMap::block;
+      blocks *= static_cast<std::size_t>(out.blocks[a]);
+    }
+    out.occupied.assign(blocks, 0);
     fill<T>(hu, attenuation, content.first, out, context);
   });
 }

@@ -53,7 +53,7 @@ void trace(const RayVolume& volume, const RayBatch& rays, float* sums) {
     const F u0 = hn::Load(f, rays.u + r), du = hn::Load(f, rays.du + r);
     const F v0 = hn::Load(f, rays.v + r), dv = hn::Load(f, rays.dv + r);
     const F first = hn::Load(f, rays.first + r), last = hn::Load(f, rays.last + r);
-    F sum = none;
+    F sum = hn::Load(f, sums + r);
     for (std::int32_t n = rays.first_of_all; n <= rays.last_of_all; ++n) {
       const F at = hn::Set(f, static_cast<float>(n));
       // The crop has an empty border: beyond it a ray sees that.

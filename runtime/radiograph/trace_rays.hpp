@@ -26,7 +26,7 @@ struct RayBatch {
 };
 
 namespace kernels {
-/// Of every ray, the sum of what it meets on its planes: RayBatch::most numbers, in steps.
+/// Adds to the sum of every ray what it meets on its planes: RayBatch::most numbers, in steps.
 void trace_rays(const RayVolume& volume, const RayBatch& rays, float* sums);
 }  // namespace kernels
 

@@ -24,7 +24,8 @@ void run(const Target& target, const std::string& bytes) {
 // Every byte, but where each reading is a file written and read by a library: fewer of them.
 std::size_t step_of(const std::string& target, std::size_t size) {
   if (target == "model") return 1 + size / 3;
-  const bool library = target.starts_with("dicom") || target == "nrrd" || target == "mha" || target == "nifti" || target == "case_yaml";
+  const bool library = target.starts_with("dicom") || target == "nrrd" || target == "mha" ||
+                       target == "nifti" || target == "case_yaml";
   return library ? 1 + size / 48 : 1;
 }
 

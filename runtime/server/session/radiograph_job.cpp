@@ -46,7 +46,7 @@ Status trace(RadiographJob& job) {
   std::vector<std::uint32_t> tissues;
   if (!job.volume) {
     tissues.resize(model.tissues.size());
-    std::iota(tissues.begin(), tissues.end(), 0);
+    std::iota(tissues.begin(), tissues.end(), 0U);
   }
   const BodyPool::Lease body = pose_still(*job.model, job.request, tissues);
   if (!body)

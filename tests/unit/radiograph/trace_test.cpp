@@ -196,6 +196,36 @@ TEST(RadiographOfNoise, AgreesWithItsSlowTwinOnEveryInstructionSet) {
   }
 }
 
+// Blocks of noise in air: what rays pass by changes no bit.
+TEST(RadiographOfNoise, IsTheSameWhereRaysPassEmptyBlocksBy) {
+  std::mt19937 random(8);
+  std::size_t skipped = 0;
+  for (int round = 0; round < 14; ++round) {
+    const Vector3d about(20, 900, -30);
+    Image hu = random_scan(test::grid_about(about, 120, {1.5, 2, 1.2}), 50 + static_cast<unsigned>(round));
+    const auto values = hu.scalars<std::int16_t>();
+    const auto& size = hu.grid.size;
+    for (int k = 0; k < size[2]; ++k) {
+      for (int j = 0; j < size[1]; ++j) {
+        for (int i = 0; i < size[0]; ++i) {
+          if (((i / 13) * 7 + (j / 11) * 5 + (k / 17) * 3 + round) % 9 != 0)
+            values[hu.grid.offset(i, j, k)] = -1024;
+        }
+      }
+    }
+    XRaySetup setup = random_setup(random, about);
+    if (round >= 12) setup.source = about + Vector3d(0.3, 0.2, 0.4);
+    if (round == 13) setup.detector.centre = about + 8 * setup.detector.right.cross(setup.detector.down);
+    AttenuationMap map = attenuation_map(hu, kUsual);
+    skipped += static_cast<std::size_t>(std::count(map.occupied.begin(), map.occupied.end(), 0));
+    const std::vector<float> fast = line_integrals(map, setup);
+    map.occupied.assign(map.occupied.size(), 1);
+    EXPECT_EQ(fast, line_integrals(map, setup)) << round;
+    EXPECT_GT(*std::max_element(fast.begin(), fast.end()), 0.1);
+  }
+  EXPECT_GT(skipped, 100U);
+}
+
 TEST(RadiographOfASmoothBody, AgreesWithSiddon) {
   // The other model of a voxel: they meet where the scan is finer than what it shows.
   const ImageGrid grid = test::grid_about({0, 0, 0}, 160, {1.5, 1.2, 2});

@@ -67,7 +67,9 @@ async function refilled(name: string, segment: Int32Array, joints: Float64Array 
 function differences(is: VolumeImage, expected: ReturnType<typeof readNrrd>): number {
   assert.deepEqual([...is.grid.size], expected.sizes);
   is.grid.origin.forEach((value, axis) => assert.ok(Math.abs(value - expected.origin[axis]!) < 1e-6));
-  return is.voxels.reduce((sum: number, value: number, at: number) => sum + Number(value !== expected.values[at]), 0);
+  let differ = 0;
+  for (let at = 0; at < is.voxels.length; ++at) differ += Number(is.voxels[at] !== expected.values[at]);
+  return differ;
 }
 
 test("balls hung on another segment change the posed volume as the program with the page's file does; undone, it is as before", async () => {

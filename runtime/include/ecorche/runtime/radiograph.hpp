@@ -64,6 +64,11 @@ struct AttenuationMap {
   double step = 0;                         ///< attenuation of one step, 1/mm
   std::unique_ptr<std::uint16_t[]> steps;  ///< grid.voxels(), and two more to be loaded for nothing
   std::size_t room = 0;                    ///< numbers that `steps` has room for
+  /// A byte for every block of so many voxels a side, i fastest, the last ones cut short by the grid: 0 where
+  /// nothing of it attenuates. Rays pass it by.
+  static constexpr std::int32_t block = 16;
+  std::array<std::int32_t, 3> blocks{};
+  std::vector<std::uint8_t> occupied;
 };
 
 /// That of `hu`: one component, Hounsfield units, any scalar type; what is no number is air. `out` keeps its
