@@ -96,12 +96,14 @@ TEST(Volumes, ALatticeGrowsOnlyAsFarAsTheMemoryGoes) {
   spec.changed_bricks = true;
   const std::uint64_t voxels = model->volumes[0].image.grid.voxels();
   VolumeStream first(spec, voxels, memory.kept_pool()), second(spec, voxels, memory.kept_pool());
+  const HungSpheres hung{};
   std::uint64_t number = 0;
   const auto write = [&](VolumeStream& stream, double mm, v1::VolumeFrame& frame) {
     frame.Clear();
     frame.set_frame(++number);
     wire::Payload payload;
-    return stream.write(served, body_at(mm), 1U << 28, false, frame, payload);
+    const runtime::PosedBody body = body_at(mm);
+    return stream.write({served, hung, body}, 1U << 28, false, frame, payload);
   };
   v1::VolumeFrame frame;
   EXPECT_TRUE(write(first, 0, frame).ok());
