@@ -110,8 +110,8 @@ test("held by hand, the GPU skins to the server's vertices, by every method", as
         assert.equal(a === NO_NORMAL, b === NO_NORMAL);
         if (a !== NO_NORMAL && normalOf(a).reduce((sum, value, i) => sum + value * normalOf(b)[i], 0) < 0.999) ++turned;
       }
-      // The poses are not those by which the server measured: twice what it says.
-      assert.ok(largest < 2 * stated + 0.1, `${Skinning[method]} at ${angle}: ${largest} mm off the server`);
+      // The poses are not those by which the server measured (protocol/skinning.test.ts has those): no more than a few voxels' tenth.
+      assert.ok(largest < 2, `${Skinning[method]} at ${angle}: ${largest} mm off the server`);
       assert.ok(twin <= 1, `${Skinning[method]} at ${angle}: ${twin} steps off the processor's twin`);
       assert.ok(turned <= 2, `${turned} normals off the twin's`);
     }
@@ -157,13 +157,10 @@ test("on a slow line it changes by itself, and says so", async () => {
   // At rest the finest comes, whichever way.
   await page().waitForFunction(() => /^full detail/.test(document.querySelector(".readout .arrival")!.textContent!), undefined, { timeout: 60_000 });
   if (await way() === "skinning") {
-    const counting = page().evaluate(async () => {
-      const { live } = (window as any).ecorche, before = live.stream.generation;
-      await new Promise((resolve) => setTimeout(resolve, 4000));
-      return live.stream.generation - before;
-    });
+    // A pose is then some 2 kB; as vertices it was 80.
     await move(4000);
-    assert.ok(await counting >= 8, `${await counting} frames in four seconds: motions are few bytes`);
+    const { framesPerSecond, bytesPerSecond } = await page().evaluate(() => (window as any).ecorche.store.state.stats);
+    assert.ok(framesPerSecond > 0 && bytesPerSecond / framesPerSecond < 8e3, `${bytesPerSecond} bytes and ${framesPerSecond} frames a second`);
   }
 });
 

@@ -57,6 +57,8 @@ export class GpuSkinner {
     gl.uniform1f(gl.getUniformLocation(program, "restStep"), box.scale);
     gl.uniform1f(gl.getUniformLocation(program, "posedStep"), table.box.scale);
     gl.bindVertexArray(this.array);
+    // Whoever drew from the buffer may have left it bound, and WebGL writes into none that is bound elsewhere.
+    gl.bindBuffer(gl.ARRAY_BUFFER, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, this.buffer);
     gl.enable(gl.RASTERIZER_DISCARD);
