@@ -40,6 +40,7 @@ struct SetupChoice {
 /// Throws Error{usage} for what no body is needed to refuse; as check(XRaySetup).
 void check(const SetupChoice& choice);
 
+/// What was chosen, in millimetres of LPS.
 struct ChosenSetup {
   XRaySetup here;   ///< where the body stands as posed
   XRaySetup still;  ///< the same about the body with its root as scanned

@@ -32,6 +32,7 @@ struct Beam {
   View view;
   double turn;
 
+  /// `turned_by` in radians.
   Beam(View from = View::ap, double turned_by = 0) : view(from), turn(turned_by) {}
   /// Unit vector from source to detector, LPS of the body as scanned.
   Eigen::Vector3d way() const;
