@@ -51,7 +51,7 @@ class Help(unittest.TestCase):
         shutil.copytree(CASE, self.folder / "patient")
         shutil.copy(MODEL, self.folder / "patient.hdf")
         lines = [re.search(r"(?m)^Example: ecorche (.*)$", run(name, "--help").stdout).group(1) for name in subcommands()]
-        later = ("phantom", "preprocess", "probe", "serve", "stream", "unpose", "refill", "path", "deformers", "tears", "contact")
+        later = ("phantom", "new", "preprocess", "probe", "serve", "stream", "unpose", "refill", "path", "deformers", "tears", "contact")
         chosen = [line for line in lines if line.split()[0] not in later]
         chosen += [line for line in lines if line.split()[0] in ("unpose", "refill", "path")]
         self.assertGreater(len(chosen), 10)
@@ -61,8 +61,8 @@ class Help(unittest.TestCase):
 
     def test_slips(self):
         self.refused(64, "error: ecorche: unknown subcommand 'preproces' (did you mean 'preprocess'?)", "preproces", "ph")
-        self.refused(64, "unknown subcommand 'nonsense' (one of phantom, check,", "nonsense", "--help")
-        self.refused(64, "error: ecorche: no subcommand (one of phantom, check,")
+        self.refused(64, "unknown subcommand 'nonsense' (one of phantom, new, check,", "nonsense", "--help")
+        self.refused(64, "error: ecorche: no subcommand (one of phantom, new, check,")
         self.refused(64, "did you mean --output?", "phantom", "-o", self.folder / "x", "--outptu", "y")
         self.refused(64, "skin.stl: is no case (give a case.yaml, or the folder that holds one", "check", CASE / "skin.stl")
         self.refused(65, "case.yaml: is not an HDF5 file (a model is what ecorche preprocess writes", "info", CASE / "case.yaml")

@@ -30,6 +30,11 @@ def inputs(folder, form):
     return [folder / "ct.nrrd", folder / "segmentation.seg.nrrd"]
 
 
+def write_nrrd(path, sizes, voxels, space):
+    head = f"NRRD0004\ntype: uchar\ndimension: {len(sizes)}\nsizes: {' '.join(map(str, sizes))}\nencoding: raw\n{space}\n"
+    path.write_bytes(head.encode() + voxels)
+
+
 class New(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -89,7 +94,7 @@ class New(unittest.TestCase):
         self.assertIn("round the label of the body", text)
         page = (self.folder / "totalsegmentator.html").read_text()
         self.assertEqual(page.count("data:image/png;base64,"), 2)
-        for word in ("prostate", "tibia_left and tibia_right", "no script"):
+        for word in ("masks are empty: those structures are absent", "tibia_left and tibia_right", "no script"):
             self.assertIn(word, page + "no script")
         self.assertNotRegex(page, r"<script|<link|src='(?!data:)|http")
         self.assertTrue((self.folder / "totalsegmentator_case" / "picture.png").read_bytes().startswith(b"\x89PNG"))
@@ -142,6 +147,36 @@ class New(unittest.TestCase):
             self.assertFalse(case.exists())
         result = run("new", scan / "total.nii.gz", "-o", scan)
         self.assertEqual((result.returncode, "holds files" in result.stderr), (73, True), result.stderr)
+
+    def test_images_and_tables_that_do_not_fit(self):
+        folder = self.folder / "unfit"
+        (folder / "empty").mkdir(parents=True)
+        (folder / "masks").mkdir()
+        place = "space: left-posterior-superior\nspace directions: {}(1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
+        write_nrrd(folder / "labels.nrrd", (4, 4, 4), bytes(i % 3 for i in range(64)), place.format(""))
+        write_nrrd(folder / "colours.nrrd", (3, 4, 4, 4), bytes(192), place.format("none ") + "kinds: RGB-color domain domain domain\n")
+        for name in ("labels.json", "other.json"):
+            (folder / name).write_text('{"1": "liver", "2": "spleen"}')
+        shutil.copy(folder / "colours.nrrd", folder / "masks" / "liver.nrrd")
+        (folder / "file").write_text("")
+        labels, table = folder / "labels.nrrd", folder / "labels.json"
+        for words, line in (
+                ([folder / "empty"], "holds no image that can be read"),
+                ([folder / "colours.nrrd"], "it is a picture in colours: save the grey values, or the label map"),
+                ([labels, table, folder / "other.json"], "belongs to no label map: all have names"),
+                ([labels, table], "no label of a bone is known"),
+        ):
+            result = run("new", *words, "-o", folder / "case")
+            self.assertEqual((result.returncode in (64, 65), line in result.stderr), (True, True), result.stderr)
+        self.assertIn("is a file (name a folder with -o)", run("new", labels, table, "-o", folder / "file").stderr)
+        for entry, line in (
+                ("\n  - {file: labels.nrrd, table: labels.json}\n  - {file: labels.nrrd, table: labels.json, resample: linear}",
+                 "' is no way to resample labels"),
+                ("\n  - {file: labels.nrrd, table: labels.json}\n  - {file: masks}", "its voxels are not one whole number each"),
+                (" {file: labels.nrrd, table: labels.json, form: qform}", "has neither qform nor sform: it is no NIfTI"),
+        ):
+            (folder / "case.yaml").write_text(f"name: t\nskeleton: generic\nlabels:{entry}\n")
+            self.assertIn(line, run("check", folder / "case.yaml").stderr)
 
     def test_names_of_strangers_stay_text(self):
         """Hostile names neither break the YAML nor the page."""

@@ -203,6 +203,7 @@ class Radiograph(unittest.TestCase):
     def test_refusals(self):
         self.refused(64, "the model has no 'knee_lef' (did you mean 'knee_left'?)", "--target", "knee_lef")
         self.refused(64, "the model has no '1,2' (", "--target", "1,2")
+        self.refused(64, "a point beyond 1e9 mm", "--target", "1e10,0,0")
         self.refused(64, "no picture is written as '.jpg' (use .png, .dcm,", out="no.jpg")
         self.refused(64, "--detector: where the source stands is not said (add --source)", "--detector", "1,2,3")
         self.refused(64, "--source: where the detector stands is not said (add --detector)", "--source", "1,2,3")

@@ -169,7 +169,7 @@ TEST(MessageTable, WithoutControl) {
     EXPECT_EQ(status.code, StatusCode::permission_denied) << row.name;
     EXPECT_EQ(status.message, text);
   }
-  EXPECT_EQ(refused, 9);
+  EXPECT_EQ(refused, 10);
 }
 
 TEST(MessageTable, WithoutRecordings) {
