@@ -124,7 +124,8 @@ class Source {
       const fs::path name(file.file),
           whole = name.parent_path().extension() == ".dicom" ? name.parent_path() : name;
       if (!out.empty() && out.back().from == root_ / whole) continue;
-      out.push_back({root_ / whole, settings_.output / back_name(root_ / whole), &file});
+      out.push_back(
+          {root_ / whole, settings_.output / whole.parent_path() / back_name(root_ / whole), &file});
     }
     return out;
   }
