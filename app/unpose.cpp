@@ -54,7 +54,7 @@ std::string name_of(const fs::path& file) {
 
 // What was DICOM comes back as NRRD: on the way its frame of reference has changed twice.
 fs::path back_name(const fs::path& file) {
-  const fs::path name = file.filename();
+  fs::path name = file.filename();
   if (!io::is_dicom(file)) return name;
   return name.stem().string() + (name.extension() == ".dcm" ? ".seg.nrrd" : ".nrrd");
 }
@@ -270,7 +270,7 @@ class WayBack {
         std::find_if(masks_.begin(), masks_.end(), [&](const auto& one) { return one.first == grid; });
     if (known != masks_.end()) return known->second;
     const std::string number = masks_.empty() ? "" : "-" + std::to_string(masks_.size() + 1);
-    const fs::path file = settings_.output / ("folds-mask" + number + ".nrrd");
+    fs::path file = settings_.output / ("folds-mask" + number + ".nrrd");
     io::write_image(file, ImagesBack::mask(grid, trip));
     report_.files.push_back(file);
     masks_.emplace_back(grid, file);
