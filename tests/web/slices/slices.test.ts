@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import type { Browser } from "playwright-core";
-import { Client, type type ModelOpened } from "../../../clients/web/protocol/src/index.js";
+import { Client, type ModelOpened } from "../../../clients/web/protocol/src/index.js";
 import type { PlaneGeometry } from "../../../clients/web/viewer/src/slices/plane.js";
 import { orientationOf, pointAt } from "../../../clients/web/viewer/src/slices/plane.js";
 import { CT_PRESETS, greyOf, type Window } from "../../../clients/web/viewer/src/slices/window.js";
