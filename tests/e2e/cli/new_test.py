@@ -30,8 +30,8 @@ def inputs(folder, form):
     return [folder / "ct.nrrd", folder / "segmentation.seg.nrrd"]
 
 
-def write_nrrd(path, sizes, voxels, space):
-    head = f"NRRD0004\ntype: uchar\ndimension: {len(sizes)}\nsizes: {' '.join(map(str, sizes))}\nencoding: raw\n{space}\n"
+def write_nrrd(path, sizes, voxels, space, kind="uchar"):
+    head = f"NRRD0004\ntype: {kind}\ndimension: {len(sizes)}\nsizes: {' '.join(map(str, sizes))}\nencoding: raw\n{space}\n"
     path.write_bytes(head.encode() + voxels)
 
 
@@ -160,7 +160,11 @@ class New(unittest.TestCase):
         shutil.copy(folder / "colours.nrrd", folder / "masks" / "liver.nrrd")
         (folder / "file").write_text("")
         labels, table = folder / "labels.nrrd", folder / "labels.json"
+        write_nrrd(folder / "speck.nrrd", (9, 9, 9), bytes(1 if v == 364 else 2 for v in range(729)), place.format(""))
+        (folder / "speck.json").write_text('{"1": "femur_left", "2": "liver"}')
         for words, line in (
+                ([folder / "speck.nrrd", folder / "speck.json", "--skin-from-labels"],
+                 "no bone is left (see the notes above, and give --side where one limb alone was scanned)"),
                 ([folder / "empty"], "holds no image that can be read"),
                 ([folder / "colours.nrrd"], "it is a picture in colours: save the grey values, or the label map"),
                 ([labels, table, folder / "other.json"], "belongs to no label map: all have names"),
@@ -169,7 +173,19 @@ class New(unittest.TestCase):
             result = run("new", *words, "-o", folder / "case")
             self.assertEqual((result.returncode in (64, 65), line in result.stderr), (True, True), result.stderr)
         self.assertIn("is a file (name a folder with -o)", run("new", labels, table, "-o", folder / "file").stderr)
+        (folder / "crowd").mkdir()
+        for k in range(4097):
+            (folder / "crowd" / f"m{k}.nrrd").hardlink_to(folder / "labels.nrrd")
+        for ids in (40000, 70000):
+            voxels = np.arange(1, ids + 1, dtype="<u4").tobytes()
+            write_nrrd(folder / f"{ids}.nrrd", (ids, 1, 1), voxels, place.format("") + "endian: little\n", "uint")
+            (folder / f"{ids}.json").write_text(json.dumps({str(k): f"n{k}" for k in range(1, ids + 1)}))
         for entry, line in (
+                (" {file: crowd}", "holds 4097 masks (a folder may hold 4096)"),
+                ("\n  - {file: 70000.nrrd, table: 70000.json}\n  - {file: 70000.nrrd, table: 70000.json}",
+                 "a label map has more than 65535 ids (is it a label map, or a picture?)"),
+                ("\n  - {file: 40000.nrrd, table: 40000.json}\n  - {file: 40000.nrrd, table: 40000.json}",
+                 "the label maps have more than 65535 ids together"),
                 ("\n  - {file: labels.nrrd, table: labels.json}\n  - {file: labels.nrrd, table: labels.json, resample: linear}",
                  "' is no way to resample labels"),
                 ("\n  - {file: labels.nrrd, table: labels.json}\n  - {file: masks}", "its voxels are not one whole number each"),

@@ -6,8 +6,8 @@ import subprocess
 import unittest
 
 import numpy
-import pydicom
-from pydicom.uid import ExplicitVRBigEndian, ImplicitVRLittleEndian
+import pydicom.encaps
+from pydicom.uid import ExplicitVRBigEndian, ImplicitVRLittleEndian, JPEG2000Lossless
 
 from described import Described
 from dicom_made import AXIAL, ENHANCED_CT, item, new_file, set_pixels, text, turned, write_series
@@ -121,6 +121,14 @@ class Series(Described):
         self.assert_read(form=("series=1.2.3.4.5",))
         self.refused(self.place, "has no series 'Head'", form=("series=Head",))
 
+    def test_more_series_than_a_scan_has(self):
+        self.write(volume=self.volume[:, :, :1])
+        one = (self.place / "IM0000").read_bytes()
+        self.assertEqual(one.count(b"1.2.3.4.5\0"), 1)
+        for k in range(1001):
+            (self.place / f"{k}").write_bytes(one.replace(b"1.2.3.4.5\0", b"1.2.3.%04d" % k))
+        self.refused(self.place, "holds more than 1000 series (name a smaller folder)")
+
     def test_scouts_and_mixed_ways(self):
         self.write()
         sagittal = AXIAL[:, [1, 2, 0, 3]]
@@ -226,7 +234,7 @@ class Series(Described):
         self.refused(self.place, "its Rescale Slope or Intercept is 0")
         for file in self.place.glob("*"):
             file.write_bytes(file.read_bytes()[:700])
-        self.refused(self.place, "is cut")
+        self.refused(self.place, "which is cut or damaged, at byte 700")
         one = sorted(self.place.glob("*"))[0]
         for file in self.place.glob("*"):
             file.unlink()
@@ -234,6 +242,43 @@ class Series(Described):
         meta = b"\x02\x00\x10\x00UI\x14\x00" + b"1.2.840.10008.1.2.1\0"
         one.write_bytes(b"\0" * 128 + b"DICM" + meta + nested)
         self.refused(self.place, "sequences lie 16 deep in each other at byte")
+
+    def test_headers_that_lie(self):
+        def put(**values):
+            return lambda data, _: [setattr(data, key, value) for key, value in values.items()]
+        for change, line in (
+                (put(Rows=0), "has 9 x 0 pixels (export it again)"),
+                (put(BitsStored=17), "stores 17 bits up to bit 15 of 16 (export it again)"),
+                (put(NumberOfFrames=0), "says that it has 0 frames (export it again)"),
+                (put(PixelSpacing=["0", "0.7"]), "its Pixel Spacing is 0 (export it again)"),
+                (put(ModalityLUTSequence=[item(LUTDescriptor=[1, 0, 16])]), "its values lie behind a table (Modality LUT), or are single bits"),
+                (lambda data, k: setattr(data, "ImagePositionPatient", text(AXIAL[:3, 3] + [900 * (k % 2), 0, 1.5 * k])),
+                 "its slices do not lie over each other: they are 900 mm apart"),
+        ):
+            with self.subTest(line):
+                self.write(change)
+                self.refused(self.place, line)
+
+    def test_packed_pixels_that_end_early(self):
+        self.write()
+        for file in sorted(self.place.glob("IM*")):
+            subprocess.run(["gdcmconv", "--rle", str(file), str(file)], check=True)
+            file.write_bytes(file.read_bytes()[:-8])  # what ends them
+        self.refused(self.place, "ends within its pixels (copy it from the archive again)")
+        data = new_file(self.folder / "e.dcm", ENHANCED_CT)
+        data.Modality, data.SeriesInstanceUID = "CT", "1.2.3.4.6"
+        set_pixels(data, numpy.ascontiguousarray(self.volume.transpose(2, 1, 0)), True)
+        data.NumberOfFrames = 12
+        data.SharedFunctionalGroupsSequence = [item(
+            PixelMeasuresSequence=[item(PixelSpacing=["0.8", "0.7"], SliceThickness="1.5")],
+            PlaneOrientationSequence=[item(ImageOrientationPatient=["1", "0", "0", "0", "1", "0"])])]
+        data.PerFrameFunctionalGroupsSequence = [
+            item(PlanePositionSequence=[item(ImagePositionPatient=["0", "0", str(1.5 * k)])]) for k in range(12)]
+        data.PixelData = pydicom.encaps.encapsulate([bytes(64)] * 12, fragments_per_frame=2, has_bot=False)
+        data["PixelData"].is_undefined_length = True
+        data.file_meta.TransferSyntaxUID = JPEG2000Lossless
+        data.save_as(self.folder / "e.dcm", write_like_original=False)
+        self.refused(self.folder / "e.dcm", "does not tell which of its 24 fragments are of which of its 12 frames")
 
 
 if __name__ == "__main__":

@@ -7,10 +7,11 @@ import subprocess
 import unittest
 
 import numpy
-import pydicom
+import pydicom.encaps
+from pydicom.uid import RLELossless
 
 from described import IO_FILES, TYPES, Described
-from dicom_made import AXIAL, segment, text, turned, write_segmentation, write_series
+from dicom_made import AXIAL, item, segment, text, turned, write_segmentation, write_series
 
 RIGHT = ("24028007", "Right")
 FEMUR, TIBIA, LIVER = ("71341001", "Femur"), ("12611008", "Tibia"), ("10200004", "Liver")
@@ -100,6 +101,35 @@ class Segments(Described):
         self.refused_segments("its Image Position is 1.5e+06")
         written(change=lambda data: setattr(data, "PixelData", data.PixelData[:20]))
         self.refused_segments("of its pixels")
+        written(segments=[segment(1, "Femur", FEMUR), segment(2, "tibia_left", TIBIA), item(SegmentLabel="liver")])
+        self.refused_segments("has a segment without a number (export it again)")
+        written(change=lambda data: data.__delitem__("PixelData"))
+        self.refused_segments("has no pixels (export it again)")
+
+        def packed(data):
+            data.PixelData = pydicom.encaps.encapsulate([bytes(8)] * data.NumberOfFrames)
+            data["PixelData"].is_undefined_length = True
+            data.file_meta.TransferSyntaxUID = RLELossless
+        written(change=packed)
+        self.refused_segments("packs single bits (unpack it: gdcmconv --raw IN OUT)")
+
+        def wide(data):
+            data.BitsAllocated = data.BitsStored = 32
+            data.HighBit, data.PixelData = 31, bytes(4 * 63 * data.NumberOfFrames)
+        written(kind="FRACTIONAL", change=wide)
+        self.refused_segments("has segments of 32 bits (export it as binary)")
+
+        def uneven(data):
+            del data.SharedFunctionalGroupsSequence[0].PixelMeasuresSequence[0].SpacingBetweenSlices
+            for frame, z in zip(data.PerFrameFunctionalGroupsSequence, numpy.cumsum(1 + 0.37 * numpy.arange(99) ** 0.5)):
+                frame.PlanePositionSequence[0].ImagePositionPatient = text([-10, -20, z])
+        written(change=uneven)
+        self.refused_segments("its planes are at uneven distances, the least 1.37 mm")
+
+        def unknown(data):
+            data.SegmentationType, data.PixelData = "LABELMAP", b"\x09" * len(data.PixelData)
+        written(kind="LABELMAP", change=unknown)
+        self.refused_segments("holds segment 9, which is not described (export it again)")
         shutil.copy(written(), self.folder / "again.dcm")
         self.refused_segments("holds 2 segmentations: 1.2.3.4.8 'Bones'; 1.2.3.4.8 'Bones'", self.folder)
         place = self.folder / "alone"
@@ -148,6 +178,17 @@ class Written(Described):
         volume = self.random.random(shape).astype("f4") * 1e5
         self.assertIn("its values need more than 16 bits: written in steps of 1.5", self.write(self.nrrd(volume, affine), "f.dicom"))
         numpy.testing.assert_allclose(self.describe(self.folder / "f.dicom")[1][0], volume, atol=1.6 / 2)
+        colours = self.nrrd(volume.astype("u1"), affine, "colours.nrrd")
+        head, voxels = colours.read_bytes().split(b"\n\n", 1)
+        head = head.replace(b"dimension: 3", b"dimension: 4").replace(b"sizes: 9", b"sizes: 3 9").replace(
+            b"directions: ", b"directions: none ").replace(b"kinds: ", b"kinds: RGB-color ")
+        colours.write_bytes(head + b"\n\n" + voxels * 3)
+        self.write(colours, "colours.dicom", refused="a CT has one value a voxel (use .nrrd, .mha or .nii.gz)")
+        long = self.nrrd(numpy.ones((65536, 1, 1), "u1"), affine, "long.nrrd")
+        self.write(long, "long.dicom", refused="a DICOM slice has 65535 rows and columns at most")
+        self.write(long, "long.dcm", refused="a DICOM SEG has 65535 rows and columns at most")
+        many = self.nrrd(numpy.arange(1, 65537, dtype="i4").reshape(256, 256, 1), affine, "many.nrrd")
+        self.write(many, "many.dcm", refused="a DICOM SEG has 65535 segments at most")
         # A left-handed grid has its slices the other way round.
         mirror = affine @ numpy.diag([1.0, 1, -1, 1])
         self.write(self.nrrd(volume.astype("i4").astype("i2"), mirror), "m.dicom")
@@ -159,6 +200,9 @@ class Written(Described):
     def test_who_was_scanned_is_dropped_unless_kept(self):
         source = write_series(self.folder / "scan", self.random.integers(0, 100, (9, 7, 12)).astype("i2"), AXIAL)
         image = self.nrrd(self.random.integers(-9, 9, (9, 7, 12)).astype("i2"), AXIAL)
+        other = write_series(self.folder / "mr", self.random.integers(0, 9, (9, 7, 3)).astype("i2"), AXIAL,
+                             change=lambda data, _: setattr(data, "Modality", "MR"))
+        self.write(image, "mr.dicom", f"source={other}", refused="is a series of MR (posed volumes are written as CT: name a CT series)")
         self.write(image, "a.dicom", f"source={source}")
         self.write(image, "b.dicom", f"source={source}", "keep")
         self.write(image, "c.dicom", f"source={source}")

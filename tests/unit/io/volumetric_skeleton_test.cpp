@@ -32,6 +32,7 @@ VolumetricSkeletonFile small() {
   s.parent = {none, 0, 0, 2, none};
   s.segment = {0, 1, 1, none, 2};
   file.segments = {"forearm", "hand", "thumb"};
+  file.joints = {{-12.1, 1e6, 0.1 + 0.2}, {0, -700.3, 1e-9}, {1, 2, 3}};
   return file;
 }
 
@@ -47,14 +48,17 @@ void expect_equal(const VolumetricSkeletonFile& a, const VolumetricSkeletonFile&
   EXPECT_EQ(s.parent, t.parent);
   EXPECT_EQ(s.segment, t.segment);
   EXPECT_EQ(a.segments, b.segments);
+  EXPECT_EQ(a.joints, b.joints);
 }
 
 TEST(VolumetricSkeletonFile, ComesBackAsItWent) {
   const Scratch scratch;
   std::vector<VolumetricSkeletonFile> files(5, small());
   files[1].skeleton.parent.clear();
+  files[1].joints.clear();
   files[2].skeleton.segment.clear();
   files[2].segments.clear();
+  files[2].joints.clear();
   files[3].skeleton.metric = DistanceMetric::chamfer345;
   files[3].skeleton.distance = {12, 9, 11, 12, 3};
   files[3].skeleton.parent.assign(5, none);  // a tree without an edge
@@ -128,6 +132,9 @@ TEST(VolumetricSkeletonFile, RefusesWhatContradictsItself) {
                               "$1 format=\"ascii\">" + text + "</DataArray>");
   };
   refuses("its field 'size' has not 3 values", field("size", "9 8"));
+  refuses("its field 'joints' has not 9 values", field("joints", "1 2 3 4 5 6"));
+  refuses("its field 'joints' holds 1e+07", field("joints", "1 2 3 4 1e7 6 7 8 9"));
+  refuses("its field 'joints' holds nan", field("joints", "1 2 3 4 nan 6 7 8 9"));
   refuses("its field 'tree' is neither 0 nor 1", field("tree", "2"));
   refuses("its metric is 'taxicab'", field("metric", "116 97 120 105 99 97 98 0"));
   refuses("its field 'metric' is not of 1 strings at most", field("metric", "97 0 98 0"));
