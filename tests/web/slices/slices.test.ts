@@ -3,12 +3,12 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import type { Browser } from "playwright-core";
-import { Client, type ModelOpened } from "../../../clients/web/protocol/src/index.js";
+import { Client, type BodyFrame, type ModelOpened } from "../../../clients/web/protocol/src/index.js";
 import type { PlaneGeometry } from "../../../clients/web/viewer/src/slices/plane.js";
 import { orientationOf, pointAt } from "../../../clients/web/viewer/src/slices/plane.js";
 import { CT_PRESETS, greyOf, type Window } from "../../../clients/web/viewer/src/slices/window.js";
 import { launch, newPage, openBody, Site, type Viewed } from "../support/page.js";
-import { apart, colorAt, project } from "../support/picture.js";
+import { apart, colorAt, foremost, project } from "../support/picture.js";
 import { Server } from "../support/server.js";
 
 type Three = readonly [number, number, number];
@@ -154,6 +154,34 @@ test("two clicks measure the true distance, posed and scanned, and it is listed,
   assert.equal(await row.count(), 0);
   await page.keyboard.press("Escape");
   await part("({ slices }) => slices.store.set({ tool: 'cross', open: false })");
+});
+
+test("two clicks on the body measure between the points of its surface that were clicked", async () => {
+  const { page } = viewed, stream = await client.subscribeMesh();
+  const frame = stream.latest ?? await new Promise<BodyFrame>((resolve) => stream.on("frame", resolve));
+  const rows = ["femur_left", "femur_right"].map((name) => model.tissues.findIndex((tissue) => tissue.name === name));
+  // Nothing else stands before them; the foremost vertex of each is seen from the front. (Of the skull that is a spike.)
+  await page.evaluate((only) => (window as any).ecorche.layers.isolate(only), rows);
+  await page.evaluate(() => (window as any).ecorche.fit("front", true));
+  await page.keyboard.press("l");
+  const ends = rows.map((row) => foremost(frame, row));
+  for (const end of ends) {
+    const { x, y } = await project(page, end);
+    await page.mouse.click(x, y);
+  }
+  await page.waitForFunction(() => (window as any).ecorcheSlices.measures.store.state.list.length === 1);
+  const points = await part<{ posed: Three; rest: Three | null }[]>("({ measures }) => measures.store.state.list[0].points");
+  // A pixel is some mm wide, and the surface slopes away from the vertex by less than it.
+  const mm = await page.evaluate(() => (window as any).ecorche.stage.camera.position.length() * 2000 * Math.tan(Math.PI / 12) / (window as any).ecorche.stage.canvas.clientHeight);
+  points.forEach(({ posed }, at) => assert.ok(Math.hypot(...posed.map((value, axis) => value - ends[at]![axis]!)) < 3 * mm + 2, `${posed} was clicked, ${ends[at]} aimed at`));
+  const expected = Math.hypot(...ends[0]!.map((value, axis) => value - ends[1]![axis]!));
+  const shown = Number.parseFloat((await page.locator(".measures tbody tr td").first().textContent())!);
+  assert.ok(Math.abs(shown - expected) < 3 * mm + 2, `${shown} mm, expected ${expected}`);
+  await page.click(".measures button[aria-label='Remove distance 1']");
+  await page.keyboard.press("Escape");
+  await part("({ slices }) => slices.store.set({ tool: 'cross', open: false })");
+  await page.evaluate((only) => (window as any).ecorche.layers.isolate(only), rows);
+  await client.closeMesh(stream);
 });
 
 test("the clipping plane opens the body and closes the cut with lids", async () => {

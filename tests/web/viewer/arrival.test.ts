@@ -73,14 +73,14 @@ const normalOf = (coded: number): number[] => {
   return n.map((value) => value / length);
 };
 
-test("on a fast line the body stays with frames", async () => {
+test("on a fast line the body stays with frames", async (context) => {
   let late = false;
   await move(5000, async () => {
     late ||= await page().evaluate(() => (window as any).ecorche.store.state.stats.latencyMs > 150);
     return false;
   });
   // A machine that does something else looks like a slow line at times.
-  if (late) return;
+  if (late) return context.skip("the machine was busy");
   assert.equal(await way(), "frames");
   assert.match(await arrivalText() ?? "", /detail$/);
 });
