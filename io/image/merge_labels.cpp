@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include <ecorche/values/error.hpp>
+#include "io/image/renumber.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -21,21 +22,6 @@ std::set<std::int64_t> ids_of(const Segmentation& map) {
   }
   ids.erase(0);
   return ids;
-}
-
-template <class T>
-void add(std::span<const T> from, const std::map<std::int64_t, std::uint16_t>& numbers,
-         const std::vector<std::uint8_t>& taken, std::span<std::uint16_t> to) {
-  T last{};
-  std::uint16_t number = 0;  // neighbours are mostly alike
-  for (std::size_t v = 0; v < from.size(); ++v) {
-    if (from[v] != last) {
-      last = from[v];
-      const auto found = numbers.find(static_cast<std::int64_t>(last));
-      number = found == numbers.end() ? std::uint16_t{0} : found->second;
-    }
-    if (number != 0 && taken[v] == 0) to[v] = number;
-  }
 }
 
 }  // namespace
@@ -82,11 +68,12 @@ Segmentation merged(std::vector<Segmentation> maps) {
     }
     for (std::size_t layer = 0; layer < map.layers.size(); ++layer) {
       if (layer == out.layers.size()) out.layers.emplace_back(grid, ScalarType::u16);
-      with_scalar_type(map.layers[layer].type, [&](auto zero) {
-        using T = decltype(zero);
-        add<T>(std::as_const(map.layers[layer]).scalars<T>(), numbers, taken,
-               out.layers[layer].scalars<std::uint16_t>());
-      });
+      const Image numbered = renumber(map.layers[layer], numbers);
+      const auto from = numbered.scalars<std::uint16_t>();
+      const auto to = out.layers[layer].scalars<std::uint16_t>();
+      for (std::size_t v = 0; v < from.size(); ++v) {
+        if (from[v] != 0 && taken[v] == 0) to[v] = from[v];
+      }
     }
     map = {};  // its memory is not needed any more
     for (const Image& layer : out.layers) {

@@ -16,6 +16,7 @@
 #include "io/image/header_fields.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/nifti_names.hpp"
+#include "io/image/renumber.hpp"
 #include "io/image/terminology.hpp"
 
 namespace ecorche::io {
@@ -77,26 +78,6 @@ Image take_layer(const Image& image, int layer) {
   const std::byte* from = image.bytes.data() + size * static_cast<std::size_t>(layer);
   for (std::size_t v = 0; v < out.grid.voxels(); ++v)
     std::memcpy(out.bytes.data() + v * size, from + v * step, size);
-  return out;
-}
-
-Image renumber(const Image& layer, const std::map<std::int64_t, std::uint16_t>& ids) {
-  Image out(layer.grid, ScalarType::u16);
-  const auto to = out.scalars<std::uint16_t>();
-  with_scalar_type(layer.type, [&](auto zero) {
-    using T = decltype(zero);
-    const auto from = layer.scalars<T>();
-    T last{};
-    std::uint16_t id = 0;  // neighbours are mostly alike
-    for (std::size_t v = 0; v < from.size(); ++v) {
-      if (from[v] != last) {
-        last = from[v];
-        const auto found = ids.find(static_cast<std::int64_t>(last));
-        id = found == ids.end() ? std::uint16_t{0} : found->second;
-      }
-      to[v] = id;
-    }
-  });
   return out;
 }
 

@@ -178,16 +178,19 @@ TEST(LabelTable, EveryMistakeIsNamed) {
   refused("a.tsv", std::string("index\tname\n1\0\n", 13), "is no text");
 }
 
-TEST(CaseLabels, TablesComeFromFilesOrFromTheImage) {
-  const Scratch scratch;
-  write_case(scratch.path(), small_case(), Context{});
+// The small case in `scratch`, its labels as said.
+Case read_with_labels(const Scratch& scratch, const std::string& labels) {
   const std::string head =
       "name: a\nskeleton: skeleton.yaml\nskin: skin.stl\nbones:\n  - {name: pelvis_bone, file: "
       "bones/pelvis_bone.stl, segment: pelvis}\n";
-  const auto read = [&](const std::string& labels) {
-    return read_case(scratch.put("case.yaml", head + "labels: " + labels + "\n"), {scratch.path(), ""},
-                     Context{});
-  };
+  return read_case(scratch.put("case.yaml", head + "labels: " + labels + "\n"), {scratch.path(), ""},
+                   Context{});
+}
+
+TEST(CaseLabels, TablesComeFromFilesOrFromTheImage) {
+  const Scratch scratch;
+  write_case(scratch.path(), small_case(), Context{});
+  const auto read = [&](const std::string& labels) { return read_with_labels(scratch, labels); };
   scratch.put("t.ctbl", "1 Pelvis 0 0 0 0\n");
   const std::map<std::int64_t, std::string> pelvis{{1, "pelvis"}};
   EXPECT_EQ(read("{file: volumes/labels.nrrd, table: t.ctbl}").labels->table, pelvis);
@@ -216,13 +219,7 @@ TEST(CaseLabels, TablesComeFromFilesOrFromTheImage) {
 TEST(CaseLabels, SeveralMapsHaveAnOrder) {
   const Scratch scratch;
   write_case(scratch.path(), small_case(), Context{});
-  const std::string head =
-      "name: a\nskeleton: skeleton.yaml\nskin: skin.stl\nbones:\n  - {name: pelvis_bone, file: "
-      "bones/pelvis_bone.stl, segment: pelvis}\n";
-  const auto read = [&](const std::string& labels) {
-    return read_case(scratch.put("case.yaml", head + "labels: " + labels + "\n"), {scratch.path(), ""},
-                     Context{});
-  };
+  const auto read = [&](const std::string& labels) { return read_with_labels(scratch, labels); };
   const auto put = [&](const std::string& name, std::vector<std::uint8_t> voxels, double spacing = 1) {
     ImageGrid grid;
     grid.size = {static_cast<std::int32_t>(voxels.size()), 1, 1};

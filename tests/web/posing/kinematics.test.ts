@@ -7,7 +7,7 @@ import path from "node:path";
 import { after, before, test } from "node:test";
 import { parse } from "yaml";
 import { Client } from "../../../clients/web/protocol/src/index.js";
-import { anglesFromRotation, constrain, rotationFromAngles, setAngle, settable, type Angles } from "../../../clients/web/viewer/src/posing/angles.js";
+import { anglesFromRotation, anglesWithin, constrain, rotationFromAngles, setAngle, settable, type Angles } from "../../../clients/web/viewer/src/posing/angles.js";
 import { forward, move, placeJoint } from "../../../clients/web/viewer/src/posing/forward.js";
 import { counterpart, mirrorPose } from "../../../clients/web/viewer/src/posing/mirror.js";
 import { restPose, samePose, withRotation, type Pose } from "../../../clients/web/viewer/src/posing/pose.js";
@@ -95,7 +95,7 @@ function holdAgainstProgram(model: string, body: Rig, pose: Pose): void {
   for (const { name, residual_mm } of report.targets) assert.ok(residual_mm < 1e-6, `${name} is ${residual_mm} mm from where the viewer has it`);
   body.segments.forEach(({ joint }, row) => {
     if (joint.sequence.length === 0) return;
-    const angles = anglesFromRotation(joint, done.rotation[row]!);
+    const angles = anglesWithin(joint, done.rotation[row]!);
     joint.sequence.forEach((angle, i) => {
       const theirs = report.angles[joint.name][`${angle.name}_deg`];
       const apart = theirs - angles[i]! * DEGREES;  // half a turn this way is half a turn that way
