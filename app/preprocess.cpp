@@ -190,8 +190,10 @@ int run(const Program& program, const PreprocessSettings& settings) {
   timed(stages, "write", [&] { model_file::write(made.model, settings.output, program.context("write")); });
 
   std::vector<model_file::DigestCheck> digests;  // of what is on the disk now
-  timed(stages, "verify",
-        [&] { digests = model_file::check_digests(settings.output, program.context("verify")); });
+  // The model stands under its name by now: a stop would leave it there and call it interrupted.
+  Context verifying = program.context("verify");
+  verifying.stop = {};
+  timed(stages, "verify", [&] { digests = model_file::check_digests(settings.output, verifying); });
   const auto bad = static_cast<std::size_t>(std::count_if(
       digests.begin(), digests.end(), [](const model_file::DigestCheck& d) { return !d.good; }));
   if (bad > 0) {

@@ -234,6 +234,17 @@ class Cli(unittest.TestCase):
             self.assertLess(time.monotonic() - start, 5, f"slow to stop after {wait} s (a busy machine is allowed for)")
             self.assertEqual(list(self.folder.iterdir()), [], f"something was left after {wait} s")
 
+    def test_a_stop_that_comes_when_the_model_is_written_is_too_late(self):
+        target = self.folder / "m.hdf"
+        child = subprocess.Popen([ECORCHE, "preprocess", str(CASE), "-o", str(target)],
+                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        while child.poll() is None and not target.exists():
+            time.sleep(0.0005)
+        child.send_signal(signal.SIGINT)
+        _, err = child.communicate(timeout=60)
+        self.assertEqual(child.returncode, 0, err)
+        self.assertEqual(list(self.folder.iterdir()), [target])
+
     def test_killed_at_many_points_leaves_the_old_model_whole(self):
         target = self.folder / "m.hdf"
         shutil.copy(MODEL, target)

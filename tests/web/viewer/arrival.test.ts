@@ -157,10 +157,14 @@ test("on a slow line it changes by itself, and says so", async () => {
   // At rest the finest comes, whichever way.
   await page().waitForFunction(() => /^full detail/.test(document.querySelector(".readout .arrival")!.textContent!), undefined, { timeout: 60_000 });
   if (await way() === "skinning") {
-    // A pose is then some 2 kB; as vertices it was 80.
-    await move(4000);
-    const { framesPerSecond, bytesPerSecond } = await page().evaluate(() => (window as any).ecorche.store.state.stats);
-    assert.ok(framesPerSecond > 0 && bytesPerSecond / framesPerSecond < 8e3, `${bytesPerSecond} bytes and ${framesPerSecond} frames a second`);
+    // A pose is then some 2 kB; as vertices it was 80. On a busy machine it may change once or twice until it stays.
+    let bytesPerPose = Infinity;
+    await move(60_000, async () => {
+      const { framesPerSecond, bytesPerSecond } = await page().evaluate(() => (window as any).ecorche.store.state.stats);
+      bytesPerPose = framesPerSecond > 0 ? bytesPerSecond / framesPerSecond : Infinity;
+      return await way() === "skinning" && bytesPerPose < 8e3;
+    });
+    assert.ok(bytesPerPose < 8e3, `${bytesPerPose} bytes a pose`);
   }
 });
 

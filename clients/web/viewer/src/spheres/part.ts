@@ -90,11 +90,11 @@ export function makeBalls(app: App, posing: Posing, content: HTMLElement): Balls
   };
   addBallsPanel(app, hanging, store, names, { load: () => void load(), reset: () => void reset(), save, saveVolume: () => void saveVolume(), placeJoint: (row, place) => placeJoint(row, place) }, content);
   // The model was read anew, or the server has forgotten the session: what is shown would be another's.
+  let identity = client().model?.identity;
   app.live.onOpened(({ model }) => {
     if (hanging.store.state.spheres && model.identity !== identity) hanging.close();
     identity = model.identity;
   });
-  let identity = client().model?.identity;
   const part = { hanging, store, scene };
   // For the browser's console, and for tests.
   Object.assign(window, { ecorcheBalls: part });
