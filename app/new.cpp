@@ -7,6 +7,7 @@
 #include "app/scan/case_folder.hpp"
 #include "app/scan/scan_page.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/platform/heap.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -37,6 +38,7 @@ nlohmann::json entry_json(const ScanEntry& entry) {
 }
 
 int run(const Program& program, NewSettings& settings) {
+  platform::use_big_heap();
   if (!settings.side.empty()) settings.options.side = settings.side == "left" ? Side::left : Side::right;
   check_case_target(settings.output, settings.scan);
   Scan scan =

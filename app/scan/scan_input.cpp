@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/scan/scan_input.hpp"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <numeric>
 #include <set>
 
 #include "core/values/text.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/dicom_segmentation.hpp"
+#include "io/image/equal_run.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/label_json.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/mask_folder.hpp"
 #include "io/image/nifti_names.hpp"
+#include "io/image/non_finite.hpp"
+#include "io/image/whole_labels.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -20,6 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostLabels = 2048;  // values of a picture are more
+constexpr std::size_t kAtOnce = 4;         // files that are read beside each other: each takes memory
 constexpr double kAirHu = -500, kAirBackground = -1024;
 
 std::string small_ending(const fs::path& path) {
@@ -36,10 +45,10 @@ std::optional<std::set<std::int64_t>> label_values(const Image& image) {
   std::set<std::int64_t> seen;
   const bool fits = with_scalar_type(image.type, [&](auto zero) {
     using T = decltype(zero);
-    T last{};
-    for (const T v : image.scalars<T>()) {
-      if (v == last) continue;
-      last = v;
+    const auto voxels = image.scalars<T>();
+    const T* const end = voxels.data() + voxels.size();
+    for (const T* at = voxels.data(); at != end; at = io::end_of_run(at, end)) {
+      const T v = *at;
       if (!(v >= T{}) || static_cast<double>(v) != std::floor(static_cast<double>(v)) ||
           static_cast<double>(v) > 2147483647.0)
         return false;
@@ -89,6 +98,16 @@ Names read_names(const fs::path& table) {
   return {io::make_identifiers(read.names), std::move(read.codes)};
 }
 
+// What one file holds, as far as that can be told without the others.
+struct Looked {
+  Image image;
+  std::optional<std::set<std::int64_t>> values;  // where they may be labels
+  std::map<std::int64_t, std::string> names;     // in its header
+  std::optional<io::Mask> mask;                  // instead of the image, of a file of a folder
+  std::vector<std::string> notes;
+  std::exception_ptr error;
+};
+
 // `clin_ct_ribs_` of MOOSE's `clin_ct_ribs_organ_indices.json`, else the stem.
 std::string table_stem(const fs::path& table) {
   const std::string name = table.filename().string();
@@ -116,12 +135,8 @@ class Reader {
         files.push_back(path);
       }
     }
-    std::size_t done = 0;
-    for (const fs::path& path : files) {
-      read_file(path);
-      context_.report(static_cast<double>(++done) / static_cast<double>(files.size()));
-    }
-    read_mask_groups();
+    read_files(files);
+    take_mask_groups();
     name_labels();
     if (out_.labels.empty() && out_.images.empty())
       throw Error(ErrorKind::data, paths.front().string(), "holds no image",
@@ -130,6 +145,11 @@ class Reader {
   }
 
  private:
+  struct MaskFolder {
+    io::MaskLayers layers;
+    std::size_t files = 0;
+  };
+
   void list_folder(const fs::path& folder, std::vector<fs::path>& files) {
     const std::vector<fs::path> images = io::images_within(folder);
     std::error_code error;
@@ -146,9 +166,68 @@ class Reader {
     folders_.insert(folder);
   }
 
-  // A folder's masks are read again, together: only whether it is one is looked at here.
-  void read_file(const fs::path& path) {
-    context_.check_stop();
+  // Several beside each other; what becomes of them is decided in their order. Bytes tell how long it takes.
+  void read_files(const std::vector<fs::path>& files) {
+    std::vector<double> bytes;
+    for (const fs::path& path : files) bytes.push_back(bytes_of(path));
+    const double all = std::accumulate(bytes.begin(), bytes.end(), 0.0);
+    double done = 0;
+    const auto most = static_cast<std::size_t>(std::max(1, tbb::this_task_arena::max_concurrency()));
+    const std::size_t at_once = std::min(kAtOnce, most);
+    for (std::size_t begin = 0; begin < files.size(); begin += at_once) {
+      context_.check_stop();
+      std::vector<Looked> some(std::min(at_once, files.size() - begin));
+      tbb::parallel_for(std::size_t{0}, some.size(), [&](std::size_t i) {
+        try {
+          some[i] = look(files[begin + i]);
+        } catch (...) {
+          some[i].error = std::current_exception();
+        }
+      });
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        for (const std::string& note : some[i].notes) options_.say(note);
+        if (some[i].error) std::rethrow_exception(some[i].error);
+        take(files[begin + i], std::move(some[i]));
+        context_.report((done += bytes[begin + i]) / all);
+      }
+    }
+  }
+
+  static double bytes_of(const fs::path& path) {
+    std::error_code error;
+    double out = 1;
+    if (!fs::is_directory(path, error)) {
+      const auto size = fs::file_size(path, error);
+      return error ? out : out + static_cast<double>(size);
+    }
+    for (fs::directory_iterator at(path, error); !error && at != fs::directory_iterator();
+         at.increment(error))
+      if (at->is_regular_file(error)) out += static_cast<double>(at->file_size(error));
+    return out;
+  }
+
+  static bool is_slicer(const fs::path& path) {
+    return text::lower(path.filename().string()).ends_with(".seg.nrrd");
+  }
+
+  Looked look(const fs::path& path) const {
+    Looked out;
+    if (io::is_dicom(path) || is_slicer(path)) return out;
+    const files::ReadOptions options{options_.limits,
+                                     [&out](std::string_view line) { out.notes.emplace_back(line); }};
+    out.image = io::read_stored_image(path, options);
+    check_components(path, out.image);
+    out.values = label_values(out.image);
+    out.names = io::read_nifti_names(path);
+    const bool alone = out.values && out.values->size() <= 1 && out.names.empty();
+    if (alone && folders_.contains(path.parent_path()) && !table_for(path)) {
+      out.mask = io::as_mask(out.image);
+      out.image = {};
+    }
+    return out;
+  }
+
+  void take(const fs::path& path, Looked looked) {
     if (io::is_dicom(path)) {
       if (std::optional<io::Segmentation> map = io::read_dicom_segmentation(path, options_, {})) {
         out_.labels.push_back({path, std::move(*map), "its segments"});
@@ -157,35 +236,34 @@ class Reader {
       }
       return;
     }
-    const bool nrrd = text::lower(path.filename().string()).ends_with(".seg.nrrd");
-    if (nrrd) {
+    if (is_slicer(path)) {
       io::Segmentation map = io::read_segmentation(path, options_);
       const bool named = !map.names.empty();
       out_.labels.push_back({path, std::move(map), named ? "its own segments" : ""});
       return;
     }
-    Image image = io::read_image(path, options_);
-    check_components(path, image);
-    const auto values = label_values(image);
-    const auto names = io::read_nifti_names(path);
-    const bool in_folder = folders_.contains(path.parent_path());
-    if (values && values->size() <= 1 && in_folder && names.empty() && !table_for(path)) {
-      masks_[path.parent_path()].push_back(path);
+    if (looked.mask) {
+      MaskFolder& folder = masks_[path.parent_path()];
+      folder.layers.add(*looked.mask, path);
+      ++folder.files;
       return;
     }
-    const bool labels = values && (!names.empty() || table_for(path) || !looks_grey(image, values->size()));
+    const auto& values = looked.values;
+    // A file that names labels means them: values that are none are refused below.
+    const bool labels =
+        !looked.names.empty() || (values && (table_for(path) || !looks_grey(looked.image, values->size())));
     if (!labels) {
-      add_grey(path, std::move(image));
+      io::replace_non_finite(looked.image, path, options_);
+      add_grey(path, std::move(looked.image));
       return;
     }
-    if (values->empty()) {
+    if (values && values->empty()) {
       out_.notes.push_back(path.string() + ": holds no label: it is left out");
       return;
     }
-    image = {};
-    io::Segmentation map = io::read_segmentation(path, options_);
+    io::Segmentation map = io::segmentation_of(io::whole_labels(std::move(looked.image), path), path);
     const bool named = !map.names.empty();
-    if (!named && values->size() == 1) {  // a mask by itself is named by its file
+    if (!named && values && values->size() == 1) {  // a mask by itself is named by its file
       map.names = io::make_identifiers({{*values->begin(), io::image_stem(path)}});
       out_.labels.push_back({path, std::move(map), "the name of its file"});
       return;
@@ -207,13 +285,12 @@ class Reader {
     out_.images.push_back(grey(path, std::move(image)));
   }
 
-  void read_mask_groups() {
-    for (const auto& [folder, files] : masks_) {
-      std::size_t empty = 0;
-      io::Segmentation map = io::read_masks(files, options_, context_.quiet(), &empty);
-      if (empty > 0)
+  void take_mask_groups() {
+    for (auto& [folder, masks] : masks_) {
+      io::Segmentation map = masks.layers.take(folder);
+      if (const std::size_t empty = masks.layers.empty(); empty > 0)
         out_.notes.push_back(folder.string() + ": " + std::to_string(empty) + " of " +
-                             std::to_string(files.size()) + " masks are empty: those structures are absent");
+                             std::to_string(masks.files) + " masks are empty: those structures are absent");
       out_.labels.push_back({folder, std::move(map), "the names of its files"});
     }
   }
@@ -279,7 +356,7 @@ class Reader {
   Scan out_;
   std::vector<fs::path> tables_;
   std::set<fs::path> folders_;
-  std::map<fs::path, std::vector<fs::path>> masks_;
+  std::map<fs::path, MaskFolder> masks_;
 };
 
 }  // namespace

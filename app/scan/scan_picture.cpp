@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -90,11 +91,19 @@ Picture picture_of(const ScanCase& scan, bool from_front, int pixels, const std:
     const auto p = grid.point(i, j, k);
     return Eigen::Vector3d(p[0], p[1], p[2]);
   };
+  // A box of indices is a box of points where axes are straight, and holds one where they are oblique.
+  std::array<int, 3> first{grid.size[0], grid.size[1], grid.size[2]}, last{-1, -1, -1};
   each([&](int i, int j, int k, std::uint16_t) {
-    const Eigen::Vector3d p = point(i, j, k);
+    first = {std::min(first[0], i), std::min(first[1], j), std::min(first[2], k)};
+    last = {std::max(last[0], i), std::max(last[1], j), std::max(last[2], k)};
+  });
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d p =
+        point((corner & 1) != 0 ? last[0] : first[0], (corner & 2) != 0 ? last[1] : first[1],
+              (corner & 4) != 0 ? last[2] : first[2]);
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
-  });
+  }
   const double coarse = *std::max_element(grid.spacing.begin(), grid.spacing.end());
   const report::View view =
       (from_front ? report::View::coronal() : report::View::sagittal())
@@ -109,7 +118,22 @@ Picture picture_of(const ScanCase& scan, bool from_front, int pixels, const std:
     half += 0.5 * grid.spacing[a] / view.pixel_mm *
             Eigen::Vector2d(std::abs(axis.dot(view.across)), std::abs(axis.dot(view.up)));
   }
+  // A voxel with another of its structure before it is not seen: most are not.
+  std::size_t axis = 0;
+  double most = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const Eigen::Vector3d along(grid.direction[a], grid.direction[3 + a], grid.direction[6 + a]);
+    if (std::abs(along.dot(view.toward)) <= std::abs(most)) continue;
+    most = along.dot(view.toward);
+    axis = a;
+  }
+  const int before = most > 0 ? 1 : -1;
+  const auto hidden = [&](std::array<int, 3> v, std::uint16_t id) {
+    v[axis] += before;
+    return v[axis] >= 0 && v[axis] < grid.size[axis] && voxels[grid.offset(v[0], v[1], v[2])] == id;
+  };
   each([&](int i, int j, int k, std::uint16_t id) {
+    if (hidden({i, j, k}, id)) return;
     const ScanEntry& entry = scan.entries[id - 1U];
     Layer& layer = !entry.drawn || entry.role == Role::body ? body : entry.role == Role::bone ? bones : soft;
     const Eigen::Vector3d p = point(i, j, k);

@@ -76,20 +76,22 @@ ImageHeader parse_nifti_header(std::string_view head, const std::filesystem::pat
 /// Makes `data_offset` the byte where the voxels or their stream begin: behind skipped lines, before the end.
 void place_data(ImageHeader& header);
 
-/// Fills `image`, whose grid and type are set, from the file that `header` was read from and that
-/// `check_payload` has passed. Throws Error{io}, and Error{data} for 64-bit integers beyond 32 bits.
-void read_voxels(const ImageHeader& header, const std::filesystem::path& path, Image& image);
+/// Fills `image`, whose grid and type are set, from `stored` of the file that `header` was read from. Throws
+/// Error{data} for 64-bit integers beyond 32 bits.
+void read_voxels(const ImageHeader& header, const std::filesystem::path& path, std::vector<std::byte> stored,
+                 Image& image);
 
-/// The voxels of a checked file as they are stored. Throws Error{io}.
+/// The voxels as they are stored, of a file that `check_payload` has passed: of a gzip stream no more than
+/// its header declares is kept, nor anything set aside that it does not hold. Throws Error{io}, and
+/// Error{data} for a stream that is damaged, or of another length than declared.
 std::vector<std::byte> stored_voxels(const ImageHeader& header, const std::filesystem::path& path);
 
 /// What a gzip stream at the beginning of `packed` inflates to, at most `limit` bytes of it. Throws
 /// Error{data}.
 std::string inflate_head(std::string_view packed, std::size_t limit, const std::filesystem::path& path);
 
-/// Holds the declared bytes against the data file: its length where raw, its whole inflated stream where gzip
-/// (counted without storing it, so that a lying header costs nothing); and all that they take in memory
-/// against the budget of a file of that size. Throws Error{data}.
+/// Holds the declared bytes against the data file: its length where raw, what its length may inflate to where
+/// gzip; and all that they take in memory against the budget of a file of that size. Throws Error{data}.
 void check_payload(const ImageHeader& header, const std::filesystem::path& path,
                    const files::ReadLimits& limits);
 

@@ -13,6 +13,7 @@
 #include "io/image/header_fields.hpp"
 #include "io/image/itk_images.hpp"
 #include "io/image/non_finite.hpp"
+#include "io/image/packed_nrrd.hpp"
 #include "io/image/right_angles.hpp"
 #include "io/image/whole_labels.hpp"
 
@@ -116,6 +117,7 @@ Image read_stored(const Path& path, const files::ReadOptions& options, const Ima
   if (declared.grid) check_grid(*declared.grid, path, options);
   place_data(declared);
   check_payload(declared, path, options.limits);
+  std::vector<std::byte> stored = stored_voxels(declared, path);
   Image image = opinion(declared, path, format, skewed);
   check_agreement(declared, image, path);
   if (declared.grid) {
@@ -123,7 +125,7 @@ Image read_stored(const Path& path, const files::ReadOptions& options, const Ima
   } else {
     check_grid(image.grid, path, options);
   }
-  read_voxels(declared, path, image);
+  read_voxels(declared, path, std::move(stored), image);
   return image;
 }
 
@@ -150,6 +152,10 @@ Image read_label_image(const Path& path, const files::ReadOptions& options, cons
   return whole_labels(read_stored(path, options, choice, true), path);
 }
 
+Image read_stored_image(const Path& path, const files::ReadOptions& options) {
+  return read_stored(path, options, {}, false);
+}
+
 void write_image(const Path& path, const Image& image, bool compress) {
   Format format = Format::nrrd;
   if (ends_with(path, ".mha")) {
@@ -169,7 +175,11 @@ void write_image(const Path& path, const Image& image, bool compress) {
                 "report this");
   }
   files::AtomicFile file(path);
-  itk_images::write(file.temporary(), format, image, compress);
+  if (format == Format::nrrd && compress && image.components == 1) {
+    write_packed_nrrd(file.temporary(), image);
+  } else {
+    itk_images::write(file.temporary(), format, image, compress);
+  }
   file.commit();
 }
 

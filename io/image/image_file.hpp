@@ -25,6 +25,10 @@ Image read_image(const std::filesystem::path& path, const files::ReadOptions& op
 Image read_label_image(const std::filesystem::path& path, const files::ReadOptions& options = {},
                        const ImageChoice& choice = {});
 
+/// The same as the file has it, for those who look first whether it holds grey values or labels: nothing is
+/// replaced yet. Of what is no DICOM.
+Image read_stored_image(const std::filesystem::path& path, const files::ReadOptions& options);
+
 /// Writes `.nrrd`, `.mha` or `.nii.gz`, atomically; compressed where `compress`.
 /// Throws Error{usage} for another extension, Error{cannot_create}, Error{io}.
 void write_image(const std::filesystem::path& path, const Image& image, bool compress = true);

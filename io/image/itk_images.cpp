@@ -9,6 +9,7 @@
 #include <itkNrrdImageIO.h>
 
 #include <iostream>
+#include <mutex>
 #include <sstream>
 
 #include <ecorche/values/error.hpp>
@@ -73,6 +74,9 @@ std::string one_line(std::string_view text) {
 
 template <class F>
 auto guarded(ErrorKind kind, const std::filesystem::path& path, F&& f) {
+  // What `Complaints` changes is the whole process's: one call at a time.
+  static std::mutex one;
+  const std::lock_guard lock(one);
   const Complaints kept;
   try {
     return f();

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/values/text.hpp"
+#include "io/image/equal_run.hpp"
 #include "io/image/header_fields.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/same_grid.hpp"
@@ -18,48 +19,48 @@ using Path = std::filesystem::path;
 constexpr std::array<std::string_view, 6> kEndings{".nii.gz", ".nii", ".nrrd", ".nhdr", ".mha", ".mhd"};
 constexpr std::size_t kMostMasks = 4096;
 
-struct Mask {
-  std::vector<std::uint8_t> inside;
-  std::size_t voxels = 0;
-};
+using Run = Mask::Run;
 
-// What is not 0; refuses more than one other value.
-Mask mask_of(const Image& image, const Path& path) {
-  Mask mask;
-  mask.inside.resize(image.grid.voxels());
-  with_scalar_type(image.type, [&](auto zero) {
+template <class T>
+std::optional<std::vector<Run>> runs_of(std::span<const T> voxels) {
+  std::vector<Run> out;
+  T value{};
+  const T *const first = voxels.data(), *const last = first + voxels.size();
+  for (const T* at = first; at != last;) {
+    const T* const end = end_of_run(at, last);
+    if (*at != T{}) {
+      if (value == T{}) value = *at;
+      if (*at != value) return std::nullopt;
+      out.push_back({static_cast<std::uint64_t>(at - first), static_cast<std::uint64_t>(end - first)});
+    }
+    at = end;
+  }
+  return out;
+}
+
+// Two values of an image that is no mask.
+std::string two_values(const Image& image) {
+  return with_scalar_type(image.type, [&](auto zero) {
     using T = decltype(zero);
     const auto voxels = image.scalars<T>();
-    T value{};
-    for (std::size_t v = 0; v < voxels.size(); ++v) {
-      if (voxels[v] == T{}) continue;
-      if (value == T{}) value = voxels[v];
-      if (voxels[v] != value)
-        fields::refuse(path,
-                       "is no mask: it holds several labels, among them " +
-                           std::to_string(static_cast<std::int64_t>(value)) + " and " +
-                           std::to_string(static_cast<std::int64_t>(voxels[v])),
-                       "name it by itself, as a label map");
-      mask.inside[v] = 1;
-      ++mask.voxels;
-    }
+    const auto first = std::find_if(voxels.begin(), voxels.end(), [](T v) { return v != T{}; });
+    const auto other = std::find_if(first, voxels.end(), [&](T v) { return v != T{} && v != *first; });
+    return std::to_string(static_cast<std::int64_t>(*first)) + " and " +
+           std::to_string(static_cast<std::int64_t>(*other));
   });
-  return mask;
 }
 
-bool free_for(const Image& layer, const Mask& mask) {
-  const auto voxels = layer.scalars<std::uint16_t>();
-  for (std::size_t v = 0; v < voxels.size(); ++v) {
-    if (mask.inside[v] != 0 && voxels[v] != 0) return false;
-  }
-  return true;
+void check_count(std::size_t masks, const Path& folder) {
+  if (masks > kMostMasks)
+    fields::refuse(folder, "holds " + std::to_string(masks) + " masks", "a folder may hold 4096");
 }
 
-void put(Image& layer, const Mask& mask, std::uint16_t id) {
+bool free_for(const Image& layer, const std::vector<Run>& runs) {
   const auto voxels = layer.scalars<std::uint16_t>();
-  for (std::size_t v = 0; v < voxels.size(); ++v) {
-    if (mask.inside[v] != 0) voxels[v] = id;
-  }
+  return std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
+    return std::all_of(voxels.data() + run.begin, voxels.data() + run.end,
+                       [](std::uint16_t v) { return v == 0; });
+  });
 }
 
 }  // namespace
@@ -95,50 +96,67 @@ std::vector<Path> images_within(const Path& folder) {
   return out;
 }
 
+std::optional<Mask> as_mask(const Image& image) {
+  if (image.components != 1) return std::nullopt;
+  return with_scalar_type(image.type, [&](auto zero) -> std::optional<Mask> {
+    auto runs = runs_of(image.scalars<decltype(zero)>());
+    if (!runs) return std::nullopt;
+    return Mask{image.grid, std::move(*runs)};
+  });
+}
+
+void MaskLayers::add(const Mask& mask, const Path& path) {
+  if (count_++ == 0) first_ = path.filename().string();
+  check_count(count_, path.parent_path());
+  if (!grid_) grid_ = mask.grid;
+  if (!same_place(mask.grid, *grid_))
+    fields::refuse(
+        path,
+        "its voxels are not those of " + first_ + ": " + described(mask.grid) + ", not " + described(*grid_),
+        "resample it onto the grid of the others by nearest neighbour, or move it to a folder of its own");
+  if (mask.runs.empty()) {
+    ++empty_;
+    return;
+  }
+  const auto id = static_cast<std::uint16_t>(names_.size() + 1);
+  names_.emplace(id, image_stem(path));
+  auto layer = std::find_if(out_.layers.begin(), out_.layers.end(),
+                            [&](const Image& l) { return free_for(l, mask.runs); });
+  if (layer == out_.layers.end()) layer = out_.layers.insert(layer, Image(*grid_, ScalarType::u16));
+  const auto voxels = layer->scalars<std::uint16_t>();
+  for (const Run& run : mask.runs) std::fill(voxels.data() + run.begin, voxels.data() + run.end, id);
+}
+
+Segmentation MaskLayers::take(const Path& folder) {
+  if (names_.empty()) {
+    fields::refuse(
+        folder, count_ == 0 ? "holds no image" : "each of its " + std::to_string(count_) + " masks is empty",
+        "name a folder of masks: femur_left.nii.gz, ...");
+  }
+  out_.names = make_identifiers(names_);
+  return std::move(out_);
+}
+
 Segmentation read_masks(const std::vector<Path>& files, const files::ReadOptions& options,
                         const Context& context, std::size_t* empty) {
-  Segmentation out;
-  std::map<std::int64_t, std::string> names;
-  std::optional<ImageGrid> grid;
-  std::size_t done = 0, absent = 0;
-  if (files.size() > kMostMasks)
-    fields::refuse(files.front().parent_path(), "holds " + std::to_string(files.size()) + " masks",
-                   "a folder may hold 4096");
+  const Path folder = files.empty() ? Path() : files.front().parent_path();
+  check_count(files.size(), folder);
+  MaskLayers layers;
+  std::size_t done = 0;
   for (const Path& path : files) {
     context.check_stop();
     const Image image = read_label_image(path, options);
     if (image.components != 1)
       fields::refuse(path, "its voxels are not one whole number each", "save a mask");
-    if (!grid) grid = image.grid;
-    if (!same_place(image.grid, *grid))
-      fields::refuse(
-          path,
-          "its voxels are not those of " + files.front().filename().string() + ": " + described(image.grid) +
-              ", not " + described(*grid),
-          "resample it onto the grid of the others by nearest neighbour, or move it to a folder of its own");
-    const Mask mask = mask_of(image, path);
+    const std::optional<Mask> mask = as_mask(image);
+    if (!mask)
+      fields::refuse(path, "is no mask: it holds several labels, among them " + two_values(image),
+                     "name it by itself, as a label map");
+    layers.add(*mask, path);
     context.report(static_cast<double>(++done) / static_cast<double>(files.size()));
-    if (mask.voxels == 0) {
-      ++absent;
-      continue;
-    }
-    const auto id = static_cast<std::uint16_t>(names.size() + 1);
-    names.emplace(id, image_stem(path));
-    auto layer =
-        std::find_if(out.layers.begin(), out.layers.end(), [&](const Image& l) { return free_for(l, mask); });
-    if (layer == out.layers.end()) layer = out.layers.insert(layer, Image(*grid, ScalarType::u16));
-    put(*layer, mask, id);
   }
-  if (empty != nullptr) *empty = absent;
-  if (names.empty()) {
-    const Path folder = files.empty() ? Path() : files.front().parent_path();
-    fields::refuse(
-        folder,
-        files.empty() ? "holds no image" : "each of its " + std::to_string(files.size()) + " masks is empty",
-        "name a folder of masks: femur_left.nii.gz, ...");
-  }
-  out.names = make_identifiers(names);
-  return out;
+  if (empty != nullptr) *empty = layers.empty();
+  return layers.take(folder);
 }
 
 }  // namespace ecorche::io

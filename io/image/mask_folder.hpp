@@ -3,6 +3,9 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include <ecorche/values/context.hpp>
@@ -19,6 +22,37 @@ bool is_image_name(const std::filesystem::path& path);
 
 /// The images of a folder, by name.
 std::vector<std::filesystem::path> images_within(const std::filesystem::path& folder);
+
+/// What is not 0 in an image of one structure.
+struct Mask {
+  struct Run {
+    std::uint64_t begin = 0, end = 0;  ///< voxels in memory order, half-open
+  };
+  ImageGrid grid;
+  std::vector<Run> runs;  ///< ascending; none where the structure is absent
+};
+
+/// The image as a mask; nothing where it holds more than one value besides 0, or several components.
+std::optional<Mask> as_mask(const Image& image);
+
+/// Masks put together as `read_masks` has them, one by one.
+class MaskLayers {
+ public:
+  /// Adds the mask of the file `path`, which gives it its name. Throws Error{data} for another grid than the
+  /// first one's.
+  void add(const Mask& mask, const std::filesystem::path& path);
+  /// How many were without a voxel.
+  std::size_t empty() const { return empty_; }
+  /// All of them; `folder` is for messages. Throws Error{data} where none has a voxel.
+  Segmentation take(const std::filesystem::path& folder);
+
+ private:
+  Segmentation out_;
+  std::map<std::int64_t, std::string> names_;
+  std::optional<ImageGrid> grid_;
+  std::string first_;
+  std::size_t count_ = 0, empty_ = 0;
+};
 
 /// Reads masks, one after the other, on one grid. Each becomes a label named like its file, numbered from 1
 /// in their order; a mask without a voxel is absent (TotalSegmentator writes those too). A mask lies in the

@@ -2,7 +2,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -109,14 +108,6 @@ std::optional<std::uint64_t> inflate_all(const ImageHeader& header, const Path& 
   return inflater.count();
 }
 
-void check_stream(const ImageHeader& header, const Path& path) {
-  const std::uint64_t expected = header.stream_offset + header.voxel_bytes();
-  const auto count = inflate_all(header, path, [](std::uint64_t, const unsigned char*, std::size_t) {});
-  if (count == expected) return;
-  refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its compressed data hold " +
-                   (count && *count > expected ? "more" : std::to_string(count.value_or(expected))));
-}
-
 // As stored, in the order of this machine, and as what they mean.
 void spend(const ImageHeader& header, std::uint64_t file_bytes, const Path& path,
            const files::ReadLimits& limits) {
@@ -188,20 +179,28 @@ void check_payload(const ImageHeader& header, const Path& path, const files::Rea
                      std::to_string(packed) + " compressed bytes cannot hold them");
   }
   spend(header, packed, path, limits);
-  check_stream(header, path);
 }
 
 std::vector<std::byte> stored_voxels(const ImageHeader& header, const Path& path) {
-  std::vector<std::byte> out(header.voxel_bytes());
+  std::vector<std::byte> out;
   if (!header.gzip) {
+    out.resize(header.voxel_bytes());
     DataFile(header).read(out.data(), out.size());
     return out;
   }
-  const std::uint64_t skip = header.stream_offset;
-  inflate_all(header, path, [&](std::uint64_t at, const unsigned char* from, std::size_t some) {
-    const std::uint64_t begin = std::max(at, skip), end = std::min(at + some, skip + out.size());
-    if (begin < end) std::memcpy(out.data() + (begin - skip), from + (begin - at), end - begin);
-  });
+  // Room is set aside, but only what comes is written there: a header that lies costs no memory.
+  out.reserve(header.voxel_bytes());
+  const std::uint64_t skip = header.stream_offset, expected = skip + header.voxel_bytes();
+  const auto count =
+      inflate_all(header, path, [&](std::uint64_t at, const unsigned char* from, std::size_t some) {
+        const std::uint64_t begin = std::max(at, skip), end = std::min(at + some, expected);
+        if (begin >= end) return;
+        const auto* bytes = reinterpret_cast<const std::byte*>(from);
+        out.insert(out.end(), bytes + (begin - at), bytes + (end - at));
+      });
+  if (count != expected)
+    refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its compressed data hold " +
+                     (count && *count > expected ? "more" : std::to_string(count.value_or(expected))));
   return out;
 }
 

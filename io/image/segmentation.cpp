@@ -138,7 +138,10 @@ Segmentation read_segmentation(const Path& path, const files::ReadOptions& optio
     if (std::optional<Segmentation> read = read_dicom_segmentation(path, options, choice))
       return std::move(*read);
   }
-  Image image = read_label_image(path, options, choice);
+  return segmentation_of(read_label_image(path, options, choice), path);
+}
+
+Segmentation segmentation_of(Image image, const Path& path) {
   const std::vector<Segment> segments = read_segments(read_nrrd_keys(path), image.components, path);
   if (segments.empty() && image.components != 1) {
     refuse(path,

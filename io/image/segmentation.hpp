@@ -37,6 +37,10 @@ struct Segmentation {
 Segmentation read_segmentation(const std::filesystem::path& path, const files::ReadOptions& options = {},
                                const ImageChoice& choice = {});
 
+/// The same of an image that `read_label_image` has read from that file, or that `whole_labels` has made of
+/// what `read_stored_image` read.
+Segmentation segmentation_of(Image image, const std::filesystem::path& path);
+
 /// Writes a `.seg.nrrd` that names its segments (those ids of `names` that a layer holds), one component a
 /// layer; atomically. Layers are of one grid and type. Throws Error{usage} for another ending,
 /// Error{cannot_create}, Error{io}.

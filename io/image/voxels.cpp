@@ -65,8 +65,8 @@ void narrow(std::span<const From> from, Image& image, const std::filesystem::pat
 
 }  // namespace
 
-void read_voxels(const ImageHeader& header, const std::filesystem::path& path, Image& image) {
-  std::vector<std::byte> bytes = stored_voxels(header, path);
+void read_voxels(const ImageHeader& header, const std::filesystem::path& path, std::vector<std::byte> bytes,
+                 Image& image) {
   const std::size_t size = header.stored_bytes();
   if (header.swapped) swap_bytes(bytes, size);
   if (header.planar && header.components > 1)

@@ -7,6 +7,7 @@
 
 #include "io/image/header.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/packed_nrrd.hpp"
 #include "tests/unit/io/itk_reading.hpp"
 #include "tests/unit/io/scratch.hpp"
 
@@ -269,6 +270,23 @@ TEST(Image, VoxelsThatAreGoneAreNamed) {
   header.data_file = scratch.put("a.raw", "less");
   expect_error(ErrorKind::io, "a.raw: reading failed (check the disk)",
                [&] { stored_voxels(header, "a.nhdr"); });
+}
+
+// Pieces are packed beside each other: what lies over their ends comes back, noise and runs.
+TEST(Image, PackedInPieces) {
+  const Scratch scratch;
+  ImageGrid grid;
+  grid.size = {301, 257, 29};
+  Image image(grid, ScalarType::i16);
+  std::uint32_t state = 1;
+  for (std::int16_t& v : image.scalars<std::int16_t>()) {
+    state = state * 1664525 + 1013904223;
+    v = state >> 31 != 0 ? static_cast<std::int16_t>(state >> 16) : std::int16_t{7};
+  }
+  write_image(scratch / "a.nrrd", image);
+  expect_same(read_image(scratch / "a.nrrd"), image, 0);
+  expect_error(ErrorKind::io, "/dev/full: writing failed (check the disk's free space)",
+               [&] { write_packed_nrrd("/dev/full", image); });
 }
 
 TEST(Image, WritingRefusesWhatItCannotDo) {
