@@ -16,6 +16,7 @@
 #include "preprocess/bounds.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/check/joints.hpp"
+#include "preprocess/check/lost_segments.hpp"
 #include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/cor/centres.hpp"
 #include "preprocess/mapping/bind.hpp"
@@ -253,8 +254,12 @@ Certificate certify(const Model& model, const Context& context) {
   if (!broken.empty()) {
     std::string what = "the model breaks its bounds: " + broken[0];
     for (std::size_t i = 1; i < std::min<std::size_t>(broken.size(), 3); ++i) what += "; " + broken[i];
-    throw Error(ErrorKind::data, "certificate", what,
-                "run ecorche check on the case, or try another --mesher or --voxel");
+    throw Error(
+        ErrorKind::data, "certificate", what,
+        broken[0].starts_with("max_outside_mm")
+            ? "a part thinner than a tet, or a surface in another frame: more tets by --max-tets; ecorche "
+              "check says which lie outside of the skin"
+            : "run ecorche check on the case, or try another --mesher or --voxel");
   }
   return certificate;
 }
@@ -288,6 +293,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   model.rig = stage.kept([&](const Context& inner) { return rig::fit(patient, inner); }, patient,
                          RigRequest{patient});
   check::refuse(check::joint_findings(patient, model.rig, context));
+  check::refuse(check::lost_segments(patient));
   model.bone_segment = owners(patient, model.rig.skeleton);
   for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);
 

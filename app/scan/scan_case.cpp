@@ -7,7 +7,9 @@
 
 #include "app/scan/label_names.hpp"
 #include "app/scan/scan_borders.hpp"
+#include "app/scan/scan_doubts.hpp"
 #include "app/scan/scan_sides.hpp"
+#include "app/scan/scan_specks.hpp"
 #include "core/values/text.hpp"
 #include "io/image/same_grid.hpp"
 #include "preprocess/scan/ct_body.hpp"
@@ -21,14 +23,14 @@ using Becomes = Structure::Becomes;
 using Role = ScanEntry::Role;
 
 constexpr std::size_t kMostEntries = 65534;
+constexpr int kFewestLayers = 3;          // of voxels along each axis
 constexpr std::size_t kLeastVoxels = 20;  // of anything that becomes a surface
-constexpr double kSpeckShare = 0.01;      // of a structure's voxels: smaller pieces are specks
 constexpr double kCovered = 0.35;         // a structure that keeps less of itself is another one's
 constexpr double kExposed = 0.05;         // share of bone on the outside of what is a body
 constexpr double kBare = 0.1;             // share of bone that may lie outside of a body's label
 
-std::string place(const std::array<double, 3>& p) {
-  return "[" + text::number(p[0], 4) + ", " + text::number(p[1], 4) + ", " + text::number(p[2], 4) + "]";
+std::string percent_of(double share) {
+  return std::to_string(std::lround(100 * share)) + " %";
 }
 
 class Decider {
@@ -46,8 +48,10 @@ class Decider {
     merge();
     context_.report(0.3);
     drop_covered();
-    take_specks_off();
+    pieces_ = take_specks_off(out_, body_, context_.quiet());
+    recount();
     give_sides(out_, names_.named, pieces_, options_.side);
+    recount();
     context_.report(0.6);
     find_skin();
     context_.report(0.9);
@@ -66,6 +70,11 @@ class Decider {
         std::min_element(scan_.labels.begin(), scan_.labels.end(),
                          [&](const ScanLabels& a, const ScanLabels& b) { return volume(a) < volume(b); });
     grid_ = finest->map.layers.front().grid;
+    if (const int least = *std::min_element(grid_.size.begin(), grid_.size.end()); least < kFewestLayers)
+      throw Error(ErrorKind::data, finest->path.string(),
+                  "has " + std::to_string(least) + (least == 1 ? " layer" : " layers") +
+                      " of voxels along one axis: no body can be drawn round them",
+                  "give the whole scan, not a slice of it");
     for (ScanLabels& labels : scan_.labels) {
       const ImageGrid own = labels.map.layers.front().grid;
       if (io::same_place(own, grid_)) continue;
@@ -174,58 +183,12 @@ class Decider {
     recount();
   }
 
-  void take_specks_off() {
-    std::vector<std::uint8_t> wanted(out_.entries.size() + 1, 0);
-    for (std::size_t e = 0; e < out_.entries.size(); ++e) wanted[e + 1] = out_.entries[e].drawn ? 1 : 0;
-    pieces_ = scan::find_pieces(out_.labels, wanted, context_.quiet());
-    std::vector<std::uint8_t> speck(pieces_.pieces.size(), 0);
-    struct Count {
-      std::size_t pieces = 0, voxels = 0;
-      std::array<double, 3> first{0, 0, 0};
-    };
-    std::vector<Count> specks(out_.entries.size());
-    for (std::size_t p = 0; p < speck.size(); ++p) {
-      const scan::Piece& piece = pieces_.pieces[p];
-      const std::size_t e = piece.id - 1U;
-      if (static_cast<double>(piece.voxels) >= kSpeckShare * static_cast<double>(out_.entries[e].voxels))
-        continue;
-      speck[p] = 1;
-      if (specks[e].pieces++ == 0) specks[e].first = piece.centre;
-      specks[e].voxels += piece.voxels;
-    }
-    std::uint16_t body = 0;
-    for (std::size_t e = 0; e < out_.entries.size() && body == 0; ++e)
-      body = out_.entries[e].role == Role::body ? static_cast<std::uint16_t>(e + 1) : std::uint16_t{0};
-    const auto voxels = out_.labels.scalars<std::uint16_t>();
-    for (const scan::Run& run : pieces_.runs) {
-      if (speck[run.piece] == 0) continue;
-      const std::size_t begin = grid_.offset(run.begin, run.j, run.k);
-      for (std::size_t v = begin; v < begin + static_cast<std::size_t>(run.end - run.begin); ++v)
-        voxels[v] = body_[v] != 0 ? body : std::uint16_t{0};
-    }
-    for (std::size_t e = 0; e < specks.size(); ++e) {
-      if (specks[e].pieces == 0) continue;
-      out_.notes.push_back(out_.entries[e].name + ": " + std::to_string(specks[e].pieces) +
-                           (specks[e].pieces == 1 ? " speck" : " specks") + " of " +
-                           std::to_string(specks[e].voxels) + " voxels in all taken off, the first at " +
-                           place(specks[e].first));
-    }
-    // Pieces that are gone must not count below.
-    for (std::size_t p = 0; p < speck.size(); ++p) {
-      if (speck[p] != 0) pieces_.pieces[p].voxels = 0;
-    }
-    recount();
-  }
-
   void find_skin() {
-    const auto labels = std::as_const(out_.labels).scalars<std::uint16_t>();
-    std::size_t bone = 0, bare = 0;
-    for (std::size_t v = 0; v < labels.size(); ++v) {
-      if (labels[v] == 0 || out_.entries[labels[v] - 1U].role != Role::bone) continue;
-      ++bone;
-      bare += body_[v] == 0 ? 1 : 0;
-    }
-    if (bone == 0)
+    const bool bone = std::any_of(out_.entries.begin(), out_.entries.end(),
+                                  [](const ScanEntry& e) { return e.role == Role::bone && e.voxels > 0; });
+    const double bare = bare_share([&](std::size_t v) { return body_[v] != 0; });
+    if (!bone) check_sides();
+    if (!bone)
       throw Error(ErrorKind::data, scan_.labels.front().path.string(), "no label of a bone is known",
                   "see the names that are known in docs/reference/structures.md, or write the case by hand");
     bool body = false, shell = false;
@@ -233,7 +196,7 @@ class Decider {
       if (out_.entries[e].role != Role::body || original_[e] == 0) continue;
       (names_.named[e].structure->becomes == Becomes::shell ? shell : body) = true;
     }
-    if (body && static_cast<double>(bare) <= kBare * static_cast<double>(bone)) {
+    if (body && bare <= kBare) {
       out_.skin = {"round the label of the body", 1, {}};
       return;
     }
@@ -243,10 +206,8 @@ class Decider {
       return;
     }
     if (body)
-      out_.doubts.push_back(
-          "the body's label leaves " +
-          std::to_string(std::lround(100.0 * static_cast<double>(bare) / static_cast<double>(bone))) +
-          " % of the bones outside: it is not used for the skin");
+      out_.doubts.push_back("the body's label leaves " + percent_of(bare) +
+                            " of the bones outside: it is not used for the skin");
     if (from_ct()) return;
     if (exposed < kExposed) {
       out_.skin = {"round all that is labelled", exposed < 0.01 ? 0.9 : 0.6, {}};
@@ -258,10 +219,37 @@ class Decider {
       return;
     }
     throw Error(ErrorKind::data, scan_.labels.front().path.string(),
-                "nothing says where the skin is: " + std::to_string(std::lround(100 * exposed)) +
-                    " % of the outside of all that is labelled is bone",
+                "nothing says where the skin is: " + percent_of(exposed) +
+                    " of the outside of all that is labelled is bone",
                 "give the CT too, or a label of the whole body (TotalSegmentator -ta body), before or after "
                 "these files");
+  }
+
+  // The share of the bones' voxels for which `within` is false.
+  template <class F>
+  double bare_share(F&& within) const {
+    const auto labels = out_.labels.scalars<std::uint16_t>();
+    std::vector<std::uint8_t> is_bone(out_.entries.size() + 1, 0);
+    for (std::size_t e = 0; e < out_.entries.size(); ++e) is_bone[e + 1] = out_.entries[e].role == Role::bone;
+    std::size_t bone = 0, bare = 0;
+    for (std::size_t v = 0; v < labels.size(); ++v) {
+      if (labels[v] == 0 || is_bone[labels[v]] == 0) continue;
+      ++bone;
+      bare += within(v) ? 0 : 1;
+    }
+    return bone == 0 ? 0 : static_cast<double>(bare) / static_cast<double>(bone);
+  }
+
+  // Bones that are known, but of which none found its side.
+  void check_sides() const {
+    for (std::size_t e = 0; e < names_.named.size(); ++e) {
+      if (!sides_given(e) || original_[e] == 0) continue;
+      throw Error(
+          ErrorKind::data, scan_.labels.front().path.string(),
+          names_.named[e].name + " is known, but not its side, nor that of any other bone",
+          "say it where one limb alone was scanned (--side left or --side right), or give labels that "
+          "have sides with it");
+    }
   }
 
   bool from_ct() {
@@ -274,11 +262,18 @@ class Decider {
     const Image* image = &ct->image;
     Image placed;
     if (!io::same_place(ct->image.grid, grid_)) {
-      placed = io::resampled_nearest(ct->image, grid_);
+      placed = io::resampled_nearest(ct->image, grid_, ct->background);
       image = &placed;
     }
     const scan::CtBody body =
         scan::find_body(*image, options_.skin_hu, options_.bridge_mm, known, context_.quiet());
+    const double bare = bare_share([&](std::size_t v) { return body.inside[v] != 0; });
+    if (bare > kBare) {
+      out_.doubts.push_back("what is denser than " + text::number(options_.skin_hu) + " HU in " +
+                            ct->path.filename().string() + " leaves " + percent_of(bare) +
+                            " of the bones outside: it is not used for the skin");
+      return false;
+    }
     ScanEntry entry;
     entry.name = "body";
     entry.role = Role::body;
@@ -325,6 +320,7 @@ class Decider {
     recount();
     tell_borders(out_, context_.quiet());
     tell_missing(out_);
+    tell_contradictions(out_, scan_.images);
     out_.fates = std::move(names_.fates);
     for (std::size_t m = 0; m < names_.of_map.size(); ++m) {
       for (const auto& [id, e] : names_.of_map[m]) {

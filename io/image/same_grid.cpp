@@ -31,8 +31,15 @@ std::string described(const ImageGrid& grid) {
   return out + "]";
 }
 
-Image resampled_nearest(const Image& image, const ImageGrid& grid) {
+Image resampled_nearest(const Image& image, const ImageGrid& grid, double beyond) {
   Image out(grid, image.type, image.components);
+  if (beyond != 0) {
+    with_scalar_type(out.type, [&](auto zero) {
+      using T = decltype(zero);
+      const auto scalars = out.scalars<T>();
+      std::fill(scalars.begin(), scalars.end(), static_cast<T>(beyond));
+    });
+  }
   // The index is affine in the index: one step along i adds the same to all three.
   const auto origin = image.grid.index(grid.point(0, 0, 0));
   std::array<std::array<double, 3>, 3> step{};

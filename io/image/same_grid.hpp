@@ -14,7 +14,7 @@ bool same_place(const ImageGrid& a, const ImageGrid& b);
 /// `128 x 128 x 60 voxels of 3 x 3 x 5 mm from [0, 0, 0]`, for messages.
 std::string described(const ImageGrid& grid);
 
-/// The value at the nearest voxel of `image` for every voxel of `grid`; 0 where it has none.
-Image resampled_nearest(const Image& image, const ImageGrid& grid);
+/// The value at the nearest voxel of `image` for every voxel of `grid`; `beyond` where it has none.
+Image resampled_nearest(const Image& image, const ImageGrid& grid, double beyond = 0);
 
 }  // namespace ecorche::io

@@ -11,8 +11,11 @@
 #include <ecorche/values/error.hpp>
 #include "core/values/degrees.hpp"
 #include "core/values/text.hpp"
+#include "preprocess/check/frames.hpp"
 #include "preprocess/check/inside.hpp"
 #include "preprocess/check/joint_places.hpp"
+#include "preprocess/check/lost_segments.hpp"
+#include "preprocess/check/skin_fault.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 
 namespace ecorche::check {
@@ -25,6 +28,8 @@ constexpr double kOutside = 0.02;  // of the longer bone: surfaces of skin and b
 // an elbow's axis 75 to 100 to the humerus (London 1981) and, by the carrying angle of up to 28 (Zampagni et
 // al. 2008), 62 to the forearm. Nothing flexes beyond 45 degrees of square.
 constexpr double kAcross = 45;
+constexpr double kLostSkin = 3;      // bones longer than so many skins are in no such skin
+constexpr double kAlone = 0.5;       // of a bone's length: the middle of any lies nearer
 constexpr double kExchanged = 0.25;  // of the shorter bone's length; and what may be left of the distances
 
 std::string millimetres(double x) {
@@ -127,6 +132,8 @@ class Joints {
   bool possible(std::size_t row, const Vector3d& at) const {
     const Place is = place_of(skeleton_, bones_, row, at);
     if (is_root(row)) return !std::isfinite(is.own) || is.own <= 2 * body_length(patient_);
+    // One bone alone: its joint joins nothing, and is the middle of the bone (of a skull, in its hollow).
+    if (!bones_[parent(row)].tree && !is_given(row)) return is.own <= kAlone * is.length;
     const auto near = [&] {
       if (is.nearest() <= is.near()) return true;
       const auto gap = gap_between(bones_[row], bones_[parent(row)]);
@@ -145,9 +152,27 @@ class Joints {
     return (*inside)(p);
   }
 
+  // A joint right at its bones lies outside because the skin does not enclose them: its fault, told once.
+  bool blame_skin(std::size_t row) {
+    const Vector3d& at = joint(row).center;
+    const Place is = place_of(skeleton_, bones_, row, at);
+    const double out = beyond_skin(at);
+    if (is_root(row) || out == 0 || is.nearest() > is.near()) return false;
+    if (!fault_) fault_ = skin_fault(patient_.skin);
+    if (!*fault_) return false;
+    if (!blamed_)
+      findings_.push_back({patient_.generic ? Severity::warning : Severity::error, patient_.skin_name,
+                           (*fault_)->what + ", so that the " + joint(row).name + ", " +
+                               millimetres(is.nearest()) + " from its bones, lies " + millimetres(out) +
+                               " outside of what it encloses",
+                           at, (*fault_)->mend});
+    blamed_ = true;
+    return true;
+  }
+
   void check_center(std::size_t row) {
     const Vector3d& at = joint(row).center;
-    if (possible(row, at)) return;
+    if (possible(row, at) || blame_skin(row)) return;
     const Place is = place_of(skeleton_, bones_, row, at);
     std::string what = "its center " + place(at) + " lies ";
     const double out = beyond_skin(at);
@@ -238,6 +263,8 @@ class Joints {
   mutable std::unique_ptr<Inside> inside_;
   mutable std::unique_ptr<geometry::FaceTree> skin_;
   std::vector<Finding> findings_;
+  std::optional<std::optional<SkinFault>> fault_;  // of the skin, looked for where it matters
+  bool blamed_ = false;                            // it has been told
 };
 
 }  // namespace
@@ -254,7 +281,28 @@ double body_length(const Case& patient) {
   return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
-std::vector<Finding> size_findings(const Case& patient) {
+// A skin that would be lost in its bones is in another unit than they.
+std::optional<Finding> lost_skin(const Case& patient) {
+  Eigen::AlignedBox3d all, skin;
+  for (const CaseBone& bone : patient.bones) {
+    for (Eigen::Index v = 0; v < bone.surface.V.rows(); ++v) all.extend(bone.surface.V.row(v).transpose());
+  }
+  for (Eigen::Index v = 0; v < patient.skin.V.rows(); ++v) skin.extend(patient.skin.V.row(v).transpose());
+  if (all.isEmpty() || skin.isEmpty()) return std::nullopt;
+  const double bones = all.sizes().maxCoeff(), own = skin.sizes().maxCoeff();
+  if (!(bones > kLostSkin * own)) return std::nullopt;
+  const double factor = unit_factor(own, bones, kLostSkin * bones);
+  return Finding{Severity::error,
+                 patient.skin_name,
+                 "is " + millimetres(own) + " long, the bones " + millimetres(bones),
+                 {},
+                 factor > 0 ? "mend its unit: made " + text::number(factor, 6) +
+                                  " times larger it would be " + millimetres(factor * own)
+                            : "give the skin of these bones, in their unit"};
+}
+
+// Against the bounds that the skeleton's file gives.
+std::vector<Finding> wrong_size(const Case& patient) {
   const double length = body_length(patient);
   if (!patient.size || length == 0) return {};
   const BodySize& size = *patient.size;
@@ -286,6 +334,13 @@ std::vector<Finding> size_findings(const Case& patient) {
   return {out};
 }
 
+std::vector<Finding> size_findings(const Case& patient) {
+  std::vector<Finding> out = wrong_size(patient);
+  if (!out.empty()) return out;
+  if (std::optional<Finding> lost = lost_skin(patient)) out.push_back(std::move(*lost));
+  return out;
+}
+
 std::vector<Finding> joint_findings(const Case& patient, const Rig& rig, const Context& context) {
   return Joints(patient, rig).run(context);
 }
@@ -310,6 +365,7 @@ void inspect_joints(const Case& patient, const Context& context, Report& report)
   try {
     const Rig rig = rig::fit(patient, inner);
     found = joint_findings(patient, rig, context);
+    for (Finding& lost : lost_segments(patient)) found.push_back(std::move(lost));
     report.findings.insert(report.findings.end(), found.begin(), found.end());
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::config && error.kind() != ErrorKind::data) throw;

@@ -15,13 +15,14 @@ namespace ecorche::check {
 double body_length(const Case& patient);
 
 /// At most one error: the length against the bounds that the skeleton's file gives, with the unit that would
-/// fit.
+/// fit; else a skin far shorter than its bones.
 std::vector<Finding> size_findings(const Case& patient);
 
 /// One error for each joint of `rig`, which was found for `patient`, that lies outside the skin and its
-/// bones, far from both bones that it joins, or turns (a hinge that flexes) about what is nearly a bone's
-/// shaft; and one for two neighbours whose bones are exchanged. Of the `generic` tree, which joins whatever
-/// bones lie near each other, they are warnings. `where` is `joint NAME`, `at` its centre.
+/// bones (where the skin is open or a shell, that is named instead, once), far from both bones that it joins,
+/// or turns (a hinge that flexes) about what is nearly a bone's shaft; and one for two neighbours whose bones
+/// are exchanged. Of the `generic` tree, which joins whatever bones lie near each other, they are warnings.
+/// `where` is `joint NAME`, `at` its centre.
 std::vector<Finding> joint_findings(const Case& patient, const Rig& rig, const Context& context);
 
 /// Finds the joints and puts the findings of both behind `report`'s: the rig's warnings as warnings. Nothing

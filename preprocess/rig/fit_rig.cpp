@@ -8,6 +8,7 @@
 
 #include <ecorche/kinematics/angles.hpp>
 #include "core/values/degrees.hpp"
+#include "preprocess/rig/bridged_joints.hpp"
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/mirrored_joints.hpp"
@@ -169,6 +170,7 @@ Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* e
   JointSources sources(patient, asked);
   take_other_sides(asked, sources, context);
   keep_rest_possible(asked, sources, context);
+  if (!patient.generic) keep_bridged_near(patient, asked, sources);
   for (std::size_t row = 0; row < asked.segments.size(); ++row) {
     context.check_stop();
     fit_joint(patient, sources, row, rig, context);

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -27,6 +28,8 @@
 
 namespace ecorche::voxel {
 namespace {
+
+constexpr double kToldOutside = 0.25;  // of a bone's: more than coarse voxels and thin skin explain
 
 struct Bounds {
   std::array<double, 3> low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
@@ -175,10 +178,12 @@ Solid solid(const SurfaceMesh& surface, const std::string& name, bool is_skin, c
                                (hole.holes == 1 ? " hole" : " holes, the largest") + " of " +
                                std::to_string(hole.edges) + " edges at [" + rounded(hole.middle.x()) + ", " +
                                rounded(hole.middle.y()) + ", " + rounded(hole.middle.z()) + "]";
+      const std::string repair = "ecorche repair --holes " + rounded(std::ceil(1.05 * hole.filling_edge));
       const std::string mend =
-          hole.filling_edge > 0
-              ? "close it: ecorche repair --holes " + rounded(std::ceil(1.05 * hole.filling_edge)) + " does"
-              : std::string("give a closed surface of the body");
+          hole.filling_edge <= 0 ? "give a closed surface of the body"
+          : hole.closed
+              ? "close it: " + repair + " does"
+              : "close it: " + repair + " does what it can, for not all of its open edges form loops";
       if (is_skin) throw Error(ErrorKind::data, name, what, mend);
       out.warning = name + ": " + what + "; only the voxels that it touches count (" + mend + ")";
     } else {
@@ -195,6 +200,47 @@ Solid solid(const SurfaceMesh& surface, const std::string& name, bool is_skin, c
     throw Error(ErrorKind::data, name, "encloses no volume", "give a closed surface of the body");
   }
   return out;
+}
+
+/// How many voxels a bone claims, and how many of them lie outside of the skin.
+struct Outside {
+  std::size_t all = 0, outside = 0;
+  double share() const { return all == 0 ? 0 : static_cast<double>(outside) / static_cast<double>(all); }
+};
+
+Outside outside_of(const VoxelMask& skin, const VoxelMask& bone) {
+  Outside out;
+  for (int k = bone.low[2]; k < bone.low[2] + bone.size[2]; ++k) {
+    for (int j = bone.low[1]; j < bone.low[1] + bone.size[1]; ++j) {
+      const bool met = k >= skin.low[2] && k < skin.low[2] + skin.size[2] && j >= skin.low[1] &&
+                       j < skin.low[1] + skin.size[1];
+      for (std::size_t w = 0; w < bone.row_words(); ++w) {
+        const std::size_t at = bone.row(j, k) + w, word = bone.first_word() + w;
+        const std::uint64_t claimed = bone.touched[at] | bone.inside[at];
+        std::uint64_t in = 0;
+        if (met && word >= skin.first_word() && word < skin.first_word() + skin.row_words()) {
+          const std::size_t there = skin.row(j, k) + word - skin.first_word();
+          in = skin.touched[there] | skin.inside[there];
+        }
+        out.all += static_cast<std::size_t>(std::popcount(claimed));
+        out.outside += static_cast<std::size_t>(std::popcount(claimed & ~in));
+      }
+    }
+  }
+  return out;
+}
+
+/// Bones of which much lies outside are told.
+void tell_outside(const Case& patient, const std::vector<Solid>& solids, const Context& context) {
+  for (std::size_t b = 0; b < patient.bones.size(); ++b) {
+    if (solids[b + 1].mask.inside.empty()) continue;
+    const double share = outside_of(solids[0].mask, solids[b + 1].mask).share();
+    if (share > kToldOutside)
+      context.warn(
+          patient.bones[b].name + ": " + text::number(100 * share, 2) +
+          " % of it lies outside the skin, and counts as body there (mend one of them if that is not "
+          "meant; ecorche check says where)");
+  }
 }
 
 /// Voxels that more than one bone claims, and all that do, lower index first.
@@ -304,6 +350,7 @@ Image voxelize(const Case& patient, const Options& options, const Context& conte
   for (const Solid& each : solids) {
     if (!each.warning.empty()) context.warn(each.warning);
   }
+  tell_outside(patient, solids, context);
 
   // Bones after the skin, in their order; a layer of the image is one thread's.
   std::vector<Contested> contested(static_cast<std::size_t>(grid.size[2]));

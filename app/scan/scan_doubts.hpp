@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// What in a scan contradicts itself: images that lie elsewhere, left bones to the right of their pairs.
+#pragma once
+
+#include <vector>
+
+#include "app/scan/scan_case.hpp"
+
+namespace ecorche::app {
+
+/// Adds a doubt for each image that covers less than half of what is labelled, and one where most bones that
+/// are there twice have their sides exchanged.
+void tell_contradictions(ScanCase& out, const std::vector<ScanImage>& images);
+
+}  // namespace ecorche::app

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/check/lost_segments.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "preprocess/check/inside.hpp"
+#include "preprocess/geometry/face_tree.hpp"
+#include "preprocess/geometry/hole_size.hpp"
+
+namespace ecorche::check {
+namespace {
+
+constexpr Eigen::Index kSamples = 200;  // vertices of each bone
+constexpr double kOnSkin = 0.02;        // of the skin's length: bones may be drawn a little larger than it
+
+Eigen::AlignedBox3d bounds_of(const SurfaceMesh& mesh) {
+  return {mesh.V.colwise().minCoeff().transpose(), mesh.V.colwise().maxCoeff().transpose()};
+}
+
+// Whether some of the body is about the bone: a vertex of it in the skin, or right at it, or all of the skin
+// in its bounds.
+class Body {
+ public:
+  explicit Body(const SurfaceMesh& skin)
+      : box_(bounds_of(skin)), inside_(skin), tree_(skin), near_(kOnSkin * box_.sizes().maxCoeff()) {}
+
+  bool holds(const SurfaceMesh& bone) const {
+    if (bounds_of(bone).contains(box_)) return true;
+    const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kSamples);
+    for (Eigen::Index v = 0; v < bone.V.rows(); v += step) {
+      const Eigen::Vector3d p = bone.V.row(v).transpose();
+      if (inside_(p) || tree_.nearest(p).squared <= near_ * near_) return true;
+    }
+    return false;
+  }
+
+ private:
+  Eigen::AlignedBox3d box_;
+  Inside inside_;
+  geometry::FaceTree tree_;
+  double near_;
+};
+
+}  // namespace
+
+std::vector<Finding> lost_segments(const Case& patient) {
+  if (patient.skin.F.rows() == 0) return {};
+  const Body body(patient.skin);
+  std::map<std::string, const CaseBone*> lost;
+  std::map<std::string, bool> held;
+  for (const CaseBone& bone : patient.bones) {
+    if (bone.surface.V.rows() == 0 || held[bone.segment]) continue;
+    if (body.holds(bone.surface)) {
+      held[bone.segment] = true;
+      lost.erase(bone.segment);
+    } else {
+      lost.emplace(bone.segment, &bone);
+    }
+  }
+  // What an open skin encloses is not sure.
+  if (lost.empty() || geometry::largest_hole(patient.skin).holes > 0) return {};
+  std::vector<Finding> out;
+  for (const auto& [segment, bone] : lost)
+    out.push_back({Severity::error, segment,
+                   "its bones lie outside the skin: nothing of the body would follow them",
+                   bone->surface.V.colwise().mean().transpose(),
+                   "mend their frame or unit, or the skin; or leave them out"});
+  return out;
+}
+
+}  // namespace ecorche::check
