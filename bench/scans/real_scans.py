@@ -30,7 +30,7 @@ def icrp(data, folder):
     """AF_organs.txt is no table that any program writes: its first columns become one."""
     table = folder / "AF_labels.tsv"
     rows = re.findall(r"(?m)^(\d+)\s+(\S.*?)\s{2,}", (data / "icrp110_female/AF_organs.txt").read_text(errors="replace"))
-    table.write_text("".join(f"{label}\t{name}\n" for label, name in rows))
+    table.write_text("index\tname\n" + "".join(f"{label}\t{name}\n" for label, name in rows))
     return RealScan("icrp110_female", [data / "icrp110_female/AF_labels.mha", table], by_hand="a table of names")
 
 
@@ -65,7 +65,7 @@ def arm(data, folder):
     path = folder / "arm.mha"
     path.write_bytes(("\n".join([*lines, "CompressedData = False", "ElementType = MET_UCHAR", "ElementDataFile = LOCAL"]) + "\n").encode()
                      + out.tobytes("F"))
-    (folder / "arm.tsv").write_text("".join(f"{key}\t{name}\n" for key, name in table.items()))
+    (folder / "arm.tsv").write_text("index\tname\n" + "".join(f"{key}\t{name}\n" for key, name in table.items()))
     return RealScan("arm_volume", [path, folder / "arm.tsv"], ("--side", "right"), by_hand="bones cut apart, and a table of names")
 
 
