@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/handlers/client.hpp"
 
-#include <algorithm>
 #include <new>
 
 #include <ecorche/wire/convert.hpp>
@@ -227,7 +226,6 @@ void Client::model_changed(std::uint64_t identity) {
 
 void Client::pose_done(const PoseOutcome& outcome, const Skipped& skipped) {
   if (over()) return;
-  last_sequence_ = std::max(last_sequence_, outcome.sequence);  // of a clip that the server plays
   notify([&] { acknowledge(outcome, skipped); });
 }
 

@@ -45,7 +45,7 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
           io_,
           [this](const Pose& pose) {
             PoseRequest request;
-            request.sequence = poses_.last_sequence() + 1;
+            request.sequence = clip_sequence_ = poses_.last_sequence() + 1;
             request.pose = pose;
             request.skinning = poses_.present().skinning;
             put(std::move(request));
@@ -113,6 +113,8 @@ bool Session::unsubscribe(Member& member, std::uint32_t id) {
 
 void Session::pose(PoseRequest request) {
   player_->stop();
+  // Sent before its client heard of the clip's newest poses: it comes after them all the same.
+  if (request.sequence <= clip_sequence_) request.sequence = poses_.last_sequence() + 1;
   put(std::move(request));
 }
 

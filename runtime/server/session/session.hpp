@@ -95,7 +95,8 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   /// About the bytes of a frame of it.
   std::uint64_t frame_bytes(const StreamSpec& spec) const { return planner_.frame_bytes(spec); }
 
-  /// From the member that holds control; already checked against the rig.
+  /// From the member that holds control; already checked against the rig. One that crossed a clip's poses on
+  /// its way gets the number after theirs.
   void pose(PoseRequest request);
   const PoseSlot& poses() const { return poses_; }
   /// Poses by itself, until the clip ends, a pose comes or everybody has left. All who hear of ClipState hear
@@ -197,6 +198,7 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   HungSpheres hung_;
   SessionRecorder recorder_;
   std::shared_ptr<ClipPlayer> player_;
+  std::uint64_t clip_sequence_ = 0;  ///< of the newest pose that a clip showed
   Presence presence_;
   News members_news_, clip_news_;
   Alarm alarm_;  ///< for who is due

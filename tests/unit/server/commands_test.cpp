@@ -217,8 +217,30 @@ TEST(ClipTest, IsListedAndPlayedByTheServerAtItsRate) {
   while (const auto ack = client.client().receive(client::Clock::now() + std::chrono::milliseconds(200)))
     sequence = std::max(sequence, ack->envelope.pose_ack().sequence());
   EXPECT_GT(sequence, 13U);
-  client.send(sequence, client.bent(0));
-  EXPECT_EQ(client.next_ack().status().code(), static_cast<std::uint32_t>(StatusCode::out_of_range));
+  client.send(10, client.bent(0));
+  EXPECT_EQ(client.next_ack().status().code(), static_cast<std::uint32_t>(StatusCode::out_of_range))
+      << "its own numbers grow";
+}
+
+TEST(ClipTest, APoseThatCrossesTheClipsOwnIsTheNextAfterThem) {
+  const TestServer server;
+  TestClient client(server);
+  client.subscribe_mesh();
+  client.client().call(play("turning", 1));
+  std::uint64_t played = 0;
+  while (const auto heard = client.client().receive(client::Clock::now() + std::chrono::milliseconds(200)))
+    played = std::max(played, heard->envelope.pose_ack().sequence());
+  ASSERT_GT(played, 5U);
+  // As if none of that had come yet.
+  for (const std::uint64_t sent : {1, 2}) {
+    client.send(sent, client.bent(0.1 * static_cast<double>(sent)));
+    const v1::PoseAck ack = client.next_ack();
+    EXPECT_EQ(ack.status().code(), 0U);
+    EXPECT_EQ(ack.sequence(), played + sent);
+    EXPECT_EQ(client.next_mesh(played + sent).envelope.mesh_frame().pose_sequence(), played + sent);
+  }
+  client.send(played + 3, client.bent(0));
+  EXPECT_EQ(client.next_ack().sequence(), played + 3);
 }
 
 TEST(ClipTest, ALoopGoesOnUntilAPoseOrAStopEndsIt) {
