@@ -29,8 +29,8 @@ struct ProbeSettings {
   bool gradient = false;
 };
 
-runtime::ProbeWants wants_of(const ProbeSettings& settings, const Model& model) {
-  runtime::ProbeWants wants{.gradient = settings.gradient, .tissue = true};
+runtime::ProbeOptions wants_of(const ProbeSettings& settings, const Model& model) {
+  runtime::ProbeOptions wants{.gradient = settings.gradient, .tissue = true};
   const auto sampling =
       settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
   const bool all = settings.volumes == std::vector<std::string>{"all"};
@@ -63,7 +63,7 @@ json number(float value) {
   return decimal;
 }
 
-json columns_of(const runtime::ProbeWants& wants, const Model& model) {
+json columns_of(const runtime::ProbeOptions& wants, const Model& model) {
   json out{"x", "y", "z", "to_x", "to_y", "to_z", "tet", "part", "tissue"};
   for (const auto& wanted : wants.volumes) {
     const ModelVolume& volume = model.volumes[wanted.row];
@@ -78,7 +78,7 @@ json columns_of(const runtime::ProbeWants& wants, const Model& model) {
 }
 
 json row_of(std::size_t i, std::span<const float> points, const runtime::Probed& probed,
-            const runtime::ProbeWants& wants, const Model& model) {
+            const runtime::ProbeOptions& wants, const Model& model) {
   const bool held = probed.tet[i] != runtime::TetPlace::none;
   json row;
   for (std::size_t c = 0; c < 3; ++c) row.push_back(number(points[3 * i + c]));
@@ -114,7 +114,7 @@ std::vector<float> moved(const RigidTransform& motion, std::vector<float> points
 
 // The body is probed with its root as scanned, where float32 is fine, whatever the root does to it.
 runtime::Probed probed_at(const runtime::BodyPoser& poser, const Pose& pose, const ProbeSettings& settings,
-                          const std::vector<float>& points, const runtime::ProbeWants& wants) {
+                          const std::vector<float>& points, const runtime::ProbeOptions& wants) {
   runtime::PosedBody body = poser.make_frame();
   const auto [code, what] = poser.run(pose, runtime::skinning_from_name(settings.skinning), {}, body,
                                       runtime::NodesOf::body, runtime::Root::still);
@@ -141,7 +141,7 @@ runtime::Probed probed_at(const runtime::BodyPoser& poser, const Pose& pose, con
 int run(const Program& program, const ProbeSettings& settings) {
   const std::vector<float> points = read_points(settings.points);
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
-  const runtime::ProbeWants wants = wants_of(settings, *model);
+  const runtime::ProbeOptions wants = wants_of(settings, *model);
   const Pose pose = pose_of(program, settings, *model);
   const runtime::BodyPoser poser(model);
   const runtime::Probed probed = probed_at(poser, pose, settings, points, wants);

@@ -77,7 +77,7 @@ class Replay {
       const v1::Envelope& envelope = frame->envelope;
       if (envelope.has_pose_ack()) {
         if (envelope.pose_ack().status().code() != 0)
-          throw client::to_error("pose", envelope.pose_ack().status());
+          throw client::ServerError("pose", envelope.pose_ack().status());
         acknowledged = true;
       } else if (envelope.has_mesh_frame()) {
         compare(envelope.mesh_frame(), frame->payload, at, expected);

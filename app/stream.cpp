@@ -237,7 +237,7 @@ class Stream {
       take_frame(mesh.pose_sequence(), meshes_, std::move(frame));
     } else if (envelope.has_volume_frame()) {
       const v1::VolumeFrame& volume = envelope.volume_frame();
-      if (volume.status().code() != 0) throw client::to_error("volume", volume.status());
+      if (volume.status().code() != 0) throw client::ServerError("volume", volume.status());
       settled_ = std::max(settled_, volume.pose_sequence());
       take_frame(volume.pose_sequence(), volumes_, std::move(frame));
     }
@@ -250,12 +250,12 @@ class Stream {
     if (status.ok()) return;
     v1::Status told;
     wire::to_proto(status, told);
-    throw client::to_error("frame " + std::to_string(mesh.frame()), told);
+    throw client::ServerError("frame " + std::to_string(mesh.frame()), told);
   }
 
   void take_ack(const v1::PoseAck& ack) {
     if (ack.status().code() != 0)
-      throw client::to_error("pose " + std::to_string(ack.sequence()), ack.status());
+      throw client::ServerError("pose " + std::to_string(ack.sequence()), ack.status());
     skipped_ += ack.skipped();
     if (ack.clamped_size() > 0) ++clamped_;
   }

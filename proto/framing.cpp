@@ -40,7 +40,7 @@ std::string head_of(const v1::Envelope& envelope, std::size_t payload_bytes) {
 
 }  // namespace
 
-std::span<std::byte> FrameReader::want() {
+std::span<std::byte> FrameReader::prepare() {
   switch (part_) {
     case Part::header:
       return std::span(header_).subspan(filled_);
@@ -54,7 +54,7 @@ std::span<std::byte> FrameReader::want() {
   return {};
 }
 
-Status FrameReader::advance(std::size_t n) {
+Status FrameReader::commit(std::size_t n) {
   filled_ += n;
   if (part_ == Part::header && filled_ == header_bytes) return finish_header();
   if (part_ == Part::envelope && filled_ == envelope_.size()) return finish_envelope();
@@ -103,7 +103,7 @@ Status FrameReader::finish_envelope() {
   return {};
 }
 
-Frame FrameReader::take() {
+Frame FrameReader::release() {
   part_ = Part::header;
   filled_ = 0;
   return std::exchange(frame_, {});

@@ -96,13 +96,13 @@ Status read_recording(std::span<const std::byte> file, RecordedSession& out) {
   Reader reader(out);
   FrameReader frames(kLimits);
   while (!file.empty()) {
-    const std::span<std::byte> into = frames.want();
+    const std::span<std::byte> into = frames.prepare();
     const std::size_t n = std::min(into.size(), file.size());
     std::memcpy(into.data(), file.data(), n);
     file = file.subspan(n);
-    if (const Status status = frames.advance(n); !status.ok()) return broken(status.message);
+    if (const Status status = frames.commit(n); !status.ok()) return broken(status.message);
     if (!frames.complete()) continue;
-    Frame frame = frames.take();
+    Frame frame = frames.release();
     if (Status status = reader.take(frame.envelope); !status.ok()) return status;
   }
   if (!reader.ended() || !frames.between_frames())

@@ -59,7 +59,7 @@ BonePoints points_in_bones(const Model& model, const runtime::Probe& probe, doub
   const Eigen::RowVector3f low = model.nodes.colwise().minCoeff(), high = model.nodes.colwise().maxCoeff();
   runtime::Probe::PosedTree tree;
   probe.follow({model.nodes.data(), static_cast<std::size_t>(model.nodes.size())}, tree);
-  const runtime::ProbeWants wants{false, true, {}};
+  const runtime::ProbeOptions wants{false, true, {}};
   BonePoints out;
   runtime::Probed found;
   std::vector<float> slice;

@@ -41,7 +41,7 @@ void time_probe(const Table& table, const std::shared_ptr<const Model>& model, s
   draw_points(*model, nodes, 10000, rest, posed);
   runtime::Probe::PosedTree tree;
   runtime::Probed out;
-  runtime::ProbeWants wants{.gradient = true};
+  runtime::ProbeOptions wants{.gradient = true};
   for (std::uint32_t v = 0; v < model->volumes.size(); ++v) wants.volumes.push_back({v});
   line(table, "probe: a new pose", threads, time(30, [&](int) { probe.follow(nodes, tree); }));
   line(table, "probe: a new pose and one point", threads, time(30, [&](int f) {

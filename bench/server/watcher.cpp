@@ -58,7 +58,7 @@ void Watcher::watch(const wire::Address& address, const std::string& session, v1
     const auto frame = client.receive(client::Clock::now() + std::chrono::milliseconds(100));
     if (!frame || !frame->envelope.has_volume_frame()) continue;
     if (const auto& status = frame->envelope.volume_frame().status(); status.code() != 0)
-      throw client::to_error("volume", status);
+      throw client::ServerError("volume", status);
     ++frames_;
     bytes_ += frame->payload.size();
   }

@@ -13,6 +13,8 @@ constexpr wire::FrameLimits kLimits{.envelope_bytes = 16U << 20, .payload_bytes 
 // Of a large payload, before it is read on: a tenth of a millisecond's copying.
 constexpr std::size_t kEnough = 256U << 10;
 
+constexpr auto kHighestCode = static_cast<std::uint32_t>(StatusCode::unauthenticated);
+
 ErrorKind kind_of(std::uint32_t code) {
   switch (static_cast<StatusCode>(code)) {
     case StatusCode::permission_denied:
@@ -31,11 +33,11 @@ ErrorKind kind_of(std::uint32_t code) {
 
 }  // namespace
 
-Error to_error(const std::string& where, const v1::Status& status) {
-  return Error(kind_of(status.code()), where,
-               "status " + std::to_string(status.code()) + ": " + status.message(),
-               "this is the server's answer");
-}
+ServerError::ServerError(const std::string& where, const v1::Status& status)
+    : Error(kind_of(status.code()), where,
+            "status " + std::to_string(status.code()) + ": " + status.message(),
+            "this is the server's answer"),
+      code_(status.code() <= kHighestCode ? static_cast<StatusCode>(status.code()) : StatusCode::unknown) {}
 
 Client::Client(const wire::Address& address, const std::string& name, const Access& access)
     : socket_(address, Clock::now() + std::chrono::seconds(5), access.authorities), reader_(kLimits) {
@@ -68,7 +70,7 @@ wire::Frame Client::call(v1::Envelope request, std::shared_ptr<const wire::Paylo
       continue;
     }
     if (frame->envelope.has_status() && frame->envelope.status().code() != 0)
-      throw to_error("server", frame->envelope.status());
+      throw ServerError("server", frame->envelope.status());
     return std::move(*frame);
   }
   throw Error(ErrorKind::temporary, "server", "no answer within " + std::to_string(patience.count()) + " s",
@@ -90,15 +92,15 @@ std::optional<wire::Frame> Client::receive(Clock::time_point until) {
 
 std::optional<wire::Frame> Client::read_frame(Clock::time_point until) {
   while (!reader_.complete()) {
-    const std::span<std::byte> want = reader_.want();
+    const std::span<std::byte> want = reader_.prepare();
     const std::size_t n = socket_.read(want, until, std::min(want.size(), kEnough));
     if (n == 0) return std::nullopt;
     bytes_received_ += n;
-    if (const Status status = reader_.advance(n); !status.ok()) {
+    if (const Status status = reader_.commit(n); !status.ok()) {
       throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
     }
   }
-  wire::Frame frame = reader_.take();
+  wire::Frame frame = reader_.release();
   attend(frame.envelope);
   return frame;
 }
@@ -118,9 +120,9 @@ void Client::attend(const v1::Envelope& envelope) {
     answer.mutable_pong()->set_data(envelope.ping().data());
     send(answer);
   } else if (envelope.has_goodbye()) {
-    throw to_error("server", envelope.goodbye().status());
+    throw ServerError("server", envelope.goodbye().status());
   } else if (envelope.has_status() && envelope.request_id() == 0) {
-    throw to_error("server", envelope.status());
+    throw ServerError("server", envelope.status());
   }
 }
 

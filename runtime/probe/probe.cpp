@@ -151,7 +151,7 @@ struct Probe::Impl {
                     copies.rest());
     fit_blocks({runs, rest_nodes, rest});
   }
-  void run(const Way& way, std::span<const float> points, const ProbeWants& wants, Probed& out) const;
+  void run(const Way& way, std::span<const float> points, const ProbeOptions& wants, Probed& out) const;
 };
 
 Probe::Probe(std::shared_ptr<const Model> model, std::span<const std::uint32_t> given)
@@ -173,19 +173,19 @@ void Probe::fit(const PosedTree& tree) const {
   fit_blocks({impl_->runs, tree.nodes, tree.boxes});
 }
 
-void Probe::posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
+void Probe::posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeOptions& wants,
                           Probed& out) const {
   const PaddedNodes& rest = impl_->rest_nodes;
   impl_->run({{impl_->runs, tree.nodes, tree.boxes}, rest, rest, tree.nodes, false}, points, wants, out);
 }
 
-void Probe::rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
+void Probe::rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeOptions& wants,
                           Probed& out) const {
   const PaddedNodes& rest = impl_->rest_nodes;
   impl_->run({{impl_->runs, rest, impl_->rest}, tree.nodes, rest, tree.nodes, true}, points, wants, out);
 }
 
-void Probe::Impl::run(const Way& way, std::span<const float> points, const ProbeWants& wants,
+void Probe::Impl::run(const Way& way, std::span<const float> points, const ProbeOptions& wants,
                       Probed& out) const {
   const std::size_t count = points.size() / 3;
   out.tet.resize(count);
@@ -196,7 +196,7 @@ void Probe::Impl::run(const Way& way, std::span<const float> points, const Probe
   out.tissue.resize(wants.tissue ? count : 0);
   out.values.resize(wants.volumes.size());
   for (std::size_t v = 0; v < wants.volumes.size(); ++v) {
-    const ProbeWants::Volume& wanted = wants.volumes[v];
+    const ProbeOptions::Volume& wanted = wants.volumes[v];
     if (wanted.row >= model->volumes.size())
       throw Error(ErrorKind::usage, "probe", "the model has no volume " + std::to_string(wanted.row),
                   "it has " + std::to_string(model->volumes.size()));

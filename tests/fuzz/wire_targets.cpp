@@ -67,15 +67,15 @@ void framing(Bytes bytes) {
   wire::FrameReader reader(kLimits);
   std::size_t read = 0, written = 0;
   while (!bytes.empty()) {
-    const auto into = reader.want();
+    const auto into = reader.prepare();
     const std::size_t n = std::min({into.size(), bytes.size(), piece});
     must(n > 0);
     std::memcpy(into.data(), bytes.data(), n);
     bytes = bytes.subspan(n);
     read += n;
-    if (!reader.advance(n).ok()) return;
+    if (!reader.commit(n).ok()) return;
     if (!reader.complete()) continue;
-    const wire::Frame frame = reader.take();
+    const wire::Frame frame = reader.release();
     must(reader.between_frames());
     look_at(frame);
     // What came whole can be sent again; Protobuf may write it shorter.
@@ -104,12 +104,12 @@ template <class Look>
 void each_frame(Bytes bytes, Look&& look) {
   wire::FrameReader reader(kLimits);
   while (!bytes.empty()) {
-    const auto into = reader.want();
+    const auto into = reader.prepare();
     const std::size_t n = std::min(into.size(), bytes.size());
     std::memcpy(into.data(), bytes.data(), n);
     bytes = bytes.subspan(n);
-    if (!reader.advance(n).ok()) return;
-    if (reader.complete()) look(reader.take());
+    if (!reader.commit(n).ok()) return;
+    if (reader.complete()) look(reader.release());
   }
 }
 

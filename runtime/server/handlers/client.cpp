@@ -103,7 +103,7 @@ void Client::leave_place() {
   if (session && !said_goodbye_ && !session->retired()) {
     try {
       place = SavedPlace{.session = session,
-                         .asked = session->subscriptions().requests_of(*this),
+                         .subscriptions = session->subscriptions().requests_of(*this),
                          .controlled = session->control().controls(*this)};
     } catch (const std::bad_alloc&) {  // then nobody comes back to it
     }

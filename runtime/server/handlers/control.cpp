@@ -40,7 +40,7 @@ Status handle_give_control(Client& client, const v1::GiveControl& give, const Re
             who + " takes none that it did not claim (ReleaseControl, and it may claim it)"};
   }
   client.answer_status(request.id(), {});
-  if (to != &client && control.hand_over(client, *to, Clock::now())) to->control_given();
+  if (to != &client && control.transfer(client, *to, Clock::now())) to->control_given();
   return {};
 }
 

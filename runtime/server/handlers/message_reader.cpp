@@ -6,7 +6,7 @@
 namespace ecorche::server {
 
 std::span<std::byte> MessageReader::buffer() {
-  const std::span<std::byte> wanted = frames_.want();
+  const std::span<std::byte> wanted = frames_.prepare();
   direct_ = wanted.size() >= inbox_.size();
   return direct_ ? wanted : std::span<std::byte>(inbox_);
 }
@@ -31,18 +31,18 @@ Status MessageReader::next(std::optional<wire::Frame>& out) {
     }
     if (!frames_.complete()) continue;
     unfinished_since_.reset();
-    out = frames_.take();
+    out = frames_.release();
   }
   return {};
 }
 
 Status MessageReader::advance() {
-  if (direct_) return frames_.advance(filled_);
-  const std::span<std::byte> wanted = frames_.want();
+  if (direct_) return frames_.commit(filled_);
+  const std::span<std::byte> wanted = frames_.prepare();
   const std::size_t n = std::min(wanted.size(), unparsed_.size());
   std::copy_n(unparsed_.begin(), n, wanted.begin());
   unparsed_ = unparsed_.subspan(n);
-  return frames_.advance(n);
+  return frames_.commit(n);
 }
 
 }  // namespace ecorche::server

@@ -22,7 +22,7 @@ struct ProbeRequest {
   std::uint64_t id = 0;
   bool to_rest = true;
   std::vector<float> points;
-  runtime::ProbeWants wants;
+  runtime::ProbeOptions wants;
   runtime::Probed found;
   Status status;
 

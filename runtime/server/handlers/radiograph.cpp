@@ -17,7 +17,7 @@ constexpr std::uint64_t kMaxPixels = 1 << 22;
 constexpr std::int32_t kPixels = 512;  // along a side that is not said
 
 // What is asked beside the picture's integrals, and who asked.
-struct Asked {
+struct RadiographRequest {
   std::uint64_t id = 0;
   v1::RenderRadiograph::Content content{};
   runtime::Exposure exposure;
@@ -103,7 +103,7 @@ Status read_setup(const v1::RenderRadiograph& render, runtime::SetupChoice& out)
   return {};
 }
 
-Status read_request(const v1::RenderRadiograph& render, const Model& model, Asked& out) {
+Status read_request(const v1::RenderRadiograph& render, const Model& model, RadiographRequest& out) {
   if (!v1::RenderRadiograph::Content_IsValid(render.content()))
     return invalid("there is no content " + std::to_string(render.content()));
   out.content = render.content();
@@ -116,7 +116,8 @@ Status read_request(const v1::RenderRadiograph& render, const Model& model, Aske
   return read_setup(render, out.job.choice);
 }
 
-v1::Array append_picture(const Asked& asked, const runtime::Exposure& exposure, wire::Payload& payload) {
+v1::Array append_picture(const RadiographRequest& asked, const runtime::Exposure& exposure,
+                         wire::Payload& payload) {
   const std::vector<float>& integrals = asked.job.integrals;
   if (asked.content != v1::RenderRadiograph::CONTENT_GREY_16 &&
       asked.content != v1::RenderRadiograph::CONTENT_GREY_8)
@@ -136,7 +137,7 @@ struct Written {
   std::shared_ptr<wire::Payload> payload = std::make_shared<wire::Payload>();
 };
 
-void write(const Asked& asked, Written& out) {
+void write(const RadiographRequest& asked, Written& out) {
   const RadiographJob& job = asked.job;
   const runtime::XRaySetup& setup = job.setup.here;
   v1::Radiograph& picture = *out.envelope.mutable_radiograph();
@@ -160,7 +161,7 @@ void write(const Asked& asked, Written& out) {
   *picture.mutable_timings() = job.timings;
 }
 
-void on_made(Client& client, const Asked& asked, Written& written) {
+void on_made(Client& client, const RadiographRequest& asked, Written& written) {
   client.pending().radiograph.reset();
   if (client.over()) return;
   if (!asked.job.status.ok()) return client.answer_status(asked.id, asked.job.status);
@@ -174,7 +175,7 @@ Status handle_render_radiograph(Client& client, const v1::RenderRadiograph& rend
     return {StatusCode::resource_exhausted,
             "radiograph: one is being made for this connection (wait for it)"};
   const Session& session = *client.session();
-  const auto asked = std::make_shared<Asked>();
+  const auto asked = std::make_shared<RadiographRequest>();
   asked->id = request.id();
   RadiographJob& job = asked->job;
   job.model = session.model();

@@ -86,7 +86,7 @@ void resume(Client& client, ResumeRequest request) {
   // A retired one's members were told so; who comes back now opens the new one.
   if (session && session->retired() && place->controlled) client.inherit(session->name());
   if (!session || session->retired()) return client.answer(request.request_id, std::move(request.hello));
-  if (request.subscriptions.empty()) request.subscriptions = place->asked;
+  if (request.subscriptions.empty()) request.subscriptions = place->subscriptions;
   if (!lacking_streams(request.subscriptions, *session).empty())
     return remake_aside(client, std::move(request), *session);
   try {

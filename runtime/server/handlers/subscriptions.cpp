@@ -13,7 +13,7 @@ namespace {
 
 // A subscription, and what it is answered by.
 struct Prepared {
-  SubscriptionRequest asked;
+  SubscriptionRequest request;
   v1::Subscribed subscribed = {};
   std::shared_ptr<const wire::Payload> payload = nullptr;
   Status status = {};
@@ -38,7 +38,7 @@ Status check_limits(const Client& client, std::size_t subscriptions, std::uint64
 
 Status subscribe(Client& client, std::uint64_t id, Prepared prepared) {
   Session& session = *client.session();
-  const Subscription* const subscription = session.subscribe(client, prepared.asked);
+  const Subscription* const subscription = session.subscribe(client, prepared.request);
   if (!subscription) {
     client.registry().metrics().hit("kept");
     return {StatusCode::resource_exhausted,
@@ -50,7 +50,7 @@ Status subscribe(Client& client, std::uint64_t id, Prepared prepared) {
   v1::Subscribed& subscribed = *envelope.mutable_subscribed();
   subscribed = std::move(prepared.subscribed);
   subscribed.set_subscription(subscription->id);
-  if (prepared.asked.streams.empty())
+  if (prepared.request.streams.empty())
     prepared.payload = describe(*session.model(), subscription->streams, subscribed);
   client.answer(id, std::move(envelope), std::move(prepared.payload));
   return {};
@@ -60,18 +60,18 @@ Status subscribe(Client& client, std::uint64_t id, Prepared prepared) {
 void prepare_aside(Client& client, std::uint64_t id, SubscriptionRequest asked) {
   ++client.pending().subscriptions;
   const auto made = std::make_shared<Prepared>();
-  made->asked = std::move(asked);
+  made->request = std::move(asked);
   const std::shared_ptr<Session> session = client.session();
   client.registry().executor().run(
       Service::background,
       [made, model = session->model()] {
         made->status = guarded("subscribe", [&]() -> Status {
-          made->asked.streams = open_streams(*model, std::get<MeshSpec>(made->asked.spec));
-          if (empty(made->asked.streams)) {
+          made->request.streams = open_streams(*model, std::get<MeshSpec>(made->request.spec));
+          if (empty(made->request.streams)) {
             return {StatusCode::invalid_argument,
                     "subscribe: no vertex of the tissues lies in the region (make it larger)"};
           }
-          made->payload = describe(*model, made->asked.streams, made->subscribed);
+          made->payload = describe(*model, made->request.streams, made->subscribed);
           return {};
         });
       },
@@ -98,7 +98,7 @@ Status handle_subscribe(Client& client, const v1::Subscribe& wanted, const Reque
     return status;
   SubscriptionRequest asked{.id = 0, .spec = spec, .request = wanted};
   const auto* mesh = std::get_if<MeshSpec>(&spec);
-  if (!mesh || !takes_long(*mesh)) return subscribe(client, request.id(), {.asked = std::move(asked)});
+  if (!mesh || !takes_long(*mesh)) return subscribe(client, request.id(), {.request = std::move(asked)});
   prepare_aside(client, request.id(), std::move(asked));
   return {};
 }

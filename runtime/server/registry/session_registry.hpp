@@ -27,7 +27,7 @@ namespace ecorche::server {
 /// The place that a connection left.
 struct SavedPlace {
   std::weak_ptr<Session> session;
-  std::vector<SubscriptionRequest> asked;
+  std::vector<SubscriptionRequest> subscriptions;
   bool controlled = false;
   Clock::time_point since = Clock::now();
 };

@@ -33,8 +33,8 @@ void Journal::put(Level level, const std::string& who, const std::string& text) 
 }
 
 void Journal::tick(Clock::time_point now) {
-  if (now - told_ < told_every) return;
-  told_ = now;
+  if (now - reported_at_ < report_interval) return;
+  reported_at_ = now;
   if (left_out_ == 0) return;
   const std::string text = "log: " + std::to_string(std::exchange(left_out_, 0)) +
                            " more lines in 10 s (raise --log-rate to see them)";

@@ -21,7 +21,7 @@ class Journal {
   using Level = spdlog::level::level_enum;
   using Write = std::function<void(Level, const std::string&)>;
   static constexpr double all = 10, burst_seconds = 10;
-  static constexpr std::chrono::seconds told_every{10};
+  static constexpr std::chrono::seconds report_interval{10};
 
   /// `write` gets every line that may be written; without one, spdlog.
   explicit Journal(double lines_per_second, Write write = {});
@@ -40,7 +40,7 @@ class Journal {
   Rates each_;
   Rate all_;
   std::uint64_t left_out_ = 0;
-  Clock::time_point told_ = Clock::now();
+  Clock::time_point reported_at_ = Clock::now();
 };
 
 }  // namespace ecorche::server

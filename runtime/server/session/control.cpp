@@ -64,7 +64,7 @@ bool Control::claim(Member& member, Clock::time_point now) {
   return true;
 }
 
-bool Control::hand_over(Member& from, Member& to, Clock::time_point now) {
+bool Control::transfer(Member& from, Member& to, Clock::time_point now) {
   if (controller_ != &from) return false;
   give(to);
   notify(now);

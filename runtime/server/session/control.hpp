@@ -37,7 +37,7 @@ class Control {
   /// False where the member does not hold it.
   bool release(Member& member, Clock::time_point now);
   /// From who holds it to another member. False where `from` does not hold it.
-  bool hand_over(Member& from, Member& to, Clock::time_point now);
+  bool transfer(Member& from, Member& to, Clock::time_point now);
   /// Tells all once control is free that was reserved.
   void expire(Clock::time_point now);
 

@@ -22,7 +22,7 @@ class ProbeQueue {
  public:
   /// So long after the last question poses are still made ready for the next; and so long what that takes is
   /// kept.
-  static constexpr std::chrono::seconds asked_lately{1}, forgotten_after{10};
+  static constexpr std::chrono::seconds recent{1}, forgotten_after{10};
 
   /// With the posed body, or with null and the reason.
   using Ready = std::function<void(const std::shared_ptr<const ProbeFrame>&, const Status&)>;
@@ -52,7 +52,7 @@ class ProbeQueue {
 
  private:
   static bool lately(const std::optional<Clock::time_point>& then, Clock::time_point now) {
-    return then && now - *then < asked_lately;
+    return then && now - *then < recent;
   }
   std::shared_ptr<ProbeFrame> spare();
   void answer(const std::shared_ptr<ProbeFrame>& frame, const Status& status);

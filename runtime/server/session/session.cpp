@@ -92,8 +92,8 @@ void Session::leave(Member& member, bool may_return) {
   control_.leave(member, may_return, now);
   if (!control_.members().empty()) return;
   player_->stop();
-  members_news_.forget();
-  clip_news_.forget();
+  members_news_.cancel();
+  clip_news_.cancel();
   set_alarm();  // a server that stops would wait for who watches at the slowest rate
   forget_probes(now);
 }
@@ -156,7 +156,7 @@ void Session::tell_clip() {
     state.set_playing(player_->playing());
   }
   tell(v1::FEATURE_CLIP_STATE, envelope);
-  if (player_->playing()) clip_news_.again_after(kWhilePlaying);
+  if (player_->playing()) clip_news_.schedule_after(kWhilePlaying);
 }
 
 void Session::set_thresholds(const runtime::QualityThresholds& thresholds) {

@@ -15,13 +15,13 @@
 #include "runtime/server/schedule/executor.hpp"
 #include "runtime/server/schedule/stream_activity.hpp"
 #include "runtime/server/schedule/turn_queue.hpp"
+#include "runtime/server/session/change_notifier.hpp"
 #include "runtime/server/session/clip.hpp"
 #include "runtime/server/session/control.hpp"
 #include "runtime/server/session/frame_planner.hpp"
 #include "runtime/server/session/hung_spheres.hpp"
 #include "runtime/server/session/job_pacer.hpp"
 #include "runtime/server/session/job_reporter.hpp"
-#include "runtime/server/session/news.hpp"
 #include "runtime/server/session/pose_slot.hpp"
 #include "runtime/server/session/presence.hpp"
 #include "runtime/server/session/probe_queue.hpp"
@@ -200,7 +200,7 @@ class Session : public std::enable_shared_from_this<Session>, private JobListene
   std::shared_ptr<ClipPlayer> player_;
   std::uint64_t clip_sequence_ = 0;  ///< of the newest pose that a clip showed
   Presence presence_;
-  News members_news_, clip_news_;
+  ChangeNotifier members_news_, clip_news_;
   Alarm alarm_;  ///< for who is due
   Turn quality_turn_, first_frame_turn_;
   std::uint64_t frames_ = 0;

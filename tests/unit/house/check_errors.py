@@ -28,7 +28,6 @@ DISK = "takes a disk that fails between two calls"
 RIGHTS = "takes a user without rights, and CI runs as root"
 EXCEPTIONS = {
     "app/stream.cpp": {"a frame of another topology": "takes a server that breaks the protocol", "which was not sent": "takes a server that breaks the protocol"},
-    "clients/cpp/client.cpp": {"this is the server's answer": "hands on what a server says", "no answer within": "takes a server that never answers"},
     "core/kinematics/retarget.cpp": {"ask for a frame of the clip": CALLER},
     "core/model_file/guard.cpp": {"was replaced while it was opened": "takes a race between two system calls",
                                   "is filtered": "HDF5 filters chunks only, and chunks are refused before"},

@@ -26,10 +26,10 @@ std::string bytes_of(const EncodedFrame& frame) {
 // used up.
 Status feed(FrameReader& reader, std::string_view bytes, std::size_t piece = 1 << 20) {
   while (!bytes.empty() && !reader.complete()) {
-    const std::span<std::byte> want = reader.want();
+    const std::span<std::byte> want = reader.prepare();
     const std::size_t n = std::min({want.size(), bytes.size(), piece});
     std::memcpy(want.data(), bytes.data(), n);
-    if (const Status status = reader.advance(n); !status.ok()) return status;
+    if (const Status status = reader.commit(n); !status.ok()) return status;
     bytes.remove_prefix(n);
   }
   return {};
@@ -67,7 +67,7 @@ TEST(Framing, GoldenBytes) {
   FrameReader reader(kLimits);
   ASSERT_TRUE(feed(reader, golden).ok());
   ASSERT_TRUE(reader.complete());
-  const Frame frame = reader.take();
+  const Frame frame = reader.release();
   EXPECT_EQ(frame.envelope.request_id(), 5U);
   EXPECT_EQ(frame.envelope.ping().data(), "hi");
   EXPECT_EQ(frame.payload, *sixteen_bytes());
@@ -89,7 +89,7 @@ TEST(Framing, FramesFollowEachOtherInAnyPieces) {
       EXPECT_TRUE(reader.between_frames());
       ASSERT_TRUE(feed(reader, one, piece).ok());
       ASSERT_TRUE(reader.complete());
-      EXPECT_EQ(reader.take().envelope.request_id(), 5U);
+      EXPECT_EQ(reader.release().envelope.request_id(), 5U);
     }
   }
 }
@@ -102,9 +102,9 @@ TEST(Framing, MemoryThatIsGivenBackServesTheNextPayloadWhateverItsSize) {
     const std::byte* const memory = spent.data();
     reader.reuse(std::move(spent));
     ASSERT_TRUE(feed(reader, bytes_of(encode(a_ping()))).ok());
-    EXPECT_TRUE(reader.take().payload.empty()) << "memory for none";
+    EXPECT_TRUE(reader.release().payload.empty()) << "memory for none";
     ASSERT_TRUE(feed(reader, ping, 5).ok());
-    const Frame frame = reader.take();
+    const Frame frame = reader.release();
     EXPECT_EQ(frame.payload, *sixteen_bytes());
     if (size > 0) {
       EXPECT_EQ(frame.payload.data(), memory);
@@ -118,7 +118,7 @@ TEST(Framing, EveryPrefixWaits) {
     FrameReader reader(kLimits);
     EXPECT_TRUE(feed(reader, std::string_view(bytes).substr(0, length)).ok());
     EXPECT_FALSE(reader.complete()) << length;
-    EXPECT_FALSE(reader.want().empty()) << length;
+    EXPECT_FALSE(reader.prepare().empty()) << length;
   }
 }
 
@@ -143,7 +143,7 @@ TEST(Framing, SizesAreRefusedBeforeAnythingIsAllocated) {
     EXPECT_EQ(header_status(bad.envelope_bytes, bad.payload_bytes, reader).code, bad.code)
         << bad.envelope_bytes << " " << bad.payload_bytes;
     // Still the header's own eight bytes: nothing was made room for.
-    EXPECT_LE(reader.want().size(), header_bytes);
+    EXPECT_LE(reader.prepare().size(), header_bytes);
   }
   FrameReader reader(kLimits);
   EXPECT_TRUE(header_status(1024, 1024, reader).ok());
@@ -167,7 +167,7 @@ TEST(Framing, UnknownMessagesArriveAsNothing) {
   FrameReader reader(kLimits);
   ASSERT_TRUE(feed(reader, bytes).ok());
   ASSERT_TRUE(reader.complete());
-  EXPECT_EQ(reader.take().envelope.message_case(), v1::Envelope::MESSAGE_NOT_SET);
+  EXPECT_EQ(reader.release().envelope.message_case(), v1::Envelope::MESSAGE_NOT_SET);
 }
 
 TEST(Framing, RandomBytesNeverHarm) {
@@ -179,7 +179,7 @@ TEST(Framing, RandomBytesNeverHarm) {
     if (run % 2 == 0) bytes.replace(0, 8, std::string("\x18\0\0\0\x10\0\0\0", 8));
     FrameReader reader(kLimits);
     const Status status = feed(reader, bytes);
-    if (status.ok() && reader.complete()) reader.take();
+    if (status.ok() && reader.complete()) reader.release();
   }
 }
 

@@ -100,7 +100,7 @@ TEST(Allocation, NoneInAProbe) {
   PosedBody body = poser.make_frame();
   Probe::PosedTree tree;
   Probed out;
-  const ProbeWants wants{.gradient = true, .tissue = true, .volumes = {{0}, {1}}};
+  const ProbeOptions wants{.gradient = true, .tissue = true, .volumes = {{0}, {1}}};
   constexpr int numbers = 3 * 500;
   std::vector<float> points;
   points.reserve(numbers);

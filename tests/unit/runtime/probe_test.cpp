@@ -92,7 +92,7 @@ TEST_F(ProbeTest, ValuesAreThoseOfThePosedVolume) {
   bend(1.2);
   const VolumePoser poser(model);
   VolumePoser::Scratch scratch;
-  ProbeWants wants;
+  ProbeOptions wants;
   for (std::uint32_t row = 0; row < model->volumes.size(); ++row)
     wants.volumes.push_back({row, Sampling::trilinear});
   ASSERT_EQ(wants.volumes.size(), 2U);

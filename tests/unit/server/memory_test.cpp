@@ -223,13 +223,13 @@ class Posing {
     wire::FrameReader reader({.envelope_bytes = 1 << 20, .payload_bytes = 1 << 26});
     std::size_t at = 0;
     while (!reader.complete()) {
-      const auto into = reader.want();
+      const auto into = reader.prepare();
       std::memcpy(into.data(), bytes.data() + at, into.size());
       at += into.size();
-      EXPECT_TRUE(reader.advance(into.size()).ok());
+      EXPECT_TRUE(reader.commit(into.size()).ok());
     }
     EXPECT_EQ(at, bytes.size());
-    return reader.take();
+    return reader.release();
   }
   static void expect_right(const Reader& reader, const Pose& pose) {
     const runtime::BodyPoser& poser = model().poser();

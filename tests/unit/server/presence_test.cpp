@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "runtime/server/handlers/display_name.hpp"
-#include "runtime/server/session/news.hpp"
+#include "runtime/server/session/change_notifier.hpp"
 #include "tests/unit/server/fake_member.hpp"
 
 namespace ecorche::server {
@@ -64,9 +64,9 @@ TEST(PresenceTest, WhoLeavesOrHasItAsksNoMore) {
   room.presence.ask(room.second, true);
   room.presence.ask(room.third, true);
   room.changes = 0;
-  EXPECT_FALSE(room.control.hand_over(room.second, room.third, room.now)) << "it is not its to give";
+  EXPECT_FALSE(room.control.transfer(room.second, room.third, room.now)) << "it is not its to give";
   EXPECT_EQ(room.changes, 0);
-  EXPECT_TRUE(room.control.hand_over(room.first, room.third, room.now));
+  EXPECT_TRUE(room.control.transfer(room.first, room.third, room.now));
   EXPECT_EQ(room.changes, 1);
   EXPECT_EQ(room.listed(), "13! 12Bo? 11Ada+ ");
   EXPECT_EQ(room.third.control.back(), (FakeMember::ControlNews{v1::ROLE_CONTROLLER, false, 0}));
@@ -117,7 +117,7 @@ TEST(DisplayName, IsPlainAndShort) {
 TEST(NewsTest, TellsSoonOnceAndNotTooOften) {
   net::io_context io;
   std::vector<Clock::time_point> told;
-  News news(io, std::chrono::milliseconds(100), [&] { told.push_back(Clock::now()); });
+  ChangeNotifier news(io, std::chrono::milliseconds(100), [&] { told.push_back(Clock::now()); });
   const auto wait = [&](int milliseconds) {
     const auto until = Clock::now() + std::chrono::milliseconds(milliseconds);
     io.restart();
@@ -133,14 +133,14 @@ TEST(NewsTest, TellsSoonOnceAndNotTooOften) {
   wait(300);
   ASSERT_EQ(told.size(), 2U) << "one for all";
   EXPECT_GE(told[1] - begin, std::chrono::milliseconds(100));
-  news.again_after(std::chrono::milliseconds(150));
+  news.schedule_after(std::chrono::milliseconds(150));
   news.changed();  // comes before
   wait(60);
   EXPECT_EQ(told.size(), 3U);
   wait(400);
   EXPECT_EQ(told.size(), 3U);
-  news.again_after(std::chrono::milliseconds(120));
-  news.forget();
+  news.schedule_after(std::chrono::milliseconds(120));
+  news.cancel();
   wait(300);
   EXPECT_EQ(told.size(), 3U);
 }

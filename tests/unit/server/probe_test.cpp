@@ -99,7 +99,7 @@ class Offline {
     probe_.follow(body.nodes, tree_);
   }
   runtime::Probed ask(const std::vector<double>& points, v1::ProbePoints::Direction direction) const {
-    const runtime::ProbeWants wants{.gradient = true, .tissue = true, .volumes = {{.row = 0}, {.row = 1}}};
+    const runtime::ProbeOptions wants{.gradient = true, .tissue = true, .volumes = {{.row = 0}, {.row = 1}}};
     runtime::Probed found;
     if (direction == kToRest)
       probe_.posed_to_rest(tree_, narrowed(points), wants, found);

@@ -80,7 +80,7 @@ TEST(SessionRegistry, KeepsFewPlacesOfThoseWhoComeAndGo) {
   const auto session = open.open("shared");
   session->join(guest);
   for (const char* token : {"z", "y", "a", "b", "c"}) {
-    open.registry.left(token, SavedPlace{.session = session, .asked = {}, .controlled = false});
+    open.registry.left(token, SavedPlace{.session = session, .subscriptions = {}, .controlled = false});
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   EXPECT_FALSE(open.registry.find_place("z"));

@@ -39,11 +39,11 @@ class Elsewhere {
     wire::FrameReader reader({.envelope_bytes = 1 << 20, .payload_bytes = 1 << 20});
     boost::system::error_code ec;
     while (!reader.complete()) {
-      const auto spec = reader.want();
+      const auto spec = reader.prepare();
       net::read(socket_, net::buffer(spec.data(), spec.size()), ec);
-      if (ec || !reader.advance(spec.size()).ok()) return false;
+      if (ec || !reader.commit(spec.size()).ok()) return false;
     }
-    return reader.take().envelope.has_server_hello();
+    return reader.release().envelope.has_server_hello();
   }
 
  private:
@@ -94,10 +94,10 @@ TEST(Shares, AFloodOfBadClientsWritesFewLines) {
   EXPECT_EQ(lines.back(), "#7001: ended");
   journal.tick(Clock::now());
   EXPECT_EQ(lines.size(), 21U);
-  journal.tick(Clock::now() + Journal::told_every);
+  journal.tick(Clock::now() + Journal::report_interval);
   ASSERT_EQ(lines.size(), 22U);
   EXPECT_EQ(lines.back(), "log: 6980 more lines in 10 s (raise --log-rate to see them)");
-  journal.tick(Clock::now() + 2 * Journal::told_every);
+  journal.tick(Clock::now() + 2 * Journal::report_interval);
   EXPECT_EQ(lines.size(), 22U) << "nothing was left out since";
   // From however many addresses.
   for (int i = 0; i < 7000; ++i)

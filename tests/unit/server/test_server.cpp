@@ -162,13 +162,13 @@ std::optional<wire::Frame> RawClient::receive(double seconds) {
   const auto until = within(seconds);
   try {
     while (!reader_.complete()) {
-      const std::size_t n = socket_.read(reader_.want(), until);
-      if (n == 0 || !reader_.advance(n).ok()) return std::nullopt;
+      const std::size_t n = socket_.read(reader_.prepare(), until);
+      if (n == 0 || !reader_.commit(n).ok()) return std::nullopt;
     }
   } catch (const Error&) {
     return std::nullopt;  // hung up
   }
-  return reader_.take();
+  return reader_.release();
 }
 
 StatusCode RawClient::last_words() {

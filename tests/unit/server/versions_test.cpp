@@ -90,13 +90,13 @@ TEST(Versions, FramesOfTheFirstDayAreReadAndWritten) {
   wire::FrameReader reader({.envelope_bytes = 1024, .payload_bytes = 1024});
   std::size_t at = 0;
   while (!reader.complete()) {
-    const auto into = reader.want();
+    const auto into = reader.prepare();
     std::memcpy(into.data(), kMesh.data() + at, into.size());
     at += into.size();
-    ASSERT_TRUE(reader.advance(into.size()).ok());
+    ASSERT_TRUE(reader.commit(into.size()).ok());
   }
   EXPECT_EQ(at, kMesh.size());
-  const wire::Frame frame = reader.take();
+  const wire::Frame frame = reader.release();
   EXPECT_EQ(frame.envelope.mesh_frame().frame(), 2U);
   EXPECT_EQ(frame.envelope.mesh_frame().arrays(0).array().components(), 3U);
   std::array<float, 3> first{};

@@ -108,14 +108,14 @@ class WebClient {
     wire::FrameReader reader({.envelope_bytes = 1 << 20, .payload_bytes = 1 << 26});
     std::size_t at = 0;
     while (at < data->size() && !reader.complete()) {
-      const auto into = reader.want();
+      const auto into = reader.prepare();
       const std::size_t n = std::min(into.size(), data->size() - at);
       std::memcpy(into.data(), data->data() + at, n);
       at += n;
-      if (!reader.advance(n).ok()) return std::nullopt;
+      if (!reader.commit(n).ok()) return std::nullopt;
     }
     if (!reader.complete() || at != data->size()) return std::nullopt;  // not one frame
-    return reader.take();
+    return reader.release();
   }
 
  private:

@@ -44,7 +44,7 @@ struct FrameLimits {
 /// Takes a stream of bytes apart. It asks for bytes instead of being fed, so that a payload is read from the
 /// socket to where it stays:
 ///
-///   while (!reader.complete()) { n = read(socket, reader.want()); status = reader.advance(n); if
+///   while (!reader.complete()) { n = read(socket, reader.prepare()); status = reader.commit(n); if
 ///   (!status.ok()) ... }
 ///
 /// After a status that is not ok the stream is lost: a frame's end cannot be found any more.
@@ -57,19 +57,19 @@ class FrameReader {
   void set_limits(FrameLimits limits) { limits_ = limits; }
 
   /// Where the next bytes go; never empty unless a frame is complete.
-  std::span<std::byte> want();
+  std::span<std::byte> prepare();
 
-  /// The first `n` bytes of want() were filled. resource_exhausted for a frame beyond the limits,
+  /// The first `n` bytes of prepare() were filled. resource_exhausted for a frame beyond the limits,
   /// invalid_argument for one that is not a frame: an empty envelope, a payload that is no multiple of 16,
   /// padding that is not zero, no Protobuf.
-  Status advance(std::size_t n);
+  Status commit(std::size_t n);
 
   /// Whether a frame is there to take.
   bool complete() const { return part_ == Part::done; }
   /// No byte of a frame has come yet.
   bool between_frames() const { return part_ == Part::header && filled_ == 0; }
   /// The complete frame; the reader then waits for the next.
-  Frame take();
+  Frame release();
   /// Memory for the next payload, which need not be cleared then: at 16 MB that takes as long as reading it.
   void reuse(Payload spent) { spent_ = std::move(spent); }
 

@@ -15,7 +15,7 @@
 namespace ecorche::runtime {
 
 /// What to say of every point besides the tet that holds it and where it is on the other side.
-struct ProbeWants {
+struct ProbeOptions {
   /// A volume to sample.
   struct Volume {
     std::uint32_t row = 0;                    ///< of Model::volumes
@@ -73,10 +73,10 @@ class Probe {
 
   /// `points`: 3 * #P, LPS mm; those that are not finite lie outside. Any number of threads may ask the same
   /// tree. Throws Error{usage} for a volume that the model has not.
-  void posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
+  void posed_to_rest(const PosedTree& tree, std::span<const float> points, const ProbeOptions& wants,
                      Probed& out) const;
   /// Points of the scan into the posed body.
-  void rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeWants& wants,
+  void rest_to_posed(const PosedTree& tree, std::span<const float> points, const ProbeOptions& wants,
                      Probed& out) const;
 
   /// What is probed.

@@ -12,6 +12,18 @@
 
 namespace ecorche::client {
 
+/// A status that is not OK, as the server sent it.
+class ServerError : public Error {
+ public:
+  /// `where` names the request.
+  ServerError(const std::string& where, const v1::Status& status);
+
+  StatusCode code() const noexcept { return code_; }
+
+ private:
+  StatusCode code_;
+};
+
 /// How a server is entered.
 struct Access {
   std::string authorities;   ///< PEM file whose certificates are trusted; empty: no TLS
@@ -30,8 +42,8 @@ struct Access {
 ///   client.send(pose);
 ///   while (auto message = client.receive(until)) { ... }    // PoseAck, MeshFrame, VolumeFrame
 ///
-/// Errors: temporary (nobody there, hung up, the server stops or has no room), refused (PERMISSION_DENIED),
-/// protocol (anything else that the server says or does).
+/// Errors: ServerError for what the server answers; temporary (nobody there, hung up, the server stops or has
+/// no room), refused (PERMISSION_DENIED), usage (NOT_FOUND), protocol (anything else that it says or does).
 class Client {
  public:
   /// How long the server may take for an answer.
@@ -71,8 +83,5 @@ class Client {
   std::uint64_t last_request_ = 0;
   std::uint64_t bytes_received_ = 0;
 };
-
-/// The error that a status is to whoever asked. `where` names the request.
-Error to_error(const std::string& where, const v1::Status& status);
 
 }  // namespace ecorche::client

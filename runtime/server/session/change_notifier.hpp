@@ -11,23 +11,23 @@
 
 namespace ecorche::server {
 
-/// Calls `tell` once for all that has changed, not within changed(): whoever changed something is answered
+/// Calls `notify` once for all that has changed, not within changed(): whoever changed something is answered
 /// first. On the I/O thread.
-class News {
+class ChangeNotifier {
  public:
   /// `least`: from one call to the next.
-  News(net::io_context& io, Clock::duration least, std::function<void()> tell)
-      : least_(least), tell_(std::move(tell)), alarm_(io, [this] { ring(); }) {}
+  ChangeNotifier(net::io_context& io, Clock::duration least, std::function<void()> notify)
+      : least_(least), notify_(std::move(notify)), alarm_(io, [this] { fire(); }) {}
 
   /// Throws nothing: where there is no memory for it, the next change tells of both.
-  void changed() noexcept { ask(std::max(Clock::now(), told_ + least_)); }
+  void changed() noexcept { schedule(std::max(Clock::now(), notified_at_ + least_)); }
   /// Once more after so long, unless something changes before.
-  void again_after(Clock::duration time) noexcept { ask(Clock::now() + std::max(time, least_)); }
+  void schedule_after(Clock::duration time) noexcept { schedule(Clock::now() + std::max(time, least_)); }
   /// Nobody is here to be told.
-  void forget() noexcept { ask(std::nullopt); }
+  void cancel() noexcept { schedule(std::nullopt); }
 
  private:
-  void ask(std::optional<Clock::time_point> at) noexcept {
+  void schedule(std::optional<Clock::time_point> at) noexcept {
     if (at && due_ && *due_ <= *at) return;
     due_ = at;
     try {
@@ -36,16 +36,16 @@ class News {
       due_.reset();
     }
   }
-  void ring() {
+  void fire() {
     due_.reset();
-    told_ = Clock::now();
-    tell_();
+    notified_at_ = Clock::now();
+    notify_();
   }
 
   Clock::duration least_;
-  std::function<void()> tell_;
+  std::function<void()> notify_;
   std::optional<Clock::time_point> due_;
-  Clock::time_point told_{};
+  Clock::time_point notified_at_{};
   Alarm alarm_;
 };
 
