@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What other projects link, by add_subdirectory or find_package(ecorche COMPONENTS ...):
+#   ecorche::c           libecorche.so: poses in process, by a C ABI
+#   ecorche::c_client    libecorche_client.so: shows what a server poses, likewise
 #   ecorche::runtime     poses prepared models: bodies, volumes, probes, quality
 #   ecorche::client      speaks with a server
 #   ecorche::preprocess  reads cases and prepares models (with ECORCHE_TOOLS)
@@ -49,8 +51,15 @@ foreach(_component ${_components})
   list(APPEND _all ${_installed})
 endforeach()
 list(REMOVE_DUPLICATES _all)
-install(TARGETS ${_all} EXPORT ecorche ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-  INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(TARGETS ecorche_c ecorche_c_client ${_all} EXPORT ecorche ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(FILES clients/c/include/ecorche/ecorche.h clients/c/include/ecorche/ecorche_client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecorche)
+# From the pkgconfig folder up to where all is installed.
+string(REGEX REPLACE "[^/]+" ".." _up ${CMAKE_INSTALL_LIBDIR})
+foreach(_name ecorche ecorche_client)
+  configure_file(cmake/ecorche.pc.in ${PROJECT_BINARY_DIR}/${_name}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${_name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endforeach()
 foreach(_headers core/include proto/include runtime/include clients/cpp/include)
   install(DIRECTORY ${_headers}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 endforeach()

@@ -39,6 +39,7 @@ ARROWS = {
                        "runtime/server/schedule", "runtime/server/session", "runtime/server/registry",
                        "runtime/server/handlers"],
     "clients/cpp": ["proto", "core/values"],
+    "clients/c": ["core", "runtime", "io/case", "proto", "clients/cpp"],
     "app": ["core", "io", "phantom", "preprocess", "runtime", "proto", "clients"],
 }
 # What systems do each in their own way; its headers name nothing of any system. core/values needs none of it.
@@ -52,7 +53,7 @@ PLAIN_HEADERS = {f"core/include/ecorche/values/{name}.hpp" for name in ("image",
 # Where public headers belong: <ecorche/wire/framing.hpp> is of proto.
 PUBLIC = {"values": "core/values", "files": "core/files", "kinematics": "core/kinematics", "model_file": "core/model_file",
           "io": "io/case", "preprocess": "preprocess", "runtime": "runtime", "wire": "proto", "v1": "proto", "client": "clients/cpp",
-          "version.hpp": "core/values"}
+          "version.hpp": "core/values", "ecorche.h": "clients/c", "ecorche_client.h": "clients/c"}
 FOREIGN_IN_VALUES = re.compile(r"#include <(hdf5|H5|yaml|tbb|spdlog|fmt|fstream|filesystem|thread|mutex)")
 # Units that link GPL or AGPL libraries carry that licence themselves; nothing else may include those libraries.
 GPL_UNITS = ("preprocess/tet/cgal/", "preprocess/tet/tetgen/", "preprocess/weights/cholmod/",

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the handle of ecorche_client.h is.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <ecorche/ecorche_client.h>
+#include <ecorche/client/client.hpp>
+#include <ecorche/wire/mesh_decoder.hpp>
+#include "clients/c/edited_pose.hpp"
+#include "clients/c/guard.hpp"
+
+namespace ecorche::c {
+
+/// What was opened; made once, and where it is.
+struct OpenedBody {
+  v1::ModelOpened opened;
+  wire::Payload triangles;
+  Rig rig;
+  std::vector<AngleRow> angles;
+  EditedPose pose{rig.skeleton};
+  std::uint64_t sequence = 0;  ///< of the last pose that was sent
+
+  OpenedBody() = default;
+  OpenedBody(const OpenedBody&) = delete;
+  OpenedBody& operator=(const OpenedBody&) = delete;
+};
+
+}  // namespace ecorche::c
+
+struct ecorche_client {
+  ecorche::client::Client connection;
+  std::vector<std::string> models = {};
+  std::unique_ptr<ecorche::c::OpenedBody> body = nullptr;
+  bool controls = false;
+
+  std::optional<std::uint32_t> subscription = {};
+  ecorche::wire::MeshDecoder decoder = {};
+  std::vector<ecorche::wire::DecodedTissue> frame = {};
+  std::optional<ecorche::v1::PoseQuality> quality = {};
+};
+
+namespace ecorche::c {
+
+/// As guarded(); what a server answers keeps its code.
+template <class Work>
+ecorche_code guarded_call(const Work& work) noexcept {
+  return guarded([&] {
+    try {
+      return work();
+    } catch (const client::ServerError& error) {
+      return fail(static_cast<ecorche_code>(error.code()), error.what());
+    }
+  });
+}
+
+/// As guarded_call(), for what needs a client (null is refused) and where `opened` a model of it.
+template <class Work>
+ecorche_code with_client(const ecorche_client* client, bool opened, const Work& work) noexcept {
+  if (client == nullptr) return fail(ECORCHE_INVALID_ARGUMENT, "client: is null");
+  if (opened && !client->body)
+    return fail(ECORCHE_FAILED_PRECONDITION, "client: has no model yet (call ecorche_client_open)");
+  return guarded_call(work);
+}
+
+/// Of the last frame; null where it does not hold the tissue.
+const wire::DecodedTissue* find_decoded(const ecorche_client& client, std::uint32_t tissue);
+
+}  // namespace ecorche::c

@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Shows bodies that an ecorche server poses, from any language that calls C: what libecorche does in process,
+ * with the work done elsewhere and others looking on.
+ *
+ *   ecorche_client* client = NULL;
+ *   if (ecorche_client_connect("127.0.0.1:7070", NULL, &client) != ECORCHE_OK) {
+ *     fprintf(stderr, "%s\n", ecorche_client_error_message());
+ *     exit(1);
+ *   }
+ *   ecorche_client_open(client, NULL, NULL);
+ *   ecorche_client_subscribe(client, NULL);
+ *   ecorche_client_set_angle(client, "elbow_left", "flexion", 1.57);
+ *   ecorche_client_send_pose(client, ECORCHE_SKINNING_COR, NULL);
+ *   ecorche_event event = ECORCHE_EVENT_INIT;
+ *   while (ecorche_client_poll(client, 0, &event) == ECORCHE_OK && event.kind != ECORCHE_EVENT_NONE) {
+ *     if (event.kind == ECORCHE_EVENT_FRAME) draw(ecorche_client_positions(client, 0));
+ *   }
+ *
+ * Units, errors, ownership and structs are as in ecorche.h, but for the error message, which is
+ * ecorche_client_error_message().
+ *
+ * Threads: a client is for one thread at a time. It starts none: it reads and answers the server within
+ * ecorche_client_poll and within what waits for an answer, so call the former every frame.
+ *
+ * After UNAVAILABLE the connection is gone: close the client, connect again, and open the session by its
+ * name.
+ */
+#ifndef ECORCHE_CLIENT_H
+#define ECORCHE_CLIENT_H
+
+#include <ecorche/ecorche.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* As ecorche_abi_version, ecorche_version and ecorche_error_message, of this library. */
+ECORCHE_API unsigned ecorche_client_abi_version(void);
+ECORCHE_API const char* ecorche_client_version(void);
+ECORCHE_API const char* ecorche_client_error_message(void);
+
+/* ---- connections
+ * ------------------------------------------------------------------------------------------- */
+
+typedef struct ecorche_client ecorche_client;
+
+typedef struct ecorche_client_options {
+  size_t struct_size;
+  const char* name;        /* that the server's log has; NULL: "ecorche_client" */
+  const char* token;       /* of the right to connect; NULL: none */
+  const char* authorities; /* PEM file of certificates that are trusted; NULL: no TLS */
+} ecorche_client_options;
+#define ECORCHE_CLIENT_OPTIONS_INIT \
+  { sizeof(ecorche_client_options), 0, 0, 0 }
+
+/* "127.0.0.1:7070". Waits 5 s at most; `options` may be NULL. UNAVAILABLE where nobody answers there. */
+ECORCHE_API ecorche_code ecorche_client_connect(const char* address, const ecorche_client_options* options,
+                                                ecorche_client** out);
+ECORCHE_API void ecorche_client_close(ecorche_client* client);
+/* Which ecorche answers: "0.1.0". */
+ECORCHE_API const char* ecorche_client_server(const ecorche_client* client);
+/* Received so far. */
+ECORCHE_API uint64_t ecorche_client_bytes(const ecorche_client* client);
+
+/* The models that the server has; their names are good until the next call. */
+ECORCHE_API ecorche_code ecorche_client_models(ecorche_client* client, uint32_t* count);
+ECORCHE_API const char* ecorche_client_model(const ecorche_client* client, uint32_t row);
+
+/* Opens a model (NULL: the first) in a session that others may join by its name (NULL: one of its own). Once
+ * for a connection. NOT_FOUND for another model. */
+ECORCHE_API ecorche_code ecorche_client_open(ecorche_client* client, const char* model, const char* session);
+/* Its name, for others. */
+ECORCHE_API const char* ecorche_client_session(const ecorche_client* client);
+
+/* What was opened; see the functions of ecorche_model that are named alike. `rest` of a tissue is NULL: it
+ * comes by frames. */
+ECORCHE_API uint32_t ecorche_client_tissue_count(const ecorche_client* client);
+ECORCHE_API ecorche_code ecorche_client_tissue(const ecorche_client* client, uint32_t tissue,
+                                               ecorche_tissue_info* out);
+ECORCHE_API uint32_t ecorche_client_segment_count(const ecorche_client* client);
+ECORCHE_API ecorche_code ecorche_client_segment(const ecorche_client* client, uint32_t segment,
+                                                ecorche_segment_info* out);
+ECORCHE_API uint32_t ecorche_client_angle_count(const ecorche_client* client);
+ECORCHE_API ecorche_code ecorche_client_angle(const ecorche_client* client, uint32_t angle,
+                                              ecorche_angle_info* out);
+
+/* ---- poses
+ * ------------------------------------------------------------------------------------------------- */
+
+/* Not 0: this client poses the session, and others look on. */
+ECORCHE_API int ecorche_client_controls(const ecorche_client* client);
+/* Takes control where it is free; FAILED_PRECONDITION where another has it. */
+ECORCHE_API ecorche_code ecorche_client_claim(ecorche_client* client);
+ECORCHE_API ecorche_code ecorche_client_release(ecorche_client* client);
+
+/* The pose that is sent next; see the functions of ecorche_pose that are named alike. */
+ECORCHE_API ecorche_code ecorche_client_reset_pose(ecorche_client* client);
+ECORCHE_API ecorche_code ecorche_client_set_angle(ecorche_client* client, const char* joint,
+                                                  const char* angle, double radians);
+ECORCHE_API ecorche_code ecorche_client_set_angle_at(ecorche_client* client, uint32_t angle, double radians);
+ECORCHE_API ecorche_code ecorche_client_set_rotation(ecorche_client* client, uint32_t segment,
+                                                     const double xyzw[4]);
+ECORCHE_API ecorche_code ecorche_client_set_root(ecorche_client* client, const double translation[3]);
+/* Sends it, and does not wait. `sequence` (may be NULL) is what the frame that shows it will say. */
+ECORCHE_API ecorche_code ecorche_client_send_pose(ecorche_client* client, ecorche_skinning skinning,
+                                                  uint64_t* sequence);
+
+/* ---- frames
+ * ------------------------------------------------------------------------------------------------ */
+
+typedef enum ecorche_encoding {
+  ECORCHE_ENCODING_F32 = 1,      /* 12 bytes a vertex; bit for bit what libecorche gives */
+  ECORCHE_ENCODING_U16 = 2,      /* 6 bytes, within half a step: some 0.03 mm */
+  ECORCHE_ENCODING_U16_DELTA = 3 /* the same numbers in a third of that while the body moves */
+} ecorche_encoding;
+
+typedef struct ecorche_stream_options {
+  size_t struct_size;
+  ecorche_encoding encoding;
+  int32_t normals;         /* not 0: with normals, within 1 degree */
+  double max_rate;         /* frames a second; 0: every pose */
+  const uint32_t* tissues; /* rows; NULL: all */
+  size_t tissue_count;
+  int32_t quality; /* not 0: every pose is measured before its frame leaves, which takes a whole body's time */
+} ecorche_stream_options;
+#define ECORCHE_STREAM_OPTIONS_INIT \
+  { sizeof(ecorche_stream_options), ECORCHE_ENCODING_U16_DELTA, 1, 0, 0, 0, 0 }
+
+/* Frames come from now on; `options` may be NULL. Another call replaces the last one. */
+ECORCHE_API ecorche_code ecorche_client_subscribe(ecorche_client* client,
+                                                  const ecorche_stream_options* options);
+
+typedef enum ecorche_event_kind {
+  ECORCHE_EVENT_NONE = 0,  /* nothing more came */
+  ECORCHE_EVENT_FRAME = 1, /* positions are new */
+  ECORCHE_EVENT_POSE = 2, /* a pose was taken (`code` is OK), or refused for ecorche_client_error_message() */
+  ECORCHE_EVENT_CONTROL = 3,      /* ecorche_client_controls() changed, or control is free */
+  ECORCHE_EVENT_MODEL_CHANGED = 4 /* the server has read the model anew: connect again */
+} ecorche_event_kind;
+
+typedef struct ecorche_event {
+  size_t struct_size;
+  ecorche_event_kind kind;
+  ecorche_code code;
+  uint64_t sequence; /* of FRAME and POSE: which pose */
+  int32_t vacant;    /* of CONTROL: not 0: ecorche_client_claim would have it */
+} ecorche_event;
+#define ECORCHE_EVENT_INIT \
+  { sizeof(ecorche_event), ECORCHE_EVENT_NONE, ECORCHE_OK, 0, 0 }
+
+/* The next thing that came. Waits `seconds` for one; 0: never, for a game's loop. */
+ECORCHE_API ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche_event* out);
+
+/* Of the last frame: 3 * vertex_count, LPS mm; NULL before the first, or for a tissue that was not asked for.
+ */
+ECORCHE_API const float* ecorche_client_positions(const ecorche_client* client, uint32_t tissue);
+/* 3 * vertex_count, unit vectors; NULL where there are none. */
+ECORCHE_API const float* ecorche_client_normals(const ecorche_client* client, uint32_t tissue);
+/* As ecorche_body_copy. */
+ECORCHE_API ecorche_code ecorche_client_copy(const ecorche_client* client, uint32_t tissue,
+                                             ecorche_space space, float* positions, size_t position_stride,
+                                             float* normals, size_t normal_stride, size_t capacity);
+/* The last quality that frames told, and of which pose it is (`sequence` may be NULL). FAILED_PRECONDITION
+ * where none has yet. A server measures as ecorche_body_measure does when it samples, and tells no reasons:
+ * reason_count is 0. */
+ECORCHE_API ecorche_code ecorche_client_quality(const ecorche_client* client, ecorche_quality* out,
+                                                uint64_t* sequence);
+
+/* ---- probes
+ * ------------------------------------------------------------------------------------------------ */
+
+/* As ecorche_body_posed_to_rest and _rest_to_posed, of the body as the server last showed it; waits for the
+ * answer. Of ecorche_probed only points and tissues; at most 10000 points. */
+ECORCHE_API ecorche_code ecorche_client_posed_to_rest(ecorche_client* client, const float* points,
+                                                      size_t count, ecorche_probed* out);
+ECORCHE_API ecorche_code ecorche_client_rest_to_posed(ecorche_client* client, const float* points,
+                                                      size_t count, ecorche_probed* out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
