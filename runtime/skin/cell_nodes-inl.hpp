@@ -14,9 +14,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
-/// Four bytes each, corner 0 lowest.
-using Corners = hn::Vec<hn::Rebind<std::uint32_t, F>>;
-
 #if HWY_TARGET <= HWY_AVX3
 
 /// 16 kBlocks nodes, which stay in registers while the groups of the cell are moved: a vector of corners is
@@ -47,10 +44,11 @@ class CellNodes {
     }
   }
 
+  /// `corners`: of a vector of vertices, four bytes each, corner 0 lowest.
   template <int kCorner>
-  HWY_INLINE V3 corner(Corners corners) const {
+  HWY_INLINE V3 corner(const std::uint32_t* corners) const {
     // Permutations take as many bits as they need: there is nothing to mask.
-    const __m512i at = hn::ShiftRight<8 * kCorner>(corners).raw;
+    const __m512i at = _mm512_srli_epi32(_mm512_loadu_si512(corners), 8 * kCorner);
     return {V{of(x_, at)}, V{of(y_, at)}, V{of(z_, at)}};
   }
 
@@ -71,6 +69,23 @@ class CellNodes {
   __m512 x_[kBlocks], y_[kBlocks], z_[kBlocks];
 };
 
+#elif HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+
+template <std::size_t kBlocks>
+class CellNodes {
+ public:
+  HWY_INLINE CellNodes(const float* places, const std::uint32_t* rows) : nodes_(places, rows, 16 * kBlocks) {}
+
+  template <int kCorner>
+  HWY_INLINE V3 corner(const std::uint32_t* corners) const {
+    const auto [x, y, z] = nodes_.columns([&](std::size_t i) { return corners[i] >> (8 * kCorner) & 255; });
+    return {x, y, z};
+  }
+
+ private:
+  PaletteRows<float, 16 * kBlocks> nodes_;
+};
+
 #else
 
 template <std::size_t kBlocks>
@@ -81,8 +96,10 @@ class CellNodes {
   }
 
   template <int kCorner>
-  HWY_INLINE V3 corner(Corners corners) const {
-    const hn::Vec<I> at = hn::And(hn::BitCast(I(), hn::ShiftRight<8 * kCorner>(corners)), hn::Set(I(), 255));
+  HWY_INLINE V3 corner(const std::uint32_t* corners) const {
+    const hn::Rebind<std::uint32_t, F> d;
+    const hn::Vec<I> at =
+        hn::And(hn::BitCast(I(), hn::ShiftRight<8 * kCorner>(hn::LoadU(d, corners))), hn::Set(I(), 255));
     return {hn::GatherIndex(F(), nodes_.x, at), hn::GatherIndex(F(), nodes_.y, at),
             hn::GatherIndex(F(), nodes_.z, at)};
   }

@@ -38,7 +38,7 @@ HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::si
   const VertexGroups::Group& group = groups.groups[g];
   const std::size_t count = groups.group_vertices(group);
   for (std::size_t i = 0; i < count; i += hn::Lanes(F())) {
-    const Corners corners = hn::LoadU(hn::Rebind<std::uint32_t, F>(), &groups.corners[kSize * g + i]);
+    const std::uint32_t* corners = &groups.corners[kSize * g + i];
     const V3 x0 = nodes.template corner<0>(corners);
     const V3 e1 = minus(nodes.template corner<1>(corners), x0);
     const V3 e2 = minus(nodes.template corner<2>(corners), x0);

@@ -25,11 +25,68 @@ struct Table {
   HWY_ALIGN T x[kMostPalette], y[kMostPalette], z[kMostPalette];
 };
 
-/// Rows of three numbers turned into columns, four or eight at a time; `rows`: where each begins in `places`,
-/// filled up to a multiple of eight. The fourth number that is loaded of a row is its neighbour's.
+#if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+/// How many rows turned() takes.
+template <class T>
+using Turned = hn::FixedTag<T, HWY_TARGET <= HWY_AVX2 ? 8 : 4>;
+
+template <class T>
+struct Columns {
+  hn::Vec<Turned<T>> x, y, z;
+};
+
+/// Rows of three numbers turned into columns. `row(i)`: four numbers that begin with those of row i.
+template <class T, class Row>
+HWY_INLINE Columns<T> turned(const Row& row) {
+  const Turned<T> d;
+  const hn::RepartitionToWide<decltype(d)> pairs;
+#if HWY_TARGET <= HWY_AVX2
+  const auto load = [&](std::size_t i) HWY_ATTR { return hn::Combine(d, row(i + 4), row(i)); };
+#else
+  const auto load = [&](std::size_t i) HWY_ATTR { return row(i); };
+#endif
+  const auto low = [&](auto a, auto b) HWY_ATTR {
+    return hn::BitCast(d, hn::InterleaveLower(pairs, hn::BitCast(pairs, a), hn::BitCast(pairs, b)));
+  };
+  const auto high = [&](auto a, auto b) HWY_ATTR {
+    return hn::BitCast(d, hn::InterleaveUpper(pairs, hn::BitCast(pairs, a), hn::BitCast(pairs, b)));
+  };
+  const auto a = load(0), b = load(1), e = load(2), f = load(3);
+  const auto xy_ab = hn::InterleaveLower(d, a, b), xy_ef = hn::InterleaveLower(d, e, f);
+  const auto z_ab = hn::InterleaveUpper(d, a, b), z_ef = hn::InterleaveUpper(d, e, f);
+  return {low(xy_ab, xy_ef), high(xy_ab, xy_ef), low(z_ab, z_ef)};
+}
+#endif
+
+#if HWY_TARGET > HWY_AVX3 && HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+/// A palette row by row, for processors whose registers hold no tables: whole rows are loaded and turned into
+/// columns, which takes a third of the loads of gathers.
+template <class T, std::size_t kMost>
+class PaletteRows {
+ public:
+  HWY_INLINE PaletteRows(const T* places, const std::uint32_t* rows, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      hn::Store(hn::LoadU(Row(), places + rows[i]), Row(), rows_ + 4 * i);
+  }
+
+  /// As many as a vector has lanes; `at(i)`: the i-th's row of the palette.
+  template <class At>
+  HWY_INLINE Columns<T> columns(const At& at) const {
+    static_assert(hn::MaxLanes(F()) == hn::MaxLanes(Turned<T>()));
+    return turned<T>([&](std::size_t i) HWY_ATTR { return hn::Load(Row(), rows_ + 4 * at(i)); });
+  }
+
+ private:
+  using Row = hn::FixedTag<T, 4>;
+  HWY_ALIGN T rows_[4 * kMost];
+};
+#endif
+
+/// Rows of three numbers turned into columns; `rows`: where each begins in `places`, filled up to a multiple
+/// of eight. The fourth number that is loaded of a row is its neighbour's.
 template <class T>
 HWY_INLINE void fetch(const T* places, const std::uint32_t* rows, std::size_t count, Table<T>& table) {
-#if HWY_TARGET == HWY_SCALAR
+#if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
   for (std::size_t i = 0; i < count; ++i) {
     const T* x = places + rows[i];
     table.x[i] = x[0];
@@ -37,30 +94,14 @@ HWY_INLINE void fetch(const T* places, const std::uint32_t* rows, std::size_t co
     table.z[i] = x[2];
   }
 #else
-#if HWY_TARGET <= HWY_AVX2
-  const hn::FixedTag<T, 8> d;
-  const hn::FixedTag<T, 4> half;
-  const auto load = [&](std::size_t i) HWY_ATTR {
-    return hn::Combine(d, hn::LoadU(half, places + rows[i + 4]), hn::LoadU(half, places + rows[i]));
-  };
-#else
-  const hn::FixedTag<T, 4> d;
-  const auto load = [&](std::size_t i) HWY_ATTR { return hn::LoadU(d, places + rows[i]); };
-#endif
-  const hn::RepartitionToWide<decltype(d)> pairs;
-  const auto low = [&](auto a, auto b) HWY_ATTR {
-    return hn::BitCast(d, hn::InterleaveLower(pairs, hn::BitCast(pairs, a), hn::BitCast(pairs, b)));
-  };
-  const auto high = [&](auto a, auto b) HWY_ATTR {
-    return hn::BitCast(d, hn::InterleaveUpper(pairs, hn::BitCast(pairs, a), hn::BitCast(pairs, b)));
-  };
+  const Turned<T> d;
+  const hn::FixedTag<T, 4> four;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto a = load(i), b = load(i + 1), e = load(i + 2), f = load(i + 3);
-    const auto xy_ab = hn::InterleaveLower(d, a, b), xy_ef = hn::InterleaveLower(d, e, f);
-    const auto z_ab = hn::InterleaveUpper(d, a, b), z_ef = hn::InterleaveUpper(d, e, f);
-    hn::Store(low(xy_ab, xy_ef), d, table.x + i);
-    hn::Store(high(xy_ab, xy_ef), d, table.y + i);
-    hn::Store(low(z_ab, z_ef), d, table.z + i);
+    const Columns<T> columns =
+        turned<T>([&](std::size_t k) HWY_ATTR { return hn::LoadU(four, places + rows[i + k]); });
+    hn::Store(columns.x, d, table.x + i);
+    hn::Store(columns.y, d, table.y + i);
+    hn::Store(columns.z, d, table.z + i);
   }
 #endif
 }

@@ -43,6 +43,29 @@ struct Corners {
   VI x[4][3];
 };
 
+// One run of sixteen tets, its nodes fetched from one set of places.
+#if HWY_TARGET > HWY_AVX3 && HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+class Run {
+ public:
+  HWY_INLINE Run(const TetPalettes& palettes, std::size_t run, const std::int32_t* places)
+      : nodes_(places, palettes.rows(run), palettes.filled(run)), corners_(palettes.corners(run)) {}
+  HWY_INLINE Corners corners(std::size_t i) const {
+    Corners out;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const std::uint8_t* at = corners_ + TetPalettes::width * c + i;
+      const auto [x, y, z] = nodes_.columns([&](std::size_t lane) { return std::size_t{at[lane]}; });
+      out.x[c][0] = x;
+      out.x[c][1] = y;
+      out.x[c][2] = z;
+    }
+    return out;
+  }
+
+ private:
+  PaletteRows<std::int32_t, kMostPalette> nodes_;
+  const std::uint8_t* corners_;
+};
+#else
 // Those of tets i .. i + lanes of a run, whose palette lies in `table`.
 template <bool kLong>
 HWY_INLINE Corners corners_of(const Table<std::int32_t>& table, const std::uint8_t* corners) {
@@ -56,7 +79,6 @@ HWY_INLINE Corners corners_of(const Table<std::int32_t>& table, const std::uint8
   return out;
 }
 
-// One run of sixteen tets, its nodes fetched from one set of places.
 class Run {
  public:
   HWY_INLINE Run(const TetPalettes& palettes, std::size_t run, const std::int32_t* places)
@@ -72,6 +94,7 @@ class Run {
   const std::uint8_t* corners_;
   bool long_;
 };
+#endif
 
 // First and last voxel of the boxes along an axis, within [low, high].
 struct Span {
