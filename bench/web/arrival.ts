@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// One line of JSON a model: from the address to the first picture of the body in the viewer that `ecorche serve` holds. Run by `run`.
+import { launch } from "../../tests/web/support/page.js";
+import { Server } from "../../tests/web/support/server.js";
+
+const [runs, ...models] = process.argv.slice(2);
+const marks = ["connected", "opened", "frame", "body"];
+const median = (values: number[]) => values.sort((a, b) => a - b)[values.length >> 1]!;
+
+const browser = await launch();
+try {
+  for (const model of models) {
+    const server = await Server.start([], { model });
+    try {
+      const seconds = marks.map((): number[] => []);
+      for (let run = 0; run < Number(runs); ++run) {
+        const context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
+        const page = await context.newPage();
+        await page.goto(`http://127.0.0.1:${server.httpPort}/`);
+        await page.waitForFunction(() => performance.getEntriesByName("ecorche body").length > 0, undefined, { timeout: 90_000 });
+        const times = await page.evaluate((names) => names.map((name) => performance.getEntriesByName(`ecorche ${name}`)[0]!.startTime / 1000), marks);
+        times.forEach((time, i) => seconds[i]!.push(time));
+        await context.close();
+      }
+      console.log(JSON.stringify({ model, ...Object.fromEntries(marks.map((name, i) => [name, median(seconds[i]!)])), worst: Math.max(...seconds.at(-1)!) }));
+    } finally {
+      await server.stop();
+    }
+  }
+} finally {
+  await browser.close();
+}
