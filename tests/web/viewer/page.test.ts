@@ -47,6 +47,17 @@ test("loads little, from nowhere else, and breaks no rule of its policy", async 
     await page.waitForSelector(`html[data-theme=${scheme}]`, { state: "attached" });
     assert.deepEqual(await serious(page), []);
   }
+  // Under colours of one's own, what is chosen has theirs.
+  await page.emulateMedia({ colorScheme: "light", forcedColors: "active" });
+  const [chosen, theirs] = await page.evaluate(() => {
+    const pressed = document.querySelector<HTMLElement>('[aria-pressed="true"]')!, swatch = pressed.appendChild(document.createElement("i"));
+    swatch.style.cssText = "forced-color-adjust: none; background: Highlight";
+    const colors = [pressed, swatch].map((one) => getComputedStyle(one).backgroundColor);
+    swatch.remove();
+    return colors;
+  });
+  assert.equal(chosen, theirs);
+  await page.emulateMedia({ forcedColors: "none" });
   await page.click("#canvas", { position: { x: 10, y: 10 } });
   await page.keyboard.press("?");
   await page.waitForSelector("dialog[open]");
