@@ -18,6 +18,7 @@ class ServerError : public Error {
   /// `where` names the request.
   ServerError(const std::string& where, const v1::Status& status);
 
+  /// Never ok; `unknown` for a number that this version does not know.
   StatusCode code() const noexcept { return code_; }
 
  private:
