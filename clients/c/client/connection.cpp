@@ -38,6 +38,8 @@ void take_pose(const v1::PoseState& state, OpenedBody& body) {
   if (wire::from_proto(update, body.rig.skeleton.segments.size(), pose).ok()) body.pose.set(std::move(pose));
 }
 
+}  // namespace
+
 std::unique_ptr<OpenedBody> read_opened(wire::Frame frame) {
   if (!frame.envelope.has_model_opened()) throw lie("answered OpenModel with something else");
   auto body = std::make_unique<OpenedBody>();
@@ -53,7 +55,6 @@ std::unique_ptr<OpenedBody> read_opened(wire::Frame frame) {
   return body;
 }
 
-}  // namespace
 }  // namespace ecorche::c
 
 using namespace ecorche;
@@ -82,8 +83,10 @@ ecorche_code ecorche_client_connect(const char* address, const ecorche_client_op
     client::Access access;
     access.authorities = text(chosen.authorities, "");
     access.token = text(chosen.token, "");
-    *out = new ecorche_client{
-        client::Client(wire::parse_address(address), text(chosen.name, "ecorche_client"), access)};
+    auto made = std::make_unique<ecorche_client>(
+        ecorche_client{wire::parse_address(address), text(chosen.name, "ecorche_client"), access, nullptr});
+    made->connection = std::make_unique<client::Client>(made->address, made->name, access);
+    *out = made.release();
     return ECORCHE_OK;
   });
 }
@@ -93,11 +96,11 @@ void ecorche_client_close(ecorche_client* client) {
 }
 
 const char* ecorche_client_server(const ecorche_client* client) {
-  return client == nullptr ? nullptr : client->connection.server().server().c_str();
+  return client == nullptr ? nullptr : client->connection->server().server().c_str();
 }
 
 uint64_t ecorche_client_bytes(const ecorche_client* client) {
-  return client == nullptr ? 0 : client->connection.bytes_received();
+  return client == nullptr ? 0 : client->connection->bytes_received();
 }
 
 ecorche_code ecorche_client_models(ecorche_client* client, uint32_t* count) {
@@ -105,7 +108,7 @@ ecorche_code ecorche_client_models(ecorche_client* client, uint32_t* count) {
   return c::with_client(client, false, [&] {
     v1::Envelope request;
     request.mutable_list_models();
-    const wire::Frame answer = client->connection.call(std::move(request));
+    const wire::Frame answer = client->connection->call(std::move(request));
     client->models.clear();
     for (const v1::ModelSummary& model : answer.envelope.model_list().models())
       client->models.push_back(model.name());
@@ -127,7 +130,7 @@ ecorche_code ecorche_client_open(ecorche_client* client, const char* model, cons
     v1::OpenModel& open = *request.mutable_open_model();
     if (model != nullptr) open.set_model(model);
     if (session != nullptr) open.set_session(session);
-    client->body = c::read_opened(client->connection.call(std::move(request)));
+    client->body = c::read_opened(client->connection->call(std::move(request)));
     client->controls = client->body->opened.role() == v1::ROLE_CONTROLLER;
     return ECORCHE_OK;
   });

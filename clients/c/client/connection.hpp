@@ -2,12 +2,14 @@
 // What the handle of ecorche_client.h is.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <ecorche/ecorche_client.h>
 #include <ecorche/client/client.hpp>
+#include <ecorche/wire/address.hpp>
 #include <ecorche/wire/mesh_decoder.hpp>
 #include "clients/c/edited_pose.hpp"
 #include "clients/c/guard.hpp"
@@ -31,11 +33,16 @@ struct OpenedBody {
 }  // namespace ecorche::c
 
 struct ecorche_client {
-  ecorche::client::Client connection;
+  ecorche::wire::Address address;
+  std::string name;
+  ecorche::client::Access access;
+  std::unique_ptr<ecorche::client::Client> connection;
   std::vector<std::string> models = {};
+  std::vector<ecorche::v1::ClipSummary> clips = {};
   std::unique_ptr<ecorche::c::OpenedBody> body = nullptr;
   bool controls = false;
 
+  std::optional<ecorche::v1::Subscribe> wanted = {};  ///< what was subscribed to last
   std::optional<std::uint32_t> subscription = {};
   ecorche::wire::MeshDecoder decoder = {};
   std::vector<ecorche::wire::DecodedTissue> frame = {};
@@ -64,6 +71,12 @@ ecorche_code with_client(const ecorche_client* client, bool opened, const Work& 
     return fail(ECORCHE_FAILED_PRECONDITION, "client: has no model yet (call ecorche_client_open)");
   return guarded_call(work);
 }
+
+/// What `opened` is, made ready. Throws Error{protocol} where its parts do not fit together.
+std::unique_ptr<OpenedBody> read_opened(wire::Frame opened);
+
+/// Frames of what is wanted come from now on.
+void subscribe(ecorche_client& client);
 
 /// Of the last frame; null where it does not hold the tissue.
 const wire::DecodedTissue* find_decoded(const ecorche_client& client, std::uint32_t tissue);

@@ -32,7 +32,7 @@ ecorche_code probe(ecorche_client* client, v1::ProbePoints::Direction direction,
     const auto payload = std::make_shared<wire::Payload>();
     const std::vector<double> wide(points, points + 3 * count);
     *asked.mutable_points() = wire::append(*payload, std::span<const double>(wide), 3);
-    const wire::Frame answer = client->connection.call(std::move(request), payload);
+    const wire::Frame answer = client->connection->call(std::move(request), payload);
     const v1::Probed& found = answer.envelope.probed();
     std::span<const double> there;
     std::span<const std::int32_t> tissues;

@@ -73,6 +73,15 @@ bool take(ecorche_client& client, wire::Frame& came, ecorche_event& event) {
 
 }  // namespace
 
+void subscribe(ecorche_client& client) {
+  v1::Envelope request;
+  *request.mutable_subscribe() = *client.wanted;
+  client.frame.clear();
+  client.decoder = {};
+  const wire::Frame answer = client.connection->call(std::move(request));
+  client.subscription = answer.envelope.subscribed().subscription();
+}
+
 const wire::DecodedTissue* find_decoded(const ecorche_client& client, std::uint32_t tissue) {
   const auto found = std::find_if(client.frame.begin(), client.frame.end(),
                                   [&](const wire::DecodedTissue& one) { return one.tissue == tissue; });
@@ -91,7 +100,7 @@ ecorche_code ecorche_client_claim(ecorche_client* client) {
   return c::with_client(client, true, [&] {
     v1::Envelope request;
     request.mutable_claim_control();
-    const wire::Frame answer = client->connection.call(std::move(request));
+    const wire::Frame answer = client->connection->call(std::move(request));
     client->controls = true;
     client->body->sequence =
         std::max(client->body->sequence, answer.envelope.control_granted().last_sequence());
@@ -103,7 +112,7 @@ ecorche_code ecorche_client_release(ecorche_client* client) {
   return c::with_client(client, true, [&] {
     v1::Envelope request;
     request.mutable_release_control();
-    client->connection.call(std::move(request));
+    client->connection->call(std::move(request));
     client->controls = false;
     return ECORCHE_OK;
   });
@@ -145,7 +154,7 @@ ecorche_code ecorche_client_send_pose(ecorche_client* client, ecorche_skinning s
     update.set_sequence(++client->body->sequence);
     update.set_rig_digest(client->body->opened.rig_digest());
     update.set_skinning(method);
-    client->connection.send(envelope);
+    client->connection->send(envelope);
     if (sequence != nullptr) *sequence = client->body->sequence;
     return ECORCHE_OK;
   });
@@ -157,8 +166,7 @@ ecorche_code ecorche_client_subscribe(ecorche_client* client, const ecorche_stre
         c::read(options, ecorche_stream_options ECORCHE_STREAM_OPTIONS_INIT);
     if (chosen.encoding < ECORCHE_ENCODING_F32 || chosen.encoding > ECORCHE_ENCODING_U16_DELTA)
       return c::fail(ECORCHE_INVALID_ARGUMENT, "encoding: there is no such encoding (see ecorche_encoding)");
-    v1::Envelope request;
-    v1::Subscribe& subscribe = *request.mutable_subscribe();
+    v1::Subscribe subscribe;
     v1::MeshSelection& mesh = *subscribe.mutable_mesh();
     mesh.set_encoding(static_cast<v1::Encoding>(chosen.encoding));
     mesh.set_normals(chosen.normals != 0);
@@ -174,12 +182,10 @@ ecorche_code ecorche_client_subscribe(ecorche_client* client, const ecorche_stre
       v1::Envelope last;
       last.mutable_unsubscribe()->set_subscription(*client->subscription);
       client->subscription.reset();
-      client->connection.call(std::move(last));
+      client->connection->call(std::move(last));
     }
-    client->frame.clear();
-    client->decoder = {};
-    const wire::Frame answer = client->connection.call(std::move(request));
-    client->subscription = answer.envelope.subscribed().subscription();
+    client->wanted = subscribe;
+    c::subscribe(*client);
     return ECORCHE_OK;
   });
 }
@@ -191,9 +197,9 @@ ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche
     const auto until = client::Clock::now() + std::chrono::duration_cast<client::Clock::duration>(
                                                   std::chrono::duration<double>(std::min(seconds, longest)));
     ecorche_event event = ECORCHE_EVENT_INIT;
-    while (auto came = client->connection.receive(until)) {
+    while (auto came = client->connection->receive(until)) {
       const bool told = c::take(*client, *came, event);
-      client->connection.reuse(std::move(*came));
+      client->connection->reuse(std::move(*came));
       if (told) break;
     }
     return c::fill(out, event);

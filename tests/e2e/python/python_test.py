@@ -8,9 +8,11 @@ import gc
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 SOURCE, LIBRARY, CLIENT = (pathlib.Path(word) for word in sys.argv[1:4])
@@ -28,6 +30,7 @@ sys.path.insert(0, str(SOURCE / "tests" / "e2e" / "stream"))
 
 import ecorche  # noqa: E402
 import numpy as np  # noqa: E402
+from relay import Relay  # noqa: E402
 from serving import Server  # noqa: E402
 
 
@@ -264,6 +267,87 @@ class Clients(unittest.TestCase):
                     for _ in range(100):
                         client.send()
                         list(client.frames(0.05))
+
+    def test_it_comes_back_to_its_place(self):
+        with Relay(self.server.port) as relay, ecorche.connect(relay.address) as client, \
+                ecorche.connect(self.server.address, session=client.session) as watcher:
+            shown = client.set("elbow_left", flexion=70).send()
+            client.show(shown)
+            before = client.positions("skin")
+            relay.cut()
+            with self.assertRaises(ecorche.Unavailable):
+                for _ in range(100):
+                    client.send()
+                    list(client.frames(0.05))
+            self.assertRaises(ecorche.NotPossible, watcher.claim)  # the place is kept
+            relay.mend()
+            client.resume()
+            self.assertTrue(client.controls)
+            list(client.frames(1))
+            np.testing.assert_array_equal(client.positions("skin"), before)
+            sent = client.set("elbow_left", flexion=20).send()
+            client.show(sent)
+            self.assertEqual(watcher.show(sent).sequence, sent)
+            np.testing.assert_array_equal(client.positions("skin"), watcher.positions("skin"))
+
+    def test_it_comes_back_after_the_server_was_gone(self):
+        with Server(MODEL) as first:
+            client = ecorche.connect(first.address, session="ward")
+            self.addCleanup(client.close)
+            client.show(client.set("elbow_left", flexion=70).send())
+            before, port = client.positions("skin"), first.port
+            first.process.kill()
+            first.process.wait()
+            with self.assertRaisesRegex(ecorche.Unavailable, "cannot be reached"):
+                client.resume()
+        with Server(MODEL, port=port):
+            client.resume()
+            self.assertEqual((client.controls, client.session), (True, "ward"))
+            client.show(client.send())  # the pose that was set
+            np.testing.assert_array_equal(client.positions("skin"), before)
+        with tempfile.TemporaryDirectory() as folder:
+            case, other = pathlib.Path(folder) / "case", pathlib.Path(folder) / "other.hdf"
+            shutil.copytree(os.environ["ECORCHE_CASE"], case)
+            lines = (case / "case.yaml").read_text().splitlines(keepends=True)
+            (case / "case.yaml").write_text("".join(line for line in lines if "name: biceps_brachii_left" not in line))
+            subprocess.run([ECORCHE, "preprocess", case, "-o", other, "--max-tets", "20000"], check=True, capture_output=True)
+            with Server(other, port=port):
+                with self.assertRaisesRegex(ecorche.Error, "no model of that name"):
+                    client.resume()
+            same_name = pathlib.Path(folder) / pathlib.Path(MODEL).name
+            other.rename(same_name)
+            with Server(same_name, port=port):
+                with self.assertRaisesRegex(ecorche.NotPossible, "the server's model is another one by now"):
+                    client.resume()
+
+    def test_clips_and_recordings(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with Server(MODEL, options=("--record-dir", folder)) as server, ecorche.connect(server.address) as client:
+                client.record("bend")
+                for degrees in (20, 40, 60):
+                    client.show(client.set("elbow_left", flexion=degrees).send())
+                last = client.positions("skin")
+                client.record(None)
+                self.assertEqual(list(client.clips), ["bend"])
+                self.assertGreater(client.clips["bend"], 0)
+                client.show(client.reset().send())
+                self.assertGreater(np.abs(client.positions("skin") - last).max(), 50)
+                client.play("bend", speed=2)
+                until = time.monotonic() + 20
+                while np.abs(client.positions("skin") - last).max() > 0.1:
+                    self.assertLess(time.monotonic(), until)
+                    list(client.frames(0.1))
+                client.play(None)
+                client.show(client.set("elbow_left", flexion=5).send())
+                with self.assertRaises(ecorche.NotFound):
+                    client.play("running")
+                with self.assertRaises(ecorche.InvalidArgument):
+                    client.play("bend", speed=1000)
+                with self.assertRaisesRegex(ecorche.Error, "bend"):
+                    client.record("bend")
+        with ecorche.connect(self.server.address) as client:
+            with self.assertRaisesRegex(ecorche.NotPossible, "--record-dir"):
+                client.record("bend")
 
     def test_the_token_opens(self):
         with tempfile.TemporaryDirectory() as folder:

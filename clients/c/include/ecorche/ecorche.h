@@ -48,8 +48,7 @@
 extern "C" {
 #endif
 
-/* ---- versions
- * ---------------------------------------------------------------------------------------------- */
+/* ---- versions ---- */
 
 /* Grows by one where a program that was built with an older header no longer works. */
 #define ECORCHE_ABI_VERSION 0
@@ -59,8 +58,7 @@ ECORCHE_API unsigned ecorche_abi_version(void);
 /* "0.1.0". */
 ECORCHE_API const char* ecorche_version(void);
 
-/* ---- errors
- * ------------------------------------------------------------------------------------------------ */
+/* ---- errors ---- */
 
 /* Numbers of google.rpc.Code, as in the protocol. */
 typedef enum ecorche_code {
@@ -83,8 +81,7 @@ typedef enum ecorche_code {
  * "" where none has failed yet. */
 ECORCHE_API const char* ecorche_error_message(void);
 
-/* ---- spaces
- * ------------------------------------------------------------------------------------------------ */
+/* ---- spaces ---- */
 
 /* Where a program has its points. The patient faces the way that a character of that engine faces. */
 typedef enum ecorche_space {
@@ -110,8 +107,7 @@ ECORCHE_API ecorche_code ecorche_space_points_back(ecorche_space space, size_t c
 ECORCHE_API ecorche_code ecorche_space_rotation(ecorche_space space, int back, const double in[4],
                                                 double out[4]);
 
-/* ---- models
- * ------------------------------------------------------------------------------------------------ */
+/* ---- models ---- */
 
 /* A prepared body, as `ecorche preprocess` writes it. Never changes. */
 typedef struct ecorche_model ecorche_model;
@@ -180,8 +176,7 @@ ECORCHE_API uint32_t ecorche_model_angle_count(const ecorche_model* model);
 ECORCHE_API ecorche_code ecorche_model_angle(const ecorche_model* model, uint32_t angle,
                                              ecorche_angle_info* out);
 
-/* ---- poses
- * ------------------------------------------------------------------------------------------------- */
+/* ---- poses ---- */
 
 /* How every joint is turned. What limits and couplings make of it decides ecorche_body_update. */
 typedef struct ecorche_pose ecorche_pose;
@@ -208,8 +203,7 @@ ECORCHE_API ecorche_code ecorche_pose_rotation(const ecorche_pose* pose, uint32_
 /* Where the whole body goes from the scan: mm, LPS. */
 ECORCHE_API ecorche_code ecorche_pose_set_root(ecorche_pose* pose, const double translation[3]);
 
-/* ---- bodies
- * ------------------------------------------------------------------------------------------------ */
+/* ---- bodies ---- */
 
 /* A posed body and all its buffers. */
 typedef struct ecorche_body ecorche_body;
@@ -257,8 +251,7 @@ ECORCHE_API uint32_t ecorche_body_clamped_count(const ecorche_body* body);
 ECORCHE_API ecorche_code ecorche_body_clamped(const ecorche_body* body, uint32_t row, uint32_t* segment,
                                               double* removed);
 
-/* ---- quality
- * ----------------------------------------------------------------------------------------------- */
+/* ---- quality ---- */
 
 /* How far a pose can be believed. */
 typedef struct ecorche_quality {
@@ -291,8 +284,7 @@ typedef struct ecorche_reason {
 /* Of the last measure: what is beyond its threshold, the worst tissues first. */
 ECORCHE_API ecorche_code ecorche_body_reason(const ecorche_body* body, uint32_t row, ecorche_reason* out);
 
-/* ---- volumes
- * ----------------------------------------------------------------------------------------------- */
+/* ---- volumes ---- */
 
 typedef enum ecorche_scalar {
   ECORCHE_U8 = 0,
@@ -341,8 +333,7 @@ ECORCHE_API ecorche_code ecorche_body_volume_grid(const ecorche_body* body, uint
 ECORCHE_API ecorche_code ecorche_body_volume(ecorche_body* body, uint32_t volume, const ecorche_grid* grid,
                                              int nearest, void* voxels, size_t bytes);
 
-/* ---- probes
- * ------------------------------------------------------------------------------------------------ */
+/* ---- probes ---- */
 
 /* The caller's buffers, a row for each point; those that are NULL are left out. */
 typedef struct ecorche_probed {

@@ -23,8 +23,7 @@
  * Threads: a client is for one thread at a time. It starts none: it reads and answers the server within
  * ecorche_client_poll and within what waits for an answer, so call the former every frame.
  *
- * After UNAVAILABLE the connection is gone: close the client, connect again, and open the session by its
- * name.
+ * After UNAVAILABLE the connection is gone: ecorche_client_resume() comes back.
  */
 #ifndef ECORCHE_CLIENT_H
 #define ECORCHE_CLIENT_H
@@ -40,8 +39,7 @@ ECORCHE_API unsigned ecorche_client_abi_version(void);
 ECORCHE_API const char* ecorche_client_version(void);
 ECORCHE_API const char* ecorche_client_error_message(void);
 
-/* ---- connections
- * ------------------------------------------------------------------------------------------- */
+/* ---- connections ---- */
 
 typedef struct ecorche_client ecorche_client;
 
@@ -85,8 +83,7 @@ ECORCHE_API uint32_t ecorche_client_angle_count(const ecorche_client* client);
 ECORCHE_API ecorche_code ecorche_client_angle(const ecorche_client* client, uint32_t angle,
                                               ecorche_angle_info* out);
 
-/* ---- poses
- * ------------------------------------------------------------------------------------------------- */
+/* ---- poses ---- */
 
 /* Not 0: this client poses the session, and others look on. */
 ECORCHE_API int ecorche_client_controls(const ecorche_client* client);
@@ -106,8 +103,7 @@ ECORCHE_API ecorche_code ecorche_client_set_root(ecorche_client* client, const d
 ECORCHE_API ecorche_code ecorche_client_send_pose(ecorche_client* client, ecorche_skinning skinning,
                                                   uint64_t* sequence);
 
-/* ---- frames
- * ------------------------------------------------------------------------------------------------ */
+/* ---- frames ---- */
 
 typedef enum ecorche_encoding {
   ECORCHE_ENCODING_F32 = 1,      /* 12 bytes a vertex; bit for bit what libecorche gives */
@@ -122,7 +118,7 @@ typedef struct ecorche_stream_options {
   double max_rate;         /* frames a second; 0: every pose */
   const uint32_t* tissues; /* rows; NULL: all */
   size_t tissue_count;
-  int32_t quality; /* not 0: every pose is measured before its frame leaves, which takes a whole body's time */
+  int32_t quality; /* not 0: a pose is measured before its frame leaves, in a whole body's time */
 } ecorche_stream_options;
 #define ECORCHE_STREAM_OPTIONS_INIT \
   { sizeof(ecorche_stream_options), ECORCHE_ENCODING_U16_DELTA, 1, 0, 0, 0, 0 }
@@ -167,8 +163,27 @@ ECORCHE_API ecorche_code ecorche_client_copy(const ecorche_client* client, uint3
 ECORCHE_API ecorche_code ecorche_client_quality(const ecorche_client* client, ecorche_quality* out,
                                                 uint64_t* sequence);
 
-/* ---- probes
- * ------------------------------------------------------------------------------------------------ */
+/* ---- coming back, clips, recordings ---- */
+
+/* After the connection was lost: connects again and has the session, its control and its frames as before,
+ * where the server kept the place (a minute), else as anybody who opens the session by its name. Frames that
+ * were read stay good. Waits 5 s at most; UNAVAILABLE where nobody answers yet: call again after a while.
+ * FAILED_PRECONDITION where the model is another one by now: close the client, and connect anew. */
+ECORCHE_API ecorche_code ecorche_client_resume(ecorche_client* client);
+
+/* Motion that the server holds; names are good until the next call. */
+ECORCHE_API ecorche_code ecorche_client_clips(ecorche_client* client, uint32_t* count);
+/* `seconds`: how long it takes; may be NULL. */
+ECORCHE_API const char* ecorche_client_clip(const ecorche_client* client, uint32_t row, double* seconds);
+/* The server poses by itself, until the clip ends, a pose is sent, or `clip` is NULL. `speed`: 0.01 to 100.
+ * PERMISSION_DENIED where another has control. */
+ECORCHE_API ecorche_code ecorche_client_play(ecorche_client* client, const char* clip, double speed,
+                                             int loop);
+/* The server records the session's poses and frames under this name ([a-z0-9_], at most 64), which becomes a
+ * clip; NULL: ends, and returns once the file is whole. FAILED_PRECONDITION where it keeps no recordings. */
+ECORCHE_API ecorche_code ecorche_client_record(ecorche_client* client, const char* name);
+
+/* ---- probes ---- */
 
 /* As ecorche_body_posed_to_rest and _rest_to_posed, of the body as the server last showed it; waits for the
  * answer. Of ecorche_probed only points and tissues; at most 10000 points. */

@@ -159,6 +159,10 @@ _CLIENT_CODE = [
     ("quality", c_void_p, POINTER(QualityInfo), POINTER(c_uint64)),
     ("posed_to_rest", c_void_p, c_void_p, c_size_t, POINTER(ProbedInfo)),
     ("rest_to_posed", c_void_p, c_void_p, c_size_t, POINTER(ProbedInfo)),
+    ("resume", c_void_p),
+    ("clips", c_void_p, POINTER(c_uint32)),
+    ("play", c_void_p, c_char_p, c_double, c_int),
+    ("record", c_void_p, c_char_p),
 ]
 _CLIENT_OTHER = [
     (c_uint, "abi_version"),
@@ -172,6 +176,7 @@ _CLIENT_OTHER = [
     (c_uint32, "segment_count", c_void_p),
     (c_uint32, "angle_count", c_void_p),
     (c_int, "controls", c_void_p),
+    (c_char_p, "clip", c_void_p, c_uint32, POINTER(c_double)),
     (POINTER(c_float), "positions", c_void_p, c_uint32),
     (POINTER(c_float), "normals", c_void_p, c_uint32),
 ]

@@ -184,6 +184,25 @@ class Client(Anatomy):
         """Points of the scan, (P, 3): where they went."""
         return self._probe("rest_to_posed", points)
 
+    def resume(self) -> None:
+        """Comes back after Unavailable, to the session, control and frames; raises Unavailable where nobody answers yet."""
+        self._call("resume", self._handle)
+
+    @property
+    def clips(self) -> dict[str, float]:
+        """Motion that the server holds: how many seconds each takes."""
+        count, seconds = ctypes.c_uint32(), ctypes.c_double()
+        self._call("clips", self._handle, ctypes.byref(count))
+        return {self._library.ask("clip", self._handle, row, ctypes.byref(seconds)).decode(): seconds.value for row in range(count.value)}
+
+    def play(self, clip: Optional[str], *, speed: float = 1, loop: bool = False) -> None:
+        """The server poses by itself, until the clip ends, a pose is sent, or `clip` is None."""
+        self._call("play", self._handle, None if clip is None else clip.encode(), speed, int(loop))
+
+    def record(self, name: Optional[str]) -> None:
+        """The server records under this name, which becomes a clip; None: ends."""
+        self._call("record", self._handle, None if name is None else name.encode())
+
     def _call(self, name: str, *arguments: object) -> None:
         self._library.call(name, *arguments)
 

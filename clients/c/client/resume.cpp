@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Back to the session after the connection was lost.
+#include <algorithm>
+
+#include "clients/c/client/connection.hpp"
+
+namespace ecorche::c {
+namespace {
+
+// The place that the server kept; false where it kept none.
+bool take_place(ecorche_client& client) {
+  const v1::ServerHello& hello = client.connection->server();
+  if (!hello.has_resumed()) return false;
+  const v1::Resumed& resumed = hello.resumed();
+  client.controls = resumed.role() == v1::ROLE_CONTROLLER;
+  client.body->sequence = std::max(client.body->sequence, resumed.last_sequence());
+  client.decoder = {};
+  const auto was = std::exchange(client.subscription, std::nullopt);
+  for (const v1::ResumedSubscription& one : resumed.subscriptions()) {
+    if (was == one.was()) client.subscription = one.is();
+  }
+  return true;
+}
+
+// The session by its name, as anybody opens it. False where its model is another one by now.
+bool open_again(ecorche_client& client) {
+  v1::Envelope request;
+  v1::OpenModel& open = *request.mutable_open_model();
+  const v1::ModelOpened& before = client.body->opened;
+  open.set_model(before.model());
+  open.set_session(before.session());
+  const std::unique_ptr<OpenedBody> now = read_opened(client.connection->call(std::move(request)));
+  if (now->opened.topology_digest() != before.topology_digest() ||
+      now->opened.rig_digest() != before.rig_digest())
+    return false;
+  client.subscription.reset();
+  client.controls = now->opened.role() == v1::ROLE_CONTROLLER;
+  client.body->sequence = now->sequence;
+  return true;
+}
+
+}  // namespace
+}  // namespace ecorche::c
+
+using namespace ecorche;
+
+ecorche_code ecorche_client_resume(ecorche_client* client) {
+  return c::with_client(client, true, [&] {
+    client::Access access = client->access;
+    access.resume_token = client->connection->server().resume_token();
+    client->connection = std::make_unique<client::Client>(client->address, client->name, access);
+    if (!c::take_place(*client) && !c::open_again(*client))
+      return c::fail(ECORCHE_FAILED_PRECONDITION,
+                     "client: the server's model is another one by now (close, and connect anew)");
+    if (client->wanted && !client->subscription) c::subscribe(*client);
+    return ECORCHE_OK;
+  });
+}
