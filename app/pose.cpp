@@ -35,6 +35,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+constexpr double kPaperThinness = 0.48;  // of the spheres of a scan
+
 runtime::Sampling sampling_of(const PoseSettings& settings) {
   return settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
 }
@@ -199,7 +201,8 @@ io::DicomFacts facts_of(io::DicomFacts facts, const PoseSettings& settings, cons
   return facts;
 }
 
-int run(const Program& program, const PoseSettings& settings) {
+// `given`: the poses, where they were read already, on the same rig.
+int pose_model(const Program& program, const PoseSettings& settings, std::vector<Frame> given, json result) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   Plan plan = plan_of(settings, *model);
   if (settings.deformer == "spheres" && model->spheres.empty())
@@ -210,7 +213,8 @@ int run(const Program& program, const PoseSettings& settings) {
     if (settings.deformer == "spheres")
       plan.balls.try_emplace(volume.name, *model, volume, settings.bridge, program.context("seams"));
   }
-  const std::vector<Frame> frames = read_frames(program, settings.frames, model->rig);
+  const std::vector<Frame> frames =
+      given.empty() ? read_frames(program, settings.frames, model->rig) : std::move(given);
   if (!frames.front().name.empty()) check_folder_of_frames(settings.output);
   const std::uint64_t identity = model_file::identity(*model);
   const runtime::BodyPoser poser(model);
@@ -224,7 +228,8 @@ int run(const Program& program, const PoseSettings& settings) {
                         "Posed by ecorche: the values of the scan, moved with the body's tissues (" +
                             settings.sampling + "). For training and education.");
 
-  json result{{"ok", true}, {"model", settings.model.string()}, {"skinning", settings.skinning}};
+  result["ok"] = true;
+  result["skinning"] = settings.skinning;
   std::string text;
   for (const Frame& frame : frames) {
     const Context context = program.context(frame.name.empty() ? "pose" : frame.name);
@@ -268,19 +273,40 @@ int run(const Program& program, const PoseSettings& settings) {
   return 0;
 }
 
+int run(const Program& program, PoseSettings& settings) {
+  check_settings(settings);
+  if (!settings.scan.wanted()) return pose_model(program, settings, {}, {{"model", settings.model.string()}});
+  // What would fail only after minutes of work is refused first.
+  check_frames(settings.frames);
+  if (settings.frames.motion.file.empty()) const PosedFolder target(settings.output);
+  if (settings.deformer == "spheres") settings.scan.prepare.spheres_tp = kPaperThinness;
+  std::vector<Frame> frames;
+  return pose_scan(program, settings.scan,
+                   {settings.output, settings.frames.motion.limits,
+                    [&](const Rig& rig) {
+                      frames = read_frames(program, settings.frames, rig);
+                      if (!frames.front().name.empty()) check_folder_of_frames(settings.output);
+                    },
+                    [&](const fs::path& model, const json& scan) {
+                      settings.model = model;
+                      return pose_model(program, settings, std::move(frames), {{"scan", scan}});
+                    }});
+}
+
 }  // namespace
 
 void declare_pose(CLI::App& app, Program& program, Run& chosen) {
   const auto s = std::make_shared<PoseSettings>();
   CLI::App* command = app.add_subcommand(
       "pose", "pose a model offline: meshes, volumes, tets, displacement fields, quality.json");
-  command->add_option("MODEL", s->model, "a model that preprocess made")->required();
+  command->add_option("MODEL", s->model, "a model that preprocess made");
   command
       ->add_option("-o,--output", s->output,
                    "folder of the posed body: it appears whole; an earlier one in it gives way, anything "
                    "else is refused")
       ->required();
   add_frame_options(*command, s->frames);
+  add_scan_posing(*command, s->scan);
   command
       ->add_option(
           "--skinning", s->skinning,

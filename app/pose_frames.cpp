@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/pose_frames.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 
@@ -67,7 +68,7 @@ void add_frame_options(CLI::App& command, FrameChoice& choice) {
       "name of its own, frame_0000 ...");
 }
 
-std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig) {
+void check_frames(const FrameChoice& choice) {
   const int given =
       (choice.pose.empty() ? 0 : 1) + (choice.ik.empty() ? 0 : 1) + (choice.motion.file.empty() ? 0 : 1);
   if (given != 1) {
@@ -77,12 +78,21 @@ std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice
                                     : "--ik stands beside --pose or --motion",
                 "give one of --pose FILE, --ik FILE, or --motion CLIP --frames A:B");
   }
+  if (!choice.motion.file.empty() && choice.frames.empty())
+    usage_error("--motion", "no frames are named", "add --frames A:B[:STEP]");
+  if (!choice.pose.starts_with(io::library_prefix)) return;
+  const std::string name = choice.pose.substr(io::library_prefix.size());
+  const std::vector<std::string> known = io::library_poses();
+  if (std::find(known.begin(), known.end(), name) == known.end()) io::library_pose(name, {});  // refuses it
+}
+
+std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig) {
+  check_frames(choice);
   if (!choice.ik.empty()) {
     SolvedPose solved = solve_pose(program, choice.ik, rig, choice.ik_tolerance_mm);
     return {{"", std::move(solved.pose), std::move(solved.report), std::move(solved.warnings)}};
   }
   if (!choice.pose.empty()) return {{"", named_pose(program, choice.pose, rig), {}, nlohmann::json::array()}};
-  if (choice.frames.empty()) usage_error("--motion", "no frames are named", "add --frames A:B[:STEP]");
   const auto motion = open_motion(program, choice.motion, rig);
   std::vector<Frame> frames;
   const std::vector<std::size_t> numbers = frame_numbers(choice.frames, motion->frames());

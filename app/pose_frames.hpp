@@ -34,6 +34,9 @@ struct Frame {
   nlohmann::json missed = nlohmann::json::array();  ///< goals of --ik, as warnings of quality.json
 };
 
+/// Refuses a choice that names no pose, whatever the rig, before anything is read. Throws Error{usage}.
+void check_frames(const FrameChoice& choice);
+
 /// The poses, in order; notes what the clip moves nothing by, and where its zero pose was aligned. Throws
 /// Error{usage} for a choice that names no pose, and as the readers do.
 std::vector<Frame> read_frames(const Program& program, const FrameChoice& choice, const Rig& rig);

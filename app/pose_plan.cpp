@@ -31,7 +31,10 @@ std::vector<std::uint32_t> rows_of(const Items& items, const std::vector<std::st
 
 }  // namespace
 
-Plan plan_of(const PoseSettings& settings, const Model& model) {
+void check_settings(const PoseSettings& settings) {
+  if (settings.scan.wanted() == !settings.model.empty())
+    usage_error("pose", settings.scan.wanted() ? "both MODEL and --scan are given" : "no model is given",
+                "give a MODEL that preprocess made, or --scan SCAN...");
   check_dicom_options(settings.dicom, settings.writes_dicom(), "add --volume-format dicom");
   if (!settings.bridge && settings.deformer != "spheres")
     usage_error("--no-bridge", "tets open no gaps", "add --deformer spheres");
@@ -42,8 +45,11 @@ Plan plan_of(const PoseSettings& settings, const Model& model) {
       usage_error("--as-case", "a case is written as STL and NRRD", "leave out --format and --volume-format");
     if (settings.deformer != "tets")
       usage_error("--as-case", "a case's surfaces and volumes follow the same tets", "leave out --deformer");
-    return {{}, {}, true, false, {}};  // the case itself, and the tets beside it
   }
+}
+
+Plan plan_of(const PoseSettings& settings, const Model& model) {
+  if (settings.as_case) return {{}, {}, true, false, {}};  // the case itself, and the tets beside it
   const std::vector<std::string> all{"all"};
   const bool everything = !settings.chooses();
   Plan plan;

@@ -10,6 +10,7 @@
 #include <ecorche/values/model.hpp>
 #include "app/pose_frames.hpp"
 #include "app/posed_dicom.hpp"
+#include "app/scan/posed_scan.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::app {
@@ -17,6 +18,7 @@ namespace ecorche::app {
 // As the command line says it.
 struct PoseSettings {
   std::filesystem::path model, output;
+  ScanPosing scan;  // instead of a model
   FrameChoice frames;
   std::string skinning = "cor";
   std::vector<std::string> tissues, volumes;
@@ -41,6 +43,9 @@ struct Plan {
   bool tets = false, field = false;
   std::map<std::string, runtime::VolumeBalls> balls;  // of volumes that are refilled, by name
 };
+
+/// Refuses what contradicts itself, whatever the model. Throws Error{usage}.
+void check_settings(const PoseSettings& settings);
 
 /// What is not named is not written; naming nothing writes everything. Throws Error{usage}.
 Plan plan_of(const PoseSettings& settings, const Model& model);

@@ -24,11 +24,11 @@ inline void add_read_budget(CLI::App& command, files::ReadLimits& limits) {
 }
 
 /// `--series`, `--phase`. `choice` must outlive the command line's parsing.
-inline void add_image_choice(CLI::App& command, io::ImageChoice& choice) {
-  command.add_option("--series", choice.series,
-                     "which series of a DICOM folder, by UID, the end of one, or description");
-  command.add_option("--phase", choice.phase, "which volume of a DICOM series in time, from 1")
-      ->check(CLI::Range(1, 10000));
+inline std::vector<CLI::Option*> add_image_choice(CLI::App& command, io::ImageChoice& choice) {
+  return {command.add_option("--series", choice.series,
+                             "which series of a DICOM folder, by UID, the end of one, or description"),
+          command.add_option("--phase", choice.phase, "which volume of a DICOM series in time, from 1")
+              ->check(CLI::Range(1, 10000))};
 }
 
 /// Readers tell on stderr what they had to change.

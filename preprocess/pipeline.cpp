@@ -294,6 +294,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
                          RigRequest{patient});
   check::refuse(check::joint_findings(patient, model.rig, context));
   check::refuse(check::lost_segments(patient));
+  if (hooks.on_rig) hooks.on_rig(model.rig);
   model.bone_segment = owners(patient, model.rig.skeleton);
   for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);
 

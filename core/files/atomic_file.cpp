@@ -2,7 +2,6 @@
 #include "core/files/atomic_file.hpp"
 
 #include <array>
-#include <bit>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "core/files/hidden_beside.hpp"
 #include "core/platform/file.hpp"
 #include "core/platform/process.hpp"
 #include "core/values/text.hpp"
@@ -47,16 +47,6 @@ fs::path folder_of(const fs::path& path) {
               "make the folder, or name another one");
 }
 
-// Hidden, with all extensions kept (.nii.gz): some writers choose the format by them. The process is named
-// for remove_stale_parts.
-fs::path hidden_beside(const fs::path& path) {
-  std::array<std::byte, sizeof(std::uint64_t)> guess{};
-  if (const std::error_code error = platform::fill_random(guess)) cannot_write(path, error);
-  return folder_of(path) /
-         ("." + std::to_string(platform::process_id()) + "." +
-          text::hex(std::bit_cast<std::uint64_t>(guess)) + ".part." + path.filename().string());
-}
-
 [[noreturn]] void cannot_rename(const fs::path& path, const std::error_code& error) {
   throw Error(ErrorKind::io, path.string(), "cannot rename: " + error.message(), "check the folder's rights");
 }
@@ -83,8 +73,8 @@ class Rollback {
     std::error_code error;
     const fs::file_status before = fs::symlink_status(path, error);
     if (!fs::exists(before) || fs::is_directory(before)) return;  // a folder stays, and is in the way
-    const fs::path hidden = hidden_beside(path);
-    fs::rename(path, hidden, error);
+    const fs::path hidden = hidden_beside(path, error);
+    if (!error) fs::rename(path, hidden, error);
     if (error) cannot_rename(path, error);
     moved_.emplace_back(path, hidden);
   }
@@ -111,8 +101,9 @@ AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
     throw Error(ErrorKind::cannot_create, path_.string(), "is a folder", "name a file");
   }
   if (const std::error_code error = platform::cannot_make_in(folder)) cannot_write(path_, error);
-  temporary_ = hidden_beside(path_);
   std::error_code error;
+  temporary_ = hidden_beside(path_, error);
+  if (error) cannot_write(path_, error);
   const platform::File file(temporary_, platform::Open::make, error);
   if (error) cannot_write(path_, error);
 }

@@ -9,9 +9,11 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <fstream>
 #include <optional>
 #include <regex>
 
+#include "core/files/scratch_folder.hpp"
 #include "core/files/stale_parts.hpp"
 #include "tests/unit/io/scratch.hpp"
 
@@ -129,6 +131,54 @@ TEST(StaleParts, OfProcessesThatEndedAreSwept) {
   for (const std::string& name : kept) EXPECT_TRUE(fs::exists(scratch / name)) << name;
   remove_stale_parts_ending(scratch.path(), ".hdf");
   EXPECT_FALSE(fs::exists(scratch / kept[0]));
+}
+
+TEST(ScratchFolder, IsHiddenBesideItsTargetAndGoesWithWhatIsInIt) {
+  const Scratch scratch;
+  fs::path was;
+  for (const char* target : {"posed", "posed/", "posed/.", "deep/er/posed"}) {
+    const ScratchFolder folder(scratch / target);
+    was = folder.path();
+    const std::regex form("\\." + std::to_string(::getpid()) + "\\.[0-9a-f]{16}\\.part\\.posed");
+    EXPECT_TRUE(std::regex_match(was.filename().string(), form)) << was;
+    EXPECT_EQ(was.parent_path(), target[0] == 'd' ? scratch / "deep" / "er" : fs::path(scratch.path()))
+        << target;
+    EXPECT_EQ(fs::status(was).permissions(), fs::perms::owner_all);
+    fs::create_directories(was / "patient");
+    std::ofstream(was / "patient" / "ct.nrrd") << "voxels";
+    EXPECT_TRUE(fs::exists(was));
+  }
+  EXPECT_EQ(names_in(scratch.path()), std::vector<std::string>{"deep"});
+}
+
+TEST(ScratchFolder, SweepsThoseOfProcessesThatEnded) {
+  const Scratch scratch;
+  const ::pid_t ended = ::fork();
+  if (ended == 0) ::_exit(0);
+  ASSERT_EQ(::waitpid(ended, nullptr, 0), ended);
+  const std::string dead = "." + std::to_string(ended) + ".0123456789abcdef.part.";
+  fs::create_directories(scratch / (dead + "posed") / "patient");
+  fs::create_directories(scratch / (dead + "other"));
+  { const ScratchFolder folder(scratch / "posed"); }
+  EXPECT_EQ(names_in(scratch.path()), std::vector<std::string>{dead + "other"});
+}
+
+TEST(ScratchFolder, TakesNoneThatIsThere) {
+  const Scratch scratch;
+  const fs::path guessed = scratch / ("." + std::to_string(::getpid()) + ".0707070707070707.part.posed");
+  fs::create_directories(guessed / "somebody_elses");
+  every_byte = 7;
+  try {
+    const ScratchFolder folder(scratch / "posed");
+    ADD_FAILURE() << "was made";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::cannot_create);
+    EXPECT_NE(error.problem().find("cannot make a folder to write in meanwhile: File exists"),
+              std::string::npos)
+        << error.what();
+  }
+  every_byte.reset();
+  EXPECT_TRUE(fs::exists(guessed / "somebody_elses"));
 }
 
 }  // namespace

@@ -63,6 +63,8 @@ struct Result {
 struct Hooks {
   /// As each stage starts.
   std::function<void(std::string_view name, int index, int count)> on_stage = {};
+  /// The rig, as soon as it is found: whoever throws here ends the run before the long stages.
+  std::function<void(const Rig&)> on_rig = {};
   /// Where stages are kept from run to run. The certificate is not: it must be measured on what is there.
   StageStore* store = nullptr;
   /// Called where weights or certificate are refused and the mesh has tets to blame, with the worst of them.
