@@ -27,7 +27,9 @@ inline void add_read_budget(CLI::App& command, files::ReadLimits& limits) {
 inline std::vector<CLI::Option*> add_image_choice(CLI::App& command, io::ImageChoice& choice) {
   return {command.add_option("--series", choice.series,
                              "which series of a DICOM folder, by UID, the end of one, or description"),
-          command.add_option("--phase", choice.phase, "which volume of a DICOM series in time, from 1")
+          command
+              .add_option("--phase", choice.phase,
+                          "which volume of an image in time (4-D, or a DICOM series), from 1")
               ->check(CLI::Range(1, 10000))};
 }
 

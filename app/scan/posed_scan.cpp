@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kName = "patient";  // of the case, and so of the model
-constexpr double kSure = 0.9;  // names that are known have more, sides that are not clear less
+constexpr double kSure = 0.9;             // names that are known have more, sides that are not clear less
 constexpr std::size_t kMostNamed = 3;
 
 // The bones that are least sure, in one line; empty where all are.

@@ -105,6 +105,7 @@ struct Looked {
   std::map<std::int64_t, std::string> names;     // in its header
   std::optional<io::Mask> mask;                  // instead of the image, of a file of a folder
   std::vector<std::string> notes;
+  bool in_time = false;  // of several volumes, of which one was taken
   std::exception_ptr error;
 };
 
@@ -136,6 +137,8 @@ class Reader {
       }
     }
     read_files(files);
+    if (choice_.phase != 0 && !in_time_)
+      throw Error(ErrorKind::usage, "--phase", "no image here is in time", "leave it out");
     take_mask_groups();
     name_labels();
     if (out_.labels.empty() && out_.images.empty())
@@ -187,6 +190,7 @@ class Reader {
       for (std::size_t i = 0; i < some.size(); ++i) {
         for (const std::string& note : some[i].notes) options_.say(note);
         if (some[i].error) std::rethrow_exception(some[i].error);
+        in_time_ = in_time_ || some[i].in_time || io::is_dicom(files[begin + i]);
         take(files[begin + i], std::move(some[i]));
         context_.report((done += bytes[begin + i]) / all);
       }
@@ -215,7 +219,7 @@ class Reader {
     if (io::is_dicom(path) || is_slicer(path)) return out;
     const files::ReadOptions options{options_.limits,
                                      [&out](std::string_view line) { out.notes.emplace_back(line); }};
-    out.image = io::read_stored_image(path, options);
+    out.image = io::read_stored_image(path, options, choice_.phase, out.in_time);
     check_components(path, out.image);
     out.values = label_values(out.image);
     out.names = io::read_nifti_names(path);
@@ -277,7 +281,7 @@ class Reader {
     throw Error(ErrorKind::data, path.string(),
                 "has " + std::to_string(image.components) + " numbers a voxel",
                 colours ? "it is a picture in colours: save the grey values, or the label map"
-                        : "save one number a voxel");
+                        : "save one number a voxel, or take one by --phase where they follow in time");
   }
 
   void add_grey(const fs::path& path, Image image) {
@@ -357,6 +361,7 @@ class Reader {
   std::vector<fs::path> tables_;
   std::set<fs::path> folders_;
   std::map<fs::path, MaskFolder> masks_;
+  bool in_time_ = false;  // whether a phase may be chosen of any of the files
 };
 
 }  // namespace

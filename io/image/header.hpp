@@ -23,6 +23,8 @@ namespace ecorche::io {
 inline constexpr std::uint64_t largest_image_bytes = std::uint64_t{1} << 33;
 /// Deflate cannot pack zeros tighter than about 1032 to 1.
 inline constexpr std::uint64_t largest_inflation = 1100;
+/// Volumes that may follow each other in time.
+inline constexpr std::int64_t most_volumes = 10000;
 
 struct ImageHeader {
   std::array<std::int32_t, 3> size{0, 0, 0};
@@ -30,6 +32,10 @@ struct ImageHeader {
   bool wide = false;                 ///< stored as i64, of which `type` is i32
   bool wide_unsigned = false;        ///< as u64
   int components = 1;
+  int volumes = 1;                                   ///< in time; all else is said of one of them
+  bool volumes_first = false;                        ///< they lie voxel by voxel: `components` are they
+  bool may_be_volumes = false;                       ///< `components` are a list of anything
+  std::uint64_t bytes_before = 0, bytes_behind = 0;  ///< of the volumes that are not read
   bool gzip = false;
   std::filesystem::path data_file;  ///< the file itself, or a plain name beside it
   std::uint64_t data_offset = 0;    ///< of the first voxel byte, or of the gzip stream, in `data_file`
@@ -51,11 +57,13 @@ struct ImageHeader {
   std::size_t stored_bytes() const { return wide ? 8 : scalar_bytes(type); }
   /// Bytes of all voxels as stored; the parsers keep it at most `largest_image_bytes`.
   std::uint64_t voxel_bytes() const;
+  /// With those of the volumes that are not read.
+  std::uint64_t all_bytes() const { return bytes_before + voxel_bytes() + bytes_behind; }
 };
 
 /// The header of a `.nrrd` or `.nhdr`. `head` holds the file's beginning (the first MiB at least, or all of
-/// it). Throws Error{data} for anything but a 3-D image, raw or gzip, of a ScalarType, in mm, in LPS, RAS,
-/// LAS or no space at all.
+/// it). Throws Error{data} for anything but a 3-D image, or several in time, raw or gzip, of a ScalarType, in
+/// mm, in LPS, RAS, LAS or no space at all.
 ImageHeader parse_nrrd_header(std::string_view head, const std::filesystem::path& path);
 
 /// The free `key:=value` pairs of a NRRD's header, nothing of another format's. Throws Error{missing_input}
@@ -73,6 +81,10 @@ ImageHeader parse_meta_header(std::string_view head, const std::filesystem::path
 /// ways.
 ImageHeader parse_nifti_header(std::string_view head, const std::filesystem::path& path, NiftiForm form);
 
+/// Leaves of an image in time its volume `phase`, from 1; 0: the only one. Throws Error{data}, with how many
+/// there are.
+void choose_volume(ImageHeader& header, int phase, const std::filesystem::path& path);
+
 /// Makes `data_offset` the byte where the voxels or their stream begin: behind skipped lines, before the end.
 void place_data(ImageHeader& header);
 
@@ -80,6 +92,9 @@ void place_data(ImageHeader& header);
 /// Error{data} for 64-bit integers beyond 32 bits.
 void read_voxels(const ImageHeader& header, const std::filesystem::path& path, std::vector<std::byte> stored,
                  Image& image);
+
+/// Of several components the row `component`, from 0.
+Image one_component(const Image& image, int component);
 
 /// The voxels as they are stored, of a file that `check_payload` has passed: of a gzip stream no more than
 /// its header declares is kept, nor anything set aside that it does not hold. Throws Error{io}, and

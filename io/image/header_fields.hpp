@@ -31,6 +31,14 @@ inline std::int64_t integer(std::string_view text, std::int64_t least, std::int6
   return value;
 }
 
+/// How many volumes follow each other in time.
+inline int volumes_of(std::int64_t count, const std::filesystem::path& path) {
+  if (count > most_volumes)
+    refuse(path, "declares " + std::to_string(count) + " volumes in time",
+           "it may have " + std::to_string(most_volumes) + ": save those that are needed");
+  return static_cast<int>(count);
+}
+
 /// A data file named by a header: a plain name beside it. Anything else could read any file of the machine.
 inline std::filesystem::path beside(const std::filesystem::path& path, std::string_view name) {
   const bool plain = !name.empty() && name != "." && name != ".." &&

@@ -11,7 +11,7 @@ namespace ecorche::io {
 struct ImageChoice {
   NiftiForm form = NiftiForm::either;
   std::string series;  ///< of DICOM: UID, the end of one, or description; empty: the only one
-  int phase = 0;       ///< of DICOM in four dimensions: which volume, from 1; 0: there is only one
+  int phase = 0;       ///< of an image in time: which volume, from 1; 0: there is only one
 };
 
 }  // namespace ecorche::io

@@ -76,7 +76,7 @@ void check_grid(ImageGrid& grid, const Path& path, const files::ReadOptions& opt
 
 // ITK's second opinion; where the axes of the file are a little off, which it refuses, there is none.
 Image opinion(const ImageHeader& declared, const Path& path, Format format, bool skewed) {
-  if (declared.second_version) return as_declared(declared);
+  if (declared.second_version || declared.volumes > 1) return as_declared(declared);
   try {
     return itk_images::read_header(path, format);
   } catch (const Error&) {
@@ -85,9 +85,9 @@ Image opinion(const ImageHeader& declared, const Path& path, Format format, bool
   }
 }
 
-// As the file has it.
-Image read_stored(const Path& path, const files::ReadOptions& options, const ImageChoice& choice,
-                  bool labels) {
+// As the file has it. With `in_time`, which tells whether it holds volumes in time, a phase is theirs alone.
+Image read_stored(const Path& path, const files::ReadOptions& options, ImageChoice choice, bool labels,
+                  bool* in_time = nullptr) {
   if (is_dicom(path)) {
     if (choice.form != NiftiForm::either)
       refuse(path, "has neither qform nor sform: it is no NIfTI", "leave out form");
@@ -96,8 +96,7 @@ Image read_stored(const Path& path, const files::ReadOptions& options, const Ima
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored))
     refuse(path, "is a folder without DICOM files, no image", "name a .nrrd, .mha or .nii.gz");
-  if (!choice.series.empty() || choice.phase != 0)
-    refuse(path, "is no DICOM, which alone has series and phases", "leave out series and phase");
+  if (!choice.series.empty()) refuse(path, "is no DICOM, which alone has series", "leave out series");
   Format format = Format::nrrd;
   if (ends_with(path, ".mha") || ends_with(path, ".mhd")) {
     format = Format::meta;
@@ -113,6 +112,11 @@ Image read_stored(const Path& path, const files::ReadOptions& options, const Ima
   ImageHeader declared = format == Format::nrrd   ? parse_nrrd_header(head, path)
                          : format == Format::meta ? parse_meta_header(head, path)
                                                   : parse_nifti(head, path, choice.form);
+  if (in_time != nullptr) {
+    *in_time = declared.volumes > 1 || declared.may_be_volumes;
+    if (!*in_time) choice.phase = 0;
+  }
+  choose_volume(declared, choice.phase, path);
   const bool skewed = declared.grid && degrees_off(*declared.grid) > kItkDegrees;
   if (declared.grid) check_grid(*declared.grid, path, options);
   place_data(declared);
@@ -126,7 +130,7 @@ Image read_stored(const Path& path, const files::ReadOptions& options, const Ima
     check_grid(image.grid, path, options);
   }
   read_voxels(declared, path, std::move(stored), image);
-  return image;
+  return declared.volumes_first ? one_component(image, choice.phase - 1) : image;
 }
 
 }  // namespace
@@ -152,8 +156,10 @@ Image read_label_image(const Path& path, const files::ReadOptions& options, cons
   return whole_labels(read_stored(path, options, choice, true), path);
 }
 
-Image read_stored_image(const Path& path, const files::ReadOptions& options) {
-  return read_stored(path, options, {}, false);
+Image read_stored_image(const Path& path, const files::ReadOptions& options, int phase, bool& in_time) {
+  ImageChoice choice;
+  choice.phase = phase;
+  return read_stored(path, options, choice, false, &in_time);
 }
 
 void write_image(const Path& path, const Image& image, bool compress) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // https://itk.org/Wiki/ITK/MetaIO/Documentation
+#include <charconv>
+#include <initializer_list>
 #include <map>
+#include <vector>
 
 #include "core/values/text.hpp"
 #include "io/image/header.hpp"
@@ -76,6 +79,44 @@ bool truth(const MetaFields& fields, std::string_view key, bool otherwise) {
   return value == "True" || value == "true" || value == "1";
 }
 
+// `count` numbers of the first of `keys` that is there; `otherwise` where none is.
+std::vector<double> numbers_of(const MetaFields& fields, std::initializer_list<std::string_view> keys,
+                               std::size_t count, std::vector<double> otherwise, const Path& path) {
+  for (const std::string_view key : keys) {
+    const auto found = fields.find(key);
+    if (found == fields.end()) continue;
+    std::vector<double> out;
+    for (const std::string_view word : text::words(found->second)) {
+      double value = 0;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+      if (error == std::errc() && end == word.data() + word.size()) out.push_back(value);
+    }
+    if (out.size() != count || text::words(found->second).size() != count)
+      refuse(path, "its " + std::string(key) + " is not " + std::to_string(count) + " numbers");
+    return out;
+  }
+  return otherwise;
+}
+
+// Of an image in time, which ITK's reader takes for one of four dimensions in space. The rows of the matrix
+// are the axes; the fourth must be time alone.
+ImageGrid grid_in_time(const MetaFields& fields, const ImageHeader& header, const Path& path) {
+  const std::vector<double> unit{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  const auto axes = numbers_of(fields, {"TransformMatrix", "Rotation", "Orientation"}, 16, unit, path);
+  const auto origin = numbers_of(fields, {"Offset", "Position", "Origin"}, 4, {0, 0, 0, 0}, path);
+  const auto spacing = numbers_of(fields, {"ElementSpacing", "ElementSize"}, 4, {1, 1, 1, 1}, path);
+  ImageGrid grid;
+  grid.size = header.size;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (axes[4 * axis + 3] != 0 || axes[12 + axis] != 0)
+      refuse(path, "its TransformMatrix mixes space and time", "save one 3-D image");
+    for (std::size_t row = 0; row < 3; ++row) grid.direction[3 * row + axis] = axes[4 * axis + row];
+    grid.origin[axis] = origin[axis];
+    grid.spacing[axis] = spacing[axis];
+  }
+  return grid;
+}
+
 }  // namespace
 
 ImageHeader parse_meta_header(std::string_view head, const Path& path) {
@@ -84,15 +125,18 @@ ImageHeader parse_meta_header(std::string_view head, const Path& path) {
   if (value_of(fields, "ObjectType", "Image") != "Image") {
     refuse(path, "holds a '" + fields.at("ObjectType") + "'", "it must be an image");
   }
-  if (needed(fields, "NDims", path) != "3")
-    refuse(path, "has " + fields.at("NDims") + " axes", "save a 3-D image");
+  const std::string axes = needed(fields, "NDims", path);
+  if (axes != "3" && axes != "4") refuse(path, "has " + axes + " axes", "save a 3-D image");
   const std::string sizes = needed(fields, "DimSize", path);
   const auto counts = text::words(sizes);
-  if (counts.size() != 3) refuse(path, "its DimSize is '" + sizes + "'");
-  for (std::size_t i = 0; i < 3; ++i) {
-    header.size[i] = static_cast<std::int32_t>(
-        fields::integer(counts[i], 1, std::numeric_limits<std::int32_t>::max(), "DimSize", path));
+  if (counts.size() != (axes == "3" ? 3U : 4U)) refuse(path, "its DimSize is '" + sizes + "'");
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const std::int64_t count =
+        fields::integer(counts[i], 1, std::numeric_limits<std::int32_t>::max(), "DimSize", path);
+    if (i < 3) header.size[i] = static_cast<std::int32_t>(count);
+    if (i == 3) header.volumes = fields::volumes_of(count, path);
   }
+  if (axes == "4") header.grid = grid_in_time(fields, header, path);
   header.components = static_cast<int>(fields::integer(value_of(fields, "ElementNumberOfChannels", "1"), 1,
                                                        1 << 16, "ElementNumberOfChannels", path));
   set_meta_type(header, needed(fields, "ElementType", path), path);

@@ -191,11 +191,17 @@ void set_size(ImageHeader& header, const NiftiFields& f, const Path& path) {
       refuse(path, "axis " + std::to_string(axis) + " has " + std::to_string(size) + " voxels");
     if (axis <= 3) header.size[axis - 1] = static_cast<std::int32_t>(size);
     if (axis == 5) header.components = static_cast<int>(std::min<std::int64_t>(size, 1 << 16));
-    if (axis != 5 && axis > 3 && size != 1) {
+    if (axis == 4) header.volumes = fields::volumes_of(size, path);
+    if (axis > 5 && size != 1) {
       refuse(path, "has " + std::to_string(size) + " volumes on axis " + std::to_string(axis),
-             "save one 3-D image; components of a voxel are the fifth axis");
+             "save one 3-D image; volumes in time are the fourth axis, components of a voxel the fifth");
     }
   }
+  if (header.volumes > 1 && header.components > 1)
+    refuse(path,
+           "holds " + std::to_string(header.volumes) + " volumes in time of " +
+               std::to_string(header.components) + " numbers a voxel",
+           "save one 3-D image");
 }
 
 }  // namespace

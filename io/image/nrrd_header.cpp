@@ -113,17 +113,36 @@ std::string needed(const NrrdFields& fields, const char* key, const Path& path) 
   return found->second;
 }
 
-// Whether the first axis holds the components of a voxel: it has no direction in space.
-void check_axes(const NrrdFields& fields, std::int64_t dimension, const Path& path) {
-  if (dimension == 3) return;
+// Which of four axes has no direction in space: the first, components of a voxel, or the last, volumes in
+// time.
+bool last_is_none(const NrrdFields& fields, const Path& path) {
   const auto found = fields.find("spacedirections");
   const std::vector<std::string_view> axes =
       found == fields.end() ? std::vector<std::string_view>() : text::words(found->second);
   const auto is_none = [](std::string_view axis) { return axis == "none"; };
-  if (axes.empty() || !is_none(axes.front()) || std::count_if(axes.begin(), axes.end(), is_none) != 1) {
-    refuse(path, "has 4 axes, and the first is not the only one with space direction 'none'",
-           "save one 3-D image; components of a voxel come first");
+  if (axes.empty() || is_none(axes.front()) == is_none(axes.back()) ||
+      std::count_if(axes.begin(), axes.end(), is_none) != 1) {
+    refuse(path, "has 4 axes, and neither the first nor the last is the only one with space direction 'none'",
+           "save one 3-D image; components of a voxel come first, volumes in time last");
   }
+  return is_none(axes.back());
+}
+
+// `count` volumes or components, on the first axis or the last.
+void set_fourth_axis(const NrrdFields& fields, std::int64_t count, bool last, ImageHeader& header,
+                     const Path& path) {
+  if (last) {
+    header.volumes = fields::volumes_of(count, path);
+    return;
+  }
+  header.components = static_cast<int>(count);
+  const auto kinds = fields.find("kinds");
+  const auto words = kinds == fields.end() ? std::vector<std::string_view>() : text::words(kinds->second);
+  const std::string kind = words.empty() ? "" : text::lower(words.front());
+  header.may_be_volumes = kind == "list";
+  if (kind != "time") return;
+  header.volumes = fields::volumes_of(count, path);
+  header.volumes_first = true;
 }
 
 void check_unit(const NrrdFields& fields, const Path& path) {
@@ -220,7 +239,7 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   if (dimension != 3 && dimension != 4) {
     refuse(path, "has " + std::to_string(dimension) + " axes", "save a 3-D image");
   }
-  check_axes(fields, dimension, path);
+  const bool last = dimension == 4 && last_is_none(fields, path);
   check_unit(fields, path);
   const std::string sizes = needed(fields, "sizes", path);
   const auto counts = text::words(sizes);
@@ -228,10 +247,10 @@ ImageHeader parse_nrrd_header(std::string_view head, const Path& path) {
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::int64_t count =
         fields::integer(counts[i], 1, std::numeric_limits<std::int32_t>::max(), "sizes", path);
-    if (dimension == 4 && i == 0) {
-      header.components = static_cast<int>(count);
+    if (dimension == 4 && i == (last ? 3U : 0U)) {
+      set_fourth_axis(fields, count, last, header, path);
     } else {
-      header.size[i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
+      header.size[last ? i : i - (counts.size() - 3)] = static_cast<std::int32_t>(count);
     }
   }
   set_nrrd_type(header, text::lower(needed(fields, "type", path)), path);

@@ -71,12 +71,12 @@ std::uint64_t present(const ImageHeader& header) {
   return length - std::min(header.data_offset, length);
 }
 
-// The bytes from `data_offset` on.
+// The bytes from `data_offset` on, but for the first `skip`.
 class DataFile {
  public:
-  explicit DataFile(const ImageHeader& header)
+  explicit DataFile(const ImageHeader& header, std::uint64_t skip = 0)
       : name_(header.data_file.string()), file_(header.data_file, std::ios::binary) {
-    file_.seekg(static_cast<std::streamoff>(header.data_offset));
+    file_.seekg(static_cast<std::streamoff>(header.data_offset + skip));
   }
   void read(void* to, std::uint64_t bytes) {
     file_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
@@ -94,7 +94,7 @@ class DataFile {
 template <class F>
 std::optional<std::uint64_t> inflate_all(const ImageHeader& header, const Path& path, F&& take) {
   DataFile file(header);
-  const std::uint64_t expected = header.stream_offset + header.voxel_bytes();
+  const std::uint64_t expected = header.stream_offset + header.all_bytes();
   Inflater inflater;
   std::vector<unsigned char> block(kBlock);
   for (std::uint64_t left = header.packed_bytes.value_or(present(header));
@@ -142,7 +142,7 @@ std::string inflate_head(std::string_view packed, std::size_t limit, const Path&
 void place_data(ImageHeader& header) {
   if (header.at_end) {
     const std::uint64_t length = length_of(header.data_file);
-    header.data_offset = length - std::min(length, header.voxel_bytes());
+    header.data_offset = length - std::min(length, header.all_bytes());
     return;
   }
   if (header.skipped_lines > 0) {
@@ -161,7 +161,7 @@ void check_payload(const ImageHeader& header, const Path& path, const files::Rea
     throw Error(ErrorKind::missing_input, header.data_file.string(), "cannot be opened",
                 "the header " + path.string() + " names it");
   }
-  const std::uint64_t there = present(header), expected = header.voxel_bytes();
+  const std::uint64_t there = present(header), expected = header.all_bytes();
   if (!header.gzip) {
     if (there != expected) {
       refuse(path,
@@ -185,15 +185,16 @@ std::vector<std::byte> stored_voxels(const ImageHeader& header, const Path& path
   std::vector<std::byte> out;
   if (!header.gzip) {
     out.resize(header.voxel_bytes());
-    DataFile(header).read(out.data(), out.size());
+    DataFile(header, header.bytes_before).read(out.data(), out.size());
     return out;
   }
   // Room is set aside, but only what comes is written there: a header that lies costs no memory.
   out.reserve(header.voxel_bytes());
-  const std::uint64_t skip = header.stream_offset, expected = skip + header.voxel_bytes();
+  const std::uint64_t expected = header.stream_offset + header.all_bytes();
+  const std::uint64_t first = header.stream_offset + header.bytes_before, past = first + header.voxel_bytes();
   const auto count =
       inflate_all(header, path, [&](std::uint64_t at, const unsigned char* from, std::size_t some) {
-        const std::uint64_t begin = std::max(at, skip), end = std::min(at + some, expected);
+        const std::uint64_t begin = std::max(at, first), end = std::min(at + some, past);
         if (begin >= end) return;
         const auto* bytes = reinterpret_cast<const std::byte*>(from);
         out.insert(out.end(), bytes + (begin - at), bytes + (end - at));

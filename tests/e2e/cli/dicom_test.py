@@ -118,7 +118,7 @@ class Dicom(unittest.TestCase):
         self.assertFalse((self.folder / "x").exists())
         done = run("thin", self.folder / "nrrd" / "labels.nrrd", "-o", self.folder / "t.vtp", "--series", "1")
         self.assertEqual(done.returncode, 65, done.stderr)
-        self.assertIn("is no DICOM, which alone has series and phases", done.stderr)
+        self.assertIn("is no DICOM, which alone has series (leave out series)", done.stderr)
 
 
 if __name__ == "__main__":

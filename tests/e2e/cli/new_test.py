@@ -194,6 +194,27 @@ class New(unittest.TestCase):
             (folder / "case.yaml").write_text(f"name: t\nskeleton: generic\nlabels:{entry}\n")
             self.assertIn(line, run("check", folder / "case.yaml").stderr)
 
+    def test_one_volume_of_a_ct_in_time(self):
+        """Of a 4-D CT the volume that is named becomes the case's; without a name it is refused, and so is a name for nothing."""
+        scan = self.folder / "totalsegmentator_ml"
+        ct = nibabel.load(scan / "ct.nii.gz")
+        other = np.full(ct.shape, -1000, "i2")
+        nibabel.save(nibabel.Nifti1Image(np.stack([other, np.asarray(ct.dataobj), other], 3), ct.affine), self.folder / "ct.nii.gz")
+        words = [self.folder / "ct.nii.gz", scan / "total.nii.gz", scan / "body.nii.gz", "-o"]
+        result = run("new", *words, self.folder / "time_refused")
+        self.assertEqual(result.returncode, 65)
+        self.assertIn("holds 3 volumes, one after the other in time (take one by --phase, in a case by phase:, from 1 to 3)", result.stderr)
+        self.assertFalse((self.folder / "time_refused").exists())
+        result = run("new", "--phase", "2", *words, self.folder / "time_case")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = run("new", scan / "ct.nii.gz", *words[1:], self.folder / "still_case")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name in ("ct.nrrd", "labels.nrrd"):
+            self.assertEqual((self.folder / "time_case" / name).read_bytes(), (self.folder / "still_case" / name).read_bytes(), name)
+        result = run("new", "--phase", "2", *words[1:], self.folder / "no_time")
+        self.assertEqual(result.returncode, 64)
+        self.assertIn("error: --phase: no image here is in time (leave it out)", result.stderr)
+
     def test_names_of_strangers_stay_text(self):
         """Hostile names neither break the YAML nor the page."""
         scan = self.folder / "hostile"

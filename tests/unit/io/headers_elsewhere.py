@@ -47,9 +47,9 @@ class Headers(Described):
         (self.folder / name).write_bytes((text + f"ElementDataFile = {head['ElementDataFile']}\n").encode() + body)
         return self.folder / name
 
-    def assert_read(self, path, array=None, axes=numpy.eye(3), origin=(1, -2, 3)):
+    def assert_read(self, path, array=None, axes=numpy.eye(3), origin=(1, -2, 3), form=()):
         array = self.array if array is None else array
-        grid, voxels = self.describe(path)
+        grid, voxels = self.describe(path, *form)
         numpy.testing.assert_array_equal(voxels, array if array.ndim == 4 else array[None])
         affine = numpy.eye(4)
         affine[:3, :3], affine[:3, 3] = axes.T, origin
@@ -140,6 +140,66 @@ class Headers(Described):
         self.refused(self.meta("a.mha", body, HeaderSize=9), "its header asks to skip 9 bytes of its own file (write it without HeaderSize)")
         rgb = self.random.integers(0, 255, (3, 4, 5, 3)).astype("u1")
         self.assert_read(self.meta("a.mha", self.bytes_of(rgb, "<"), rgb, ElementNumberOfChannels=3), rgb)
+
+    def test_one_volume_of_several_in_time(self):
+        """The fourth axis last, and of a NRRD also first: of kind time, or the list that 3D Slicer writes."""
+        array = self.random.integers(0, 100, (4, 5, 3, 6)).astype("i2")
+        body, first = self.bytes_of(array, "<"), self.bytes_of(numpy.moveaxis(array, 3, 0), "<")
+        way = " ".join("(%.17g,%.17g,%.17g)" % tuple(axis) for axis in OBLIQUE)
+        last = {"dimension": 4, "sizes": "4 5 3 6", "space directions": way + " none"}
+        before = {"dimension": 4, "sizes": "6 4 5 3", "space directions": "none " + way}
+        unit = OBLIQUE / numpy.linalg.norm(OBLIQUE, axis=1)[:, None]
+        matrix = numpy.eye(4)
+        matrix[:3, :3] = unit
+        meta = {"NDims": 4, "DimSize": "4 5 3 6", "TransformMatrix": " ".join("%.17g" % x for x in matrix.flat), "Offset": "1 -2 3 0",
+                "ElementSpacing": "%.17g %.17g %.17g 7" % tuple(numpy.linalg.norm(OBLIQUE, axis=1))}
+        packed = zlib.compress(body)
+        paths = [self.nrrd("last.nrrd", body, **last), self.nrrd("packed.nrrd", gzip.compress(body), encoding="gzip", **last),
+                 self.nrrd("first.nrrd", first, kinds="time domain domain domain", **before), self.meta("a.mha", body, **meta),
+                 self.meta("b.mha", packed, CompressedData="True", CompressedDataSize=len(packed), **meta)]
+        for path in paths:
+            for phase in (1, 3, 6):
+                self.assert_read(path, array[..., phase - 1], OBLIQUE, form=(f"phase={phase}",))
+            self.refused(path, "holds 6 volumes, one after the other in time (take one by --phase, in a case by phase:, from 1 to 6)")
+            self.refused(path, "has no phase 7 (it has 6)", form=("phase=7",))
+        listed = self.nrrd("list.nrrd", first, kinds="list domain domain domain", **before)
+        self.assert_read(listed, array[..., 3], OBLIQUE, form=("phase=4",))
+        self.assert_read(listed, numpy.moveaxis(array, 3, 0), OBLIQUE)  # as layers of a segmentation
+        self.assert_read(self.nrrd("back.nrrd", b"a header" + body, **last, **{"byte skip": -1}), array[..., 1], OBLIQUE, form=("phase=2",))
+
+    def test_hostile_headers_of_images_in_time(self):
+        body = bytes(2 * 4 * 5 * 3 * 6)
+        way = "(1,0,0) (0,1,0) (0,0,1)"
+        last = {"dimension": 4, "sizes": "4 5 3 6", "space directions": way + " none"}
+        meta = {"NDims": 4, "DimSize": "4 5 3 6", "TransformMatrix": "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "Offset": "1 -2 3 0",
+                "ElementSpacing": "1 1 1 1"}
+        rows = [(self.nrrd, last, {"sizes": "4 5 3 10001"}, "declares 10001 volumes in time (it may have 10000: save those that are needed)"),
+                (self.nrrd, last, {"sizes": "4 5 3 9999"}, "declares 1199880 bytes of voxels, but has 720"),
+                (self.nrrd, last, {"sizes": "4 5 3 5"}, "declares 600 bytes of voxels, but has 720"),
+                (self.nrrd, last, {"sizes": "2000 2000 2000 10000"}, "images may hold 2^33 bytes"),
+                (self.nrrd, last, {"space directions": "none " + way + " none"}, "has 4 axes, and neither the first nor the last"),
+                (self.nrrd, last, {"space": None}, "holds volumes in time, but does not say in which space they lie"),
+                (self.meta, meta, {"DimSize": "4 5 3 2147483647"}, "declares 2147483647 volumes in time"),
+                (self.meta, meta, {"DimSize": "4 5 3 7"}, "declares 840 bytes of voxels, but has 720"),
+                (self.meta, meta, {"DimSize": "4 5 3"}, "its DimSize is '4 5 3'"),
+                (self.meta, meta, {"TransformMatrix": "1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1"}, "its TransformMatrix mixes space and time"),
+                (self.meta, meta, {"TransformMatrix": "1 0 0 0 1 0 0 0 1"}, "its TransformMatrix is not 16 numbers"),
+                (self.meta, meta, {"TransformMatrix": "1 1 0 0 0 1 0 0 0 0 1 0 0 0 0 1"}, "its axes are not orthonormal"),
+                (self.meta, meta, {"Offset": "1 -2 nan 0"}, "its origin is"),
+                (self.meta, meta, {"ElementSpacing": "1 -1 1 1"}, "its spacing is"),
+                (self.meta, meta, {"ElementSpacing": "1 1 x 1"}, "its ElementSpacing is not 4 numbers")]
+        for write, head, change, part in rows:
+            for phase in (1, 5):
+                name = "h.nrrd" if write == self.nrrd else "h.mha"
+                self.refused(write(name, body, **{**head, **change}), part, form=(f"phase={phase}",))
+        bomb = gzip.compress(bytes(1 << 20))
+        self.refused(self.nrrd("bomb.nrrd", bomb, encoding="gzip", **last), "declares 720 bytes of voxels, but its compressed data hold more",
+                     form=("phase=2",))
+        few = self.nrrd("few.nrrd", gzip.compress(body[:600]), encoding="gzip", **last)
+        for phase in (1, 6):
+            self.refused(few, "declares 720 bytes of voxels, but its compressed data hold 600", form=(f"phase={phase}",))
+        self.refused(self.nrrd("much.nrrd", gzip.compress(body), encoding="gzip", **{**last, "sizes": "40 50 30 9000"}),
+                     "compressed bytes cannot hold them", form=("phase=1",))
 
 
 if __name__ == "__main__":

@@ -136,8 +136,19 @@ TEST(Image, FlippedBytesNeverHarm) {
   const Scratch scratch;
   write_image(scratch / "z.nrrd", noise(ScalarType::u8, 1));
   write_image(scratch / "z.mha", noise(ScalarType::u8, 1));
+  // Two volumes in time, of which the second is read.
+  std::string nrrd = changed(kNrrd, "dimension: 3", "dimension: 4");
+  nrrd = changed(changed(nrrd, "sizes: 2 3 4", "sizes: 2 3 4 2"), "(0,0,3)", "(0,0,3) none");
+  scratch.put("t.nrrd", changed(nrrd, "kinds: domain domain domain\n", "") + std::string(24, 'b'));
+  std::string meta = changed(changed(kMeta, "NDims = 3", "NDims = 4"), "= 2 3 4", "= 2 3 4 2");
+  meta = changed(changed(meta, "1 0 0 0 1 0 0 0 1", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"), "5 6 7", "5 6 7 0");
+  scratch.put("t.mha", changed(meta, "= 1 2 3", "= 1 2 3 1") + std::string(24, 'b'));
+  ImageChoice second;
+  second.phase = 2;
+  EXPECT_EQ(read_image(scratch / "t.nrrd", {}, second).bytes, std::vector<std::byte>(24, std::byte{'b'}));
+  expect_same(read_image(scratch / "t.mha", {}, second), read_image(scratch / "t.nrrd", {}, second), 0);
   std::mt19937 random(1);
-  for (const std::string name : {"z.nrrd", "z.mha"}) {
+  for (const std::string name : {"z.nrrd", "z.mha", "t.nrrd", "t.mha"}) {
     const std::string whole = scratch.get(name);
     int read = 0;
     for (int round = 0; round < 150; ++round) {
@@ -145,7 +156,7 @@ TEST(Image, FlippedBytesNeverHarm) {
       bytes[random() % bytes.size()] = static_cast<char>(random());
       const auto path = scratch.put("a" + name, bytes);
       try {
-        const Image image = read_image(path);
+        const Image image = read_image(path, {}, name[0] == 't' ? second : ImageChoice{});
         ASSERT_EQ(image.bytes.size(), image.grid.voxels() * static_cast<std::size_t>(image.components) *
                                           scalar_bytes(image.type));
         ++read;
@@ -167,7 +178,7 @@ TEST(Image, EveryMistakeInANrrdIsNamed) {
   refused("NRRD0004", "NRRD0009", "ct.nrrd: is no NRRD: its first line is not NRRD0001 to NRRD0005");
   refused("dimension: 3", "dimension: 2", "ct.nrrd: has 2 axes (save a 3-D image)");
   refused("dimension: 3", "dimension: 4",
-          "has 4 axes, and the first is not the only one with space direction 'none'");
+          "has 4 axes, and neither the first nor the last is the only one with space direction 'none'");
   refused("sizes: 2 3 4", "sizes: 2 3", "its sizes are '2 3'");
   refused("sizes: 2 3 4", "seizes: 2 3 4", "its header lacks 'sizes'");
   refused("sizes: 2 3 4", "sizes 2 3 4", "line 6 of its header is no field: 'sizes 2 3 4'");

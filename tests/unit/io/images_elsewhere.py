@@ -116,7 +116,31 @@ class Nifti(Described):
         self.assertEqual(grid["components"], 3)
         for i in range(3):
             numpy.testing.assert_array_equal(voxels[i], array[..., 0, i])
-        self.refused(self.save(numpy.zeros((4, 5, 3, 2), "i2"), TURN, "time.nii"), "has 2 volumes on axis 4")
+        self.refused(self.save(numpy.zeros((4, 5, 3, 1, 1, 2), "i2"), TURN, "six.nii"), "has 2 volumes on axis 6 (save one 3-D image;")
+
+    def test_one_volume_of_several_in_time(self):
+        """Voxels, scale, frame and type are nibabel's of that volume alone."""
+        array = self.random.integers(-90, 100, (4, 5, 3, 6)).astype("i2")
+        for change in (None, lambda i: i.header.set_slope_inter(0.5, -3)):
+            for version in (nibabel.Nifti1Image, nibabel.Nifti2Image):
+                for name in ("time.nii", "time.nii.gz"):
+                    path = self.save(array, oblique(), name, change, version)
+                    for phase in (1, 4, 6):
+                        grid, voxels = self.describe(path, f"phase={phase}")
+                        self.assert_ras_frame(grid, oblique())
+                        self.assertEqual((grid["size"], grid["components"]), ([4, 5, 3], 1))
+                        numpy.testing.assert_allclose(voxels[0], nibabel.load(path).dataobj[..., phase - 1], atol=1e-4)
+                    self.refused(path, "holds 6 volumes, one after the other in time (take one by --phase, in a case by phase:, from 1 to 6)")
+                    self.refused(path, "has no phase 7 (it has 6)", form=("phase=7",))
+        single = self.save(array[..., 0], oblique(), "one.nii")
+        self.assertEqual(self.describe(single, "phase=1")[1].shape, (1, 4, 5, 3))
+        self.refused(single, "has no phase 2 (it has 1)", form=("phase=2",))
+        both = self.save(numpy.zeros((4, 5, 3, 2, 3), "i2"), TURN, "both.nii")
+        self.refused(both, "holds 2 volumes in time of 3 numbers a voxel (save one 3-D image)", form=("phase=1",))
+        whole = self.save(array, oblique(), "cut.nii").read_bytes()
+        for cut in (1, 120, 700):  # of the first volume nothing is missing
+            (self.folder / "cut.nii").write_bytes(whole[:-cut])
+            self.refused(self.folder / "cut.nii", "declares 720 bytes of voxels, but has", form=("phase=1",))
 
     def test_what_is_written_nibabel_reads(self):
         array = self.random.integers(0, 100, (4, 5, 3)).astype("i2")
