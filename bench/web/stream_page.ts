@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of stream.ts: keeps so many poses on their way for so many seconds, gives every frame to WebGL where asked to, and posts what
 // came of it.
-import { Client, Encoding, type BodyFrame } from "../../clients/web/protocol/src/index.js";
+import { Client, Encoding, type BodyFrame, type ModelOpened } from "../../clients/web/protocol/src/index.js";
 import { bendingPose } from "../../tests/web/support/poses.js";
 
 const wanted = new URLSearchParams(location.search);
@@ -20,10 +20,22 @@ function uploader(): (frame: BodyFrame) => void {
   };
 }
 
+/** Tissues that have so many vertices together, or a little less. */
+function tissuesOf(model: ModelOpened, vertices: number): string[] {
+  const names: string[] = [];
+  for (const tissue of [...model.tissues].sort((a, b) => Number(b.vertices - a.vertices))) {
+    if (tissue.vertices > vertices) continue;
+    names.push(tissue.name);
+    vertices -= Number(tissue.vertices);
+  }
+  return names;
+}
+
 async function measure(): Promise<object> {
   const client = await Client.connect(wanted.get("server")!, { worker: "/worker.js" });
   const model = await client.open();
-  const stream = await client.subscribeMesh({ encoding: number("encoding") as Encoding, normals: number("normals") === 1, level: number("level") });
+  const stream = await client.subscribeMesh({ encoding: number("encoding") as Encoding, normals: number("normals") === 1, level: number("level"),
+    tissues: number("vertices") ? tissuesOf(model, number("vertices")) : [] });
   const upload = number("upload") === 1 ? uploader() : undefined;
   let frames = 0, bytes = 0, decodeMs = 0, serverMs = 0, start = 0, sent = model.lastSequence;
   const at = new Map<bigint, number>(), delays: number[] = [], warm = 20;
