@@ -70,6 +70,10 @@ std::vector<Label> all_labels(const Scan& scan) {
       label.name = name != map.names.end() ? name->second : "label_" + std::to_string(id);
       const auto code = map.codes.find(id);
       label.meaning = io::recognise(label.name, code != map.codes.end() ? &code->second : nullptr);
+      if (const auto guess = scan.labels[m].guesses.find(id); guess != scan.labels[m].guesses.end()) {
+        label.meaning.how = guess->second.how;
+        label.meaning.confidence = std::min(label.meaning.confidence, guess->second.confidence);
+      }
       out.push_back(std::move(label));
     }
   }

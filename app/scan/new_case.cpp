@@ -40,6 +40,13 @@ std::vector<CLI::Option*> add_scan_options(CLI::App& command, ScanSettings& sett
                     .add_option("--skin-hu", settings.options.skin_hu,
                                 "HU: what is denser is the patient, where no label shows the body")
                     ->check(CLI::Range(-1000.0, 200.0))
+                    ->each([&settings](const std::string&) { settings.skin_given = true; })
+                    ->capture_default_str());
+  out.push_back(command
+                    .add_option("--bone-hu", settings.options.bone_hu,
+                                "HU: what is denser is bone, where no label of any bone is there")
+                    ->check(CLI::Range(-1000.0, 3000.0))
+                    ->each([&settings](const std::string&) { settings.bone_given = true; })
                     ->capture_default_str());
   for (CLI::Option* option : add_image_choice(command, settings.choice)) out.push_back(option);
   out.push_back(command.add_flag("--skin-from-labels", settings.options.skin_from_labels,
@@ -50,6 +57,7 @@ std::vector<CLI::Option*> add_scan_options(CLI::App& command, ScanSettings& sett
 NewCase new_case(const Program& program, const ScanSettings& settings, const files::ReadLimits& limits,
                  const std::filesystem::path& folder) {
   ScanOptions options = settings.options;
+  options.own_values = settings.skin_given && settings.bone_given;
   if (!settings.side.empty()) options.side = settings.side == "left" ? Side::left : Side::right;
   Scan scan = read_scan(settings.scan, reading(program, limits), settings.choice, program.context("read"));
   NewCase out{decide(scan, options, program.context("labels")), {}};

@@ -17,6 +17,7 @@ struct ScanSettings {
   std::string side;  ///< left, right or nothing
   ScanOptions options;
   io::ImageChoice choice;
+  bool skin_given = false, bone_given = false;  ///< whether these were said
 };
 
 /// What the files of a scan may be, for help texts.

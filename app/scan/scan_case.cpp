@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "app/scan/ct_bones.hpp"
 #include "app/scan/label_names.hpp"
 #include "app/scan/scan_borders.hpp"
 #include "app/scan/scan_doubts.hpp"
@@ -40,11 +41,15 @@ class Decider {
 
   ScanCase decide() {
     out_.notes = scan_.notes;
-    if (scan_.labels.empty())
-      throw Error(ErrorKind::data, scan_.images.front().path.string(), "comes without labels",
-                  "segment it first (TotalSegmentator, MOOSE, 3D Slicer), and give the label maps with it");
-    on_one_grid();
     names_ = name_labels(scan_);
+    // Labels that nobody knows may be bones: they are refused below.
+    if (std::none_of(names_.named.begin(), names_.named.end(), [](const Named& named) {
+          return named.structure == nullptr || named.structure->becomes == Becomes::bone;
+        })) {
+      scan_.labels.push_back(bones_of_ct(scan_, options_, out_, context_.quiet()));
+      names_ = name_labels(scan_);
+    }
+    on_one_grid();
     merge();
     context_.report(0.3);
     drop_covered();
@@ -278,7 +283,7 @@ class Decider {
     entry.name = "body";
     entry.role = Role::body;
     entry.drawn = false;
-    entry.how = "denser than " + text::number(options_.skin_hu) + " HU in the CT";
+    entry.how = "denser than " + ct->value(options_.skin_hu) + " in the CT";
     entry.confidence = 0.8;
     for (int number = 2; std::any_of(out_.entries.begin(), out_.entries.end(),
                                      [&](const ScanEntry& e) { return e.name == entry.name; });
@@ -291,8 +296,8 @@ class Decider {
       body_[v] = 1;
       if (labels[v] == 0) labels[v] = id;
     }
-    std::string how = "round what is denser than " + text::number(options_.skin_hu) + " HU in " +
-                      ct->path.filename().string();
+    std::string how =
+        "round what is denser than " + ct->value(options_.skin_hu) + " in " + ct->path.filename().string();
     if (body.taken_off_ml >= 1)
       how += ", without " + text::number(body.taken_off_ml) +
              " ml that are no part of the patient (table, clothes)";

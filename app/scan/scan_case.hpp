@@ -15,6 +15,8 @@ namespace ecorche::app {
 struct ScanOptions {
   Side side = Side::both;         ///< of a scan of one limb
   double skin_hu = -300;          ///< denser than this is the patient, where no label says so
+  double bone_hu = 226;           ///< denser than this is bone, where no label of any bone is there
+  bool own_values = false;        ///< both of those are in the image's own values, which are no HU
   bool skin_from_labels = false;  ///< round all labels, where nothing better is there
   double bridge_mm = 6;           ///< what hangs on the patient by less is no part
 };
@@ -60,8 +62,9 @@ struct ScanCase {
 };
 
 /// Recognises, merges on one grid (finer structures before coarser ones, earlier files before later ones),
-/// takes specks off, gives pieces their sides, finds the skin. Throws Error{data} where no bone is left, or
-/// no skin can be found.
+/// takes specks off, gives pieces their sides, finds the skin. Where no label names a bone and all are
+/// known, bones come from the CT (ct_bones.hpp). Throws Error{data} where no bone is left, or no skin can be
+/// found.
 ScanCase decide(Scan& scan, const ScanOptions& options, const Context& context);
 
 }  // namespace ecorche::app

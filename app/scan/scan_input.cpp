@@ -366,6 +366,10 @@ class Reader {
 
 }  // namespace
 
+std::string ScanImage::value(double v) const {
+  return text::number(v, 6) + (own_values ? " (its own values, no HU)" : " HU");
+}
+
 Scan read_scan(const std::vector<fs::path>& paths, const files::ReadOptions& options,
                const io::ImageChoice& choice, const Context& context) {
   return Reader(options, choice, context).read(paths);

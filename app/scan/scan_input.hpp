@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,19 +13,30 @@
 
 namespace ecorche::app {
 
+/// What a label was guessed to be.
+struct LabelGuess {
+  std::string how;  ///< for a reader
+  double confidence = 1;
+};
+
 /// A label map, and where its names came from.
 struct ScanLabels {
   std::filesystem::path path;
   io::Segmentation map;
-  std::string names_from;  ///< for a reader: `its header`, `organ_indices.json`, ...
+  std::string names_from;                           ///< for a reader: `its header`, `organ_indices.json`, ...
+  std::map<std::int64_t, LabelGuess> guesses = {};  ///< by id, where its names were guessed
 };
 
 /// An image of grey values.
 struct ScanImage {
   std::filesystem::path path;
   Image image;
-  bool ct = false;        ///< in Hounsfield units, as its least values tell
-  double background = 0;  ///< what is outside of the patient
+  bool ct = false;          ///< in Hounsfield units, as its least values tell, or taken as a CT
+  double background = 0;    ///< what is outside of the patient
+  bool own_values = false;  ///< a CT whose values are no HU
+
+  /// `226 HU`, for a reader.
+  std::string value(double v) const;
 };
 
 struct Scan {

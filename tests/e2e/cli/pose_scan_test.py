@@ -125,7 +125,7 @@ class PoseScan(unittest.TestCase):
                 (("-o", out, "--pose", self.folder / "none.yaml", "--scan", *self.scan), 66, "none.yaml: cannot be opened"),
                 (("-o", out, *pose, "--no-bridge", "--scan", *self.scan), 64, "--no-bridge: tets open no gaps"),
                 (("-o", out, *pose, "--scan", self.folder / "none"), 66, "none: no such file or folder (mend the path)"),
-                (("-o", out, *pose, "--scan", self.scan[0]), 65, "comes without labels"),
+                (("-o", out, *pose, "--bone-hu", "2900", "--scan", self.scan[0]), 65, "holds no bone: only 0 ml"),
                 (("-o", foreign, *pose, "--scan", *self.scan), 73, "holds letter.txt, which is of no posed body here"),
         ):
             result = run("pose", *words)
