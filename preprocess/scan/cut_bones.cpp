@@ -11,10 +11,10 @@
 namespace ecorche::scan {
 namespace {
 
-constexpr double kBlock = 4;    // mm: the template is asked once in a block of so much
-constexpr double kNear = 14;    // mm: a seed lies nearer to its bone
-constexpr double kMargin = 10;  // mm: ... and the bones of other segments so much farther
-constexpr double kAgrees = 12;  // mm
+constexpr double kBlock = 4;      // mm: the template is asked once in a block of so much
+constexpr double kSeedNear = 14;  // mm: a seed lies nearer to its bone
+constexpr double kMargin = 10;    // mm: ... and the bones of other segments so much farther
+constexpr double kAgrees = 12;    // mm
 
 // The part of an image that holds all of a mask, as an image of its own.
 struct Part {
@@ -146,7 +146,7 @@ class Cutter {
 
   void seed() {
     each_block([&](const Eigen::Vector3d& p, const std::vector<std::size_t>& voxels) {
-      const NearestBone near = nearest_bone(clouds_, placed_.segments, p, kNear);
+      const NearestBone near = nearest_bone(clouds_, placed_.segments, p, kSeedNear);
       if (near.segment < 0) return;
       const double reach = near.distance + kMargin;
       if (nearest_bone(clouds_, placed_.segments, p, reach, near.segment).segment >= 0) return;
