@@ -2,6 +2,7 @@
 // A name that a model does not hold: the nearest that it holds, not all ninety of them.
 #pragma once
 
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace ecorche::app {
 template <class Items>
 Error unknown_name(const std::string& option, const std::string& name, const Items& items) {
   std::vector<std::string> known;
+  known.reserve(std::size(items));
   for (const auto& item : items) known.push_back(item.name);
   const std::string near = io::yaml::nearest(name, known);
   std::string mend = near.empty() ? "use names that ecorche info lists" : "did you mean '" + near + "'?";
