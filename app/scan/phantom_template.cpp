@@ -11,12 +11,14 @@ namespace {
 constexpr double kSpacing = 9, kShell = 6;  // mm
 
 Points shell_points(const phantom::Shape& shape) {
-  const phantom::Box box = shape.box();
+  const phantom::Box& box = shape.box();
   std::vector<Eigen::Vector3d> found;
-  const auto first = [&](int a) { return kSpacing * std::ceil(box.lo[a] / kSpacing); };
-  for (double z = first(2); z <= box.hi[2]; z += kSpacing) {
-    for (double y = first(1); y <= box.hi[1]; y += kSpacing) {
-      for (double x = first(0); x <= box.hi[0]; x += kSpacing) {
+  const auto first = [&](int a) { return static_cast<int>(std::ceil(box.lo[a] / kSpacing)); };
+  const auto last = [&](int a) { return static_cast<int>(std::floor(box.hi[a] / kSpacing)); };
+  for (int k = first(2); k <= last(2); ++k) {
+    for (int j = first(1); j <= last(1); ++j) {
+      for (int i = first(0); i <= last(0); ++i) {
+        const double x = kSpacing * i, y = kSpacing * j, z = kSpacing * k;
         const double d = shape.distance({x, y, z});
         if (d < 0 && d > -kShell) found.emplace_back(x, y, z);
       }

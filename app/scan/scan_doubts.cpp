@@ -25,8 +25,9 @@ void tell_elsewhere(ScanCase& out, const ScanImage& image) {
   std::size_t all = 0, within = 0;
   for (std::size_t v = 0; v < labels.size(); v += step) {
     if (labels[v] == 0) continue;
+    const std::size_t slice = v / (nx * ny);
     const Point index = own.index(grid.point(static_cast<double>(v % nx), static_cast<double>(v / nx % ny),
-                                             static_cast<double>(v / (nx * ny))));
+                                             static_cast<double>(slice)));
     bool in = true;
     for (std::size_t a = 0; a < 3; ++a) in = in && index[a] >= -0.5 && index[a] <= own.size[a] - 0.5;
     ++all;
@@ -81,7 +82,7 @@ void tell_exchanged(ScanCase& out) {
     const double x = middle[e + 1][0] - middle[static_cast<std::size_t>(pair - out.entries.begin()) + 1][0];
     if (std::abs(x) < kApartMm) continue;
     ++(x > 0 ? right : exchanged);
-    if (x < 0 && first.empty()) first = name + " lies to the right of " + other;
+    if (x < 0 && first.empty()) first.append(name).append(" lies to the right of ").append(other);
   }
   if (exchanged <= right) return;
   out.doubts.push_back(

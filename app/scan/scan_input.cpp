@@ -172,6 +172,7 @@ class Reader {
   // Several beside each other; what becomes of them is decided in their order. Bytes tell how long it takes.
   void read_files(const std::vector<fs::path>& files) {
     std::vector<double> bytes;
+    bytes.reserve(files.size());
     for (const fs::path& path : files) bytes.push_back(bytes_of(path));
     const double all = std::accumulate(bytes.begin(), bytes.end(), 0.0);
     double done = 0;

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -22,7 +24,9 @@ const T* end_of_run(const T* first, const T* last) {
     std::memcpy(&word, at, 8);
     if (word != pattern) break;
   }
-  while (at != last && std::memcmp(at, first, sizeof(T)) == 0) ++at;
+  // By bytes, as above.
+  const auto bytes = [](const T* of) { return std::bit_cast<std::array<std::byte, sizeof(T)>>(*of); };
+  while (at != last && bytes(at) == bytes(first)) ++at;
   return at;
 }
 

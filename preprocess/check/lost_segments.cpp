@@ -63,6 +63,7 @@ std::vector<Finding> lost_segments(const Case& patient) {
   // What an open skin encloses is not sure.
   if (lost.empty() || geometry::largest_hole(patient.skin).holes > 0) return {};
   std::vector<Finding> out;
+  out.reserve(lost.size());
   for (const auto& [segment, bone] : lost)
     out.push_back({Severity::error, segment,
                    "its bones lie outside the skin: nothing of the body would follow them",

@@ -257,7 +257,10 @@ class Search {
       centre += bone_.row(p).transpose();
     }
     centre /= static_cast<double>(bone_.rows());
-    for (double way = least - high + kLeastInView; way <= most - low - kLeastInView; way += kStep) {
+    const double first = least - high + kLeastInView, last = most - low - kLeastInView;
+    const int steps = first <= last ? static_cast<int>((last - first) / kStep) : -1;
+    for (int step = 0; step <= steps; ++step) {
+      const double way = first + step * kStep;
       context_.check_stop();
       // Beside, by the middles of what both have here.
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -371,6 +374,7 @@ Points spread_points(const std::vector<std::uint8_t>& mask, const ImageGrid& gri
     }
   }
   std::vector<Eigen::Vector3d> means;
+  means.reserve(cells.size());
   for (const auto& [key, cell] : cells) means.push_back(cell.sum / cell.count);
   Points out(static_cast<Eigen::Index>(means.size()), 3);
   for (std::size_t m = 0; m < means.size(); ++m) out.row(static_cast<Eigen::Index>(m)) = means[m].transpose();

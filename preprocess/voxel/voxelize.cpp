@@ -300,9 +300,9 @@ void settle(const Contested& contested, const Case& patient, Image& labels, cons
   tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t n) {
     context.check_stop();
     const std::size_t voxel = all[n].first;
-    const std::array<double, 3> p =
-        grid.point(static_cast<double>(voxel % nx), static_cast<double>(voxel / nx % ny),
-                   static_cast<double>(voxel / (nx * ny)));
+    const std::size_t slice = voxel / (nx * ny);
+    const std::array<double, 3> p = grid.point(
+        static_cast<double>(voxel % nx), static_cast<double>(voxel / nx % ny), static_cast<double>(slice));
     double best = std::numeric_limits<double>::infinity();
     for (const std::uint16_t label : all[n].second) {
       const double d = surfaces.at(label)->nearest({p[0], p[1], p[2]}).squared;

@@ -235,7 +235,8 @@ TEST_F(Bodies, VolumesAndSlicesAreThoseOfTheClasses) {
     const ImageGrid grown = runtime::grow_to(toy->volumes[v].image.grid, wanted.nodes);
     EXPECT_TRUE(std::equal(grown.size.begin(), grown.size.end(), grid.size));
     for (const bool slice : {false, true}) {
-      if (slice) grid.origin[2] += grid.spacing[2] * (grid.size[2] / 2), grid.size[2] = 1;
+      const auto middle = grid.size[2] / 2;
+      if (slice) grid.origin[2] += grid.spacing[2] * middle, grid.size[2] = 1;
       ImageGrid at = grown;
       std::copy_n(grid.size, 3, at.size.begin());
       std::copy_n(grid.origin, 3, at.origin.begin());

@@ -149,10 +149,13 @@ BodyTemplate block_template() {
   for (const Block& block : blocks()) {
     out.segments.push_back({block.segment, block.parent, block.joint});
     std::vector<Eigen::Vector3d> shell;
-    for (double z = block.low[2] + 2; z < block.high[2]; z += 7) {
-      for (double y = block.low[1] + 2; y < block.high[1]; y += 7) {
-        for (double x = block.low[0] + 2; x < block.high[0]; x += 7) {
-          const Eigen::Vector3d p(x, y, z);
+    const auto count = [&](int axis) {
+      return static_cast<int>(std::ceil((block.high[axis] - block.low[axis] - 2) / 7));
+    };
+    for (int z = 0; z < count(2); ++z) {
+      for (int y = 0; y < count(1); ++y) {
+        for (int x = 0; x < count(0); ++x) {
+          const Eigen::Vector3d p = block.low + Eigen::Vector3d(2 + 7 * x, 2 + 7 * y, 2 + 7 * z);
           if (std::min((p - block.low).minCoeff(), (block.high - p).minCoeff()) < 6) shell.push_back(p);
         }
       }
@@ -216,8 +219,8 @@ TEST(PlaceTemplate, LeavesOutArmsThatAreNotThere) {
   body.segments.push_back({"upper_arm_left", 1, {60, 0, 215}});
   Points points(0, 3);
   std::vector<Eigen::Vector3d> shell;
-  for (double z = 20; z < 215; z += 7) {
-    for (double a = 0; a < 6; a += 1.2) shell.emplace_back(64 + 10 * std::cos(a), 10 * std::sin(a), z);
+  for (int z = 20; z < 215; z += 7) {
+    for (int a = 0; a < 5; ++a) shell.emplace_back(64 + 10 * std::cos(1.2 * a), 10 * std::sin(1.2 * a), z);
   }
   points.resize(static_cast<Eigen::Index>(shell.size()), 3);
   for (std::size_t p = 0; p < shell.size(); ++p)

@@ -29,7 +29,7 @@ Status feed(FrameReader& reader, std::string_view bytes, std::size_t piece = 1 <
     const std::span<std::byte> want = reader.prepare();
     const std::size_t n = std::min({want.size(), bytes.size(), piece});
     std::memcpy(want.data(), bytes.data(), n);
-    if (const Status status = reader.commit(n); !status.ok()) return status;
+    if (Status status = reader.commit(n); !status.ok()) return status;
     bytes.remove_prefix(n);
   }
   return {};

@@ -90,7 +90,7 @@ TEST(PresenceTest, NoMoreThanSixtyFourAreListed) {
   std::vector<std::unique_ptr<FakeMember>> crowd;
   for (int i = 0; i < 80; ++i) {
     crowd.push_back(std::make_unique<FakeMember>());
-    crowd.back()->connection = static_cast<std::uint64_t>(100 + i);
+    crowd.back()->connection = 100 + static_cast<std::uint64_t>(i);
     room.control.join(*crowd.back(), false, room.now);
   }
   room.presence.ask(*crowd.back(), true);
