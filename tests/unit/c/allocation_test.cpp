@@ -1,44 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A game's frame allocates nothing: counted over the whole process, which is why this is a test of its own.
 #include <array>
-#include <atomic>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
+#include "tests/support/counted_new.hpp"
 #include "tests/unit/c/opened_toy.hpp"
-
-namespace {
-
-std::atomic<std::size_t> allocated{0};
-
-void* take(std::size_t bytes, std::size_t alignment) {
-  ++allocated;
-  void* memory = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t bytes) {
-  return take(bytes, alignof(std::max_align_t));
-}
-void* operator new(std::size_t bytes, std::align_val_t line) {
-  return take(bytes, static_cast<std::size_t>(line));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace ecorche::c {
 namespace {
@@ -68,18 +34,18 @@ TEST_F(Allocation, AFrameAllocatesNothing) {
   };
   frame(0.1);
   frame(0.2);
-  const std::size_t before = allocated;
+  const std::size_t before = test::allocated;
   for (int i = 0; i < 10; ++i) frame(0.03 * i);
-  EXPECT_EQ(allocated - before, 0U);
+  EXPECT_EQ(test::allocated - before, 0U);
   EXPECT_EQ(failed, 0);
   ecorche_body_destroy(one);
 }
 
 TEST_F(Allocation, TheCounterCounts) {
-  const std::size_t before = allocated;
+  const std::size_t before = test::allocated;
   ecorche_pose* other = nullptr;
   ASSERT_EQ(ecorche_pose_create(model, &other), ECORCHE_OK);
-  EXPECT_GT(allocated, before) << "the library's operator new is this one";
+  EXPECT_GT(test::allocated, before) << "the library's operator new is this one";
   ecorche_pose_destroy(other);
 }
 

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <random>
 
+#include "io/image/equal_run.hpp"
 #include "io/image/header.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/packed_nrrd.hpp"
@@ -298,6 +300,32 @@ TEST(Image, PackedInPieces) {
   expect_same(read_image(scratch / "a.nrrd"), image, 0);
   expect_error(ErrorKind::io, "/dev/full: writing failed (check the disk's free space)",
                [&] { write_packed_nrrd("/dev/full", image); });
+}
+
+// A run by bytes, wherever it begins and ends, beside one looked at value by value.
+template <class T>
+void runs_end_where_values_change(const std::vector<T>& values) {
+  const auto same = [](const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; };
+  std::uint32_t state = 3;
+  std::vector<T> row;
+  while (row.size() < 500) {
+    state = state * 1664525 + 1013904223;
+    row.insert(row.end(), 1 + (state >> 24) % 21, values[(state >> 8) % values.size()]);
+  }
+  for (std::size_t begin = 0; begin < row.size(); ++begin) {
+    std::size_t end = begin + 1;
+    while (end < row.size() && same(row[end], row[begin])) ++end;
+    EXPECT_EQ(end_of_run(row.data() + begin, row.data() + row.size()) - row.data(),
+              static_cast<std::ptrdiff_t>(end));
+  }
+}
+
+TEST(Image, RunsEndWhereValuesChange) {
+  runs_end_where_values_change<std::uint8_t>({0, 1, 255});
+  runs_end_where_values_change<std::int16_t>({0, -1, 256});
+  runs_end_where_values_change<std::uint32_t>({0, 1, 1U << 31U});
+  runs_end_where_values_change<float>({0.0F, -0.0F, 1.5F, std::numeric_limits<float>::quiet_NaN()});
+  runs_end_where_values_change<double>({0.0, -0.0, 1.5, std::numeric_limits<double>::quiet_NaN()});
 }
 
 TEST(Image, WritingRefusesWhatItCannotDo) {

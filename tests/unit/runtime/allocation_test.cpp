@@ -3,47 +3,13 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <memory>
-#include <new>
 
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/probe.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
+#include "tests/support/counted_new.hpp"
 #include "tests/support/toy_model.hpp"
-
-namespace {
-
-std::atomic<std::size_t> allocated{0};
-
-void* take(std::size_t bytes, std::size_t alignment) {
-  ++allocated;
-  void* memory = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t bytes) {
-  return take(bytes, alignof(std::max_align_t));
-}
-void* operator new(std::size_t bytes, std::align_val_t line) {
-  return take(bytes, static_cast<std::size_t>(line));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace ecorche::runtime {
 namespace {
@@ -56,17 +22,17 @@ TEST(Allocation, NoneInAFrame) {
     for (const Skinning skinning : {Skinning::lbs, Skinning::dqs, Skinning::cor}) {
       tbb::task_arena(1).execute([&] {
         ASSERT_TRUE(poser.run(pose, skinning, poser.all_tissues(), body, nodes).ok());  // whatever is lazy
-        const std::size_t before = allocated;
+        const std::size_t before = test::allocated;
         for (int frame = 1; frame <= 20; ++frame) {
           pose.rotation[1] =
               Eigen::AngleAxisd(0.15 * frame, Eigen::Vector3d::UnitX());  // beyond its limit, too
           ASSERT_TRUE(poser.run(pose, skinning, poser.all_tissues(), body, nodes).ok());
         }
-        EXPECT_EQ(allocated - before, 0u) << skinning_name(skinning);
+        EXPECT_EQ(test::allocated - before, 0u) << skinning_name(skinning);
       });
     }
   }
-  EXPECT_GT(allocated, 0u) << "the counter counts";
+  EXPECT_GT(test::allocated, 0u) << "the counter counts";
 }
 
 TEST(Allocation, NoneInAVolume) {
@@ -83,13 +49,13 @@ TEST(Allocation, NoneInAVolume) {
   tbb::task_arena(1).execute([&] {
     std::size_t before = 0;
     for (int frame = 0; frame <= 20; ++frame) {
-      if (frame == 2) before = allocated;
+      if (frame == 2) before = test::allocated;
       pose.rotation[1] = Eigen::AngleAxisd(0.1 * frame, Eigen::Vector3d::UnitX());
       ASSERT_TRUE(poser.run(pose, Skinning::cor, {}, body).ok());
       volumes.pose(body.nodes, model->volumes[0], Sampling::trilinear, grid, whole, scratch);
       volumes.follow(body.nodes, model->volumes[0], Sampling::nearest, grid, kept, scratch);
     }
-    EXPECT_EQ(allocated - before, 0u);
+    EXPECT_EQ(test::allocated - before, 0u);
   });
 }
 
@@ -110,14 +76,14 @@ TEST(Allocation, NoneInAProbe) {
   tbb::task_arena(1).execute([&] {
     std::size_t before = 0;
     for (int frame = 0; frame <= 10; ++frame) {
-      if (frame == 2) before = allocated;
+      if (frame == 2) before = test::allocated;
       pose.rotation[1] = Eigen::AngleAxisd(0.1 * frame, Eigen::Vector3d::UnitX());
       ASSERT_TRUE(poser.run(pose, Skinning::cor, {}, body).ok());
       probe.follow(body.nodes, tree);
       probe.posed_to_rest(tree, points, wants, out);
       probe.rest_to_posed(tree, points, wants, out);
     }
-    EXPECT_EQ(allocated - before, 0u);
+    EXPECT_EQ(test::allocated - before, 0u);
   });
 }
 
