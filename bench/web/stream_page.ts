@@ -31,6 +31,37 @@ function tissuesOf(model: ModelOpened, vertices: number): string[] {
   return names;
 }
 
+/** Messages of a server that does nothing else, as many on their way. */
+function measureFloor(): Promise<object> {
+  const worker = new Worker(`/floor_worker.js${location.search}`, { type: "module" });
+  const sent: number[] = [], delays: number[] = [], warm = 20;
+  let frames = 0, bytes = 0, start = 0;
+  const ask = () => {
+    sent.push(performance.now());
+    worker.postMessage(null);
+  };
+  return new Promise((resolve, reject) => {
+    worker.onerror = ({ message }) => reject(new Error(message));
+    worker.onmessage = ({ data }: MessageEvent<ArrayBuffer | null>) => {
+      // Connected.
+      if (!data) return Array.from({ length: number("ahead") }).forEach(ask);
+      const now = performance.now();
+      if (++frames === warm) [start, bytes, delays.length] = [now, 0, 0];
+      bytes += data.byteLength;
+      delays.push(now - sent.shift()!);
+      if (frames <= warm || now - start < 1000 * number("seconds")) return ask();
+      worker.terminate();
+      const seconds = (now - start) / 1000;
+      resolve({ rate: (frames - warm) / seconds, megabytes: bytes / seconds / 1e6, ...quantiles(delays) });
+    };
+  });
+}
+
+function quantiles(delays: number[]): { p50: number; p99: number } {
+  delays.sort((a, b) => a - b);
+  return { p50: delays[delays.length >> 1]!, p99: delays[Math.floor(0.99 * delays.length)]! };
+}
+
 async function measure(): Promise<object> {
   const client = await Client.connect(wanted.get("server")!, { worker: "/worker.js" });
   const model = await client.open();
@@ -58,14 +89,13 @@ async function measure(): Promise<object> {
       if (frames <= warm || now - start < 1000 * number("seconds")) return pose(poseSequence);
       client.close();
       const seconds = (now - start) / 1000, counted = frames - warm;
-      delays.sort((a, b) => a - b);
       resolve({
         vertices: frame.layout.vertexCount, rate: counted / seconds, megabytes: bytes / seconds / 1e6, decodeMs: decodeMs / counted, serverMs: serverMs / counted,
-        p50: delays[delays.length >> 1], p99: delays[Math.floor(0.99 * delays.length)], shared: crossOriginIsolated,
+        ...quantiles(delays), shared: crossOriginIsolated,
       });
     });
     if (stream.latest) pose(stream.latest.poseSequence);
   });
 }
 
-measure().catch((error: unknown) => ({ error: String(error) })).then((body) => fetch("/", { method: "POST", body: JSON.stringify(body) }));
+(number("floor") ? measureFloor() : measure()).catch((error: unknown) => ({ error: String(error) })).then((body) => fetch("/", { method: "POST", body: JSON.stringify(body) }));

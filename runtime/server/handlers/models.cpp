@@ -34,6 +34,16 @@ Status handle_open_model(Client& client, const v1::OpenModel& open, const Reques
     client.answer(request.id(), std::move(envelope));
     return {};
   }
+  const PackedTriangles* packed = open.packed_triangles() ? model.packed_triangles() : nullptr;
+  for (int i = 0; packed && i < opened.tissues_size(); ++i) {
+    v1::Tissue& tissue = *opened.mutable_tissues(i);
+    *tissue.mutable_packed_triangles() = packed->arrays[static_cast<std::size_t>(i)];
+    tissue.set_triangle_count(model.triangles[static_cast<std::size_t>(i)].count());
+  }
+  if (packed) {
+    client.answer(request.id(), std::move(envelope), packed->payload);
+    return {};
+  }
   for (int i = 0; i < opened.tissues_size(); ++i) {
     *opened.mutable_tissues(i)->mutable_triangles() = model.triangles[static_cast<std::size_t>(i)];
   }

@@ -50,7 +50,7 @@ SessionRegistry::SessionRegistry(net::io_context& io, Workers& workers, Options 
                                                           std::move(model.clips), std::move(model.poses)));
     // The first frame of all will want it.
     executor_.submit(Service::frames, [served = models_.back()] { warm_up(*served); });
-    make_levels(models_.back());
+    prepare_details(models_.back());
   }
 }
 
@@ -71,15 +71,16 @@ void SessionRegistry::stop() {
   for (const auto& session : retired_) session->stop_volumes();
 }
 
-// Levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a
+// Packed triangles, then levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a
 // model that nobody has any more.
-void SessionRegistry::make_levels(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
+void SessionRegistry::prepare_details(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
   if (leaving_ || tissue >= model->model().tissues.size() || model.use_count() == 1) return;
   executor_.submit(Service::levels, [this, model = std::move(model), tissue]() mutable {
     if (hooks_.may_coarsen && !hooks_.may_coarsen()) return;
     try {
+      if (tissue == 0) model->pack_triangles();
       model->make_levels({tissue});
-      make_levels(std::move(model), tissue + 1);
+      prepare_details(std::move(model), tissue + 1);
     } catch (const std::bad_alloc&) {  // who asks is told
     }
   });
@@ -331,7 +332,7 @@ void SessionRegistry::replace(std::shared_ptr<const ServedModel> model) {
   std::swap(*old, model);
   executor_.destroy_later(std::move(model));
   try {
-    make_levels(*old);
+    prepare_details(*old);
   } catch (const std::bad_alloc&) {  // who asks for levels has them made
   }
 }

@@ -100,7 +100,7 @@ class SessionRegistry {
   void sweep(Clock::time_point now);
 
  private:
-  void make_levels(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
+  void prepare_details(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
   void replace(std::shared_ptr<const ServedModel> model);
   void reload_from(std::size_t row);
   bool evict(const std::string& address = {});
@@ -109,7 +109,7 @@ class SessionRegistry {
   Options options_;
   MemoryBudget memory_;
   TestHooks hooks_;
-  std::atomic<bool> leaving_ = false;  ///< no more levels of detail are made before somebody asks
+  std::atomic<bool> leaving_ = false;  ///< nothing more is made before somebody asks
   std::vector<std::shared_ptr<const ServedModel>> models_;
   Executor executor_;  ///< its threads read what is above, and end before
   TurnQueue quality_turns_, first_frames_;

@@ -22,7 +22,7 @@ enum class Service : std::uint8_t {
   first_frames,  ///< what newcomers see beside a stream
   quality,       ///< of poses, measured where a core would else be idle
   background,    ///< what takes long, and nobody waits for but who asked
-  levels,        ///< of detail that nobody waits for yet
+  levels,        ///< of detail, and packed triangles, that nobody waits for yet
   disposal,      ///< of what is large
   files,         ///< of recordings
 };

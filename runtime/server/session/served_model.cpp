@@ -152,6 +152,13 @@ void ServedModel::make_levels(const std::vector<std::uint32_t>& tissues) const {
   }
 }
 
+void ServedModel::pack_triangles() const {
+  std::call_once(packing_, [this] {
+    packed_triangles_ = server::pack_triangles(model());
+    triangles_packed_ = true;
+  });
+}
+
 void ServedModel::describe_skinning(const std::vector<std::uint32_t>& tissues, std::uint32_t detail,
                                     v1::SkinningData& out, wire::Payload& payload) const {
   make_levels(tissues);

@@ -18,6 +18,7 @@
 #include "runtime/server/session/body_pool.hpp"
 #include "runtime/server/session/clip.hpp"
 #include "runtime/server/session/mesh_rows.hpp"
+#include "runtime/server/session/packed_triangles.hpp"
 #include "runtime/server/session/rest_pose.hpp"
 #include "runtime/server/session/skinning_data.hpp"
 #include "runtime/spheres/pose_volume.hpp"
@@ -48,6 +49,10 @@ struct ServedModel {
   const MeshRows& level(std::uint32_t level, std::uint32_t tissue) const {
     return levels_[tissue].levels[level - 1];
   }
+  /// Packs the triangles, on the calling thread; throws bad_alloc.
+  void pack_triangles() const;
+  /// Null where they are not packed yet. From any thread.
+  const PackedTriangles* packed_triangles() const { return triangles_packed_ ? &packed_triangles_ : nullptr; }
   /// On a worker, as those below; they throw bad_alloc.
   const runtime::QualityMeter& meter() const;
   const runtime::VolumePoser& volumes() const;
@@ -93,6 +98,9 @@ struct ServedModel {
     MeshLevels levels;
   };
 
+  mutable std::once_flag packing_;
+  mutable std::atomic<bool> triangles_packed_ = false;
+  mutable PackedTriangles packed_triangles_;
   mutable std::deque<Levels> levels_;  // of every tissue
   mutable std::deque<Balls> balls_;    // of every volume
   mutable std::once_flag meter_made_, volumes_made_;

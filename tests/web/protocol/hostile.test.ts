@@ -5,6 +5,7 @@ import assert from "node:assert/strict";
 import type { AddressInfo } from "node:net";
 import { test } from "node:test";
 import { create, toBinary } from "@bufbuild/protobuf";
+import { MeshoptEncoder } from "meshoptimizer/encoder";
 import { WebSocketServer } from "ws";
 import type { ToClient } from "../../../clients/web/protocol/src/channel.js";
 import { makePlainKernel } from "../../../clients/web/protocol/src/decode/kernel.js";
@@ -13,7 +14,7 @@ import { EnvelopeSchema } from "../../../clients/web/protocol/src/gen/ecorche/v1
 import {
   Client, ConnectionError, Encoding, MeshArray_Kind, MeshFrameSchema, MeshLevelSchema, ModelOpenedSchema, ProtocolError, ScalarType, type MeshFrame,
 } from "../../../clients/web/protocol/src/index.js";
-import { levelLayout, wholeLayout, wholeTissues, type MeshLayout } from "../../../clients/web/protocol/src/layout.js";
+import { levelLayout, unpackingReady, wholeLayout, wholeTissues, type MeshLayout } from "../../../clients/web/protocol/src/layout.js";
 import { MeshFeed } from "../../../clients/web/protocol/src/mesh_feed.js";
 import { Random } from "../support/random.js";
 import { within } from "../support/server.js";
@@ -125,6 +126,36 @@ test("layouts that point beyond their vertices are refused", () => {
   model.tissues[0].vertices = 4n;
   model.tissues[0].triangles = undefined;
   assert.throws(() => wholeTissues(model, payload), ProtocolError);
+});
+
+test("packed triangles that are none are refused", async () => {
+  await Promise.all([unpackingReady, MeshoptEncoder.ready]);
+  const triangles = Uint32Array.from([0, 1, 2, 2, 1, 3, 4, 6, 5, 4, 5, 0]);
+  const good = [...MeshoptEncoder.encodeIndexBuffer(new Uint8Array(triangles.buffer), triangles.length, 4)];
+  const opened = (bytes: number[], triangleCount: bigint, vertices = 4n) => {
+    const payload = new Uint8Array(64);
+    payload.set(bytes);
+    const model = create(ModelOpenedSchema, { tissues: [{ name: "skin", vertices, packedTriangles: array(ScalarType.U8, 1, bytes.length, 0), triangleCount }] });
+    return wholeLayout(wholeTissues(model, payload), []).indices;
+  };
+  const corners = [...opened(good, 4n, 7n)], sorted = (rows: number[]) => [0, 3, 6, 9].map((at) => rows.slice(at, at + 3).sort().join());
+  assert.deepEqual(sorted(corners), sorted([...triangles]));
+  assert.throws(() => opened(good, 4n, 2n), ProtocolError);
+  assert.throws(() => opened(good, 1n << 60n), ProtocolError);
+  assert.throws(() => opened(good, BigInt(good.length)), ProtocolError);
+  assert.throws(() => opened([], 1n), ProtocolError);
+  for (let length = 0; length < good.length; ++length) assert.throws(() => opened(good.slice(0, length), 4n, 7n), ProtocolError, `${length} bytes`);
+  const random = new Random(3);
+  for (let round = 0; round < 2000; ++round) {
+    const bytes = good.slice();
+    bytes[random.words(1)[0]! % bytes.length]! ^= 1 << (round % 8);
+    try {
+      // What still unpacks names no vertex that is not there.
+      for (const row of opened(bytes, 4n, 7n)) assert.ok(row < 7);
+    } catch (error) {
+      assert.ok(error instanceof ProtocolError, String(error));
+    }
+  }
 });
 
 test("a client that is sent nonsense says so and dials again", async (t) => {

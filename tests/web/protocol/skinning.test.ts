@@ -12,7 +12,8 @@ import {
 } from "../../../clients/web/protocol/src/index.js";
 import { wholeLayout } from "../../../clients/web/protocol/src/layout.js";
 import { MeshFeed } from "../../../clients/web/protocol/src/mesh_feed.js";
-import { readSkinning, skinningReady } from "../../../clients/web/protocol/src/skinning/skinning.js";
+import { unpackingReady } from "../../../clients/web/protocol/src/layout.js";
+import { readSkinning } from "../../../clients/web/protocol/src/skinning/skinning.js";
 import { presets, type Library } from "../../../clients/web/viewer/src/posing/presets.js";
 import { wireOf } from "../../../clients/web/viewer/src/posing/pose.js";
 import { rigOf } from "../../../clients/web/viewer/src/posing/rig.js";
@@ -111,7 +112,7 @@ test("motions are asked for alone", async () => {
 });
 
 test("bytes that are no skinning are refused, whatever they tell of", async () => {
-  await skinningReady;
+  await unpackingReady;
   const value = create(SubscribeSchema, { what: { case: "mesh", value: { motions: true } } });
   const { value: answer, payload } = await client.ask({ case: "subscribe", value }, "subscribed"), bytes = new Uint8Array(payload);
   const layout = wholeLayout(client.model!.tissues.map(({ name, vertices }) => ({ name, vertexCount: Number(vertices), triangles: new Uint32Array() })), []);

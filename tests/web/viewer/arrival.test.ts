@@ -3,10 +3,12 @@
 // to the server's own vertices; said in the read-out, and held by hand.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
+import { create } from "@bufbuild/protobuf";
 import type { Browser } from "playwright-core";
 import {
-  Client, Encoding, NO_NORMAL, Skinning, STRIDE, type BodyFrame, type MeshStream, type ModelOpened,
+  Client, Encoding, ModelOpenedSchema, NO_NORMAL, Skinning, STRIDE, type BodyFrame, type MeshStream, type ModelOpened,
 } from "../../../clients/web/protocol/src/index.js";
+import { Arrival } from "../../../clients/web/viewer/src/arrival.js";
 import { launch, newPage, openBody, Site, type Viewed } from "../support/page.js";
 import { bendingPose } from "../support/poses.js";
 import { Server, within } from "../support/server.js";
@@ -72,6 +74,24 @@ const normalOf = (coded: number): number[] => {
   const n = z < 0 ? [(1 - Math.abs(v)) * Math.sign(u || 1), (1 - Math.abs(u)) * Math.sign(v || 1), z] : [u, v, z], length = Math.hypot(...n);
   return n.map((value) => value / length);
 };
+
+test("a large body is shown by a coarser level first, and whole after that picture", async () => {
+  const body = (...vertices: bigint[]) => create(ModelOpenedSchema, { tissues: vertices.map((count) => ({ vertices: count })) });
+  assert.equal(Arrival.firstOf(body(300_000n, 200_000n)).level, undefined);
+  assert.equal(Arrival.firstOf(body(300_000n, 200_001n)).level, 2);
+  const levels = await page().evaluate(async () => {
+    const { live, stage } = (window as any).ecorche, { client, stream, arrival } = live;
+    await client.changeMesh(stream, { normals: true, level: 2 });
+    while (live.frame.level !== 2) await new Promise(requestAnimationFrame);
+    const drawn: number[] = [], off = stage.onAfterDraw(() => drawn.push(live.frame.level));
+    arrival.follow(client, stream);
+    stage.invalidate();
+    while (!drawn.includes(0)) await new Promise(requestAnimationFrame);
+    off();
+    return drawn;
+  });
+  assert.equal(levels[0], 2);
+});
 
 test("on a fast line the body stays with frames", async (context) => {
   let late = false;

@@ -35,14 +35,14 @@ export interface AdaptOptions {
 
 export type AdaptedOptions = Choice & Pick<MeshOptions, "motions" | "adaptive">;
 
-/** `onChoice`: what is asked for from now on. The stream's first choices should be those of the policy's choice(false). */
+/** `onChoice`: what is asked for from now on. The stream's first choices should be those of the policy's choice(false), but for its level. */
 export function adapt(client: Client, stream: MeshStream, onChoice: (choice: AdaptedOptions) => void = () => {}, options: AdaptOptions = {}): Adaptation {
   const vertices = client.model?.tissues.reduce((sum, tissue) => sum + Number(tissue.vertices), 0) ?? 0;
   const { policy = new Policy(), adaptive = false, line = new LinePolicy(vertices, client.hello.features.includes(Feature.SKINNING)) } = options;
   let drawMs = 0, moving = false, pose = stream.latest?.poseSequence, rest: ReturnType<typeof setTimeout> | undefined;
   let held = options.held ?? {}, work = Promise.resolve(), coarserBy = 0, servedMs = 0;
   let newest = 0n, counted: bigint | undefined, stirred = 0, still = 0;  // of what the body took up
-  let applied = choose({ adaptive: stream.options.adaptive ?? false, held: {} });
+  let applied = { ...choose({ adaptive: stream.options.adaptive ?? false, held: {} }), level: stream.options.level ?? 0 };
 
   function choose(by: { adaptive: boolean; held: Held } = { adaptive, held }): AdaptedOptions {
     const motions = by.held.motions ?? line.skins !== undefined, choice = policy.choice(moving);

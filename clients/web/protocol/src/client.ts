@@ -28,6 +28,7 @@ import { Redial } from "./redial.js";
 import { encode, Requests, type Answer, type Case, type Message } from "./requests.js";
 import { encodeHang, readSpheres, type Spheres } from "./spheres.js";
 import type { ControlState, StateChange } from "./states.js";
+import { compilesWebAssembly } from "./webassembly.js";
 
 /** None of these mends itself by dialling again. */
 const FINAL: number[] = [Code.UNAUTHENTICATED, Code.FAILED_PRECONDITION, Code.INVALID_ARGUMENT];
@@ -90,7 +91,7 @@ export class Client extends Emitter<ClientEvents> {
   /** No `model`: the server's first. No `session`: one of its own. Streams that there are go on with the new body. */
   async open(model = "", session = ""): Promise<ModelOpened> {
     const streams = [...this.streams.values()];  // not those that are asked for while the answer is on its way
-    const { value } = await this.ask({ case: "openModel", value: create(OpenModelSchema, { model, session }) }, "modelOpened");
+    const { value } = await this.ask({ case: "openModel", value: create(OpenModelSchema, { model, session, packedTriangles: compilesWebAssembly() }) }, "modelOpened");
     this.model = value;
     this.poses.restart(value.lastSequence);
     this.setControl({ role: value.role, vacant: false, reservedSeconds: 0 });

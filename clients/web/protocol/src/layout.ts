@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which vertices and triangles the frames of a subscription hold, level by level: made once, from ModelOpened and Subscribed.
+import { MeshoptDecoder } from "meshoptimizer/decoder";
 import { arrayOf, ProtocolError } from "./framing.js";
 import { ScalarType } from "./gen/ecorche/v1/common_pb.js";
-import type { ModelOpened } from "./gen/ecorche/v1/model_pb.js";
+import type { ModelOpened, Tissue } from "./gen/ecorche/v1/model_pb.js";
 import type { MeshLevel } from "./gen/ecorche/v1/stream_pb.js";
+
+/** Whoever decodes packed triangles waits for this once. Rejected where a page's policy forbids WebAssembly. */
+export const unpackingReady: Promise<void> = MeshoptDecoder.ready;
+// Who never waits for it has nothing packed, and nothing failed.
+unpackingReady?.catch(() => {});
 
 /** One tissue's part of the vertices and indices of a layout. */
 export interface TissueRange {
@@ -32,12 +38,26 @@ export interface WholeTissue {
   triangles: Uint32Array;
 }
 
-/** Throws where triangles are missing: OpenModel.without_triangles is not for this client. */
+/** Throws where triangles are missing: OpenModel.without_triangles is not for this client. Where some are packed, wait for unpackingReady before. */
 export function wholeTissues(model: ModelOpened, payload: Uint8Array<ArrayBuffer>): WholeTissue[] {
   return model.tissues.map((tissue) => {
-    const triangles = arrayOf(tissue.triangles, payload, ScalarType.U32, 3);
+    const triangles = tissue.packedTriangles ? unpackTriangles(tissue, payload) : arrayOf(tissue.triangles, payload, ScalarType.U32, 3);
     return { name: tissue.name, vertexCount: countOf(tissue.vertices), triangles };
   });
+}
+
+function unpackTriangles({ name, packedTriangles, triangleCount }: Tissue, payload: Uint8Array<ArrayBuffer>): Uint32Array<ArrayBuffer> {
+  const bytes = arrayOf(packedTriangles, payload, ScalarType.U8, 1);
+  // A triangle takes a byte at least: so that a few bytes that tell of many make no room.
+  if (triangleCount > BigInt(bytes.length)) throw new ProtocolError(`${triangleCount} triangles of ${name} in ${bytes.length} bytes`);
+  const triangles = new Uint32Array(3 * Number(triangleCount));
+  if (triangles.length === 0) return triangles;
+  try {
+    MeshoptDecoder.decodeIndexBuffer(new Uint8Array(triangles.buffer), triangles.length, triangles.BYTES_PER_ELEMENT, bytes);
+  } catch (error) {
+    throw new ProtocolError(`the triangles of ${name} cannot be unpacked: ${error instanceof Error ? error.message : error}`);
+  }
+  return triangles;
 }
 
 /** `names`: of the subscription; empty: all. */

@@ -12,7 +12,7 @@ import type { MeshFrame, MeshSelection, Subscribed } from "./gen/ecorche/v1/stre
 import { levelLayout, wholeLayout, wholeTissues, type WholeTissue } from "./layout.js";
 import { Meter } from "./meter.js";
 import { MeshFeed } from "./mesh_feed.js";
-import type { Skinning } from "./skinning/skinning.js";
+import { readSkinning, type Skinning } from "./skinning/skinning.js";
 
 const SUBPROTOCOL = "ecorche.v1";
 const SECOND_MS = 1000;
@@ -37,7 +37,6 @@ export class Link {
   private tissues: WholeTissue[] = [];
   private topology = 0n;
   private segments = 0;
-  private held: unknown[] | undefined;  // what came while the decoder of skinning was being made
   private readonly meter = new Meter();
   private clock: ReturnType<typeof setInterval> | undefined;
 
@@ -75,7 +74,6 @@ export class Link {
   private drop(): void {
     clearInterval(this.clock);
     this.asked.clear();
-    this.held = undefined;
     const { socket } = this;
     this.socket = undefined;
     socket?.close();
@@ -105,11 +103,9 @@ export class Link {
   }
 
   private hear(data: unknown): void {
-    if (this.held) return void this.held.push(data);
     try {
       if (!(data instanceof ArrayBuffer)) throw new ProtocolError("a message of text");
       const { envelope, payload } = decodeFrame(data), parsed = parse(envelope);
-      if (parsed.message.case === "subscribed" && parsed.message.value.skinning && !this.unpack) return this.hold(data);
       this.meter.received(data.byteLength);
       this.handle(parsed, envelope, payload);
     } catch (error) {
@@ -117,21 +113,6 @@ export class Link {
       if (error instanceof ProtocolError) this.post({ kind: "refused", message: error.message });
       else this.post({ kind: "failed", message: describeFault(error) });
     }
-  }
-
-  private unpack: typeof import("./skinning/skinning.js").readSkinning | undefined;
-
-  /** Until skinning can be unpacked; what follows keeps its order. */
-  private hold(data: ArrayBuffer): void {
-    const held: unknown[] = [data];
-    this.held = held;
-    import("./skinning/skinning.js").then(async ({ readSkinning, skinningReady }) => {
-      await skinningReady;
-      this.unpack = readSkinning;
-      if (this.held !== held) return;
-      this.held = undefined;
-      for (const each of held) this.hear(each);
-    }).catch((error: unknown) => this.post({ kind: "failed", message: describeFault(error) }));
   }
 
   private handle(parsed: Envelope, envelope: Uint8Array<ArrayBuffer>, payload: Uint8Array<ArrayBuffer>): void {
@@ -177,8 +158,8 @@ export class Link {
     const { topology, options: { makeKernel, shared } } = this;
     let skinning: Skinning | undefined;
     if (selection.motions) {
-      if (!answer.skinning || !this.unpack) throw new ProtocolError("motions without what to skin by");
-      skinning = this.unpack(answer.skinning, payload, layouts[0], this.segments);
+      if (!answer.skinning) throw new ProtocolError("motions without what to skin by");
+      skinning = readSkinning(answer.skinning, payload, layouts[0], this.segments);
     }
     const feed = new MeshFeed({ stream: handle, layouts, topology, encoding: selection.encoding, makeKernel, shared, skinning }, this.post);
     this.streams.set(handle, { subscription: answer.subscription, feed });

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the body comes: chosen by itself from what arrives, or held by hand; and what a frame is to the scene, whichever way it came.
-import { adapt, type Adaptation, type BodyFrame, type Client, type GpuSkinner, type Held, type MeshOptions, type MeshStream } from "../../protocol/src/index.js";
+import { adapt, type Adaptation, type BodyFrame, type Client, type GpuSkinner, type Held, type MeshOptions, type MeshStream, type ModelOpened } from "../../protocol/src/index.js";
 import type { Positions } from "./scene/body.js";
 import type { Stage } from "./scene/stage.js";
 import type { Way } from "./state/app_state.js";
 import { wordsOf } from "./errors.js";
 
-/** Coarser levels and other ways are for later, and many bytes: the first picture does not wait for them. */
+/** Coarser levels and other ways are for later, and many bytes: the first seconds do without them. */
 const CHOOSE_AFTER_MS = 1500;
+/** Bodies of more vertices are first shown by a coarser level, which is there, and drawn, much sooner. */
+const LARGE = 500_000, COARSE_LEVEL = 2;
 const KEY = "ecorche.way";
 
 export class Arrival {
@@ -17,6 +19,7 @@ export class Arrival {
   #adaptation: Adaptation | null = null;
   #make: typeof GpuSkinner | null = null;
   #skinner: GpuSkinner | null = null;
+  #stream: MeshStream | null = null;
   #drawStart = 0;
   /** The GPU does not take it: frames, then, as long as this page lives. */
   #fault: string | null = null;
@@ -31,19 +34,31 @@ export class Arrival {
   }
 
   /** What the first picture comes by. */
-  static readonly first: MeshOptions = { normals: true };
+  static firstOf(model: ModelOpened): MeshOptions {
+    const vertices = model.tissues.reduce((sum, tissue) => sum + Number(tissue.vertices), 0);
+    return { normals: true, ...(vertices > LARGE && { level: COARSE_LEVEL }) };
+  }
 
   follow(client: Client, stream: MeshStream): void {
     this.#adaptation?.stop();
     this.#adaptation = null;
-    setTimeout(() => {
-      // Whoever skins has the code ready before the first motions come.
-      const begin = async () => {
-        this.#make = (await import("../../protocol/src/skinning/gpu.js")).GpuSkinner;
-        this.#adaptation = adapt(client, stream, undefined, { adaptive: true, held: this.#held });
-      };
-      begin().catch((error: unknown) => this.say(`The body goes on coming as frames: ${wordsOf(error)}`));
-    }, CHOOSE_AFTER_MS);
+    this.#stream = stream;
+    this.#begin(client, stream).catch((error: unknown) => this.say(`The body goes on coming as frames: ${wordsOf(error)}`));
+  }
+
+  async #begin(client: Client, stream: MeshStream): Promise<void> {
+    await this.#drawn(stream);
+    // The whole body at once, where the picture shows less of it.
+    if (!stream.options.level) await new Promise((resolve) => setTimeout(resolve, CHOOSE_AFTER_MS));
+    // Whoever skins has the code ready before the first motions come.
+    this.#make = (await import("../../protocol/src/skinning/gpu.js")).GpuSkinner;
+    if (this.#stream === stream) this.#adaptation = adapt(client, stream, undefined, { adaptive: true, held: this.#held });
+  }
+
+  /** There is a picture of the stream's body. */
+  async #drawn(stream: MeshStream): Promise<void> {
+    if (!stream.latest) await new Promise<void>((resolve) => { const off = stream.on("frame", () => { off(); resolve(); }); });
+    await new Promise<void>((resolve) => { const off = this.stage.onAfterDraw(() => { off(); resolve(); }); });
   }
 
   /** Held until another is; null: by itself. */

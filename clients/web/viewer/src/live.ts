@@ -124,9 +124,10 @@ export class Live {
     }));
     const asked = hashParameters();
     performance.mark("ecorche connected");
-    // In one go: the server answers in order, and nobody waits for the way there and back between them. No name: its first model.
-    const opened = client.open(asked.get("model") ?? "", asked.get("session") ?? SHARED_SESSION).then(() => performance.mark("ecorche opened"));
-    const [stream] = await Promise.all([client.subscribeMesh(Arrival.first), opened]);
+    // No name: its first model.
+    const model = await client.open(asked.get("model") ?? "", asked.get("session") ?? SHARED_SESSION);
+    performance.mark("ecorche opened");
+    const stream = await client.subscribeMesh(Arrival.firstOf(model));
     this.stream = stream;
     stream.on("frame", (frame) => this.#show(frame));
     if (stream.latest) this.#show(stream.latest);

@@ -37,9 +37,6 @@ export interface Skinning {
   bytes: number;
 }
 
-/** Whoever decodes waits for this once. */
-export const skinningReady: Promise<void> = MeshoptDecoder.ready;
-
 function unpack(array: TissueSkinning["points"], payload: Uint8Array<ArrayBuffer>, count: number, stride: number): Uint8Array<ArrayBuffer> {
   const out = new Uint8Array(count * stride);
   if (count === 0) return out;
@@ -52,7 +49,7 @@ function unpack(array: TissueSkinning["points"], payload: Uint8Array<ArrayBuffer
   return out;
 }
 
-/** `segments`: of the model. Throws ProtocolError for what does not fit the layout, or points beyond its own arrays. */
+/** `segments`: of the model. Wait for unpackingReady before. Throws ProtocolError for what does not fit the layout, or points beyond its own arrays. */
 export function readSkinning(data: SkinningData, payload: Uint8Array<ArrayBuffer>, layout: MeshLayout, segments: number): Skinning {
   const { ranges, vertexCount } = layout, { tissues, box } = data;
   if (!box || !(box.step > 0) || ![box.step, box.lowX, box.lowY, box.lowZ].every(Number.isFinite)) throw new ProtocolError("skinning without its box");
