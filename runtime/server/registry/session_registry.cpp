@@ -71,8 +71,8 @@ void SessionRegistry::stop() {
   for (const auto& session : retired_) session->stop_volumes();
 }
 
-// Packed triangles, then levels of detail, one tissue after another, so that whoever asks for some waits for one at most. Not for a
-// model that nobody has any more.
+// Packed triangles, then levels of detail, one tissue after another, so that whoever asks for some waits for
+// one at most. Not for a model that nobody has any more.
 void SessionRegistry::prepare_details(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
   if (leaving_ || tissue >= model->model().tissues.size() || model.use_count() == 1) return;
   executor_.submit(Service::levels, [this, model = std::move(model), tissue]() mutable {

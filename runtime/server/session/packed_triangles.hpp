@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include <ecorche/v1/model.pb.h>
 #include <ecorche/values/model.hpp>
 #include <ecorche/wire/framing.hpp>
-#include "ecorche/v1/model.pb.h"
 
 namespace ecorche::server {
 

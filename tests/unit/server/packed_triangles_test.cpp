@@ -64,10 +64,9 @@ bool all_packed(const v1::ModelOpened& opened) {
 }
 
 bool all_plain(const v1::ModelOpened& opened) {
-  return std::all_of(
-      opened.tissues().begin(), opened.tissues().end(), [](const v1::Tissue& tissue) {
-        return tissue.has_triangles() && !tissue.has_packed_triangles() && tissue.triangle_count() == 0;
-      });
+  return std::all_of(opened.tissues().begin(), opened.tissues().end(), [](const v1::Tissue& tissue) {
+    return tissue.has_triangles() && !tissue.has_packed_triangles() && tissue.triangle_count() == 0;
+  });
 }
 
 TEST(PackedTriangles, AreTheModels) {
