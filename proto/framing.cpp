@@ -18,8 +18,9 @@ void append_u32(std::string& out, std::size_t value) {
   for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<char>(value >> shift & 0xff));
 }
 
-// Header, envelope and padding of a frame.
-std::string head_of(const v1::Envelope& envelope, std::size_t payload_bytes) {
+}  // namespace
+
+void encode_head(const v1::Envelope& envelope, std::size_t payload_bytes, std::string& head) {
   const std::size_t envelope_bytes = envelope.ByteSizeLong();
   // Protobuf itself ends at 2 GiB.
   if (envelope_bytes > std::numeric_limits<std::int32_t>::max() ||
@@ -29,16 +30,13 @@ std::string head_of(const v1::Envelope& envelope, std::size_t payload_bytes) {
                     std::to_string(payload_bytes) + " bytes do not make a frame",
                 "report this");
   }
-  std::string head;
+  head.clear();
   head.reserve(aligned(header_bytes + envelope_bytes));
   append_u32(head, envelope_bytes);
   append_u32(head, payload_bytes);
   envelope.AppendToString(&head);
   head.resize(aligned(head.size()), '\0');
-  return head;
 }
-
-}  // namespace
 
 std::span<std::byte> FrameReader::prepare() {
   switch (part_) {
@@ -92,7 +90,9 @@ Status FrameReader::finish_envelope() {
                    [](std::byte b) { return b == std::byte{0}; })) {
     return {StatusCode::invalid_argument, "frame: the padding is not zero (fill it with zeros)"};
   }
-  if (!frame_.envelope.ParseFromArray(envelope_.data(), static_cast<int>(envelope_bytes_))) {
+  made_ = arena_ ? &arena_->make() : nullptr;
+  v1::Envelope& envelope = made_ ? *made_ : frame_.envelope;
+  if (!envelope.ParseFromArray(envelope_.data(), static_cast<int>(envelope_bytes_))) {
     return {StatusCode::invalid_argument,
             "frame: the envelope is no ecorche.v1.Envelope (see proto/ecorche/v1)"};
   }
@@ -104,9 +104,16 @@ Status FrameReader::finish_envelope() {
 }
 
 Frame FrameReader::release() {
+  if (made_) frame_.envelope = *std::exchange(made_, nullptr);
   part_ = Part::header;
   filled_ = 0;
   return std::exchange(frame_, {});
+}
+
+Payload FrameReader::release_payload() {
+  part_ = Part::header;
+  filled_ = 0;
+  return std::exchange(frame_.payload, {});
 }
 
 std::size_t Pieces::bytes() const {
@@ -116,12 +123,14 @@ std::size_t Pieces::bytes() const {
 }
 
 EncodedFrame encode(const v1::Envelope& envelope, std::shared_ptr<const Payload> payload) {
-  std::string head = head_of(envelope, payload ? payload->size() : 0);
+  std::string head;
+  encode_head(envelope, payload ? payload->size() : 0, head);
   return {.head = std::move(head), .payload = std::move(payload)};
 }
 
 EncodedFrame encode(const v1::Envelope& envelope, Pieces pieces) {
-  std::string head = head_of(envelope, pieces.bytes());
+  std::string head;
+  encode_head(envelope, pieces.bytes(), head);
   return {.head = std::move(head), .payload = nullptr, .pieces = std::move(pieces)};
 }
 

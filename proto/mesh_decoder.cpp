@@ -68,24 +68,26 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
     tissue.tissue = array.tissue();
     tissue.normals.clear();
     tissue.numbers.clear();
-    const std::string where = "the positions of tissue " + std::to_string(array.tissue());
+    const auto bad_positions = [&](const std::string& what) {
+      return bad_mesh("the positions of tissue " + std::to_string(array.tissue()) + what);
+    };
     if (frame.encoding() == v1::ENCODING_F32) {
       std::span<const float> positions;
-      if (!find(array.array(), payload, 3, positions)) return bad_mesh(where + " are no float32");
+      if (!find(array.array(), payload, 3, positions)) return bad_positions(" are no float32");
       tissue.positions.assign(positions.begin(), positions.end());
     } else if (delta && !is_key) {
       std::span<const std::uint8_t> bytes;
-      if (!find(array.array(), payload, 1, bytes)) return bad_mesh(where + " are no deltas");
+      if (!find(array.array(), payload, 1, bytes)) return bad_positions(" are no deltas");
       const auto& tissues = key->second.tissues;
       if (count >= tissues.size() || tissues[count].tissue != array.tissue())
-        return bad_mesh(where + " are not in the keyframe");
+        return bad_positions(" are not in the keyframe");
       tissue.numbers.resize(tissues[count].numbers.size());
       if (Status status = decode_delta(std::as_bytes(bytes), tissues[count].numbers, tissue.numbers);
           !status.ok())
         return status;
     } else {
       std::span<const std::uint16_t> numbers;
-      if (!find(array.array(), payload, 3, numbers)) return bad_mesh(where + " are no u16");
+      if (!find(array.array(), payload, 3, numbers)) return bad_positions(" are no u16");
       tissue.numbers.assign(numbers.begin(), numbers.end());
     }
     if (frame.encoding() != v1::ENCODING_F32) to_positions(frame.box(), tissue);

@@ -59,10 +59,10 @@ Client::Client(const wire::Address& address, const std::string& name, const Acce
   hello_ = std::move(*answer.envelope.mutable_server_hello());
 }
 
-wire::Frame Client::call(v1::Envelope request, std::shared_ptr<const wire::Payload> payload) {
+wire::Frame Client::call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload) {
   const std::uint64_t id = ++last_request_;
   request.set_request_id(id);
-  send(request, std::move(payload));
+  send(request, payload);
   const auto until = Clock::now() + patience;
   while (auto frame = read_frame(until)) {
     if (frame->envelope.request_id() != id) {
@@ -77,10 +77,10 @@ wire::Frame Client::call(v1::Envelope request, std::shared_ptr<const wire::Paylo
               "try again");
 }
 
-void Client::send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload) {
-  const wire::EncodedFrame frame = wire::encode(envelope, std::move(payload));
-  socket_.write(std::as_bytes(std::span(frame.head)), Clock::now() + patience);
-  if (frame.payload) socket_.write(*frame.payload, Clock::now() + patience);
+void Client::send(const v1::Envelope& envelope, const std::shared_ptr<const wire::Payload>& payload) {
+  wire::encode_head(envelope, payload ? payload->size() : 0, head_);
+  socket_.write(std::as_bytes(std::span(head_)), Clock::now() + patience);
+  if (payload) socket_.write(*payload, Clock::now() + patience);
 }
 
 std::optional<wire::Frame> Client::receive(Clock::time_point until) {
@@ -90,25 +90,45 @@ std::optional<wire::Frame> Client::receive(Clock::time_point until) {
   return frame;
 }
 
-std::optional<wire::Frame> Client::read_frame(Clock::time_point until) {
-  while (!reader_.complete()) {
-    const std::span<std::byte> want = reader_.prepare();
-    const std::size_t n = socket_.read(want, until, std::min(want.size(), kEnough));
-    if (n == 0) return std::nullopt;
-    bytes_received_ += n;
-    if (const Status status = reader_.commit(n); !status.ok()) {
-      throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
-    }
+std::optional<Client::Message> Client::receive_in_place(Clock::time_point until) {
+  if (!in_place_.payload.empty()) reuse(std::exchange(in_place_, {}));
+  if (!waiting_.empty()) {
+    in_place_ = std::move(waiting_.front());
+    waiting_.pop_front();
+    return Message{in_place_.envelope, in_place_.payload};
   }
+  if (!read(until, &incoming_)) return std::nullopt;
+  in_place_.payload = reader_.release_payload();
+  attend(reader_.envelope());
+  return Message{reader_.envelope(), in_place_.payload};
+}
+
+std::optional<wire::Frame> Client::read_frame(Clock::time_point until) {
+  if (!read(until, nullptr)) return std::nullopt;
   wire::Frame frame = reader_.release();
   attend(frame.envelope);
   return frame;
 }
 
+// Until a frame is whole; false where none was in time. `arena`: where its envelope is made.
+bool Client::read(Clock::time_point until, wire::MessageArena* arena) {
+  reader_.make_envelopes_in(arena);
+  while (!reader_.complete()) {
+    const std::span<std::byte> want = reader_.prepare();
+    const std::size_t n = socket_.read(want, until, std::min(want.size(), kEnough));
+    if (n == 0) return false;
+    bytes_received_ += n;
+    if (const Status status = reader_.commit(n); !status.ok()) {
+      throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
+    }
+  }
+  return true;
+}
+
 // What the protocol asks of every client at once.
 void Client::attend(const v1::Envelope& envelope) {
-  v1::Envelope answer;
   if (envelope.has_mesh_frame() || envelope.has_volume_frame()) {
+    v1::Envelope& answer = compose();
     const bool mesh = envelope.has_mesh_frame();
     v1::FrameAck& ack = *answer.mutable_frame_ack();
     ack.set_subscription(mesh ? envelope.mesh_frame().subscription()
@@ -116,6 +136,7 @@ void Client::attend(const v1::Envelope& envelope) {
     ack.set_frame(mesh ? envelope.mesh_frame().frame() : envelope.volume_frame().frame());
     send(answer);
   } else if (envelope.has_ping()) {
+    v1::Envelope& answer = compose();
     answer.set_request_id(envelope.request_id());
     answer.mutable_pong()->set_data(envelope.ping().data());
     send(answer);

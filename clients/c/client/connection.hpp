@@ -30,6 +30,12 @@ struct OpenedBody {
   OpenedBody& operator=(const OpenedBody&) = delete;
 };
 
+/// The quality of a pose, as a frame told it.
+struct ToldQuality {
+  std::uint64_t sequence = 0;
+  ecorche_quality figures = ECORCHE_QUALITY_INIT;
+};
+
 }  // namespace ecorche::c
 
 struct ecorche_client {
@@ -46,7 +52,7 @@ struct ecorche_client {
   std::optional<std::uint32_t> subscription = {};
   ecorche::wire::MeshDecoder decoder = {};
   std::vector<ecorche::wire::DecodedTissue> frame = {};
-  std::optional<ecorche::v1::PoseQuality> quality = {};
+  std::optional<ecorche::c::ToldQuality> quality = {};
 };
 
 namespace ecorche::c {

@@ -23,11 +23,23 @@ v1::Skinning to_wire(ecorche_skinning skinning) {
   return v1::SKINNING_UNSPECIFIED;
 }
 
+ToldQuality to_c(const v1::PoseQuality& told) {
+  ToldQuality out;
+  out.sequence = told.pose_sequence();
+  ecorche_quality& quality = out.figures;
+  quality.pass = told.verdict() == v1::PoseQuality::VERDICT_PASS ? 1 : 0;
+  quality.inverted_tets = told.inverted_tets();
+  quality.inverted_share = told.inverted_share();
+  quality.min_det_f = told.min_det_f();
+  quality.volume_change = told.volume_change();
+  quality.bone_rigidity = told.bone_rigidity();
+  return out;
+}
+
 // Whether the frame is of the present subscription; then it is the client's.
-bool take_frame(ecorche_client& client, wire::Frame& came) {
-  const v1::MeshFrame& frame = came.envelope.mesh_frame();
+bool take_frame(ecorche_client& client, const v1::MeshFrame& frame, const wire::Payload& payload) {
   if (client.subscription != frame.subscription()) return false;
-  if (const Status status = client.decoder.decode(frame, came.payload, client.frame); !status.ok())
+  if (const Status status = client.decoder.decode(frame, payload, client.frame); !status.ok())
     throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
   const v1::ModelOpened& opened = client.body->opened;
   for (const wire::DecodedTissue& tissue : client.frame) {
@@ -38,15 +50,15 @@ bool take_frame(ecorche_client& client, wire::Frame& came) {
                   "check that it is ecorche serve");
     }
   }
-  if (frame.has_quality()) client.quality = frame.quality();
+  if (frame.has_quality()) client.quality = to_c(frame.quality());
   return true;
 }
 
 // What came, as an event; false for what a caller need not know of.
-bool take(ecorche_client& client, wire::Frame& came, ecorche_event& event) {
+bool take(ecorche_client& client, const client::Client::Message& came, ecorche_event& event) {
   const v1::Envelope& said = came.envelope;
   if (said.has_mesh_frame()) {
-    if (!take_frame(client, came)) return false;
+    if (!take_frame(client, said.mesh_frame(), came.payload)) return false;
     event.kind = ECORCHE_EVENT_FRAME;
     event.sequence = said.mesh_frame().pose_sequence();
   } else if (said.has_pose_ack()) {
@@ -148,7 +160,7 @@ ecorche_code ecorche_client_send_pose(ecorche_client* client, ecorche_skinning s
     const v1::Skinning method = c::to_wire(skinning);
     if (method == v1::SKINNING_UNSPECIFIED)
       return c::fail(ECORCHE_INVALID_ARGUMENT, "skinning: there is no such method (see ecorche_skinning)");
-    v1::Envelope envelope;
+    v1::Envelope& envelope = client->connection->compose();
     v1::PoseUpdate& update = *envelope.mutable_pose_update();
     wire::to_proto(client->body->pose.pose(), update);
     update.set_sequence(++client->body->sequence);
@@ -197,10 +209,8 @@ ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche
     const auto until = client::Clock::now() + std::chrono::duration_cast<client::Clock::duration>(
                                                   std::chrono::duration<double>(std::min(seconds, longest)));
     ecorche_event event = ECORCHE_EVENT_INIT;
-    while (auto came = client->connection->receive(until)) {
-      const bool told = c::take(*client, *came, event);
-      client->connection->reuse(std::move(*came));
-      if (told) break;
+    while (const auto came = client->connection->receive_in_place(until)) {
+      if (c::take(*client, *came, event)) break;
     }
     return c::fill(out, event);
   });
@@ -235,15 +245,7 @@ ecorche_code ecorche_client_quality(const ecorche_client* client, ecorche_qualit
   return c::with_client(client, true, [&] {
     if (!client->quality)
       return c::fail(ECORCHE_FAILED_PRECONDITION, "quality: no frame has told it yet (poll on)");
-    const v1::PoseQuality& told = *client->quality;
-    ecorche_quality quality = ECORCHE_QUALITY_INIT;
-    quality.pass = told.verdict() == v1::PoseQuality::VERDICT_PASS ? 1 : 0;
-    quality.inverted_tets = told.inverted_tets();
-    quality.inverted_share = told.inverted_share();
-    quality.min_det_f = told.min_det_f();
-    quality.volume_change = told.volume_change();
-    quality.bone_rigidity = told.bone_rigidity();
-    if (sequence != nullptr) *sequence = told.pose_sequence();
-    return c::fill(out, quality);
+    if (sequence != nullptr) *sequence = client->quality->sequence;
+    return c::fill(out, client->quality->figures);
   });
 }

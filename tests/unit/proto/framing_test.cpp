@@ -48,6 +48,48 @@ std::shared_ptr<const Payload> sixteen_bytes() {
   return std::make_shared<const Payload>(std::move(payload));
 }
 
+// In an arena, in the frame, and from one to the other in the middle of a frame.
+TEST(Framing, EnvelopesAreTheSameWhereverTheyAreMade) {
+  const std::string ping = bytes_of(encode(a_ping(), sixteen_bytes()));
+  const std::string told = a_ping().SerializeAsString();
+  MessageArena arena;
+  FrameReader reader(kLimits);
+  const auto expect_payload = [](const Payload& payload) { EXPECT_EQ(payload, *sixteen_bytes()); };
+  for (int round = 0; round < 3; ++round) {
+    reader.make_envelopes_in(&arena);
+    ASSERT_TRUE(feed(reader, ping).ok());
+    expect_payload(reader.release_payload());
+    EXPECT_EQ(reader.envelope().SerializeAsString(), told);
+    EXPECT_FALSE(reader.complete());
+    reader.make_envelopes_in(round == 0 ? nullptr : &arena);
+    const std::size_t most = ping.size() - 5;
+    ASSERT_TRUE(feed(reader, std::string_view(ping).substr(0, most)).ok());
+    reader.make_envelopes_in(round == 0 ? &arena : nullptr);
+    ASSERT_TRUE(feed(reader, std::string_view(ping).substr(most)).ok());
+    EXPECT_EQ(reader.envelope().SerializeAsString(), told);
+    if (round == 1) {
+      const Frame frame = reader.release();
+      EXPECT_EQ(frame.envelope.SerializeAsString(), told);
+      expect_payload(frame.payload);
+    } else {
+      expect_payload(reader.release_payload());
+      EXPECT_EQ(reader.envelope().SerializeAsString(), told);
+    }
+  }
+}
+
+// What is large once makes room, and leaves nothing of itself.
+TEST(MessageArena, AnEnvelopeIsEmptyWhateverCameBefore) {
+  MessageArena arena;
+  for (const int angles : {3, 100'000, 10}) {
+    v1::Envelope& envelope = arena.make();
+    EXPECT_EQ(envelope.ByteSizeLong(), 0U);
+    for (int i = 0; i < angles; ++i) envelope.mutable_pose_update()->add_rotation(i);
+    EXPECT_EQ(envelope.pose_update().rotation_size(), angles);
+    EXPECT_EQ(envelope.pose_update().rotation(angles - 1), angles - 1);
+  }
+}
+
 // The wire's first release, byte by byte: these never change while the protocol is 1.
 TEST(Framing, GoldenBytes) {
   const std::string golden(

@@ -15,6 +15,7 @@
 
 #include <ecorche/v1/envelope.pb.h>
 #include <ecorche/values/error.hpp>
+#include <ecorche/wire/message_arena.hpp>
 
 namespace ecorche::wire {
 
@@ -70,6 +71,12 @@ class FrameReader {
   bool between_frames() const { return part_ == Part::header && filled_ == 0; }
   /// The complete frame; the reader then waits for the next.
   Frame release();
+  /// As release(), for who is content with envelope(), which is not copied then.
+  Payload release_payload();
+  /// Of the frame that is, or was, complete; until the next one's has come.
+  const v1::Envelope& envelope() const { return made_ ? *made_ : frame_.envelope; }
+  /// Envelopes are made there from now on; null: as a part of each frame. It must outlive the reader.
+  void make_envelopes_in(MessageArena* arena) { arena_ = arena; }
   /// Memory for the next payload, which need not be cleared then: at 16 MB that takes as long as reading it.
   void reuse(Payload spent) { spent_ = std::move(spent); }
 
@@ -87,6 +94,8 @@ class FrameReader {
   std::vector<std::byte> envelope_;  ///< and its padding
   Frame frame_;
   Payload spent_;
+  MessageArena* arena_ = nullptr;
+  v1::Envelope* made_ = nullptr;  ///< in an arena; else the envelope is that of `frame_`
 };
 
 /// A payload whose bytes lie in several places, in their order.
@@ -113,5 +122,7 @@ struct EncodedFrame {
 /// Throws Error{internal} when the payload is no multiple of 16 or either part does not fit 32 bits.
 EncodedFrame encode(const v1::Envelope& envelope, std::shared_ptr<const Payload> payload = nullptr);
 EncodedFrame encode(const v1::Envelope& envelope, Pieces pieces);
+/// EncodedFrame::head into `head`, whose memory is used again. Throws as encode().
+void encode_head(const v1::Envelope& envelope, std::size_t payload_bytes, std::string& head);
 
 }  // namespace ecorche::wire

@@ -58,14 +58,26 @@ class Client {
 
   /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
   /// answer is a Status that is not OK.
-  wire::Frame call(v1::Envelope request, std::shared_ptr<const wire::Payload> payload = nullptr);
+  wire::Frame call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload = nullptr);
 
   /// Sends what has no direct answer: poses.
-  void send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload = nullptr);
+  void send(const v1::Envelope& envelope, const std::shared_ptr<const wire::Payload>& payload = nullptr);
 
   /// The next message; nothing when none came whole until `until`. Throws when the server ends the
   /// connection.
   std::optional<wire::Frame> receive(Clock::time_point until);
+
+  /// A message where it was read.
+  struct Message {
+    const v1::Envelope& envelope;
+    const wire::Payload& payload;
+  };
+  /// As receive(), but it stays where it is, until the next call here: nothing is allocated once such
+  /// messages have come.
+  std::optional<Message> receive_in_place(Clock::time_point until);
+
+  /// An empty message to be filled and sent before any other call here, likewise.
+  v1::Envelope& compose() { return outgoing_.make(); }
 
   /// A frame that was read to its end: its memory serves a later payload.
   void reuse(wire::Frame spent) { reader_.reuse(std::move(spent.payload)); }
@@ -74,12 +86,16 @@ class Client {
   std::uint64_t bytes_received() const { return bytes_received_; }
 
  private:
+  bool read(Clock::time_point until, wire::MessageArena* arena);
   std::optional<wire::Frame> read_frame(Clock::time_point until);
   void attend(const v1::Envelope& envelope);
 
   Socket socket_;
   wire::FrameReader reader_;
   std::deque<wire::Frame> waiting_;
+  wire::MessageArena incoming_, outgoing_;
+  std::string head_;      ///< of what is sent
+  wire::Frame in_place_;  ///< what receive_in_place() shows, but for an envelope in `incoming_`
   v1::ServerHello hello_;
   std::uint64_t last_request_ = 0;
   std::uint64_t bytes_received_ = 0;
