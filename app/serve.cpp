@@ -14,12 +14,14 @@
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
 #include "app/command.hpp"
+#include "app/passed_sockets.hpp"
 #include "app/served_clips.hpp"
 #include "app/signals.hpp"
 #include "app/token_file.hpp"
 #include "app/viewer/viewer_files.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/platform/heap.hpp"
+#include "core/platform/service.hpp"
 #include "core/platform/terminal.hpp"
 #include "runtime/server/net/web_host.hpp"
 #include "runtime/server/server.hpp"
@@ -104,6 +106,7 @@ server::Options options_of(const ServeSettings& settings) {
     options.http = {.host = "127.0.0.1", .port = kHttpPort};
     options.http_more_ports = kMorePorts;
   }
+  take_passed_sockets(platform::passed_sockets(), options);
   if (!settings.viewer_folder.empty())
     options.viewer = server::folder_files(settings.viewer_folder);
   else if (!viewer_files().empty())
@@ -127,6 +130,11 @@ std::string check_host_name(const std::string& name) {
   };
   if (!name.empty() && std::all_of(name.begin(), name.end(), good)) return {};
   return "'" + name + "' is no host name (give it as in viewer.example, without scheme and port)";
+}
+
+void tell(const std::string& lines) {
+  if (const std::error_code error = platform::tell_service_manager(lines))
+    spdlog::warn("the service manager cannot be told: {}", error.message());
 }
 
 int run_serve(const ServeSettings& settings, const Program& program) {
@@ -153,7 +161,8 @@ int run_serve(const ServeSettings& settings, const Program& program) {
   const std::string where = written(options.listen.host, server.port());
   if (!settings.port_file.empty()) {
     std::string ports = std::to_string(server.port()) + "\n";
-    if (!settings.http.empty()) ports += std::to_string(server.http_port()) + "\n";
+    if (!settings.http.empty() || (options.http && options.http->passed))
+      ports += std::to_string(server.http_port()) + "\n";
     files::write_text(settings.port_file, ports);
   }
   nlohmann::json report{{"address", where}, {"port", server.port()}, {"models", settings.models.size()}};
@@ -168,8 +177,15 @@ int run_serve(const ServeSettings& settings, const Program& program) {
   }
   program.result(text, report);
 
-  const std::stop_callback on_stop(program.stop, [&server] { server.stop(); });
-  const OnHangup on_hangup([&server] { server.reload(); });
+  const std::stop_callback on_stop(program.stop, [&server] {
+    tell("STOPPING=1");
+    server.stop();
+  });
+  const OnHangup on_hangup([&server] {
+    tell(platform::reloading_since_now());
+    server.reload([] { tell("READY=1"); });
+  });
+  tell("READY=1\nSTATUS=listening on " + where);
   server.run();
   return 0;
 }

@@ -37,10 +37,17 @@ tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   return {address, where.port};
 }
 
-void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, std::uint16_t more_ports) {
+void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint,
+                     const std::optional<std::intptr_t>& passed, std::uint16_t more_ports) {
   const auto ports_left = static_cast<std::uint16_t>(65535 - endpoint.port());
   const std::uint16_t more = endpoint.port() == 0 ? std::uint16_t{0} : std::min(more_ports, ports_left);
   boost::system::error_code ec;
+  if (passed) {
+    acceptor.assign(endpoint.protocol(), static_cast<tcp::acceptor::native_handle_type>(*passed), ec);
+    if (!ec) return;
+    throw Error(ErrorKind::config, "LISTEN_FDS", "a passed socket cannot be used: " + ec.message(),
+                "let the server listen by itself");
+  }
   for (std::uint32_t port = endpoint.port(); port <= std::uint32_t{endpoint.port()} + more; ++port) {
     ec = try_listening(acceptor, {endpoint.address(), static_cast<std::uint16_t>(port)});
     if (ec != net::error::address_in_use) break;

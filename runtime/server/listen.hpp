@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "runtime/server/net/asio.hpp"
 #include "runtime/server/resources/options.hpp"
@@ -13,8 +14,10 @@ namespace ecorche::server {
 /// nothing keeps them out: neither TLS with a token nor `options.insecure`.
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options);
 
-/// Where the port is in use, at one of `more_ports` after it. Throws Error{temporary} where all are in use,
-/// Error{usage} where this machine or its user has no such address.
-void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, std::uint16_t more_ports = 0);
+/// By the socket `passed`, where there is one. Else, where the port is in use, at one of `more_ports` after
+/// it. Throws Error{temporary} where all are in use, Error{usage} where this machine or its user has no such
+/// address.
+void start_listening(tcp::acceptor& acceptor, const tcp::endpoint& endpoint,
+                     const std::optional<std::intptr_t>& passed = {}, std::uint16_t more_ports = 0);
 
 }  // namespace ecorche::server

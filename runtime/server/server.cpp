@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <new>
 #include <thread>
@@ -54,10 +55,11 @@ struct Server::Impl {
   Impl(Options options, std::vector<NamedModel> models, Workers& workers_, TestHooks hooks)
       : workers(workers_), wrap(hooks.transport) {
     check_options(options);
-    start_listening(acceptor, endpoint_of(options.listen, options));
+    start_listening(acceptor, endpoint_of(options.listen, options), options.listen.passed);
     port = acceptor.local_endpoint().port();
     if (options.http) {
-      start_listening(http_acceptor, endpoint_of(*options.http, options), options.http_more_ports);
+      start_listening(http_acceptor, endpoint_of(*options.http, options), options.http->passed,
+                      options.http_more_ports);
       http_port = http_acceptor.local_endpoint().port();
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
@@ -151,10 +153,10 @@ void Server::stop() {
   post_back(impl_->io, [this] { impl_->begin_shutdown(); });
 }
 
-void Server::reload() {
-  post_back(impl_->io, [this] {
+void Server::reload(std::function<void()> done) {
+  post_back(impl_->io, [this, done = std::move(done)]() mutable {
     spdlog::info("asked to read the models again");
-    impl_->registry->reload_all();
+    impl_->registry->reload_all(std::move(done));
   });
 }
 

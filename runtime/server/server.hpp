@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,7 +47,8 @@ class Server {
   /// From any thread, any number of times, also before run().
   void stop();
   /// Reads all models again, in the background, as ReloadModel does; the log tells how each went. As stop().
-  void reload();
+  /// `done` is called on the thread that serves, where that has not stopped before.
+  void reload(std::function<void()> done = {});
 
  protected:
   /// For tests: what never fails is made to fail (registry/test_hooks.hpp).

@@ -290,22 +290,30 @@ void SessionRegistry::reload(const std::string& name, std::function<void(const S
     if (reading->status.ok()) replace(reading->model);
     executor_.destroy_later(std::exchange(reading->model, nullptr));
     done(reading->status);
+    if (reloading_ || reload_again_.empty()) return;
+    reload_all([calls = std::exchange(reload_again_, {})] {
+      for (const auto& call : calls) call();
+    });
   });
 }
 
-void SessionRegistry::reload_all() {
-  reload_from(0);
+void SessionRegistry::reload_all(std::function<void()> done) {
+  if (!done) done = [] {};
+  if (reloading_)
+    reload_again_.push_back(std::move(done));
+  else
+    reload_from(0, std::move(done));
 }
 
-void SessionRegistry::reload_from(std::size_t row) {
-  if (row >= models_.size()) return;
+void SessionRegistry::reload_from(std::size_t row, std::function<void()> done) {
+  if (row >= models_.size()) return done();
   const std::string name = models_[row]->summary.name();
-  reload(name, [this, row, name](const Status& status) {
+  reload(name, [this, row, name, done = std::move(done)](const Status& status) {
     if (status.ok())
       spdlog::info("model {}: read again", name);
     else
       spdlog::warn("model {}: {}", name, status.message);
-    reload_from(row + 1);
+    reload_from(row + 1, done);
   });
 }
 

@@ -76,8 +76,9 @@ class SessionRegistry {
   void end_recordings();
   /// Reads a model again, in the background, and calls `done` on the I/O thread.
   void reload(const std::string& name, std::function<void(const Status&)> done);
-  /// All of them, one after the other; the log tells how each went.
-  void reload_all();
+  /// All of them, one after the other, then `done`; the log tells how each went. While any is being read it
+  /// waits: what is read may be older than the wish.
+  void reload_all(std::function<void()> done);
 
   Executor& executor() { return executor_; }
   Metrics& metrics() { return metrics_; }
@@ -102,7 +103,7 @@ class SessionRegistry {
  private:
   void prepare_details(std::shared_ptr<const ServedModel> model, std::uint32_t tissue = 0);
   void replace(std::shared_ptr<const ServedModel> model);
-  void reload_from(std::size_t row);
+  void reload_from(std::size_t row, std::function<void()> done);
   bool evict(const std::string& address = {});
 
   net::io_context& io_;
@@ -116,6 +117,7 @@ class SessionRegistry {
   StreamActivity activity_;
   std::map<std::string, std::function<ModelParts()>> sources_;
   bool reloading_ = false;
+  std::vector<std::function<void()>> reload_again_;  ///< for all, once that is over: what to call then
   std::map<std::string, std::function<void()>> live_;
   std::map<std::string, SavedPlace> places_;
   std::vector<std::shared_ptr<Session>> retired_;

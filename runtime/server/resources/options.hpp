@@ -43,8 +43,9 @@ struct Limits {
 };
 
 struct Endpoint {
-  std::string host = "127.0.0.1";  ///< a numeric address, or localhost
-  std::uint16_t port = 0;          ///< 0: any free one
+  std::string host = "127.0.0.1";            ///< a numeric address, or localhost
+  std::uint16_t port = 0;                    ///< 0: any free one
+  std::optional<std::intptr_t> passed = {};  ///< a socket that listens there already
 };
 
 class WebFiles;
