@@ -51,30 +51,37 @@ foreach(_component ${_components})
   list(APPEND _all ${_installed})
 endforeach()
 list(REMOVE_DUPLICATES _all)
-install(TARGETS ecorche_c ecorche_c_client ${_all} EXPORT ecorche ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(FILES clients/c/include/ecorche/ecorche.h clients/c/include/ecorche/ecorche_client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecorche)
+# Components are packages (ecorche_packages.cmake).
+install(TARGETS ecorche_c ecorche_c_client ${_all} EXPORT ecorche
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
+  INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(FILES clients/c/include/ecorche/ecorche.h clients/c/include/ecorche/ecorche_client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecorche
+  COMPONENT development)
 # From the pkgconfig folder up to where all is installed.
 string(REGEX REPLACE "[^/]+" ".." _up ${CMAKE_INSTALL_LIBDIR})
 foreach(_name ecorche ecorche_client)
   configure_file(cmake/ecorche.pc.in ${PROJECT_BINARY_DIR}/${_name}.pc @ONLY)
-  install(FILES ${PROJECT_BINARY_DIR}/${_name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  install(FILES ${PROJECT_BINARY_DIR}/${_name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 endforeach()
 foreach(_headers core/include proto/include runtime/include clients/cpp/include)
-  install(DIRECTORY ${_headers}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+  install(DIRECTORY ${_headers}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.hpp")
 endforeach()
-install(DIRECTORY ${PROJECT_BINARY_DIR}/include/ ${PROJECT_BINARY_DIR}/proto/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+install(DIRECTORY ${PROJECT_BINARY_DIR}/include/ ${PROJECT_BINARY_DIR}/proto/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
   FILES_MATCHING PATTERN "*.hpp" PATTERN "*.pb.h" PATTERN CMakeFiles EXCLUDE PATTERN python EXCLUDE)
 if(ECORCHE_TOOLS)
   foreach(_headers io/include preprocess/include)
-    install(DIRECTORY ${_headers}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+    install(DIRECTORY ${_headers}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.hpp")
   endforeach()
-  install(TARGETS ecorche DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS ecorche DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+  include(ecorche_manual)
 endif()
 
 include(CMakePackageConfigHelpers)
 set(_package ${CMAKE_INSTALL_LIBDIR}/cmake/ecorche)
-install(EXPORT ecorche NAMESPACE ecorche:: FILE ecorche-targets.cmake DESTINATION ${_package})
+install(EXPORT ecorche NAMESPACE ecorche:: FILE ecorche-targets.cmake DESTINATION ${_package} COMPONENT development)
 configure_package_config_file(cmake/ecorche-config.cmake.in ${PROJECT_BINARY_DIR}/ecorche-config.cmake INSTALL_DESTINATION ${_package})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/ecorche-config-version.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/ecorche-config.cmake ${PROJECT_BINARY_DIR}/ecorche-config-version.cmake DESTINATION ${_package})
+install(FILES ${PROJECT_BINARY_DIR}/ecorche-config.cmake ${PROJECT_BINARY_DIR}/ecorche-config-version.cmake DESTINATION ${_package}
+  COMPONENT development)
+include(ecorche_packages)
