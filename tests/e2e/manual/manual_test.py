@@ -4,6 +4,7 @@
 
 usage: manual_test.py MADE; the environment is that of the fixtures
 """
+import gzip
 import os
 import pathlib
 import pty
@@ -30,6 +31,10 @@ def options_in_help(command):
     text = subprocess.run([os.environ["ECORCHE_BIN"], command, "--help"], capture_output=True, text=True, check=True).stdout
     heads = re.findall(r"^  (-\S+)", text, re.M)
     return {name.split("{")[0] for head in heads for name in head.split(",")}
+
+
+def read(path):
+    return gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
 
 
 def run(*words, **options):
@@ -80,7 +85,7 @@ class Manual(unittest.TestCase):
 
             def texts(where):
                 # The date is that of the last commit.
-                return {str(path.relative_to(where)): re.sub(r"(?m)^(\.TH \S+ 1) \S+", r"\1", path.read_text())
+                return {str(path.relative_to(where)): re.sub(r"(?m)^(\.TH \S+ 1) \S+", r"\1", read(path))
                         for path in where.rglob("*") if path.is_file() and path.name != "made"}
             self.assertEqual(texts(MADE), texts(pathlib.Path(folder)))
             self.assertEqual(len(list(pathlib.Path(folder, "man1").iterdir())), len(COMMANDS) + 1)
@@ -88,7 +93,7 @@ class Manual(unittest.TestCase):
 
     def test_every_option_has_its_paragraph(self):
         for command in COMMANDS:
-            text = (MADE / "man1" / f"ecorche-{command}.1").read_text().replace("\\-", "-")
+            text = read(MADE / "man1" / f"ecorche-{command}.1.gz").replace("\\-", "-")
             heads = "\n".join(re.findall(r"(?m)^\.TP\n(.+)$", text))
             self.assertEqual(set(re.findall(r"\\fB(--?[a-z][^\\]*)\\fR", heads)), options_in_help(command), command)
 
@@ -100,7 +105,7 @@ class Manual(unittest.TestCase):
         self.assertEqual(lint.stdout + lint.stderr, "")
 
     def test_text_is_shown_as_it_stands(self):
-        shown = run("mandoc", "-T", "ascii", MADE / "man1" / "ecorche-serve.1").stdout
+        shown = run("mandoc", "-T", "ascii", MADE / "man1" / "ecorche-serve.1.gz").stdout
         plain = re.sub(".\b", "", shown)
         self.assertIn("ecorche-serve - serve models", plain)
         self.assertIn("show the viewer in this folder, as it is, in place of the program's own", re.sub(r"\s+", " ", plain).lower())

@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Packages as a stranger has them: built by scripts/package, installed into a Debian that has nothing else, and used there without a
+compiler; and the image of packaging/Containerfile, where buildah is installed.
+
+usage: packages_test.py SOURCE
+ECORCHE_PACKAGES names a folder of packages that are built already, ECORCHE_DEBIAN a bare Debian (of debootstrap) that is copied.
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+SOURCE = pathlib.Path(sys.argv[1])
+HERE = pathlib.Path(__file__).resolve().parent
+
+
+def run(*words, **options):
+    done = subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
+    assert done.returncode == 0, f"{words}: {done.returncode}\n{done.stdout[-6000:]}"
+    return done.stdout
+
+
+def mirror():
+    """Where this machine's apt finds Debian: the first place that its own configuration names."""
+    said = run("apt-get", "indextargets", "--format", "$(REPO_URI)", "Created-By: Packages").split()
+    assert said, "apt knows no place for packages"
+    return said[0]
+
+
+def bare_debian(folder):
+    tree = folder / "debian"
+    if "ECORCHE_DEBIAN" in os.environ:
+        run("cp", "-a", os.environ["ECORCHE_DEBIAN"], tree)
+    else:
+        run("debootstrap", "--variant=minbase", "bookworm", tree, mirror())
+    # It asks whom this machine asks, in the same way.
+    for name in ("sources.list", "sources.list.d", "apt.conf.d", "keyrings", "trusted.gpg.d", "auth.conf.d"):
+        here, there = pathlib.Path("/etc/apt", name), tree / "etc" / "apt" / name
+        if there.is_dir():
+            shutil.rmtree(there)
+        elif there.exists():
+            there.unlink()
+        if here.is_dir():
+            shutil.copytree(here, there)
+        elif here.exists():
+            shutil.copy(here, there)
+    for name in ("etc/resolv.conf", "etc/hosts"):
+        shutil.copy(pathlib.Path("/", name), tree / name)
+    # No service is started for being installed.
+    (tree / "usr" / "sbin" / "policy-rc.d").write_text("#!/bin/sh\nexit 101\n")
+    (tree / "usr" / "sbin" / "policy-rc.d").chmod(0o755)
+    return tree
+
+
+@unittest.skipUnless(os.geteuid() == 0, "it asks for root")
+class Packages(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.scratch.cleanup)
+        folder = pathlib.Path(cls.scratch.name)
+        cls.built = pathlib.Path(os.environ.get("ECORCHE_PACKAGES", folder / "packages"))
+        if "ECORCHE_PACKAGES" not in os.environ:
+            run(SOURCE / "scripts" / "package", "--out", cls.built)
+        cls.debs = {path.name.split("_")[0]: path for path in cls.built.glob("*.deb")}
+        cls.tree = bare_debian(folder)
+
+    def inside(self, *words):
+        """A command in that Debian, with processes of its own: none outlives it."""
+        return run("unshare", "--mount", "--pid", "--fork", "--kill-child", f"--mount-proc={self.tree / 'proc'}", "chroot", self.tree, *words,
+                   env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL": "C.UTF-8", "DEBIAN_FRONTEND": "noninteractive", "HOME": "/root"})
+
+    def test_1_what_is_in_them(self):
+        self.assertEqual(len(self.debs), 5, self.debs)
+        library = next(name for name in self.debs if re.fullmatch(r"libecorche\d+", name))
+        files = {name: {line.split()[-1].removeprefix(".") for line in run("dpkg-deb", "-c", path).splitlines() if not line.startswith("d") and " -> " not in line}
+                 for name, path in self.debs.items()}
+        for name in self.debs:
+            for paper in ("copyright", "changelog.gz", "changelog.Debian.gz"):
+                self.assertIn(f"/usr/share/doc/{name}/{paper}", files[name])
+        for path in ("/usr/bin/ecorche", "/usr/share/man/man1/ecorche-serve.1.gz", "/usr/lib/systemd/system/ecorche.service",
+                     "/usr/lib/systemd/system/ecorche.socket", "/usr/share/bash-completion/completions/ecorche",
+                     "/usr/share/zsh/vendor-completions/_ecorche", "/usr/share/fish/vendor_completions.d/ecorche.fish"):
+            self.assertIn(path, files["ecorche"])
+        self.assertEqual({path.split("/")[3] for path in files[library]} - {"doc", "lintian"}, {run("dpkg-architecture", "-qDEB_HOST_MULTIARCH").strip()})
+        self.assertIn("/usr/include/ecorche/ecorche.h", files["libecorche-dev"])
+        self.assertIn("/usr/lib/python3/dist-packages/ecorche/__init__.py", files["python3-ecorche"])
+        self.assertIn("/usr/share/doc/ecorche-doc/html/index.html", files["ecorche-doc"])
+        both = [path for path in set().union(*files.values()) if sum(path in of for of in files.values()) > 1]
+        self.assertEqual(both, [], "a file of two packages")
+
+    def test_2_what_they_ask_for(self):
+        def field(name, key):
+            return run("dpkg-deb", "-f", self.debs[name], key).strip()
+        library = next(name for name in self.debs if re.fullmatch(r"libecorche\d+", name))
+        self.assertRegex(field("ecorche", "Depends"), r"libc6 \(>= .*libvtk9\.1.*libyaml-cpp")
+        self.assertNotRegex(field(library, "Depends"), r"vtk|insight|cgal|gmp|suitesparse|cholmod|tet1")
+        for name in ("libecorche-dev", "python3-ecorche"):
+            self.assertIn(f"{library} (= {field('ecorche', 'Version')})", field(name, "Depends"))
+        self.assertEqual({field(name, "Architecture") for name in ("ecorche-doc", "python3-ecorche")}, {"all"})
+
+    def test_3_from_nothing_to_a_served_body(self):
+        (self.tree / "packages").mkdir()
+        for path in self.debs.values():
+            shutil.copy(path, self.tree / "packages")
+        shutil.copy(HERE / "served.sh", self.tree / "served.sh")
+        begin = time.monotonic()
+        self.inside("apt-get", "update", "-q")
+        self.inside("sh", "-c", "apt-get install -q -y --no-install-recommends /packages/*.deb")
+        installed = time.monotonic()
+        said = self.inside("sh", "/served.sh")
+        served = time.monotonic()
+        print(f"installed in {installed - begin:.0f} s, posed by a server {served - installed:.1f} s later", file=sys.stderr)
+        self.assertLess(served - installed, 60)
+        self.assertRegex(said, r"posed in process: \d+ vertices")
+        self.assertRegex(said, r"posed by the server: \(\d+, 3\)")
+        self.assertEqual(self.inside("ldconfig", "-p").count("libecorche"), 4, "two libraries, by their names at run time and at link time")
+        self.inside("sh", "-c", "dpkg --purge ecorche ecorche-doc python3-ecorche libecorche-dev libecorche[0-9]")
+        left = run("find", self.tree / "usr", self.tree / "etc", self.tree / "lib", self.tree / "var/lib", "-iname", "*ecorche*")
+        self.assertEqual(left, "", "what is purged is gone")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
