@@ -178,10 +178,11 @@ class Units(unittest.TestCase):
     @unittest.skipUnless(shutil.which("systemd-analyze"), "no systemd-analyze")
     def test_systemd_takes_them(self):
         with tempfile.TemporaryDirectory() as folder:
-            for unit in UNITS.iterdir():
+            units = sorted(UNITS.iterdir())
+            for unit in units:
                 # Verified is also that the command is there: this build's.
-                text = unit.read_text().replace("ExecStart=ecorche ", f"ExecStart={ECORCHE} ")
-                pathlib.Path(folder, unit.name).write_text(text)
+                pathlib.Path(folder, unit.name).write_text(unit.read_text().replace("ExecStart=ecorche ", f"ExecStart={ECORCHE} "))
+            for unit in units:
                 result = subprocess.run(["systemd-analyze", "verify", "--man=no", unit.name], capture_output=True, text=True, cwd=folder,
                                         env={**os.environ, "SYSTEMD_UNIT_PATH": f"{folder}:"})
                 said = "\n".join(line for line in result.stderr.splitlines() if "ecorche" in line)
