@@ -18,7 +18,7 @@ set(_name_python python3-ecorche)
 
 # For packages alone: `cmake --install` leaves docs to read where they are, and Python to pip.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/build/docs/site/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/ecorche-doc/html
-  COMPONENT pages EXCLUDE_FROM_ALL OPTIONAL PATTERN "*.map" EXCLUDE)
+  COMPONENT pages EXCLUDE_FROM_ALL OPTIONAL PATTERN sitemap.xml.gz EXCLUDE)
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/ecorche-doc COMPONENT pages EXCLUDE_FROM_ALL
   PATTERN __pycache__ EXCLUDE)
 install(DIRECTORY clients/python/src/ecorche DESTINATION lib/python3/dist-packages COMPONENT python EXCLUDE_FROM_ALL
@@ -61,7 +61,6 @@ set(CPACK_DEBIAN_PACKAGE_SOURCE ecorche)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS ON)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/clients/c)
 
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SECTION science)
@@ -75,7 +74,11 @@ planning surgery.")
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_GENERATE_SHLIBS ON)
+# Whoever is linked to them needs this version, or a later one of the same ABI; and the loader is told that they are there.
+file(WRITE ${PROJECT_BINARY_DIR}/packages/shlibs "libecorche ${_soversion} ${_name_library} (>= ${PROJECT_VERSION})
+libecorche_client ${_soversion} ${_name_library} (>= ${PROJECT_VERSION})\n")
+file(WRITE ${PROJECT_BINARY_DIR}/packages/triggers "activate-noawait ldconfig\n")
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_BINARY_DIR}/packages/shlibs ${PROJECT_BINARY_DIR}/packages/triggers)
 set(CPACK_COMPONENT_LIBRARY_DESCRIPTION "pose prepared patients in process, or by a server (libraries)
 Two libraries with a C interface: libecorche poses a prepared patient in
 process, libecorche_client shows what a server poses.")

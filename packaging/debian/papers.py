@@ -26,7 +26,7 @@ APACHE = """License: Apache-2.0
 AGPL_UNITS = ("preprocess/tet/cgal", "preprocess/tet/tetgen", "preprocess/check/cgal", "preprocess/weights/cholmod")
 
 
-def stanza(files, license_name, owner="The ecorche maintainers"):
+def stanza(files, license_name, owner="2026 The ecorche maintainers"):
     return f"\nFiles: {files}\nCopyright: {owner}\nLicense: {license_name}\n"
 
 

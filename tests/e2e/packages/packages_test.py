@@ -6,9 +6,11 @@ compiler; and the image of packaging/Containerfile, where buildah is installed.
 usage: packages_test.py SOURCE
 ECORCHE_PACKAGES names a folder of packages that are built already, ECORCHE_DEBIAN a bare Debian (of debootstrap) that is copied.
 """
+import json
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -18,6 +20,7 @@ import unittest
 
 SOURCE = pathlib.Path(sys.argv[1])
 HERE = pathlib.Path(__file__).resolve().parent
+BUILD_ECORCHE = SOURCE / "build" / "release" / "bin" / "ecorche"
 
 
 def run(*words, **options):
@@ -120,10 +123,38 @@ class Packages(unittest.TestCase):
         self.assertLess(served - installed, 60)
         self.assertRegex(said, r"posed in process: \d+ vertices")
         self.assertRegex(said, r"posed by the server: \(\d+, 3\)")
-        self.assertEqual(self.inside("ldconfig", "-p").count("libecorche"), 4, "two libraries, by their names at run time and at link time")
+        self.assertEqual(self.inside("ldconfig", "-p").count("\tlibecorche"), 4, "two libraries, by their names at run time and at link time")
         self.inside("sh", "-c", "dpkg --purge ecorche ecorche-doc python3-ecorche libecorche-dev libecorche[0-9]")
         left = run("find", self.tree / "usr", self.tree / "etc", self.tree / "lib", self.tree / "var/lib", "-iname", "*ecorche*")
         self.assertEqual(left, "", "what is purged is gone")
+
+    @unittest.skipUnless(shutil.which("buildah"), "no buildah")
+    def test_4_the_container_is_healthy(self):
+        """Its last stage, from the packages that are there, on a bare Debian that takes the place of Debian's image."""
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            buildah = ("buildah", "--storage-driver", "vfs", "--root", folder / "store", "--runroot", folder / "run")
+            base = run(*buildah, "from", "scratch").split()[-1]
+            run(*buildah, "add", "--quiet", base, self.tree, "/")
+            run(*buildah, "commit", "--quiet", base, "localhost/debian")
+            (folder / "stage" / "packages").mkdir(parents=True)
+            shutil.copy(self.debs["ecorche"], folder / "stage" / "packages")
+            run(*buildah, "bud", "--isolation", "chroot", "--network", "host", "--format", "docker", "--pull=false", "--build-arg", "BASE=localhost/debian",
+                "--build-context", f"build={folder / 'stage'}", "--tag", "localhost/ecorche", "--file", SOURCE / "packaging" / "Containerfile", SOURCE)
+            config = json.loads(run(*buildah, "inspect", "--type", "image", "localhost/ecorche"))["Docker"]["config"]
+            self.assertEqual((config["User"], config["Healthcheck"]["Test"]), ("7070:7070", ["CMD", "healthy"]))
+            run(BUILD_ECORCHE, "phantom", "-o", folder / "patient", "--size", "small")
+            (folder / "models").mkdir()
+            run(BUILD_ECORCHE, "preprocess", folder / "patient", "-o", folder / "models" / "patient.hdf", "--max-tets", "50000")
+            for path in (folder, folder / "models", folder / "models" / "patient.hdf"):
+                path.chmod(0o755)
+            container = run(*buildah, "from", "--pull=false", "localhost/ecorche").split()[-1]
+            inside = (*buildah, "run", "--isolation", "chroot", "--volume", f"{folder / 'models'}:/models:ro", container, "--")
+            # In a network of its own, and with processes that end with the first.
+            said = run("unshare", "--net", "--pid", "--mount-proc", "--fork", "--kill-child", "sh", HERE / "contained.sh", *config["Entrypoint"], "--insecure",
+                       "/models/patient.hdf", env={**os.environ, "INSIDE": shlex.join(map(str, inside))})
+            self.assertIn("uid=7070 gid=7070", said)
+            self.assertIn("sick before, healthy then", said)
 
 
 if __name__ == "__main__":

@@ -73,6 +73,34 @@ v1::Envelope open(const std::string& model) {
   return envelope;
 }
 
+// What is being read when the second wish comes may be older than it: all is read once more.
+TEST(Reload, AWishThatComesMeanwhileIsKept) {
+  TestServer server;
+  std::atomic<int> reads = 0;
+  std::atomic<bool> go_on = false;
+  server.reads([&reads, &go_on] {
+    const int which = ++reads;
+    while (which == 1 && !go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return ModelParts{another(which)};
+  });
+  std::atomic<int> first_after = 0, others_after = 0, others = 0;
+  server.reload([&] { first_after = reads.load(); });
+  while (reads == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  for (int i = 0; i < 2; ++i) {
+    server.reload([&] {
+      others_after = reads.load();
+      ++others;
+    });
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(others, 0) << "nothing was read since";
+  go_on = true;
+  for (int i = 0; i < 5000 && others < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(first_after, 1);
+  EXPECT_EQ(others, 2);
+  EXPECT_EQ(others_after, 2) << "once for both";
+}
+
 // While one model is read, however long that takes, frames of all go on, nobody is dropped, and only those
 // who have it open are told.
 TEST(Reload, OthersStreamOnAndAreNotTold) {

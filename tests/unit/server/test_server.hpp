@@ -35,6 +35,7 @@ class TestServer {
   wire::Address http() const { return {"127.0.0.1", server_->http_port()}; }
   const Model& model() const { return *model_; }
   void stop() { server_->stop(); }
+  void reload(std::function<void()> done) { server_->reload(std::move(done)); }
   /// What ReloadModel of `toy` reads from now on; the same model before.
   void reads(std::function<ModelParts()> read);
   /// Waits for run() to return.
