@@ -198,7 +198,7 @@ class Units(unittest.TestCase):
 
     def test_the_service_has_what_was_promised(self):
         text = (UNITS / "ecorche.service").read_text()
-        for line in ("Type=notify", "DynamicUser=yes", "ProtectSystem=strict", "NoNewPrivileges=yes", "ExecReload=kill -HUP $MAINPID"):
+        for line in ("Type=notify", "DynamicUser=yes", "ProtectSystem=strict", "NoNewPrivileges=yes", 'ExecReload=sh -c "kill -HUP ${MAINPID}"'):
             self.assertIn(f"\n{line}\n", text)
         self.assertRegex(text, r"\nMemoryMax=\d+%\n")
 
