@@ -93,6 +93,7 @@ std::vector<PassedSocket> passed_sockets() {
                 "let the service manager set it, or nobody");
   std::string_view names = variable("LISTEN_FDNAMES");
   std::vector<PassedSocket> out;
+  out.reserve(static_cast<std::size_t>(*sockets));
   for (int i = 0; i < *sockets; ++i) out.push_back(describe(kFirstPassed + i, next_name(names)));
   return out;
 }

@@ -124,7 +124,7 @@ class Packages(unittest.TestCase):
         self.assertRegex(said, r"posed in process: \d+ vertices")
         self.assertRegex(said, r"posed by the server: \(\d+, 3\)")
         self.assertEqual(self.inside("ldconfig", "-p").count("\tlibecorche"), 4, "two libraries, by their names at run time and at link time")
-        self.inside("sh", "-c", "dpkg --purge ecorche ecorche-doc python3-ecorche libecorche-dev libecorche[0-9]")
+        self.inside("dpkg", "--purge", *self.debs)
         left = run("find", self.tree / "usr", self.tree / "etc", self.tree / "lib", self.tree / "var/lib", "-iname", "*ecorche*")
         self.assertEqual(left, "", "what is purged is gone")
 
@@ -155,6 +155,31 @@ class Packages(unittest.TestCase):
                        "/models/patient.hdf", env={**os.environ, "INSIDE": shlex.join(map(str, inside))})
             self.assertIn("uid=7070 gid=7070", said)
             self.assertIn("sick before, healthy then", said)
+
+    @unittest.skipUnless(shutil.which("systemd-nspawn"), "no systemd-nspawn (scripts/setup --all)")
+    def test_5_a_service_of_systemd(self):
+        """By systemd itself, which starts in that Debian: with all that the unit forbids."""
+        self.inside("sh", "-c", "apt-get install -q -y --no-install-recommends systemd systemd-sysv dbus iproute2 /packages/ecorche_*.deb "
+                    "/packages/libecorche[0-9]*.deb /packages/python3-ecorche_*.deb")
+        shutil.copy(HERE / "under_systemd.sh", self.tree)
+        self.inside("sh", "-c", "cd /tmp && ecorche phantom -o body --size small && ecorche preprocess body -o body.hdf --max-tets 50000 && "
+                    "install -D -m 644 body.hdf /srv/ecorche/patient.hdf")
+        # The cgroups that the machine has, whichever they are.
+        hierarchy = "1" if pathlib.Path("/sys/fs/cgroup/cgroup.controllers").exists() else "0"
+        with subprocess.Popen(["systemd-nspawn", "--quiet", "--directory", self.tree, "--private-network", "--register=no", "--keep-unit", "--boot"],
+                              env={**os.environ, "SYSTEMD_NSPAWN_UNIFIED_HIERARCHY": hierarchy}, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                              stderr=subprocess.STDOUT) as machine:
+            try:
+                children = pathlib.Path(f"/proc/{machine.pid}/task/{machine.pid}/children")
+                until = time.monotonic() + 60
+                while not (first := children.read_text().split()):
+                    self.assertLess(time.monotonic(), until, "systemd does not start")
+                    time.sleep(0.1)
+                said = run("nsenter", "--target", first[0], "--mount", "--pid", "--net", "--uts", "--ipc", "--root", "--wd", "sh", "/under_systemd.sh",
+                           env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL": "C.UTF-8"}, timeout=300)
+            finally:
+                machine.terminate()
+        self.assertIn("all is well", said)
 
 
 if __name__ == "__main__":
