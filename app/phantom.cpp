@@ -24,6 +24,7 @@ struct PhantomSettings {
   std::uint64_t seed = 1;
   double voxel_mm = 0;
   bool bar = false;
+  bool vary = false;
   std::string scan;  // empty: a case
 };
 
@@ -48,9 +49,11 @@ void check_target(const std::filesystem::path& folder) {
 
 int run(const Program& program, const PhantomSettings& settings) {
   check_target(settings.folder);
-  const phantom::Phantom made = settings.bar ? phantom::make_bar(size_of(settings), program.context("bar"))
-                                             : phantom::make(size_of(settings), settings.seed,
-                                                             program.context("phantom"), settings.voxel_mm);
+  const phantom::Variety variety = settings.vary ? phantom::Variety::population : phantom::Variety::plain;
+  const phantom::Phantom made = settings.bar
+                                    ? phantom::make_bar(size_of(settings), program.context("bar"))
+                                    : phantom::make(size_of(settings), settings.seed,
+                                                    program.context("phantom"), settings.voxel_mm, variety);
   const Case& patient = made.patient;
   if (!settings.scan.empty()) {
     write_phantom_scan(settings.folder, settings.scan, patient, program.context("write"));
@@ -108,6 +111,10 @@ void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
       ->capture_default_str();
   command->add_option("--seed", settings->seed, "draws the body's proportions and the noise of the CT")
       ->capture_default_str();
+  CLI::Option* vary = command->add_flag("--vary", settings->vary,
+                                        "let --seed draw from a population: 1.53 to 1.90 m tall, long and "
+                                        "short limbs, lean and fat, some without a "
+                                        "kidney, a spleen, a patella, the bones of a hand or of the toes");
   CLI::Option* voxel = command
                            ->add_option("--voxel", settings->voxel_mm,
                                         "edge of the scan's voxels, mm (default: 6, 4 or 2.5, by the size)")
@@ -119,6 +126,7 @@ void declare_phantom(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::IsMember(std::vector<std::string>(std::begin(scan_forms), std::end(scan_forms))));
   command->add_flag("--bar", settings->bar, "the bar of Sujar18 figure 7 instead of a patient")
       ->excludes(voxel)
+      ->excludes(vary)
       ->excludes("--scan");
   command->callback(
       [&program, &chosen, settings] { chosen = [&program, settings] { return run(program, *settings); }; });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "phantom/body.hpp"
 
+#include <algorithm>
+
 #include <ecorche/values/error.hpp>
 
 namespace ecorche::phantom {
@@ -13,6 +15,20 @@ void append(std::vector<Part>& to, const std::vector<Part>& from) {
   for (Part part : from) {
     if (part.mirror_of >= 0) part.mirror_of += offset;
     to.push_back(std::move(part));
+  }
+}
+
+/// What is the mirror image of it stands for itself then.
+void leave_out(std::vector<Part>& parts, const std::string& name) {
+  const auto found = std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == name; });
+  if (found == parts.end()) throw Error(ErrorKind::internal, "phantom", "no part " + name, "report it");
+  const int row = static_cast<int>(found - parts.begin());
+  parts.erase(found);
+  for (Part& part : parts) {
+    if (part.mirror_of == row)
+      part.mirror_of = -1;
+    else if (part.mirror_of > row)
+      --part.mirror_of;
   }
 }
 
@@ -38,9 +54,9 @@ const Part& find_part(const std::vector<Part>& parts, std::string_view name) {
   throw Error(ErrorKind::internal, "phantom", "no part " + std::string(name), "report it");
 }
 
-Body make_body(std::uint64_t seed) {
+Body make_body(const Proportions& of) {
   Body body;
-  body.at = make_landmarks(seed);
+  body.at = make_landmarks(of);
   const std::vector<Part> bones = make_bones(body.at);
   const std::vector<Part> vessels = make_vessels(body.at);
   const std::vector<Part> organs = make_organs(body.at, bones, vessels);
@@ -52,6 +68,7 @@ Body make_body(std::uint64_t seed) {
   append(body.parts, muscles);
   append(body.parts, neighbours);
   append(body.parts, bones);
+  for (const std::string& name : of.missing) leave_out(body.parts, name);
   return body;
 }
 

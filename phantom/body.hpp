@@ -25,8 +25,24 @@ struct Landmarks {
   double fat = 0;            ///< mm over the muscles
 };
 
-/// `seed` draws limb lengths and fat; every phantom fits into 620 x 300 x 1745 mm.
-Landmarks make_landmarks(std::uint64_t seed);
+/// What makes one body differ from another.
+struct Proportions {
+  double leg = 1, arm = 1;           ///< of the longest limbs of the plain phantom
+  double fat = 5;                    ///< mm over the muscles
+  double height = 1;                 ///< all lengths, over those of the plain phantom
+  std::vector<std::string> missing;  ///< organs that were taken out, and bones that nobody has drawn
+};
+
+/// The plain phantom's: limbs up to 2.5 % shorter than the longest, 5 to 8 mm of fat, nothing missing; it
+/// fits into 620 x 300 x 1745 mm.
+Proportions plain_proportions(std::uint64_t seed);
+
+/// Those of a population: 1.53 to 1.90 m tall, limbs from 7 % shorter to 2 % longer, 4 to 14 mm of fat; of
+/// every four bodies one lacks a part, and one of every sixteen two.
+Proportions varied_proportions(std::uint64_t seed);
+
+/// `height` is not in it: it scales what is made of them (phantom.cpp).
+Landmarks make_landmarks(const Proportions& of);
 
 constexpr double kFemoralHead = 24, kHumeralHead = 22.5;  ///< radii of the true spheres, mm
 constexpr double kBallGap = 4.5;                          ///< between a head and its socket, mm
@@ -75,7 +91,7 @@ struct Body {
   Part skin;
   std::vector<Part> parts;  ///< muscles, organs, vessels, bones: the last one wins where two share a voxel
 };
-Body make_body(std::uint64_t seed);
+Body make_body(const Proportions& of);
 
 /// The virtual skeleton. `patient` leaves hips and shoulders to a sphere fit; else every centre is given.
 Skeleton make_skeleton(const Landmarks& at, bool patient);

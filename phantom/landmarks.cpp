@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "phantom/body.hpp"
-#include "phantom/random.hpp"
 
 namespace ecorche::phantom {
 
@@ -11,11 +10,10 @@ namespace {
 constexpr double kRadians = 3.14159265358979323846 / 180;
 }
 
-Landmarks make_landmarks(std::uint64_t seed) {
-  // Limbs up to 2.5 % shorter than the largest phantom, and a fat layer of 5 to 8 mm.
-  const double leg = 1 - 0.025 * uniform(seed, 0), arm = 1 - 0.025 * uniform(seed, 1);
+Landmarks make_landmarks(const Proportions& of) {
+  const double leg = of.leg, arm = of.arm;
   Landmarks at;
-  at.fat = 5 + 3 * uniform(seed, 2);
+  at.fat = of.fat;
 
   at.root = {0, 8, 905};
   at.lumbar = {0, 42, 1016};

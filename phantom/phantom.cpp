@@ -86,15 +86,37 @@ std::vector<SurfaceMesh> make_meshes(const std::vector<Part>& parts, const Resol
   return meshes;
 }
 
+void scale(Skeleton& skeleton, double by) {
+  for (Segment& segment : skeleton.segments) segment.joint.center *= by;
+}
+
+void scale(Image& image, double by) {
+  for (double& mm : image.grid.origin) mm *= by;
+  for (double& mm : image.grid.spacing) mm *= by;
+}
+
+/// Taller or smaller as a whole, so that no angle changes.
+void scale(Case& patient, double by) {
+  if (by == 1) return;  // the plain phantom keeps its bytes
+  scale(patient.skeleton, by);
+  patient.skin.V *= by;
+  for (CaseBone& bone : patient.bones) bone.surface.V *= by;
+  for (CaseTissue& tissue : patient.tissues) tissue.surface.V *= by;
+  for (CaseVolume& volume : patient.volumes) scale(volume.image, by);
+  scale(patient.labels->image, by);
+}
+
 }  // namespace
 
-Phantom make(Size size, std::uint64_t seed, const Context& context, double voxel_mm) {
+Phantom make(Size size, std::uint64_t seed, const Context& context, double voxel_mm, Variety variety) {
   const Resolution resolution = resolution_of(size);
-  const Body body = make_body(seed);
+  const Proportions of = variety == Variety::population ? varied_proportions(seed) : plain_proportions(seed);
+  const Body body = make_body(of);
   const Landmarks& at = body.at;
   const std::vector<Part>& parts = body.parts;
   Phantom phantom;
   phantom.truth = make_skeleton(at, false);
+  scale(phantom.truth, of.height);
   phantom.clips = {make_walk(phantom.truth), make_bend(phantom.truth)};
 
   Case& patient = phantom.patient;
@@ -113,10 +135,12 @@ Phantom make(Size size, std::uint64_t seed, const Context& context, double voxel
   }
   Context scan_context = context;
   scan_context.progress = [&](double done) { context.report(0.7 + 0.3 * done); };
-  const double voxel = voxel_mm > 0 ? voxel_mm : resolution.voxel;
+  // The voxels are those of the scan, whose body is scaled below.
+  const double voxel = (voxel_mm > 0 ? voxel_mm : resolution.voxel) / of.height;
   Scan scan = make_scan(body.skin, parts, bounds_of(patient.skin), voxel, seed, scan_context);
   patient.volumes = {std::move(scan.ct), std::move(scan.ct_noisy)};
   patient.labels = std::move(scan.labels);
+  scale(patient, of.height);
   context.report(1);
   return phantom;
 }

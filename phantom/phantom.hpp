@@ -25,9 +25,16 @@ struct Phantom {
   std::vector<Clip> clips;  ///< `walk` and `bend`, at 30 frames per second, at least 2 s, looping
 };
 
-/// Same arguments, same bytes. `seed` draws the noise of the CT and the small variation of body proportions;
-/// `voxel_mm` is the edge of the scan's voxels, 0: as the size has them (6, 4 or 2.5).
-Phantom make(Size size, std::uint64_t seed, const Context& context, double voxel_mm = 0);
+/// How far bodies of different seeds differ.
+enum class Variety : std::uint8_t {
+  plain,       ///< by a few centimetres
+  population,  ///< as people do: height, limbs, fat; some lack an organ or a bone
+};
+
+/// Same arguments, same bytes. `seed` draws the noise of the CT and the body, as `variety` says; `voxel_mm`
+/// is the edge of the scan's voxels, 0: as the size has them (6, 4 or 2.5).
+Phantom make(Size size, std::uint64_t seed, const Context& context, double voxel_mm = 0,
+             Variety variety = Variety::plain);
 
 /// The bar of Sujar18 figure 7: four bones in a row in a square bar, three joints.
 Phantom make_bar(Size size, const Context& context);
