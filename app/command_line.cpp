@@ -41,6 +41,8 @@ const std::vector<std::pair<std::string, std::string>> kMoreExamples{
     {"new", "ecorche new ct.nii.gz segmentations -o my_patient --report my_patient.html"},
     {"probe", "ecorche probe patient.hdf --points points.csv --pose lib:sitting"},
     {"serve", "ecorche serve patient.hdf --http 127.0.0.1:8080"},
+    {"cohort", "ecorche cohort bids results participant group --participant-label 01 02"},
+    {"report", "ecorche report group results"},
     {"stream", "ecorche stream 127.0.0.1:7070 --motion patient/motion/walk.bvh"},
 };
 

@@ -74,6 +74,8 @@ if(ECORCHE_TOOLS)
     install(DIRECTORY ${_headers}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.hpp")
   endforeach()
   install(TARGETS ecorche DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+  # `ecorche cohort` looks for it from its own place up.
+  install(DIRECTORY workflow DESTINATION ${CMAKE_INSTALL_DATADIR}/ecorche COMPONENT command USE_SOURCE_PERMISSIONS PATTERN __pycache__ EXCLUDE)
   include(ecorche_manual)
 endif()
 

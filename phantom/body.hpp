@@ -43,6 +43,10 @@ Proportions varied_proportions(std::uint64_t seed);
 
 /// `height` is not in it: it scales what is made of them (phantom.cpp).
 Landmarks make_landmarks(const Proportions& of);
+/// Of the plain phantom.
+inline Landmarks make_landmarks(std::uint64_t seed) {
+  return make_landmarks(plain_proportions(seed));
+}
 
 constexpr double kFemoralHead = 24, kHumeralHead = 22.5;  ///< radii of the true spheres, mm
 constexpr double kBallGap = 4.5;                          ///< between a head and its socket, mm
@@ -92,6 +96,10 @@ struct Body {
   std::vector<Part> parts;  ///< muscles, organs, vessels, bones: the last one wins where two share a voxel
 };
 Body make_body(const Proportions& of);
+/// Of the plain phantom.
+inline Body make_body(std::uint64_t seed) {
+  return make_body(plain_proportions(seed));
+}
 
 /// The virtual skeleton. `patient` leaves hips and shoulders to a sphere fit; else every centre is given.
 Skeleton make_skeleton(const Landmarks& at, bool patient);

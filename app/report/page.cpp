@@ -180,7 +180,7 @@ std::string page(const Input& input) {
          "content='width=device-width'>\n<title>" +
          escaped(model.name) + ": how it was prepared</title>\n<style>" + kStyle + "</style>\n<body>\n" +
          header(model) + certificate(model.certificate, preprocess::body_size(model)) + slices(model) +
-         rig(model) + histograms(model) + warned(model, input.warnings) + times(input.stages) +
+         rig(model) + input.more + histograms(model) + warned(model, input.warnings) + times(input.stages) +
          provenance(model) + "</body></html>\n";
 }
 

@@ -14,6 +14,7 @@ struct Input {
   const Model& model;
   const std::vector<preprocess::StageTime>& stages;
   const std::vector<std::string>& warnings;  ///< of reading and of the pipeline, in their order
+  std::string more = {};                     ///< a section behind the rig, as HTML
 };
 
 /// HTML 5 with style and pictures inside, no script, no link: certificate beside its bounds, slices with

@@ -68,7 +68,10 @@ std::string png_bytes(const Picture& picture) {
 }
 
 std::string data_uri(const Picture& picture) {
-  const std::string png = png_bytes(picture);
+  return data_uri(png_bytes(picture));
+}
+
+std::string data_uri(const std::string& png) {
   std::string base64(4 * ((png.size() + 2) / 3) + 1, '\0');
   const int length =
       EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),

@@ -42,6 +42,9 @@ struct Picture {
 /// The picture as the bytes of a PNG. Throws Error{internal} where libpng fails.
 std::string png_bytes(const Picture& picture);
 
+/// The bytes of a PNG as `data:image/png;base64,...`.
+std::string data_uri(const std::string& png);
+
 /// The picture as `data:image/png;base64,...`. Throws Error{internal} where libpng fails.
 std::string data_uri(const Picture& picture);
 

@@ -14,6 +14,7 @@ MORE = {
     "pose": [("the posed folder", "posed_folder.md"), ("Quality", "quality.md"), ("the pose", "pose.md"), ("Motion", "motion.md")],
     "unpose": [("what unpose reads", "posed_folder.md#what-unpose-reads"), ("the round trip", "posed_folder.md#the-round-trip")],
     "motion": [("Motion", "motion.md")], "probe": [("Points", "points.md")], "radiograph": [("Radiographs", "radiograph.md")], "export": [("what export writes", "motion.md#what-export-writes")],
+    "cohort": [("Cohorts", "cohort.md")], "report": [("Cohorts", "cohort.md#the-group")],
     "thin": [("Thinning", "volumetric.md#thinning")], "refill": [("Refilling", "volumetric.md#refilling")],
     "tears": [("Tears", "volumetric.md#tears")], "path": [("Paths and contacts", "volumetric.md#paths-and-contacts")],
     "contact": [("Paths and contacts", "volumetric.md#paths-and-contacts")],

@@ -13,7 +13,7 @@ inline const Phantom& small_phantom() {
 }
 
 inline const Body& body() {
-  static const Body made = make_body(plain_proportions(1));
+  static const Body made = make_body(1);
   return made;
 }
 

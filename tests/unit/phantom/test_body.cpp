@@ -90,7 +90,7 @@ TEST(Body, LimbsTouchNeitherTrunkNorEachOther) {
 
 TEST(Body, AnySeedGivesABody) {
   for (std::uint64_t seed = 10; seed < 16; ++seed) {
-    const Body other = make_body(plain_proportions(seed));
+    const Body other = make_body(seed);
     EXPECT_LE(other.skin.shape.box().hi.z(), 1760);
     EXPECT_EQ(other.parts.size(), body().parts.size());
     // The floor of bones: nothing outside the skin at the centres of all joints.

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+# From a participant's files to a verified model, and what is said of it in the end.
+
+# What every step's command line holds. `given` is all that a step depends on besides its input files: when it changes, the step is made
+# again. Threads, memory and attempts change no result, so they are none of it.
+STEP = (f"{plan.python} {plan.scripts}/step.py {{rule}} {{wildcards.participant}} --out {plan.out_q} --ecorche {plan.ecorche_q} "
+        "--threads {threads} --mib {resources.hold_mib} --attempt {resources.attempt} --attempts {resources.attempts} --given {params.given:q}")
+
+wildcard_constraints:
+    participant="sub-[0-9A-Za-z]+",
+    pose="[a-z0-9_]+"
+
+rule new:
+    input: lambda wc: plan.files(wc.participant)
+    output: "{participant}/steps/new.json"
+    params: given=lambda wc: plan.given["new"](wc.participant)
+    threads: plan.threads
+    resources: **plan.resources("new")
+    group: "participant"
+    shell: STEP
+
+rule check:
+    input: lambda wc: plan.files(wc.participant) if plan.is_case(wc.participant) else f"{wc.participant}/steps/new.json"
+    output: "{participant}/steps/check.json"
+    params: given=lambda wc: plan.given["check"](wc.participant)
+    threads: plan.threads
+    resources: **plan.resources("check")
+    group: "participant"
+    shell: STEP
+
+rule repair:
+    input: "{participant}/steps/check.json"
+    output: "{participant}/steps/repair.json"
+    params: given=lambda wc: plan.given["repair"](wc.participant)
+    threads: plan.threads
+    resources: **plan.resources("repair")
+    group: "participant"
+    shell: STEP
+
+rule preprocess:
+    input: "{participant}/steps/repair.json"
+    output: "{participant}/steps/preprocess.json"
+    params: given=lambda wc: plan.given["preprocess"](wc.participant)
+    threads: plan.threads
+    resources: **plan.resources("preprocess")
+    group: "participant"
+    shell: STEP
+
+rule verify:
+    input: "{participant}/steps/preprocess.json"
+    output: "{participant}/steps/verify.json"
+    params: given=lambda wc: plan.given["verify"](wc.participant)
+    threads: plan.threads
+    resources: **plan.resources("verify")
+    group: "participant"
+    shell: STEP
+
+rule subject:
+    input:
+        lambda wc: [f"{wc.participant}/steps/{name}.json" for name in plan.told(wc.participant)]
+    output: "{participant}/steps/subject.json"
+    params: given=lambda wc: plan.given["subject"](wc.participant)
+    threads: plan.threads
+    resources: **plan.resources("subject")
+    group: "participant"
+    shell: STEP

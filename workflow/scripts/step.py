@@ -1,0 +1,224 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""One step for one participant: runs `ecorche`, keeps what it printed, and writes how it ended as steps/STEP.json.
+
+A fault of the data (exit 64, 65, 66, 77, 78) is written down and ends this with 0, so that it stops nobody: the steps that follow see it
+and pass it on. A fault of the machine (killed, no memory, a full disk) ends this with its exit code, and Snakemake tries again with twice
+the memory; at the last attempt it is written down, too. The next run of the cohort takes such a record back (scripts/record.py).
+"""
+import argparse
+import ctypes
+import json
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import record  # noqa: E402
+import summary  # noqa: E402
+
+DATA_FAULTS = {64, 65, 66, 77, 78}
+STOPPED = {130, 143}  # somebody wants an end: neither tried again at once nor written down
+
+
+class Fault(Exception):
+    def __init__(self, code, said):
+        self.code, self.said = code, said
+
+
+class Step:
+    def __init__(self, options):
+        self.name, self.options, self.given = options.step, options, json.loads(options.given)
+        self.folder = pathlib.Path(options.out) / options.participant
+        self.log = self.folder / "log" / f"{self.name}.log"
+        self.before = [json.loads((self.folder / "steps" / f"{name}.json").read_text()) for name in self.given.get("after", [])]
+        self.seconds, self.peak_mib = 0.0, 0.0
+
+    def fact(self, name):
+        return next(before["facts"][name] for before in reversed(self.before) if name in before["facts"])
+
+    def run(self):
+        for folder in (self.folder / "steps", self.folder / "log"):
+            folder.mkdir(parents=True, exist_ok=True)
+        self.log.write_text("")
+        failed = next((before for before in self.before if not before["ok"]), None)
+        if failed and self.name not in TAKE_ON:
+            record.write(self.folder, self.name, {**failed, "products": [], "facts": {}})
+            return 0
+        try:
+            products, facts = STEPS[self.name.split("-")[0]](self)
+        except Fault as fault:
+            machine = fault.code not in DATA_FAULTS
+            if fault.code in STOPPED or (machine and self.options.attempt < self.options.attempts):
+                print(f"{self.options.participant} {self.name}: {fault.said['what']} (exit {fault.code}), attempt {self.options.attempt} of "
+                      f"{self.options.attempts}", file=sys.stderr)
+                return fault.code
+            self.remember()
+            record.write(self.folder, self.name, {"ok": False, "step": self.name, "fault": "machine" if machine else "data",
+                                                  "error": {**fault.said, "exit_code": fault.code}, "products": [], "facts": {}})
+            return 0
+        self.remember()
+        record.write(self.folder, self.name, {"ok": True, "step": self.name, "fault": None, "error": None,
+                                              "products": record.products(self.folder, products), "facts": facts})
+        return 0
+
+    def remember(self):
+        """Times are measured, not made: they stand apart from what is the same in every run."""
+        record.write_text(self.folder / "log" / f"{self.name}.time.json", json.dumps(
+            {"seconds": round(self.seconds, 3), "peak_mib": round(self.peak_mib, 1), "attempt": self.options.attempt}) + "\n")
+
+    def call(self, *words, threads=None):
+        """The JSON that a command prints. Throws Fault where it ends with anything but 0; `said` is then its one clear error."""
+        command = [self.options.ecorche, "--json", "--threads", str(threads or self.options.threads), *map(str, words)]
+        with open(self.log, "a") as log:
+            print("$ " + " ".join(command[:1] + command[4:]), file=log, flush=True)
+            start = time.monotonic()
+            child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, preexec_fn=self.in_child, cwd=self.folder)
+            signal.signal(signal.SIGTERM, lambda *_: child.terminate())
+            printed = child.stdout.read()
+            _, status, usage = os.wait4(child.pid, 0)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        self.seconds += time.monotonic() - start
+        self.peak_mib = max(self.peak_mib, usage.ru_maxrss / 1024)
+        code = os.waitstatus_to_exitcode(status)
+        code = 128 - code if code < 0 else code
+        try:
+            found = json.loads(printed)
+        except ValueError:
+            found = {}
+        if code != 0:
+            raise Fault(code, self.said(code, found))
+        return found
+
+    def in_child(self):
+        """Ends with this process; holds no more memory than was planned, so that a wrong plan harms this step and no other."""
+        ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+        if self.options.mib > 0:
+            most = self.options.mib << 20
+            resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+    def said(self, code, found):
+        if "error" in found:
+            return {key: found["error"].get(key, "") for key in ("kind", "where", "what", "mend")}
+        for finding in found.get("findings", []):
+            if finding["severity"] == "error":
+                return {"kind": "data", "where": finding["where"], "what": finding["what"], "mend": finding["mend"]}
+        lines = self.log.read_text(errors="replace").splitlines()
+        faults = [line for line in lines if line.startswith("fault: ")]
+        if faults:
+            return {"kind": "data", "where": "model.hdf", "what": faults[0][len("fault: "):], "mend": "remove the file and run again"}
+        if code in (134, 137, 139):
+            what = {134: "aborted", 137: "killed, mostly for want of memory", 139: "crashed"}[code]
+            return {"kind": "internal", "where": self.name, "what": what, "mend": f"see log/{self.name}.log"}
+        return {"kind": "internal", "where": self.name, "what": lines[-1] if lines else f"ended with {code}", "mend": f"see log/{self.name}.log"}
+
+    def keep(self, name, found):
+        record.write_text(self.folder / name, json.dumps(found, indent=1, sort_keys=True) + "\n")
+
+    def fresh(self, *names):
+        """What an earlier run left under these names."""
+        for name in names:
+            path = self.folder / name
+            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink(missing_ok=True)
+
+
+def new(step):
+    step.fresh("case", "scan.html")
+    step.call("new", *step.given["files"], "-o", "case", "--report", "scan.html")
+    return ["case", "scan.html"], {"case": "case"}
+
+
+def check(step):
+    """An error that check finds is a fact, not an end, where repair may come."""
+    case = step.given["files"][0] if step.given["is_case"] else step.fact("case")
+    step.fresh("check.json")
+    facts = {"case": case, "sound": True, "inputs": record.digests(step.given["inputs"], step.given["root"])}
+    try:
+        found = step.call("check", case)
+    except Fault as fault:
+        if fault.code != 65 or not step.given["repair"]:
+            step.keep("check.json", {"ok": False, "error": {**fault.said, "exit_code": fault.code}})
+            raise
+        found, facts["sound"] = {"ok": False, "error": {**fault.said, "exit_code": fault.code}}, False
+    step.keep("check.json", found)
+    return ["check.json"], facts
+
+
+def repair(step):
+    case, allowed = step.fact("case"), step.given["repair"]
+    step.fresh("mended", "repair.json")
+    if step.fact("sound") or not allowed:
+        return [], {"case": case}
+    step.keep("repair.json", step.call("repair", case, "-o", "mended"))
+    step.call("check", "mended")
+    return ["mended", "repair.json"], {"case": "mended"}
+
+
+def preprocess(step):
+    step.fresh("model.hdf", "preprocess.json", "model.refused.vtu")
+    found = step.call("preprocess", step.fact("case"), "-o", "model.hdf", *step.given["words"],
+                      "--cache", f"{step.options.out}/.cohort/cache/{step.options.participant}", "--cache-gib", step.given["cache_gib"])
+    stages = found.pop("stages")
+    found.pop("peak_rss_mib")  # measured
+    record.write_text(step.folder / "log" / "stages.json", json.dumps(stages) + "\n")
+    warnings = [line[len("warning: "):] for line in step.log.read_text(errors="replace").splitlines() if line.startswith("warning: ")]
+    step.keep("preprocess.json", {**found, "warnings": warnings})
+    return ["model.hdf", "preprocess.json"], {}
+
+
+def verify(step):
+    step.fresh("verify.json")
+    step.keep("verify.json", step.call("verify", "model.hdf"))
+    return ["verify.json"], {}
+
+
+def pose(step):
+    name = step.name.partition("-")[2]
+    target = f"posed/{name}"
+    step.fresh(target)
+    (step.folder / "posed").mkdir(exist_ok=True)
+    step.call("pose", "model.hdf", "-o", target, *step.given["words"])
+    return [target], {}
+
+
+def subject(step):
+    """The participant's own results: figures, quality of all poses, digests, and a page."""
+    keep = {name.partition("-")[2] for name in step.given["after"] if name.startswith("pose-")}
+    posed = step.folder / "posed"
+    step.fresh(*(f"posed/{path.name}" for path in (posed.iterdir() if posed.is_dir() else []) if path.name not in keep), "report.html", "picture.png")
+    found = summary.of(step.folder, step.options.participant, step.given["after"], step.before)
+    record.write_text(step.folder / "quality.tsv", summary.quality_table(found["poses"]))
+    step.keep("provenance.json", {"ecorche": step.given["program"], "options": step.given["options"],
+                                  "inputs": next((before["facts"]["inputs"] for before in step.before if "inputs" in before["facts"]), {}),
+                                  "model_sha256": record.sha256(step.folder / "model.hdf") if found["ok"] else None})
+    step.keep("status.json", found)
+    step.call("report", "participant", step.folder)
+    return ["status.json", "quality.tsv", "provenance.json", "report.html", *(["picture.png"] if found["ok"] else [])], {}
+
+
+STEPS = {"new": new, "check": check, "repair": repair, "preprocess": preprocess, "verify": verify, "pose": pose, "subject": subject}
+TAKE_ON = {"subject"}  # tells of what failed instead of passing it on
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("step")
+    parser.add_argument("participant")
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--ecorche", required=True)
+    parser.add_argument("--given", required=True, help="what the step depends on, as JSON")
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--mib", type=int, default=0, help="the most memory; 0: no limit")
+    parser.add_argument("--attempt", type=int, default=1)
+    parser.add_argument("--attempts", type=int, default=1)
+    return Step(parser.parse_args()).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
