@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche report`: the pages of a cohort, from what its steps have written.
+#include <algorithm>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>

@@ -32,8 +32,8 @@ a{color:inherit}.soft{color:var(--soft);font-size:.87rem}.bad{color:var(--bad);f
 .bar{fill:var(--bar)}.axis{stroke:var(--soft)}li{margin:.5rem 0;overflow-wrap:anywhere}
 input{font:inherit;color:inherit;background:var(--field);border:1px solid var(--soft);border-radius:4px;padding:.35rem .6rem;width:22rem;max-width:100%;margin-bottom:.6rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;width:100%}th{text-align:left;font-weight:600;color:var(--soft);vertical-align:bottom}
-td,th{padding:.2rem .8rem .2rem 0;border-bottom:1px solid var(--line);vertical-align:top}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-td.why{min-width:16rem;overflow-wrap:anywhere}th button{font:inherit;color:inherit;background:none;border:0;padding:0;cursor:pointer;text-align:inherit}
+td,th{padding:.2rem .8rem .2rem 0;border-bottom:1px solid var(--line);vertical-align:top}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}td.n{white-space:nowrap}
+td.why{min-width:9rem;overflow-wrap:anywhere}th button{white-space:normal}th button{font:inherit;color:inherit;background:none;border:0;padding:0;cursor:pointer;text-align:inherit}
 th[aria-sort=ascending] button::after{content:' \25b2'}th[aria-sort=descending] button::after{content:' \25bc'}
 @media(max-width:40rem){body{margin:1rem auto;padding:0 .8rem}table,tbody,tr,td{display:block}thead{display:none}
 td,td.n{border:0;padding:0;text-align:left;white-space:normal;overflow-wrap:anywhere}td.why{min-width:0}tr{border-bottom:1px solid var(--line);padding:.45rem 0}
@@ -74,7 +74,19 @@ const char* tone(State state) {
 
 std::string shown(double value, const Figure& figure) {
   if (!std::isfinite(value)) return "";
-  return text::number(value * figure.per, 4) + (figure.unit.empty() ? "" : " " + figure.unit);
+  const double x = value * figure.per;
+  const std::string number = std::abs(x) >= 1000 ? text("%.0f", x) : text::number(x, 4);
+  return number + (figure.unit.empty() ? "" : " " + figure.unit);
+}
+
+// Long names may be broken where their words end.
+std::string breakable(const std::string& name) {
+  std::string out;
+  for (const char c : escaped(name)) {
+    out += c;
+    if (c == '.' || c == '_') out += "<wbr>";
+  }
+  return out;
 }
 
 std::string counts(const std::vector<Participant>& cohort) {
@@ -176,13 +188,21 @@ std::string table(const std::vector<Participant>& cohort, const std::vector<Figu
       "type=search autocomplete=off> <span class=soft id=shown aria-live=polite></span>\n<div "
       "class=wide><table "
       "id=all><thead><tr><th scope=col><button>participant</button><th scope=col><button>state</button>";
+  out += "<th scope=col><button>reason</button>";
   for (const Figure& figure : figures)
-    out += "<th scope=col class=n><button>" + escaped(figure.name) + "</button>";
-  out += "<th scope=col><button>reason</button></tr></thead>\n<tbody>\n";
+    out += "<th scope=col class=n><button>" + breakable(figure.name) + "</button>";
+  out += "</tr></thead>\n<tbody>\n";
   for (std::size_t i = 0; i < cohort.size(); ++i) {
     const Participant& one = cohort[i];
     out += "<tr><td>" + link_to(one) + "<td class=" + tone(one.state) + ">" + state_name(one.state) +
            (one.repaired ? " <span class=soft>(mended)</span>" : "");
+    std::string why = one.state == State::failed ? reason(one) : "";
+    if (one.state == State::warn) {
+      for (const PosedRow& row : one.poses) {
+        if (!row.pass) why += (why.empty() ? "" : ", ") + escaped(row.pose);
+      }
+    }
+    out += "<td class=why data-of=reason>" + why;
     for (const Figure& figure : figures) {
       const double x = figure.of[i];
       const bool far = std::find(figure.outliers.begin(), figure.outliers.end(), i) != figure.outliers.end();
@@ -190,13 +210,7 @@ std::string table(const std::vector<Participant>& cohort, const std::vector<Figu
              (std::isfinite(x) ? text("%.9g", x) : "") + "'>" + (far ? "<b>" : "") +
              escaped(shown(x, figure)) + (far ? "</b>" : "");
     }
-    std::string why = one.state == State::failed ? reason(one) : "";
-    if (one.state == State::warn) {
-      for (const PosedRow& row : one.poses) {
-        if (!row.pass) why += (why.empty() ? "" : "; ") + escaped(row.pose + ": " + row.worst);
-      }
-    }
-    out += "<td class=why>" + why + "</tr>\n";
+    out += "</tr>\n";
   }
   return out + "</tbody></table></div>\n";
 }

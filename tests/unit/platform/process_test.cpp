@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +16,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/platform/child_process.hpp"
+#include "core/platform/other_program.hpp"
 
 namespace ecorche::platform {
 namespace {
@@ -88,6 +90,36 @@ TEST(ChildProcess, EndsWhenItsTimeIsOver) {
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::interrupted);
   }
+}
+
+TEST(OtherProgram, IsFoundByPathAsAShellWould) {
+  const auto shell = find_program("sh");
+  ASSERT_TRUE(shell);
+  EXPECT_EQ(shell->filename(), "sh");
+  EXPECT_FALSE(find_program("no such program"));
+  EXPECT_FALSE(find_program("bin")) << "a folder is none";
+}
+
+TEST(OtherProgram, HandsBackItsCodeOrItsSignal) {
+  const auto shell = [](const std::string& line) {
+    return run_program(*find_program("sh"), {"-c", line}, {});
+  };
+  EXPECT_EQ(shell("exit 7"), 7);
+  EXPECT_EQ(shell("exit 0"), 0);
+  EXPECT_EQ(shell("kill -9 $$"), 137);
+  EXPECT_EQ(run_program("/no/such/program", {}, {}), 127);
+}
+
+TEST(OtherProgram, IsToldOnceToStopAndSoIsWhatItStarted) {
+  std::stop_source stop;
+  stop.request_stop();
+  // Both would sleep for a minute; the shell counts what it is told.
+  const auto start = std::chrono::steady_clock::now();
+  const int code = run_program(*find_program("sh"),
+                               {"-c", "n=0; trap 'n=$((n+1))' INT; sleep 60; sleep 0.3; exit $((40 + n))"},
+                               stop.get_token());
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  EXPECT_TRUE(code == 41 || code == 130) << code;  // 130: it was told before it had set its trap
 }
 
 }  // namespace
