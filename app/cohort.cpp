@@ -82,8 +82,8 @@ std::vector<std::string> words_of(const CohortSettings& settings, int threads) {
                {"--config", "bids=" + fs::absolute(settings.bids).string(),
                 "out=" + fs::absolute(settings.out).string(),
                 "ecorche=" + fs::read_symlink(platform::own_program(), ignored).string(),
-                "from=" + fs::current_path().string(), "levels=" + text::joined(settings.levels, ","),
-                "labels=" + joined_labels(settings.labels)});
+                "from=" + fs::current_path().string(), "levels=" + text::joined(settings.levels, ",")});
+  if (!settings.labels.empty()) words.push_back("labels=" + joined_labels(settings.labels));
   if (settings.dry_run) words.emplace_back("--dry-run");
   for (const std::string& more : settings.words) {
     std::istringstream parts(more);

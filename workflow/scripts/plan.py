@@ -105,8 +105,8 @@ class Plan:
         depends = {
             "new": lambda who: {"files": self.sources(who)},
             "check": lambda who: {"files": self.sources(who), "inputs": self.files(who), "is_case": self.is_case(who), "root": self.root,
-                                  "repair": self.config["repair"], "after": scan(who)},
-            "repair": lambda who: {"repair": self.config["repair"], "after": ["check"]},
+                                  "repair": self.config["repair"] is not False, "after": scan(who)},
+            "repair": lambda who: {"repair": self.config["repair"] is not False, "words": self.repair_words(), "after": ["check"]},
             "preprocess": lambda who: {"words": self.preprocess_words(who), "cache_gib": self.config["cache_gib"], "after": ["repair"]},
             "verify": lambda who: {"after": ["preprocess"]},
             "pose": lambda pose: {"words": self.pose_words(pose), "after": ["verify"]},
@@ -131,9 +131,16 @@ class Plan:
         common = {f"--{name}": value for name, value in self.config["preprocess"].items() if f"--{name}" not in own}
         return [word for name, value in sorted(common.items()) for word in (name, str(value))] + own
 
+    def repair_words(self):
+        return self.words(self.config["repair"]) if isinstance(self.config["repair"], dict) else []
+
     def pose_words(self, pose):
+        return self.words({**self.poses[pose], **self.config["pose"]})
+
+    def words(self, options):
+        """As the command line has them."""
         words = []
-        for name, value in {**self.poses[pose], **self.config["pose"]}.items():
+        for name, value in options.items():
             values = value if isinstance(value, list) else [value]
             if isinstance(value, bool):
                 words += [f"--{name}"] if value else []
@@ -154,7 +161,7 @@ class Plan:
         return [*scan, "check", "repair", "preprocess", "verify", *(f"pose-{pose}" for pose in self.poses)]
 
     def options(self, participant):
-        return {"preprocess": self.preprocess_words(participant), "repair": self.config["repair"],
+        return {"preprocess": self.preprocess_words(participant), "repair": self.config["repair"] if self.config["repair"] is False else self.repair_words(),
                 "poses": {name: self.pose_words(name) for name in self.poses}}
 
     # What it is planned with.

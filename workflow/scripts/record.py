@@ -41,8 +41,12 @@ def files_of(path):
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
+MEASURED = ("report.html",)  # holds times: no run gives the same bytes
+
+
 def products(folder, names):
-    return [{"file": str(file.relative_to(folder)), "bytes": file.stat().st_size} for name in names for file in files_of(folder / name)]
+    return [{"file": str(file.relative_to(folder)), "bytes": None if file.name in MEASURED else file.stat().st_size}
+            for name in names for file in files_of(folder / name)]
 
 
 def holds(path):
@@ -53,7 +57,7 @@ def holds(path):
             return False
         for product in found["products"]:
             file = (path.parent.parent / product["file"]).stat()
-            if file.st_size != product["bytes"] or file.st_mtime_ns > written:
+            if product["bytes"] not in (None, file.st_size) or file.st_mtime_ns > written:
                 return False
     except (OSError, ValueError, KeyError, TypeError):
         return False

@@ -155,7 +155,7 @@ def repair(step):
     step.fresh("mended", "repair.json")
     if step.fact("sound") or not allowed:
         return [], {"case": case}
-    step.keep("repair.json", step.call("repair", case, "-o", "mended"))
+    step.keep("repair.json", step.call("repair", case, "-o", "mended", *step.given["words"]))
     step.call("check", "mended")
     return ["mended", "repair.json"], {"case": "mended"}
 

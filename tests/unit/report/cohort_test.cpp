@@ -112,7 +112,7 @@ TEST(CohortTable, EveryRowHasACellForEveryColumn) {
 TEST(CohortPage, SaysEverythingAndLetsNothingBecomeMarkup) {
   const std::vector<Participant> cohort{someone("sub-01", 1000), somebody_failed("sub-02")};
   const std::string page = group_page(cohort, figures_of(cohort));
-  EXPECT_NE(page.find("a\ttab &amp; &lt;tag&gt;"), std::string::npos);
+  EXPECT_NE(page.find("a?tab &amp; &lt;tag&gt;"), std::string::npos);
   EXPECT_NE(page.find("<td class=why data-of=reason>sitting"), std::string::npos);
   EXPECT_NE(pose_section(cohort[0]).find("&lt;worst&gt; of all"), std::string::npos);
   EXPECT_NE(page.find("href='sub-01/report.html'"), std::string::npos);
