@@ -78,7 +78,8 @@ class SlurmNode:
         self.host = socket.gethostname().split(".")[0]
         user = subprocess.run(["id", "-un"], stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
         control, node = free_ports(2)
-        mib = int(next(line for line in open("/proc/meminfo") if line.startswith("MemTotal")).split()[1]) // 1024 * 3 // 4
+        memory = pathlib.Path("/proc/meminfo").read_text().splitlines()[0]
+        mib = int(memory.split()[1]) // 1024 * 3 // 4
         self.conf.write_text(f"""ClusterName=ecorche
 SlurmctldHost={self.host}(127.0.0.1)
 CommunicationParameters=NoInAddrAny,NoCtldInAddrAny
@@ -109,9 +110,9 @@ PartitionName=main Nodes={self.host} Default=YES MaxTime=INFINITE State=UP
 """)
 
     def start(self, name, *words):
-        log = open(self.folder / f"{name}.out", "w")
-        self.processes.append(subprocess.Popen([find(name), *map(str, words)], stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=self.env,
-                                               start_new_session=True))
+        with open(self.folder / f"{name}.out", "w") as log:
+            self.processes.append(subprocess.Popen([find(name), *map(str, words)], stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=self.env,
+                                                   start_new_session=True))
 
     def wait(self, ready, what, seconds=30):
         end = time.monotonic() + seconds
