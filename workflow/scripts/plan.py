@@ -166,13 +166,16 @@ class Plan:
 
     # What it is planned with.
 
+    def size_of(self, participant):
+        return law.size_of(tuple(self.preprocess_words(participant)), tuple(self.files(participant)))
+
     def resources(self, step):
-        tets = (lambda wc: law.tets(self.preprocess_words(wc.participant), self.files(wc.participant))) if step != "group" else (lambda wc: 0)
+        size = (lambda wc: self.size_of(wc.participant)) if step != "group" else (lambda wc: (0, 0))
         hold = self.config["hold_memory"]
         beside = self.law["job"]["mib"] if self.config.get("cluster") else 0  # a Snakemake of its own
-        return {"mem_mb": lambda wc, attempt: law.mib(self.law, step, tets(wc), attempt, beside),
-                "hold_mib": lambda wc, attempt: law.mib(self.law, step, tets(wc), attempt) if hold else 0,
-                "runtime": lambda wc, attempt: law.minutes(self.law, step, tets(wc), attempt),
+        return {"mem_mb": lambda wc, attempt: law.mib(self.law, step, size(wc), attempt, beside),
+                "hold_mib": lambda wc, attempt: law.mib(self.law, step, size(wc), attempt) if hold else 0,
+                "runtime": lambda wc, attempt: law.minutes(self.law, step, size(wc), attempt),
                 "attempt": lambda wc, attempt: attempt, "attempts": ATTEMPTS, "at_once": 1}
 
     # What is to be made.

@@ -218,7 +218,7 @@ exec {ECORCHE} "$@"
 """)
         program.chmod(0o755)
         config = self.folder / "cohort.yaml"
-        config.write_text(CONFIG + "law: {preprocess: {mib: 1000, mib_per_mtet: 0}}\n")
+        config.write_text(CONFIG + "law: {preprocess: {mib: 1000, mib_per_mtet: 0, mib_per_mvoxel: 0}}\n")
         words = ("--config", config, "--snakemake", f"--config bids={bids} out={out} ecorche={program} from={self.base}")
         said = self.call(bids, out, *words)
         self.assertEqual(asked.read_text().split(), ["1024000", "2048000", "4096000"])
@@ -304,6 +304,20 @@ exec {ECORCHE} "$@"
         self.assertIn("snakemake is not installed", line)
         self.assertIn("apt-get install", line)
         self.assertIn("at work here", self.while_locked(out, lambda: said(75, bids, out)))
+
+    def test_what_a_report_refuses(self):
+        def said(code, *words):
+            done = subprocess.run([ECORCHE, "report", *map(str, words)], capture_output=True, text=True)
+            self.assertEqual(done.returncode, code, done.stderr)
+            return done.stderr
+
+        self.assertIn("status.json: is not there (name a participant's folder of a cohort", said(66, "participant", self.folder))
+        self.assertIn("holds no participant (name a folder of results", said(66, "group", self.folder))
+        shutil.copytree(self.first / "sub-01", self.folder / "sub-01")
+        (self.folder / "sub-01/log/stages.json").write_text('[{"name": 3}]')
+        self.assertIn("is not what `ecorche preprocess --json` prints as stages (run the cohort again)", said(65, "participant", self.folder / "sub-01"))
+        (self.folder / "sub-01/status.json").write_text("{}")
+        self.assertIn("is not the status that a cohort writes (remove the participant's folder", said(65, "group", self.folder))
 
     def while_locked(self, out, do):
         (out / ".cohort").mkdir(parents=True, exist_ok=True)

@@ -18,7 +18,7 @@ import slurm_node  # noqa: E402
 from cohort_test import CONFIG, group, kept  # noqa: E402
 
 # With the 150 MiB of a job itself every participant is planned with 260 MiB: too little, twice that as well, for two million tets.
-LAW = "law: {" + ", ".join(f"{step}: {{mib: 110, mib_per_mtet: 0}}" for step in ("check", "repair", "preprocess", "verify", "pose", "subject")) + "}\n"
+LAW = "law: {" + ", ".join(f"{step}: {{mib: 110, mib_per_mtet: 0, mib_per_mvoxel: 0}}" for step in ("check", "repair", "preprocess", "verify", "pose", "subject")) + "}\n"
 
 
 class OnSlurm(unittest.TestCase):

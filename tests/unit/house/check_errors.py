@@ -27,6 +27,8 @@ SIZE = "takes an input of gigabytes"
 DISK = "takes a disk that fails between two calls"
 RIGHTS = "takes a user without rights, and CI runs as root"
 EXCEPTIONS = {
+    "app/report/cohort.cpp": {"cannot be read": DISK},
+    "core/platform/other_program.cpp": {"cannot be started: ": "takes a machine without room for one process more", "cannot be waited for: ": CALLER},
     "app/stream.cpp": {"a frame of another topology": "takes a server that breaks the protocol", "which was not sent": "takes a server that breaks the protocol"},
     "core/kinematics/retarget.cpp": {"ask for a frame of the clip": CALLER},
     "core/model_file/guard.cpp": {"was replaced while it was opened": "takes a race between two system calls",
