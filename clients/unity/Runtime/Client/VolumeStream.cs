@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.Runtime.InteropServices;
+using Ecorche.Wire;
+
+namespace Ecorche
+{
+    /// <summary>Frames of a posed volume, uncompressed: zstd is for slow lines, and the client has no decoder of it.</summary>
+    public sealed class VolumeStream
+    {
+        private const int Brick = 32;
+        private readonly int _bytesPerVoxel;
+        private readonly Volume _volume;
+        private byte[] _key = System.Array.Empty<byte>(), _voxels = System.Array.Empty<byte>();
+        private ulong _keyframe;
+        private bool _hasKey;
+
+        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate)
+        {
+            (Name, Nearest, ChangedBricks, Region, MaxRate) = (name, nearest, changedBricks, region, maxRate);
+            for (int v = 0; v < body.Volumes.Count; ++v)
+                if (body.Volumes[v].Name == name) _volume = body.Volumes[v];
+            if (_volume == null) throw new EcorcheException(Code.NotFound, name + ": the model has no such volume");
+            _bytesPerVoxel = (int)_volume.Components * FrameBytes.BytesOf(_volume.Type);
+        }
+
+        public string Name { get; }
+        public uint Subscription { get; private set; }
+        public ScalarType Type => _volume.Type;
+        /// <summary>Numbers of a voxel, side by side.</summary>
+        public int Components => (int)_volume.Components;
+        /// <summary>Voxels along i, j and k.</summary>
+        public (int i, int j, int k) Size { get; private set; }
+        /// <summary>Of voxel 0, 0, 0, LPS mm.</summary>
+        public (double x, double y, double z) Origin { get; private set; }
+        public (double x, double y, double z) Spacing { get; private set; }
+        /// <summary>Nine, row by row; its columns are the axes of i, j and k.</summary>
+        public double[] Direction { get; } = new double[9];
+        public ulong PoseSequence { get; private set; }
+        /// <summary>i fastest, little-endian; until the next frame.</summary>
+        public ReadOnlySpan<byte> Voxels => _voxels.AsSpan(0, Size.i * Size.j * Size.k * _bytesPerVoxel);
+
+        internal bool Nearest { get; }
+        internal bool ChangedBricks { get; }
+        internal double[] Region { get; }
+        internal double MaxRate { get; }
+
+        internal void Begin(uint subscription)
+        {
+            Subscription = subscription;
+            _hasKey = false;
+        }
+
+        /// <summary>Not Ok: the server says why there are no voxels; those before stay.</summary>
+        internal Code Decode(VolumeFrame told, FrameBytes from)
+        {
+            if (told.HasStatus && told.Status.Code != 0) return (Code)told.Status.Code;
+            if (told.HasContent || !told.HasGrid) throw EcorcheException.Damaged("a volume that was not asked for so");
+            var rows = Bytes(told.Voxels, from);
+            long voxels = (long)told.Grid.SizeI * told.Grid.SizeJ * told.Grid.SizeK;
+            if (told.Grid.SizeI > 65536 || told.Grid.SizeJ > 65536 || told.Grid.SizeK > 65536 || voxels * _bytesPerVoxel > int.MaxValue)
+                throw EcorcheException.Damaged("a volume of " + voxels + " voxels");
+            int size = (int)voxels * _bytesPerVoxel;
+            if (!told.HasBricks)
+            {
+                if (rows.Length != size) throw EcorcheException.Damaged("a volume of " + rows.Length + " bytes of " + size);
+                if (_voxels.Length < size) _voxels = new byte[size];
+                rows.CopyTo(_voxels);
+                SetGrid(told);
+                if (!ChangedBricks || told.Keyframe != told.Frame) return Code.Ok;
+                if (_key.Length != size) _key = new byte[size];
+                rows.CopyTo(_key);
+                (_hasKey, _keyframe) = (true, told.Frame);
+                return Code.Ok;
+            }
+            if (!_hasKey || told.Keyframe != _keyframe || _key.Length != size)
+                throw EcorcheException.Damaged("a volume is against keyframe " + told.Keyframe + ", which did not come");
+            _key.AsSpan().CopyTo(_voxels);
+            SetGrid(told);
+            PutBricks(from.Rows<uint>(told.Bricks, ScalarType.U32, 1), rows);
+            return Code.Ok;
+        }
+
+        private ReadOnlySpan<byte> Bytes(Wire.Array array, FrameBytes from)
+        {
+            int components = (int)_volume.Components;
+            switch (FrameBytes.BytesOf(_volume.Type))
+            {
+                case 1: return from.Rows<byte>(array, _volume.Type, components);
+                case 2: return MemoryMarshal.AsBytes(from.Rows<ushort>(array, _volume.Type, components));
+                case 4: return MemoryMarshal.AsBytes(from.Rows<uint>(array, _volume.Type, components));
+                default: return MemoryMarshal.AsBytes(from.Rows<ulong>(array, _volume.Type, components));
+            }
+        }
+
+        private void SetGrid(VolumeFrame told)
+        {
+            var grid = told.Grid;
+            if (grid.Direction.Count != 9) throw EcorcheException.Damaged("a grid without its direction");
+            Size = ((int)grid.SizeI, (int)grid.SizeJ, (int)grid.SizeK);
+            Origin = (grid.Origin.X, grid.Origin.Y, grid.Origin.Z);
+            Spacing = (grid.Spacing.X, grid.Spacing.Y, grid.Spacing.Z);
+            grid.Direction.Span.CopyTo(Direction);
+            PoseSequence = told.PoseSequence;
+        }
+
+        /// <summary>docs/reference/protocol.md, "Parts of a body": 32^3 voxels each, the last ones along an axis cut short.</summary>
+        private void PutBricks(ReadOnlySpan<uint> bricks, ReadOnlySpan<byte> rows)
+        {
+            long along = (Size.i + Brick - 1) / Brick, across = (Size.j + Brick - 1) / Brick, up = (Size.k + Brick - 1) / Brick;
+            foreach (uint brick in bricks)
+            {
+                if (brick >= along * across * up) throw EcorcheException.Damaged("a brick that the grid has not");
+                int i = (int)(brick % along) * Brick, j = (int)(brick / along % across) * Brick, k = (int)(brick / (along * across)) * Brick;
+                int wide = Math.Min(Brick, Size.i - i) * _bytesPerVoxel;
+                for (int z = k; z < Math.Min(k + Brick, Size.k); ++z)
+                {
+                    for (int y = j; y < Math.Min(j + Brick, Size.j); ++y)
+                    {
+                        if (rows.Length < wide) throw EcorcheException.Damaged("the bricks end too early");
+                        rows.Slice(0, wide).CopyTo(_voxels.AsSpan(((z * Size.j + y) * Size.i + i) * _bytesPerVoxel));
+                        rows = rows.Slice(wide);
+                    }
+                }
+            }
+            if (rows.Length != 0) throw EcorcheException.Damaged("the bricks go on behind their last one");
+        }
+    }
+}

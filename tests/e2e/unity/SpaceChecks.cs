@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using Ecorche;
+
+/// <summary>Points, rotations, winding and sides of a body whose left and right differ, in every space.</summary>
+internal static class SpaceChecks
+{
+    public static void Run(string[] words)
+    {
+        var random = new Random(5);
+        for (var space = Space.LpsMm; space <= Space.RasMm; ++space)
+        {
+            var axes = Axes.Of(space);
+            for (int i = 0; i < 100; ++i)
+            {
+                var p = (random.NextDouble() - 0.5, random.NextDouble() - 0.5, random.NextDouble() - 0.5);
+                var back = axes.Point(p.Item1, p.Item2, p.Item3);
+                Near(axes.PointBack(back.x, back.y, back.z), p, "there and back in " + space);
+                var q = Unit(random);
+                var turned = axes.Rotation(q.x, q.y, q.z, q.w);
+                var moved = Turn(q, p);
+                Near(Turn(turned, axes.Point(p.Item1, p.Item2, p.Item3)), axes.Point(moved.x, moved.y, moved.z), "a turn in " + space);
+                var again = axes.RotationBack(turned.x, turned.y, turned.z, turned.w);
+                Near((again.x, again.y, again.z), (q.x, q.y, q.z), "a turn back from " + space);
+            }
+        }
+        Body(words[0]);
+    }
+
+    /// <summary>The posed skin encloses a positive volume in every space, and the bone of the left hand is where its character's left is.</summary>
+    private static void Body(string address)
+    {
+        using (var client = Client.Connect(address))
+        {
+            var body = client.Open();
+            int hand = body.FindSegment("hand_left"), bone = -1;
+            for (int t = 0; t < body.Tissues.Count; ++t)
+                if (body.Tissues[t].Segment == hand) bone = t;
+            ulong sent = client.SendPose(client.NewPose().SetAngle("shoulder_left", "abduction", 1.4));
+            double whole = 0;
+            for (var space = Space.LpsMm; space <= Space.RasMm; ++space)
+            {
+                var stream = client.Subscribe(new StreamOptions { Space = space, Tissues = new[] { "skin", body.Tissues[bone].Name } });
+                var frame = Check.Wait(client, stream, sent);
+                double volume = Volume(frame.Tissues[0], frame.Level.Parts[0].Triangles) / Math.Pow(Axes.Of(space).Scale, 3);
+                if (space == Space.LpsMm) whole = volume;
+                Check.True(volume > 1e6 && Math.Abs(volume / whole - 1) < 1e-3, "the skin's volume in " + space + " is " + volume);
+                Outward(frame.Tissues[0], frame.Level.Parts[0].Triangles, space);
+                var (x, y, z) = Middle(frame.Tissues[1]);
+                double left = new[] { x, -x, -y, x, y, -x }[(int)space] / Axes.Of(space).Scale;
+                double up = new[] { z, y, z, y, z, z }[(int)space] / Axes.Of(space).Scale;
+                Check.True(left > 300 && up > 300, "the left hand in " + space + " is at " + left + ", " + up);
+                client.Unsubscribe(stream);
+            }
+        }
+        Console.WriteLine("six spaces");
+    }
+
+    private static (double x, double y, double z) Middle(TissueVertices tissue)
+    {
+        double x = 0, y = 0, z = 0;
+        for (int v = 0; v < tissue.Count; ++v)
+        {
+            x += tissue.Floats[4 * v] / tissue.Count;
+            y += tissue.Floats[4 * v + 1] / tissue.Count;
+            z += tissue.Floats[4 * v + 2] / tissue.Count;
+        }
+        return (x, y, z);
+    }
+
+    private static double Volume(TissueVertices tissue, int[] triangles)
+    {
+        var f = tissue.Floats;
+        double sum = 0;
+        for (int i = 0; i < triangles.Length; i += 3)
+        {
+            int a = 4 * triangles[i], b = 4 * triangles[i + 1], c = 4 * triangles[i + 2];
+            sum += f[a] * ((double)f[b + 1] * f[c + 2] - (double)f[b + 2] * f[c + 1]) - f[a + 1] * ((double)f[b] * f[c + 2] - (double)f[b + 2] * f[c])
+                + f[a + 2] * ((double)f[b] * f[c + 1] - (double)f[b + 1] * f[c]);
+        }
+        return sum / 6;
+    }
+
+    /// <summary>Normals point the way of their triangles.</summary>
+    private static void Outward(TissueVertices tissue, int[] triangles, Space space)
+    {
+        var f = tissue.Floats;
+        int agree = 0;
+        for (int i = 0; i < triangles.Length; i += 3)
+        {
+            int a = 4 * triangles[i], b = 4 * triangles[i + 1], c = 4 * triangles[i + 2];
+            double ux = f[b] - f[a], uy = f[b + 1] - f[a + 1], uz = f[b + 2] - f[a + 2], vx = f[c] - f[a], vy = f[c + 1] - f[a + 1], vz = f[c + 2] - f[a + 2];
+            int bits = BitConverter.ToInt32(tissue.Bytes, 4 * (a + 3));
+            double along = (uy * vz - uz * vy) * (sbyte)bits + (uz * vx - ux * vz) * (sbyte)(bits >> 8) + (ux * vy - uy * vx) * (sbyte)(bits >> 16);
+            if (along > 0) ++agree;
+        }
+        Check.True(agree > 0.95 * triangles.Length / 3, "normals in " + space + ": " + agree + " of " + triangles.Length / 3 + " triangles");
+    }
+
+    public static (double x, double y, double z) Turn((double x, double y, double z, double w) q, (double x, double y, double z) p)
+    {
+        double tx = 2 * (q.y * p.z - q.z * p.y), ty = 2 * (q.z * p.x - q.x * p.z), tz = 2 * (q.x * p.y - q.y * p.x);
+        return (p.x + q.w * tx + q.y * tz - q.z * ty, p.y + q.w * ty + q.z * tx - q.x * tz, p.z + q.w * tz + q.x * ty - q.y * tx);
+    }
+
+    private static (double x, double y, double z, double w) Unit(Random random)
+    {
+        double x = random.NextDouble() - 0.5, y = random.NextDouble() - 0.5, z = random.NextDouble() - 0.5, w = random.NextDouble();
+        double length = Math.Sqrt(x * x + y * y + z * z + w * w);
+        return (x / length, y / length, z / length, w / length);
+    }
+
+    private static void Near((double x, double y, double z) a, (double x, double y, double z) b, string what)
+    {
+        Check.True(Math.Abs(a.x - b.x) + Math.Abs(a.y - b.y) + Math.Abs(a.z - b.z) < 1e-9, what);
+    }
+}
