@@ -82,12 +82,14 @@ internal static partial class Check
         return MemoryMarshal.AsBytes<float>(three).ToArray();
     }
 
-    /// <summary>replay FILE PACKED: frames as they came over a wire, one after another (ModelOpened, Subscribed, then MeshFrames); prints what they hold.</summary>
+    /// <summary>replay FILE LAYOUT TISSUES LEVEL REGION OUT: frames as they came over a wire, one after another (ModelOpened, Subscribed, then
+    /// MeshFrames); prints what they hold, and writes the last frame's normals, three i8 each, into OUT/NAME.normals.</summary>
     private static void Replay(string[] words)
     {
         var options = new StreamOptions { Space = Ecorche.Space.LpsMm, Layout = words[1] == "packed" ? VertexLayout.Packed : VertexLayout.Float };
-        if (words.Length > 2) options.Tissues = words[2].Split(',');
-        if (words.Length > 3) options.Level = int.Parse(words[3]);
+        if (words[2] != "") options.Tissues = words[2].Split(',');
+        options.Level = int.Parse(words[3]);
+        if (words[4] != "") options.Region = words[4].Split(',').Select(double.Parse).ToArray();
         using (var file = File.OpenRead(words[0]))
         {
             var bytes = new FrameBytes();
@@ -103,10 +105,19 @@ internal static partial class Check
                 foreach (var tissue in frame.Tissues)
                 {
                     var shown = options.Layout == VertexLayout.Packed ? MemoryMarshal.AsBytes(tissue.Numbers) : Positions(tissue);
-                    Console.WriteLine(frame.Number + " " + frame.Level.Level + " " + body.Tissues[tissue.Tissue].Name + " " + Hash(shown));
+                    string name = body.Tissues[tissue.Tissue].Name;
+                    Console.WriteLine(frame.Number + " " + frame.Level.Level + " " + name + " " + Hash(shown));
+                    if (options.Layout == VertexLayout.Float) File.WriteAllBytes(Path.Combine(words[5], name + ".normals"), NormalsOf(tissue));
                 }
             }
         }
+    }
+
+    private static byte[] NormalsOf(TissueVertices tissue)
+    {
+        var three = new byte[3 * tissue.Count];
+        for (int v = 0; v < tissue.Count; ++v) Buffer.BlockCopy(tissue.Bytes, 16 * v + 12, three, 3 * v, 3);
+        return three;
     }
 
     private static Envelope Read(FrameBytes bytes)

@@ -12,9 +12,9 @@ internal static class ThreadChecks
         {
             Until(() => thread.State == LinkState.Open, thread);
             var pose = new Pose(thread.Body);
-            float before = Highest(Next(thread)), bent = 0;
-            thread.SetPose(pose.SetAngle("shoulder_left", "abduction", 2.5));
-            Until(() => (bent = Highest(Next(thread))) > before + 0.02f, thread);
+            float before = Leftmost(Next(thread)), bent = 0;
+            thread.SetPose(pose.SetAngle("shoulder_left", "abduction", 1.4));
+            Until(() => Math.Abs((bent = Leftmost(Next(thread))) - before) > 0.05f, thread);
             var probed = thread.Ask(client => client.Probe(new double[] { 0, 0, 1000 }, false));
             Check.True(probed.Wait(20000) && probed.Result.Points.Length == 3, "a probe between frames");
             Console.WriteLine("shown");
@@ -25,7 +25,7 @@ internal static class ThreadChecks
             Console.ReadLine();
             Until(() => thread.State == LinkState.Open, thread);
             thread.SetPose(pose.SetAngle("shoulder_left", "abduction", 0.2));
-            Until(() => Highest(Next(thread)) < bent - 0.02f, thread);
+            Until(() => Math.Abs(Leftmost(Next(thread)) - bent) > 0.05f, thread);
             Console.WriteLine("back " + thread.Generation);
             Console.ReadLine();
             Until(() => thread.Generation == 2 && thread.State == LinkState.Open, thread);
@@ -41,11 +41,11 @@ internal static class ThreadChecks
         return frame;
     }
 
-    private static float Highest(BodyFrame frame)
+    private static float Leftmost(BodyFrame frame)
     {
-        float most = float.NegativeInfinity;
-        for (int v = 0; v < frame.Tissues[0].Count; ++v) most = Math.Max(most, frame.Tissues[0].Floats[4 * v + 1]);
-        return most;
+        float least = float.PositiveInfinity;
+        for (int v = 0; v < frame.Tissues[0].Count; ++v) least = Math.Min(least, frame.Tissues[0].Floats[4 * v]);
+        return least;
     }
 
     private static void Until(Func<bool> holds, ClientThread thread)

@@ -116,8 +116,9 @@ namespace Ecorche
             {
                 why = error;
             }
-            catch (Exception error) when (error is IOException || error is ObjectDisposedException || error is SocketException)
+            catch (Exception error)
             {
+                // Which exceptions a socket or TLS throws where it was closed under its reader depends on the runtime.
                 why = new EcorcheException(Code.Unavailable, "the connection was lost: " + error.Message, error);
             }
             lock (_lock)

@@ -115,9 +115,9 @@ namespace Ecorche
         private static (double x, double y, double z) Normal(sbyte first, sbyte second)
         {
             double u = first / 127.0, v = second / 127.0, z = 1 - Math.Abs(u) - Math.Abs(v);
-            if (z < 0) (u, v) = ((1 - Math.Abs(v)) * (u < 0 ? -1 : 1), (1 - Math.Abs(u)) * (v < 0 ? -1 : 1));
-            double length = Math.Sqrt(u * u + v * v + z * z);
-            return (u / length, v / length, z / length);
+            double x = z < 0 ? (1 - Math.Abs(v)) * (u < 0 ? -1 : 1) : u, y = z < 0 ? (1 - Math.Abs(u)) * (v < 0 ? -1 : 1) : v;
+            double length = Math.Sqrt(x * x + y * y + z * z);
+            return (x / length, y / length, z / length);
         }
 
         private static uint Bytes((double x, double y, double z) normal, Axes axes)
