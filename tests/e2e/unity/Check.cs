@@ -15,7 +15,7 @@ internal static partial class Check
 {
     private static readonly Dictionary<string, Action<string[]>> Commands = new Dictionary<string, Action<string[]>>
     {
-        ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
+        ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
         ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["native"] = NativeChecks.Run,
         ["bench"] = Bench,
     };
@@ -218,7 +218,7 @@ internal static partial class Check
             {
                 ulong sent = client.SendPose(pose.SetAngle("elbow_left", "flexion", 0.2 * i));
                 while (volume.PoseSequence < sent) True(client.Poll(20000).Kind != EventKind.None, "a volume");
-                Console.WriteLine(i + " " + volume.Size.i + " " + volume.Size.j + " " + volume.Size.k + " " + Hash(volume.Voxels));
+                Console.WriteLine(i + " " + volume.SizeI + " " + volume.SizeJ + " " + volume.SizeK + " " + Hash(volume.Voxels));
             }
         }
     }

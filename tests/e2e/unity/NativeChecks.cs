@@ -14,8 +14,8 @@ internal static class NativeChecks
             var matrix = new double[9];
             bool mirrors = NativeMethods.ecorche_space_matrix(space, matrix) == 1;
             var axes = Axes.Of(space);
-            var (x, y, z) = axes.Point(1, 2, 3);
-            double[] found = { x, y, z };
+            var point = axes.Point(1, 2, 3);
+            double[] found = { point.x, point.y, point.z };
             for (int r = 0; r < 3; ++r)
                 Check.True(Math.Abs(found[r] - matrix[3 * r] - 2 * matrix[3 * r + 1] - 3 * matrix[3 * r + 2]) < 1e-12, "libecorche has " + space + " otherwise");
             Check.True(mirrors == axes.Mirrors, space + " mirrors");

@@ -45,15 +45,15 @@ internal static class SkinChecks
             for (int v = 0; v < to.Count; ++v)
             {
                 var p = Vertex(table, rows, table.Tissues[t].First + v, method);
-                double dx = p.x + box.x - to.Floats[4 * v], dy = p.y + box.y - to.Floats[4 * v + 1], dz = p.z + box.z - to.Floats[4 * v + 2];
-                Check.True(p.x >= 0 && p.y >= 0 && p.z >= 0 && Math.Max(p.x, Math.Max(p.y, p.z)) <= 65535 * box.step, "a vertex lies outside of its box");
+                double dx = p.x + box.Low.x - to.Floats[4 * v], dy = p.y + box.Low.y - to.Floats[4 * v + 1], dz = p.z + box.Low.z - to.Floats[4 * v + 2];
+                Check.True(p.x >= 0 && p.y >= 0 && p.z >= 0 && Math.Max(p.x, Math.Max(p.y, p.z)) <= 65535 * box.Step, "a vertex lies outside of its box");
                 worst = Math.Max(worst, Math.Sqrt(dx * dx + dy * dy + dz * dz));
             }
         }
         return worst;
     }
 
-    private static (double x, double y, double z) Vertex(SkinningTable table, float[] rows, int vertex, Skinning method)
+    private static Point3 Vertex(SkinningTable table, float[] rows, int vertex, Skinning method)
     {
         uint hung = table.HungRows[vertex];
         if (hung == 0) return Point(table, rows, vertex, method);
@@ -65,30 +65,29 @@ internal static class SkinChecks
             var p = Point(table, rows, (int)table.Hung[at], method);
             (x, y, z) = (x + share * p.x, y + share * p.y, z + share * p.z);
         }
-        return (x, y, z);
+        return new Point3(x, y, z);
     }
 
-    private static (double x, double y, double z) Point(SkinningTable table, float[] rows, int point, Skinning method)
+    private static Point3 Point(SkinningTable table, float[] rows, int point, Skinning method)
     {
-        Func<int, uint, uint, uint, (double, double, double)> rest = (_, a, b, c) =>
-            ((a - 32768.0) * table.Step, (b - 32768.0) * table.Step, (c - 32768.0) * table.Step);
+        Func<uint, uint, uint, Point3> rest = (a, b, c) => new Point3((a - 32768.0) * table.Step, (b - 32768.0) * table.Step, (c - 32768.0) * table.Step);
         uint xy = table.Points[4 * point], zn = table.Points[4 * point + 1], cxy = table.Points[4 * point + 2], cz = table.Points[4 * point + 3];
-        var own = rest(0, xy & 65535, xy >> 16, zn & 65535);
-        var centre = method == Skinning.Cor ? rest(0, cxy & 65535, cxy >> 16, cz & 65535) : own;
+        var own = rest(xy & 65535, xy >> 16, zn & 65535);
+        var centre = method == Skinning.Cor ? rest(cxy & 65535, cxy >> 16, cz & 65535) : own;
         double x = 0, y = 0, z = 0, qx = 0, qy = 0, qz = 0, qw = 0;
         for (int k = 0; k < table.Influences; ++k)
         {
             uint influence = table.Weights[table.Influences * point + k];
             double w = (influence >> 16) / 65535.0;
             int at = 8 * (int)(influence & 65535);
-            var q = ((double)rows[at], (double)rows[at + 1], (double)rows[at + 2], (double)rows[at + 3]);
-            var moved = SpaceChecks.Turn(q, centre);
+            var q = new Turn(rows[at], rows[at + 1], rows[at + 2], rows[at + 3]);
+            var moved = SpaceChecks.Moved(q, centre);
             (x, y, z) = (x + w * (moved.x + rows[at + 4]), y + w * (moved.y + rows[at + 5]), z + w * (moved.z + rows[at + 6]));
-            (qx, qy, qz, qw) = (qx + w * q.Item1, qy + w * q.Item2, qz + w * q.Item3, qw + w * q.Item4);
+            (qx, qy, qz, qw) = (qx + w * q.x, qy + w * q.y, qz + w * q.z, qw + w * q.w);
         }
-        if (method == Skinning.Lbs) return (x, y, z);
+        if (method == Skinning.Lbs) return new Point3(x, y, z);
         double size = Math.Sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
-        var rest2 = SpaceChecks.Turn((qx / size, qy / size, qz / size, qw / size), (own.Item1 - centre.Item1, own.Item2 - centre.Item2, own.Item3 - centre.Item3));
-        return (x + rest2.x, y + rest2.y, z + rest2.z);
+        var rest2 = SpaceChecks.Moved(new Turn(qx / size, qy / size, qz / size, qw / size), new Point3(own.x - centre.x, own.y - centre.y, own.z - centre.z));
+        return new Point3(x + rest2.x, y + rest2.y, z + rest2.z);
     }
 }

@@ -13,18 +13,69 @@ internal static class SpaceChecks
             var axes = Axes.Of(space);
             for (int i = 0; i < 100; ++i)
             {
-                var p = (random.NextDouble() - 0.5, random.NextDouble() - 0.5, random.NextDouble() - 0.5);
-                var back = axes.Point(p.Item1, p.Item2, p.Item3);
+                var p = new Point3(random.NextDouble() - 0.5, random.NextDouble() - 0.5, random.NextDouble() - 0.5);
+                var back = axes.Point(p.x, p.y, p.z);
                 Near(axes.PointBack(back.x, back.y, back.z), p, "there and back in " + space);
                 var q = Unit(random);
-                var turned = axes.Rotation(q.x, q.y, q.z, q.w);
-                var moved = Turn(q, p);
-                Near(Turn(turned, axes.Point(p.Item1, p.Item2, p.Item3)), axes.Point(moved.x, moved.y, moved.z), "a turn in " + space);
-                var again = axes.RotationBack(turned.x, turned.y, turned.z, turned.w);
-                Near((again.x, again.y, again.z), (q.x, q.y, q.z), "a turn back from " + space);
+                var turned = axes.Rotation(q);
+                var moved = Moved(q, p);
+                Near(Moved(turned, axes.Point(p.x, p.y, p.z)), axes.Point(moved.x, moved.y, moved.z), "a turn in " + space);
+                var again = axes.RotationBack(turned);
+                Near(new Point3(again.x, again.y, again.z), new Point3(q.x, q.y, q.z), "a turn back from " + space);
             }
         }
         Body(words[0]);
+    }
+
+    /// <summary>A skeleton that stands as the reference and is then turned by known turns drives the body into the pose of those.</summary>
+    public static void Drive(string[] words)
+    {
+        using (var client = Client.Connect(words[0]))
+        {
+            var body = client.Open();
+            var random = new Random(9);
+            foreach (Reference reference in Enum.GetValues(typeof(Reference)))
+            {
+                Pose wanted = new Pose(body), before = PoseDriver.Of(body, reference), found = new Pose(body);
+                var driver = new PoseDriver(body, reference);
+                Turn[] then = new Turn[body.Segments.Count], now = new Turn[then.Length];
+                for (int s = 0; s < then.Length; ++s)
+                {
+                    bool has = s % 4 != 3;  // the other skeleton lacks some
+                    wanted.SetRotation(s, has ? Unit(random) : before.GetRotation(s));
+                    int parent = body.Segments[s].Parent;
+                    then[s] = parent < 0 ? InBody(body, s, before) : then[parent] * InBody(body, s, before);
+                    now[s] = parent < 0 ? InBody(body, s, wanted) : now[parent] * InBody(body, s, wanted);
+                    if (has) driver.Set(s, now[s] * then[s].Inverse);
+                }
+                driver.Apply(found);
+                for (int s = 0; s < then.Length; ++s)
+                {
+                    var off = found.GetRotation(s).Inverse * wanted.GetRotation(s);
+                    Check.True(Math.Abs(off.x) + Math.Abs(off.y) + Math.Abs(off.z) < 1e-9, body.Segments[s].Name + " driven from " + reference);
+                }
+            }
+            var arms = PoseDriver.Of(body, Reference.TPose);
+            var stream = client.Subscribe(new StreamOptions { Tissues = new[] { "skin" } });
+            var frame = Check.Wait(client, stream, client.SendPose(arms));
+            float left = 0, right = 0;
+            for (int v = 0; v < frame.Tissues[0].Count; ++v)
+            {
+                left = Math.Min(left, frame.Tissues[0].Floats[4 * v]);
+                right = Math.Max(right, frame.Tissues[0].Floats[4 * v]);
+            }
+            Check.True(left < -0.6f && right > 0.6f, "arms out to " + left + " and " + right);
+        }
+        Console.WriteLine("three references");
+    }
+
+    /// <summary>A q A' by matrices.</summary>
+    private static Turn InBody(Body body, int segment, Pose pose)
+    {
+        var joint = body.Segments[segment].Joint;
+        var q = pose.GetRotation(segment);
+        Ecorche.Wire.Vector3 x = joint.AxisX, y = joint.AxisY, z = joint.AxisZ;
+        return new Turn(x.X * q.x + y.X * q.y + z.X * q.z, x.Y * q.x + y.Y * q.y + z.Y * q.z, x.Z * q.x + y.Z * q.y + z.Z * q.z, q.w);
     }
 
     /// <summary>The posed skin encloses a positive volume in every space, and the bone of the left hand is where its character's left is.</summary>
@@ -97,20 +148,20 @@ internal static class SpaceChecks
         Check.True(agree > 0.95 * triangles.Length / 3, "normals in " + space + ": " + agree + " of " + triangles.Length / 3 + " triangles");
     }
 
-    public static (double x, double y, double z) Turn((double x, double y, double z, double w) q, (double x, double y, double z) p)
+    public static Point3 Moved(Turn q, Point3 p)
     {
         double tx = 2 * (q.y * p.z - q.z * p.y), ty = 2 * (q.z * p.x - q.x * p.z), tz = 2 * (q.x * p.y - q.y * p.x);
-        return (p.x + q.w * tx + q.y * tz - q.z * ty, p.y + q.w * ty + q.z * tx - q.x * tz, p.z + q.w * tz + q.x * ty - q.y * tx);
+        return new Point3(p.x + q.w * tx + q.y * tz - q.z * ty, p.y + q.w * ty + q.z * tx - q.x * tz, p.z + q.w * tz + q.x * ty - q.y * tx);
     }
 
-    private static (double x, double y, double z, double w) Unit(Random random)
+    public static Turn Unit(Random random)
     {
         double x = random.NextDouble() - 0.5, y = random.NextDouble() - 0.5, z = random.NextDouble() - 0.5, w = random.NextDouble();
         double length = Math.Sqrt(x * x + y * y + z * z + w * w);
-        return (x / length, y / length, z / length, w / length);
+        return new Turn(x / length, y / length, z / length, w / length);
     }
 
-    private static void Near((double x, double y, double z) a, (double x, double y, double z) b, string what)
+    private static void Near(Point3 a, Point3 b, string what)
     {
         Check.True(Math.Abs(a.x - b.x) + Math.Abs(a.y - b.y) + Math.Abs(a.z - b.z) < 1e-9, what);
     }

@@ -146,6 +146,9 @@ class Unity(unittest.TestCase):
     def test_spaces_and_sides(self):
         self.assertEqual(check("space", self.server.address), "six spaces\n")
 
+    def test_another_skeleton_drives_the_body(self):
+        self.assertEqual(check("drive", self.server.address), "three references\n")
+
     def test_in_process_as_served(self):
         self.assertEqual(check("native", MODEL, self.server.address), "alike\n")
 

@@ -68,7 +68,7 @@ namespace Ecorche
         /// <summary>mm between numbers, of which positions are at most half off on each axis; 0: they are exact.</summary>
         public double Step { get; internal set; }
         /// <summary>Where number 0 lies, LPS mm.</summary>
-        public (double x, double y, double z) Low { get; internal set; }
+        public Point3 Low { get; internal set; }
         /// <summary>The newest that was measured, perhaps of an older pose; default where none has been yet.</summary>
         public Quality Quality { get; internal set; }
         /// <summary>Joints that limits held back, as rows of Body.Segments.</summary>

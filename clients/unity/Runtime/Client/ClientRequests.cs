@@ -17,6 +17,13 @@ namespace Ecorche
         public ulong PoseSequence { get; internal set; }
     }
 
+    /// <summary>Motion that a server can play.</summary>
+    public struct Clip
+    {
+        public string Name;
+        public double Seconds;
+    }
+
     public sealed partial class Client
     {
         /// <summary>The models that the server has.</summary>
@@ -192,15 +199,15 @@ namespace Ecorche
             }
         }
 
-        /// <summary>Motion that the server holds, and how long it takes, seconds.</summary>
-        public List<(string name, double seconds)> Clips()
+        /// <summary>Motion that the server holds.</summary>
+        public List<Clip> Clips()
         {
             Opened();
             Begin(_out).HasListClips = true;
-            var clips = new List<(string, double)>();
+            var clips = new List<Clip>();
             var came = Call(default);
             using (new Returned(_line, came))
-                for (int i = 0; i < _in.ClipList.Clips.Count; ++i) clips.Add((_in.ClipList.Clips[i].Name, _in.ClipList.Clips[i].Seconds));
+                for (int i = 0; i < _in.ClipList.Clips.Count; ++i) clips.Add(new Clip { Name = _in.ClipList.Clips[i].Name, Seconds = _in.ClipList.Clips[i].Seconds });
             return clips;
         }
 

@@ -30,7 +30,7 @@ namespace Ecorche
             _table = Vertices.Normals(options.Space);
             var names = new Repeated<string>();
             foreach (string name in options.Tissues) names.Append(name);
-            if (!_motions && options.Region == null && options.Level == 0) _levels.Add(MeshLevel.Whole(body, names, _axes));
+            if (options.Region == null && options.Level == 0) _levels.Add(MeshLevel.Whole(body, names, _axes));
         }
 
         public IReadOnlyList<MeshLevel> Levels => _levels;
@@ -60,7 +60,7 @@ namespace Ecorche
             to.Encoding = told.Encoding;
             to.Skinning = told.Skinning;
             to.SetClamped(told.Clamped);
-            to.Low = (told.Box.LowX, told.Box.LowY, told.Box.LowZ);
+            to.Low = new Point3(told.Box.LowX, told.Box.LowY, told.Box.LowZ);
             to.Step = told.Box.Step;
             if (_motions)
             {
@@ -258,7 +258,7 @@ namespace Ecorche
             if (sum != 0) throw EcorcheException.Damaged("a position that is not finite");
             double extent = x0 <= x1 ? Math.Max(x1 - (double)x0, Math.Max(y1 - (double)y0, z1 - (double)z0)) : 0;
             to.Step = extent > 0 ? extent / 65535 : 1;
-            to.Low = x0 <= x1 ? ((double)x0, (double)y0, (double)z0) : default;
+            to.Low = x0 <= x1 ? new Point3(x0, y0, z0) : default;
         }
 
         private void ReadMotions(MeshFrame told, FrameBytes from, BodyFrame to)

@@ -30,7 +30,7 @@ namespace Ecorche
         public double[] Rotation { get; }
 
         /// <summary>Where the whole body goes from the scan: LPS mm.</summary>
-        public (double x, double y, double z) Root { get; set; }
+        public Point3 Root { get; set; }
 
         public Skinning Skinning { get; set; } = Skinning.Cor;
 
@@ -39,7 +39,7 @@ namespace Ecorche
             Root = default;
             for (int s = 0; s < _body.Segments.Count; ++s)
             {
-                SetRotation(s, 0, 0, 0, 1);
+                SetRotation(s, Turn.None);
                 var sequence = _body.Segments[s].Joint.Sequence;
                 for (int a = 0; a < 3 && a < sequence.Count; ++a) _angles[3 * s + a] = sequence[a].Rest;
             }
@@ -65,42 +65,42 @@ namespace Ecorche
                 }
                 if (place < 0) break;
                 _angles[3 * s + place] = sign * radians;
-                Turn(s, found);
+                Bend(s, found);
                 return this;
             }
             throw new EcorcheException(Code.NotFound, joint + "." + angle + ": the model has no such angle (ecorche info lists them)");
         }
 
         /// <summary>The turn of a segment from the scan, in its joint's axes.</summary>
-        public Pose SetRotation(int segment, double x, double y, double z, double w)
+        public Pose SetRotation(int segment, Turn turn)
         {
-            Rotation[4 * segment] = w;
-            Rotation[4 * segment + 1] = x;
-            Rotation[4 * segment + 2] = y;
-            Rotation[4 * segment + 3] = z;
+            Rotation[4 * segment] = turn.w;
+            Rotation[4 * segment + 1] = turn.x;
+            Rotation[4 * segment + 2] = turn.y;
+            Rotation[4 * segment + 3] = turn.z;
             return this;
         }
 
-        public (double x, double y, double z, double w) GetRotation(int segment)
+        public Turn GetRotation(int segment)
         {
-            return (Rotation[4 * segment + 1], Rotation[4 * segment + 2], Rotation[4 * segment + 3], Rotation[4 * segment]);
+            return new Turn(Rotation[4 * segment + 1], Rotation[4 * segment + 2], Rotation[4 * segment + 3], Rotation[4 * segment]);
         }
 
         /// <summary>A turn in LPS, about where the joint is in the scan, as one in the joint's axes: A' q A.</summary>
-        public Pose SetTurn(int segment, double x, double y, double z, double w)
+        public Pose SetTurn(int segment, Turn turn)
         {
             var joint = _body.Segments[segment].Joint;
-            return SetRotation(segment, Dot(joint.AxisX, x, y, z), Dot(joint.AxisY, x, y, z), Dot(joint.AxisZ, x, y, z), w);
+            return SetRotation(segment, new Turn(Dot(joint.AxisX, turn), Dot(joint.AxisY, turn), Dot(joint.AxisZ, turn), turn.w));
         }
 
-        private static double Dot(Vector3 axis, double x, double y, double z) => axis.X * x + axis.Y * y + axis.Z * z;
+        private static double Dot(Vector3 axis, Turn turn) => axis.X * turn.x + axis.Y * turn.y + axis.Z * turn.z;
 
         /// <summary>What a session shows.</summary>
         internal void Take(PoseState shown)
         {
             if (shown.Rotation.Count != Rotation.Length) return;
             shown.Rotation.Span.CopyTo(Rotation);
-            Root = (shown.RootTranslation.X, shown.RootTranslation.Y, shown.RootTranslation.Z);
+            Root = new Point3(shown.RootTranslation.X, shown.RootTranslation.Y, shown.RootTranslation.Z);
         }
 
         private static int Find(Joint joint, string angle)
@@ -111,24 +111,18 @@ namespace Ecorche
         }
 
         /// <summary>docs/reference/protocol.md, "Angles": turn(rest)^-1 turn(angles).</summary>
-        private void Turn(int segment, Joint joint)
+        private void Bend(int segment, Joint joint)
         {
-            var q = (w: 1.0, x: 0.0, y: 0.0, z: 0.0);
-            for (int a = Math.Min(joint.Sequence.Count, 3); --a >= 0;) q = Multiply(q, About(joint.Sequence[a], -joint.Sequence[a].Rest));
-            for (int a = 0; a < joint.Sequence.Count && a < 3; ++a) q = Multiply(q, About(joint.Sequence[a], _angles[3 * segment + a]));
-            SetRotation(segment, q.x, q.y, q.z, q.w);
+            var turn = Turn.None;
+            for (int a = Math.Min(joint.Sequence.Count, 3); --a >= 0;) turn *= About(joint.Sequence[a], -joint.Sequence[a].Rest);
+            for (int a = 0; a < joint.Sequence.Count && a < 3; ++a) turn *= About(joint.Sequence[a], _angles[3 * segment + a]);
+            SetRotation(segment, turn);
         }
 
-        private static (double w, double x, double y, double z) About(AngleAxis axis, double radians)
+        private static Turn About(AngleAxis axis, double radians)
         {
             double half = (axis.Negative ? -radians : radians) / 2, s = Math.Sin(half);
-            return (Math.Cos(half), axis.Axis == 0 ? s : 0, axis.Axis == 1 ? s : 0, axis.Axis == 2 ? s : 0);
-        }
-
-        private static (double w, double x, double y, double z) Multiply((double w, double x, double y, double z) a, (double w, double x, double y, double z) b)
-        {
-            return (a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-                a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w);
+            return new Turn(axis.Axis == 0 ? s : 0, axis.Axis == 1 ? s : 0, axis.Axis == 2 ? s : 0, Math.Cos(half));
         }
     }
 }

@@ -5,6 +5,13 @@ using Ecorche.Wire;
 
 namespace Ecorche
 {
+    /// <summary>Where the numbers of skinned vertices stand: Low + Step * number, LPS mm.</summary>
+    public struct PosedBox
+    {
+        public Point3 Low;
+        public double Step;
+    }
+
     /// <summary>Vertices of a tissue in a <see cref="SkinningTable"/>.</summary>
     public struct SkinnedTissue
     {
@@ -152,9 +159,10 @@ namespace Ecorche
 
         /// <summary>A pose as skinning.hlsl reads it: `rows` has eight floats a segment, quaternion x, y, z, w, where it takes the middle of the box at
         /// rest from `low`, mm, and 0. Returns the box that the posed numbers stand in, so large that nothing is clamped.</summary>
-        public (double x, double y, double z, double step) Place(double[] motions, float[] rows)
+        public PosedBox Place(double[] motions, float[] rows)
         {
-            var (low, step) = Box(motions);
+            var box = Box(motions);
+            var low = box.Low;
             double middle = 32768 * _step;
             for (int s = 0; s < motions.Length / 7; ++s)
             {
@@ -165,10 +173,10 @@ namespace Ecorche
                 rows[8 * s + 5] = (float)(y - low.y);
                 rows[8 * s + 6] = (float)(z - low.z);
             }
-            return (low.x, low.y, low.z, step);
+            return box;
         }
 
-        private ((double x, double y, double z) low, double step) Box(double[] motions)
+        private PosedBox Box(double[] motions)
         {
             var (x0, y0, z0) = (double.PositiveInfinity, double.PositiveInfinity, double.PositiveInfinity);
             var (x1, y1, z1) = (double.NegativeInfinity, double.NegativeInfinity, double.NegativeInfinity);
@@ -183,10 +191,10 @@ namespace Ecorche
                     (x1, y1, z1) = (Math.Max(x1, x), Math.Max(y1, y), Math.Max(z1, z));
                 }
             }
-            if (!(x0 <= x1)) return (default, 1);
+            if (!(x0 <= x1)) return new PosedBox { Step = 1 };
             // A blend of motions may lead a little beyond what each makes of its points.
             double extent = 1.2 * Math.Max(Math.Max(1, x1 - x0), Math.Max(y1 - y0, z1 - z0));
-            return (((x0 + x1 - extent) / 2, (y0 + y1 - extent) / 2, (z0 + z1 - extent) / 2), extent / Whole);
+            return new PosedBox { Low = new Point3((x0 + x1 - extent) / 2, (y0 + y1 - extent) / 2, (z0 + z1 - extent) / 2), Step = extent / Whole };
         }
 
         private static (double x, double y, double z) Moved(double[] motions, int segment, double x, double y, double z)

@@ -53,29 +53,31 @@ namespace Ecorche
 
         public int Sign(int axis) => _sign[axis];
 
-        public (double x, double y, double z) Point(double x, double y, double z)
+        public Point3 Point(double x, double y, double z)
         {
-            return (Scale * Turned(0, x, y, z), Scale * Turned(1, x, y, z), Scale * Turned(2, x, y, z));
+            return new Point3(Scale * Turned(0, x, y, z), Scale * Turned(1, x, y, z), Scale * Turned(2, x, y, z));
         }
 
         /// <summary>Into LPS mm: what a probe takes.</summary>
-        public (double x, double y, double z) PointBack(double x, double y, double z)
+        public Point3 PointBack(double x, double y, double z)
         {
-            return (Back(0, x, y, z) / Scale, Back(1, x, y, z) / Scale, Back(2, x, y, z) / Scale);
+            return new Point3(Back(0, x, y, z) / Scale, Back(1, x, y, z) / Scale, Back(2, x, y, z) / Scale);
         }
 
         /// <summary>A rotation, as unit quaternion, of LPS into the space: seen in a mirror it turns the other way.</summary>
-        public (double x, double y, double z, double w) Rotation(double x, double y, double z, double w)
+        public Turn Rotation(Turn turn)
         {
             int sense = Mirrors ? -1 : 1;
-            return (sense * Turned(0, x, y, z), sense * Turned(1, x, y, z), sense * Turned(2, x, y, z), w);
+            double x = sense * turn.x, y = sense * turn.y, z = sense * turn.z;
+            return new Turn(Turned(0, x, y, z), Turned(1, x, y, z), Turned(2, x, y, z), turn.w);
         }
 
         /// <summary>And of the space into LPS.</summary>
-        public (double x, double y, double z, double w) RotationBack(double x, double y, double z, double w)
+        public Turn RotationBack(Turn turn)
         {
             int sense = Mirrors ? -1 : 1;
-            return (sense * Back(0, x, y, z), sense * Back(1, x, y, z), sense * Back(2, x, y, z), w);
+            double x = sense * turn.x, y = sense * turn.y, z = sense * turn.z;
+            return new Turn(Back(0, x, y, z), Back(1, x, y, z), Back(2, x, y, z), turn.w);
         }
 
         /// <summary>Three corners each, wound as the space wants them.</summary>

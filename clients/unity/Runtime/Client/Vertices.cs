@@ -112,19 +112,19 @@ namespace Ecorche
         }
 
         /// <summary>docs/reference/protocol.md, "Encodings": u and v in 127ths.</summary>
-        private static (double x, double y, double z) Normal(sbyte first, sbyte second)
+        private static Point3 Normal(sbyte first, sbyte second)
         {
             double u = first / 127.0, v = second / 127.0, z = 1 - Math.Abs(u) - Math.Abs(v);
             double x = z < 0 ? (1 - Math.Abs(v)) * (u < 0 ? -1 : 1) : u, y = z < 0 ? (1 - Math.Abs(u)) * (v < 0 ? -1 : 1) : v;
             double length = Math.Sqrt(x * x + y * y + z * z);
-            return (x / length, y / length, z / length);
+            return new Point3(x / length, y / length, z / length);
         }
 
-        private static uint Bytes((double x, double y, double z) normal, Axes axes)
+        private static uint Bytes(Point3 normal, Axes axes)
         {
-            var (x, y, z) = axes.Point(normal.x, normal.y, normal.z);
+            var turned = axes.Point(normal.x, normal.y, normal.z);
             double most = 127 / axes.Scale;
-            return Byte(most * x) | Byte(most * y) << 8 | Byte(most * z) << 16;
+            return Byte(most * turned.x) | Byte(most * turned.y) << 8 | Byte(most * turned.z) << 16;
         }
 
         private static uint Byte(double value) => (byte)(sbyte)Math.Round(value);
@@ -142,7 +142,8 @@ namespace Ecorche
             From1 = axes.From(1);
             From2 = axes.From(2);
             (Scale0, Scale1, Scale2) = (axes.Sign(0) * axes.Scale * step, axes.Sign(1) * axes.Scale * step, axes.Sign(2) * axes.Scale * step);
-            (Offset0, Offset1, Offset2) = axes.Point(low0, low1, low2);
+            var low = axes.Point(low0, low1, low2);
+            (Offset0, Offset1, Offset2) = (low.x, low.y, low.z);
         }
     }
 }

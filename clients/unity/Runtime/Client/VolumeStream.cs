@@ -30,15 +30,17 @@ namespace Ecorche
         /// <summary>Numbers of a voxel, side by side.</summary>
         public int Components => (int)_volume.Components;
         /// <summary>Voxels along i, j and k.</summary>
-        public (int i, int j, int k) Size { get; private set; }
+        public int SizeI { get; private set; }
+        public int SizeJ { get; private set; }
+        public int SizeK { get; private set; }
         /// <summary>Of voxel 0, 0, 0, LPS mm.</summary>
-        public (double x, double y, double z) Origin { get; private set; }
-        public (double x, double y, double z) Spacing { get; private set; }
+        public Point3 Origin { get; private set; }
+        public Point3 Spacing { get; private set; }
         /// <summary>Nine, row by row; its columns are the axes of i, j and k.</summary>
         public double[] Direction { get; } = new double[9];
         public ulong PoseSequence { get; private set; }
         /// <summary>i fastest, little-endian; until the next frame.</summary>
-        public ReadOnlySpan<byte> Voxels => _voxels.AsSpan(0, Size.i * Size.j * Size.k * _bytesPerVoxel);
+        public ReadOnlySpan<byte> Voxels => _voxels.AsSpan(0, SizeI * SizeJ * SizeK * _bytesPerVoxel);
 
         internal bool Nearest { get; }
         internal bool ChangedBricks { get; }
@@ -97,9 +99,9 @@ namespace Ecorche
         {
             var grid = told.Grid;
             if (grid.Direction.Count != 9) throw EcorcheException.Damaged("a grid without its direction");
-            Size = ((int)grid.SizeI, (int)grid.SizeJ, (int)grid.SizeK);
-            Origin = (grid.Origin.X, grid.Origin.Y, grid.Origin.Z);
-            Spacing = (grid.Spacing.X, grid.Spacing.Y, grid.Spacing.Z);
+            (SizeI, SizeJ, SizeK) = ((int)grid.SizeI, (int)grid.SizeJ, (int)grid.SizeK);
+            Origin = new Point3(grid.Origin.X, grid.Origin.Y, grid.Origin.Z);
+            Spacing = new Point3(grid.Spacing.X, grid.Spacing.Y, grid.Spacing.Z);
             grid.Direction.Span.CopyTo(Direction);
             PoseSequence = told.PoseSequence;
         }
@@ -107,18 +109,18 @@ namespace Ecorche
         /// <summary>docs/reference/protocol.md, "Parts of a body": 32^3 voxels each, the last ones along an axis cut short.</summary>
         private void PutBricks(ReadOnlySpan<uint> bricks, ReadOnlySpan<byte> rows)
         {
-            long along = (Size.i + Brick - 1) / Brick, across = (Size.j + Brick - 1) / Brick, up = (Size.k + Brick - 1) / Brick;
+            long along = (SizeI + Brick - 1) / Brick, across = (SizeJ + Brick - 1) / Brick, up = (SizeK + Brick - 1) / Brick;
             foreach (uint brick in bricks)
             {
                 if (brick >= along * across * up) throw EcorcheException.Damaged("a brick that the grid has not");
                 int i = (int)(brick % along) * Brick, j = (int)(brick / along % across) * Brick, k = (int)(brick / (along * across)) * Brick;
-                int wide = Math.Min(Brick, Size.i - i) * _bytesPerVoxel;
-                for (int z = k; z < Math.Min(k + Brick, Size.k); ++z)
+                int wide = Math.Min(Brick, SizeI - i) * _bytesPerVoxel;
+                for (int z = k; z < Math.Min(k + Brick, SizeK); ++z)
                 {
-                    for (int y = j; y < Math.Min(j + Brick, Size.j); ++y)
+                    for (int y = j; y < Math.Min(j + Brick, SizeJ); ++y)
                     {
                         if (rows.Length < wide) throw EcorcheException.Damaged("the bricks end too early");
-                        rows.Slice(0, wide).CopyTo(_voxels.AsSpan(((z * Size.j + y) * Size.i + i) * _bytesPerVoxel));
+                        rows.Slice(0, wide).CopyTo(_voxels.AsSpan(((z * SizeJ + y) * SizeI + i) * _bytesPerVoxel));
                         rows = rows.Slice(wide);
                     }
                 }
