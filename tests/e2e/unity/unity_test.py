@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package for Unity without Unity: its client is compiled by Debian's mcs, run under Mono against a server, and held against the other clients.
 
-usage: unity_test.py SOURCE CHECK LIBRARY_FOLDER; the environment is that of the fixtures
+usage: unity_test.py SOURCE LIBRARY_FOLDER; the environment is that of the fixtures
 """
 import hashlib
 import os
@@ -16,7 +16,7 @@ import unittest
 
 import numpy as np
 
-SOURCE, CHECK, LIBRARIES = (pathlib.Path(word) for word in sys.argv[1:4])
+SOURCE, LIBRARIES = (pathlib.Path(word) for word in sys.argv[1:3])
 MODEL, OTHER_MODEL = os.environ["ECORCHE_MODEL"], os.environ["ECORCHE_MODELS"].split(":")[-1]
 sys.path.insert(0, str(SOURCE / "tests" / "e2e" / "stream"))
 
@@ -27,6 +27,18 @@ from serving import ECORCHE, Server  # noqa: E402
 from ecorche.v1 import stream_pb2  # noqa: E402
 
 TOKEN = "f00dfeed" * 4
+PACKAGE = SOURCE / "clients" / "unity"
+built = tempfile.TemporaryDirectory()
+CHECK, SAMPLE = pathlib.Path(built.name) / "check.exe", pathlib.Path(built.name) / "five_steps.exe"
+
+
+def compile_program(out, *sources):
+    subprocess.run(["mcs", "-langversion:latest", "-unsafe", "-optimize+", "-warnaserror", f"-out:{out}", *map(str, sources)], check=True)
+
+
+client_sources = sorted((PACKAGE / "Runtime" / "Client").rglob("*.cs"))
+compile_program(CHECK, *sorted((SOURCE / "tests" / "e2e" / "unity").glob("*.cs")), *client_sources, *sorted((PACKAGE / "Runtime" / "Native").glob("*.cs")))
+compile_program(SAMPLE, PACKAGE / "Samples~" / "WithoutUnity" / "FiveSteps.cs", *client_sources)
 
 
 def command(*words):
@@ -268,10 +280,14 @@ class Unity(unittest.TestCase):
             thread.join()
         self.assertEqual(out, "error FailedPrecondition the server speaks protocol 2, this client 1\n")
 
+    def test_five_steps(self):
+        out = subprocess.run(["mono", SAMPLE, self.server.address], capture_output=True, text=True, check=True, timeout=60).stdout
+        self.assertRegex(out, r"^\d+ vertices, the first at y = -?\d+\.\d+ m, (pass|warn)\nthere is \w+\n$")
+
     def test_nobody_there(self):
         self.assertIn("error Unavailable 127.0.0.1:1: Connection refused (is ecorche serve running there?)", check("refused", "127.0.0.1:1", fails=True))
         self.assertIn("error InvalidArgument address: 'nowhere' is no HOST:PORT", check("refused", "nowhere", fails=True))
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])

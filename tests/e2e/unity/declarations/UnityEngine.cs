@@ -14,6 +14,7 @@ namespace UnityEngine
         public override bool Equals(object other) => throw null;
         public override int GetHashCode() => throw null;
         public static void Destroy(Object one) { }
+        public static void DestroyImmediate(Object one) { }
     }
 
     public class Component : Object
@@ -68,6 +69,7 @@ namespace UnityEngine
         public float x, y, z, w;
         public static Quaternion Inverse(Quaternion one) => throw null;
         public static Quaternion operator *(Quaternion a, Quaternion b) => throw null;
+        public static Vector3 operator *(Quaternion a, Vector3 b) => throw null;
     }
 
     public struct Matrix4x4 { }
