@@ -16,7 +16,7 @@ internal static partial class Check
     private static readonly Dictionary<string, Action<string[]>> Commands = new Dictionary<string, Action<string[]>>
     {
         ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
-        ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["native"] = NativeChecks.Run,
+        ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["cut"] = Cut, ["native"] = NativeChecks.Run,
         ["bench"] = Bench,
     };
 
@@ -214,11 +214,11 @@ internal static partial class Check
             var body = client.Open();
             var volume = client.SubscribeVolume(body.Volumes[0].Name, changedBricks: true);
             var pose = client.NewPose();
-            for (int i = 0; i < 4; ++i)
+            for (int i = 0; i < 6; ++i)
             {
-                ulong sent = client.SendPose(pose.SetAngle("elbow_left", "flexion", 0.2 * i));
+                ulong sent = client.SendPose(pose.SetAngle("elbow_left", "flexion", 0.4 + 0.01 * i));
                 while (volume.PoseSequence < sent) True(client.Poll(20000).Kind != EventKind.None, "a volume");
-                Console.WriteLine(i + " " + volume.SizeI + " " + volume.SizeJ + " " + volume.SizeK + " " + Hash(volume.Voxels));
+                Console.WriteLine(i + " " + volume.SizeI + " " + volume.SizeJ + " " + volume.SizeK + " " + Hash(volume.Voxels) + (volume.Bricks > 0 ? " by bricks" : ""));
             }
         }
     }

@@ -86,6 +86,38 @@ internal static partial class Check
         }
     }
 
+    /// <summary>No beginning of an envelope is one, but where a field ends.</summary>
+    private static void Cut(string[] words)
+    {
+        var envelope = new Envelope { RequestId = 3, HasPing = true };
+        envelope.Ping.Data = new byte[68];
+        var writer = new WireWriter();
+        writer.Begin();
+        envelope.Write(writer);
+        var whole = writer.Written.ToArray();
+        int refused = 0;
+        for (int size = 0; size < whole.Length; ++size)
+        {
+            var read = new Envelope();
+            try
+            {
+                var reader = new WireReader(whole.AsSpan(0, size));
+                read.Read(ref reader);
+                True(size == 0 || size == 2 && read.RequestId == 3, "an envelope of " + size + " bytes is read");
+            }
+            catch (EcorcheException error)
+            {
+                True(error.Code == Code.DataLoss, error.Message);
+                ++refused;
+            }
+        }
+        var last = new WireReader(whole);
+        var back = new Envelope();
+        back.Read(ref last);
+        True(back.HasPing && back.Ping.Data.Length == 68 && back.RequestId == 3, "the whole envelope");
+        Console.WriteLine("cut " + refused + " times");
+    }
+
     /// <summary>hostile ROUNDS: a server that lies. Whatever it says, the client tells an EcorcheException, and soon.</summary>
     private static void Hostile(string[] words)
     {

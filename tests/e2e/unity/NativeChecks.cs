@@ -36,6 +36,7 @@ internal static class NativeChecks
                 var vertices = new float[6 * tissue.VertexCount];
                 posed.Copy(t, Space.Unity, vertices);
                 Check.True(tissue.Name == body.Tissues[t].Name && model.FindTissue(tissue.Name) == t, "tissues alike");
+                Check.True(tissue.Triangles.AsSpan().SequenceEqual(body.Triangles(t)) && tissue.Segment == body.Tissues[t].Segment, "triangles alike");
                 for (int v = 0; v < tissue.VertexCount; ++v)
                     for (int c = 0; c < 3; ++c) worst = Math.Max(worst, Math.Abs(vertices[6 * v + c] - frame.Tissues[t].Floats[4 * v + c]));
             }

@@ -179,8 +179,8 @@ class Unity(unittest.TestCase):
             segment = body.message.skeleton.segments[body.joint("elbow_left")].joint
             first, told = segment.sequence[0], []
             self.assertEqual(first.name, "flexion")
-            for i in range(4):
-                turn = (-1 if first.negative else 1) * (0.2 * i - first.rest) / 2
+            for i in range(6):
+                turn = (-1 if first.negative else 1) * (0.4 + 0.01 * i - first.rest) / 2
                 pose = body.rest_pose()
                 pose[body.joint("elbow_left")] = np.cos(turn), *(np.sin(turn) * np.eye(3)[first.axis])
                 sent, frame = client.send_pose(pose), None
@@ -188,7 +188,11 @@ class Unity(unittest.TestCase):
                     frame = next(iter(client.frames(20)))
                 k, j, i_size = frame.voxels.shape[:3]
                 told.append(f"{i} {i_size} {j} {k} {hashlib.sha256(np.ascontiguousarray(frame.voxels).tobytes()).hexdigest()}")
-        self.assertEqual(out, told)
+        self.assertEqual([line.removesuffix(" by bricks") for line in out], told)
+        self.assertIn(" by bricks", "".join(out))
+
+    def test_envelopes_that_are_cut(self):
+        self.assertEqual(check("cut"), "cut 73 times\n")
 
     def test_who_lies_is_refused(self):
         self.assertEqual(check("hostile", 300), "refused 300\n")

@@ -42,6 +42,9 @@ namespace Ecorche
         /// <summary>i fastest, little-endian; until the next frame.</summary>
         public ReadOnlySpan<byte> Voxels => _voxels.AsSpan(0, SizeI * SizeJ * SizeK * _bytesPerVoxel);
 
+        /// <summary>How many bricks the last frame replaced; 0: it brought all voxels.</summary>
+        public int Bricks { get; private set; }
+
         internal bool Nearest { get; }
         internal bool ChangedBricks { get; }
         internal double[] Region { get; }
@@ -69,6 +72,7 @@ namespace Ecorche
                 if (_voxels.Length < size) _voxels = new byte[size];
                 rows.CopyTo(_voxels);
                 SetGrid(told);
+                Bricks = 0;
                 if (!ChangedBricks || told.Keyframe != told.Frame) return Code.Ok;
                 if (_key.Length != size) _key = new byte[size];
                 rows.CopyTo(_key);
@@ -79,7 +83,9 @@ namespace Ecorche
                 throw EcorcheException.Damaged("a volume is against keyframe " + told.Keyframe + ", which did not come");
             _key.AsSpan().CopyTo(_voxels);
             SetGrid(told);
-            PutBricks(from.Rows<uint>(told.Bricks, ScalarType.U32, 1), rows);
+            var bricks = from.Rows<uint>(told.Bricks, ScalarType.U32, 1);
+            PutBricks(bricks, rows);
+            Bricks = bricks.Length;
             return Code.Ok;
         }
 
