@@ -101,23 +101,24 @@ test("what only looks like a slow line changes nothing", () => {
   assert.equal(coarse.skins, 0, "coarser levels alone are a reason");
 });
 
-test("a stream follows: coarse in motion, whole at rest", async (t) => {
+test("a stream follows: whole though it began coarse, coarse in motion, whole at rest", async (t) => {
   const server = await Server.start();
   t.after(() => server.stop());
   const client = await within(20, Client.connect(server.url), "connecting");
   t.after(() => client.close());
   const model = await client.open();
-  const stream = await client.subscribeMesh();  // not `adaptive`: then the server would choose, too
+  const stream = await client.subscribeMesh({ level: 2 });  // not `adaptive`: then the server would choose, too
   const choices: Choice[] = [], policy = new Policy();
   const adaptation = adapt(client, stream, (choice) => choices.push(choice), { policy });
+  const shows = (level: number) => within(20, new Promise<void>((resolve) => {
+    const off = stream.on("frame", (frame) => { if (frame.level === level) { off(); resolve(); } });
+  }), `level ${level}`);
+  await shows(0);
   adaptation.drawn(200);
   let angle = 0;
   const moving = setInterval(() => client.setPose(bendingPose(model, angle += 0.01)), 40);
   t.after(() => clearInterval(moving));
   t.after(() => adaptation.stop());
-  const shows = (level: number) => within(20, new Promise<void>((resolve) => {
-    const off = stream.on("frame", (frame) => { if (frame.level === level) { off(); resolve(); } });
-  }), `level ${level}`);
   await shows(1);
   assert.equal(stream.options.level, 1);
   clearInterval(moving);

@@ -107,16 +107,19 @@ namespace Ecorche.Wire
         public string Model = "";
         public string Session = "";
         public bool WithoutTriangles;
+        public bool PackedTriangles;
 
         public void Clear()
         {
             Model = "";
             Session = "";
             WithoutTriangles = default;
+            PackedTriangles = default;
         }
 
         internal void Write(WireWriter to)
         {
+            if (PackedTriangles) to.Bool(32, PackedTriangles);
             if (WithoutTriangles) to.Bool(24, WithoutTriangles);
             if (Session.Length > 0) to.String(18, Session);
             if (Model.Length > 0) to.String(10, Model);

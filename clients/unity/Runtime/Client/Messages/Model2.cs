@@ -9,6 +9,8 @@ namespace Ecorche.Wire
         public int Segment;
         public ulong Vertices;
         public bool HasTriangles; public readonly Array Triangles = new Array();
+        public bool HasPackedTriangles; public readonly Array PackedTriangles = new Array();
+        public ulong TriangleCount;
 
         public void Clear()
         {
@@ -17,6 +19,8 @@ namespace Ecorche.Wire
             Segment = default;
             Vertices = default;
             HasTriangles = false;
+            HasPackedTriangles = false;
+            TriangleCount = default;
         }
 
         void IMessage.Read(ref WireReader from) => Read(ref from);
@@ -35,6 +39,8 @@ namespace Ecorche.Wire
                     case 24: Segment = from.SInt32(); break;
                     case 32: Vertices = from.UInt64(); break;
                     case 42: { var inner = from.Message(); Triangles.Read(ref inner); } HasTriangles = true; break;
+                    case 50: { var inner = from.Message(); PackedTriangles.Read(ref inner); } HasPackedTriangles = true; break;
+                    case 56: TriangleCount = from.UInt64(); break;
                     default: from.Skip(key); break;
                 }
             }
