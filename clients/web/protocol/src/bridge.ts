@@ -3,12 +3,16 @@
 import type { Post, ToClient, ToLink } from "./channel.js";
 import { describeFault } from "./errors.js";
 import { makeLink } from "./make_link.js";
+import { workers } from "./workers.js";
 
 /** The name of the worker's bundle, beside the page's: set by build.mjs. */
 declare const ECORCHE_WORKER: string;
 
+const LAST_WORDS_MS = 1000;
+
 export interface Bridge {
   post: Post<ToLink>;
+  /** The worker, if any, ends; what was posted before still leaves. */
   end(): void;
 }
 
@@ -19,14 +23,14 @@ export function makeBridge(worker: string | URL | false | undefined, hear: (mess
 }
 
 function inWorker(url: string | URL, hear: (message: ToClient) => void): Bridge {
-  const worker = new Worker(url, { type: "module" });
+  const worker = workers.make(url);
   worker.onmessage = ({ data }: MessageEvent<ToClient>) => hear(data);
   worker.onmessageerror = () => hear({ kind: "failed", message: "a message of the worker cannot be read" });
   worker.onerror = (event) => {
     event.preventDefault();  // told by the client instead
     hear({ kind: "failed", message: event.message || `the worker ${url} does not start` });
   };
-  return { post: (message, transfer = []) => worker.postMessage(message, transfer), end: () => worker.terminate() };
+  return { post: (message, transfer = []) => worker.postMessage(message, transfer), end: () => void setTimeout(() => worker.terminate(), LAST_WORDS_MS) };
 }
 
 function onThisThread(hear: (message: ToClient) => void): Bridge {

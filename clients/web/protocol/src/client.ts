@@ -81,6 +81,7 @@ export class Client extends Emitter<ClientEvents> {
     this.change({ state: "closed", reason });
     this.tell({ case: "goodbye", value: { $typeName: "ecorche.v1.Goodbye", retrySeconds: 0 } });
     this.post({ kind: "hang up" });
+    this.bridge.end();
     this.requests.fail(new ConnectionError(reason));
   }
 

@@ -5,6 +5,7 @@ import type { Client } from "../client.js";
 import { ConnectionError, ServerError } from "../errors.js";
 import { ProtocolError } from "../framing.js";
 import { Deformer, SubscribeSchema, type VolumeFrame } from "../gen/ecorche/v1/stream_pb.js";
+import { workers } from "../workers.js";
 import type { FromDecoder, ToDecoder } from "./channel.js";
 import type { VolumeImage } from "./decoder.js";
 
@@ -40,7 +41,7 @@ interface Waiting {
 }
 
 export class VolumeStream {
-  readonly #worker = new Worker(new URL(ECORCHE_VOLUME_WORKER, import.meta.url), { type: "module" });
+  readonly #worker = workers.make(new URL(ECORCHE_VOLUME_WORKER, import.meta.url));
   #subscription: number | null = null;
   #asking = false;
   #closed = false;
