@@ -64,7 +64,7 @@ SPDX = re.compile(r"SPDX-License-Identifier: (Apache-2\.0|AGPL-3\.0-or-later)")
 # Papers are cited in comments, by one or two authors and two digits of the year; CONVENTIONS.md says which they are.
 COMMENT = re.compile(r"//.*|#[^!i].*|\"\"\".*")
 CITED = re.compile(r"\b(?!Int|UInt|Float|Oct|Bip|Split)[A-Z][a-z]{2,}(?:[A-Z][a-z]{2,})?\d\d\b")
-CODE = {".hpp", ".cpp", ".h", ".ts", ".py", ".proto", ".cmake", ".sh"}
+CODE = {".hpp", ".cpp", ".h", ".ts", ".py", ".proto", ".cmake", ".sh", ".cs", ".hlsl", ".compute", ".shader"}
 MAX_LINES = 400
 
 

@@ -74,7 +74,8 @@ bool UEcorcheBodyComponent::SetAngle(const FString& Joint, const FString& Angle,
 
 FString UEcorcheBodyComponent::Probe(const FVector& World) {
   const FVector Local = GetComponentTransform().InverseTransformPosition(World);
-  const float Point[3] = {static_cast<float>(Local.X), static_cast<float>(Local.Y), static_cast<float>(Local.Z)};
+  const float Point[3] = {static_cast<float>(Local.X), static_cast<float>(Local.Y),
+                          static_cast<float>(Local.Z)};
   int32 Tissue = -1;
   if (!Stream.IsOpen() || !Stream.Probe(Point, Tissue)) Complain();
   return Tissue < 0 ? FString() : FString(UTF8_TO_TCHAR(Stream.Tissues()[Tissue].Name.c_str()));

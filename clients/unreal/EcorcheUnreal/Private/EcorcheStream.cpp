@@ -73,7 +73,8 @@ bool FEcorcheStream::Poll(double Seconds) {
     }
     if (Event.kind == ECORCHE_EVENT_NONE) break;
     if (Event.kind == ECORCHE_EVENT_POSE && Event.code != ECORCHE_OK) Fail();
-    if (Event.kind == ECORCHE_EVENT_MODEL_CHANGED) LastError = "the server has read the model anew (connect again)";
+    if (Event.kind == ECORCHE_EVENT_MODEL_CHANGED)
+      LastError = "the server has read the model anew (connect again)";
     if (Event.kind != ECORCHE_EVENT_FRAME) continue;
     Came = true;
     Shown = Event.sequence;
@@ -102,8 +103,9 @@ bool FEcorcheStream::ReadTissues() {
     FEcorcheTissue Tissue;
     Tissue.Name = Info.name;
     Tissue.Group = Info.group;
-    // As they are: in a mirror, counter-clockwise becomes clockwise by the right hand's rule; and Unreal, whose space is a mirror,
-    // takes the side from where corners go counter-clockwise by eye (its normal of a triangle is (p1 - p2) x (p0 - p2)).
+    // As they are: in a mirror, counter-clockwise becomes clockwise by the right hand's rule; and Unreal,
+    // whose space is a mirror, takes the side from where corners go counter-clockwise by eye (its normal of a
+    // triangle is (p1 - p2) x (p0 - p2)).
     Tissue.Triangles.assign(Info.triangles, Info.triangles + 3 * size_t{Info.triangle_count});
     Tissue.Positions.resize(3 * size_t{Info.vertex_count});
     Tissue.Normals.resize(3 * size_t{Info.vertex_count});
@@ -115,8 +117,8 @@ bool FEcorcheStream::ReadTissues() {
 bool FEcorcheStream::CopyFrame() {
   for (uint32_t Row = 0; Row < All.size(); ++Row) {
     FEcorcheTissue& Tissue = All[Row];
-    if (ecorche_client_copy(Client, Row, ECORCHE_SPACE_UNREAL, Tissue.Positions.data(), 0, Tissue.Normals.data(), 0,
-                            Tissue.Positions.size() / 3) != ECORCHE_OK)
+    if (ecorche_client_copy(Client, Row, ECORCHE_SPACE_UNREAL, Tissue.Positions.data(), 0,
+                            Tissue.Normals.data(), 0, Tissue.Positions.size() / 3) != ECORCHE_OK)
       return Fail();
   }
   return true;
