@@ -7,15 +7,16 @@ and pass it on. A fault of the machine (killed, no memory, a full disk) ends thi
 the memory; at the last attempt it is written down, too. The next run of the cohort takes such a record back (scripts/record.py).
 """
 import argparse
+import contextlib
 import ctypes
 import json
 import os
 import pathlib
-import resource
 import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 sys.dont_write_bytecode = True
@@ -25,6 +26,10 @@ import summary  # noqa: E402
 
 DATA_FAULTS = {64, 65, 66, 77, 78}
 STOPPED = {130, 143}  # somebody wants an end: neither tried again at once nor written down
+
+
+def end_with_parent():
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
 
 
 class Fault(Exception):
@@ -79,8 +84,9 @@ class Step:
         with open(self.log, "a") as log:
             print("$ " + " ".join(command[:1] + command[4:]), file=log, flush=True)
             start = time.monotonic()
-            child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, preexec_fn=self.in_child, cwd=self.folder)
+            child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, preexec_fn=end_with_parent, cwd=self.folder)
             signal.signal(signal.SIGTERM, lambda *_: child.terminate())
+            threading.Thread(target=self.hold, args=(child.pid,), daemon=True).start()
             printed = child.stdout.read()
             _, status, usage = os.wait4(child.pid, 0)
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -96,12 +102,21 @@ class Step:
             raise Fault(code, self.said(code, found))
         return found
 
-    def in_child(self):
-        """Ends with this process; holds no more memory than was planned, so that a wrong plan harms this step and no other."""
-        ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-        if self.options.mib > 0:
-            most = self.options.mib << 20
-            resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+    def hold(self, pid):
+        """Kills what holds more memory than was planned, so that a wrong plan harms this step and no other. Looked at, as Slurm does: limits
+        of the system count what is reserved, too, and libraries wait for ever where they may not reserve."""
+        page = os.sysconf("SC_PAGE_SIZE")
+        while self.options.mib > 0:
+            try:
+                with open(f"/proc/{pid}/statm") as statm:
+                    held = int(statm.read().split()[1]) * page >> 20
+            except (OSError, IndexError):
+                return
+            if held > self.options.mib:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                return
+            time.sleep(0.02)
 
     def said(self, code, found):
         if "error" in found:

@@ -208,20 +208,21 @@ document.body.innerHTML='<pre>'+JSON.stringify(found)+'</pre>'</script>"""
     def test_a_machine_that_fails_is_tried_again_with_twice_the_memory(self):
         shutil.copytree(self.base / "bids", self.folder / "bids")
         bids, out = self.folder / "bids", self.folder / "out"
-        # Killed as the kernel does it: sub-01 below 3000 MiB, sub-02 always; others never.
+        # Planned with a third of what it holds, each step is killed twice; that of sub-02 always, as the kernel would.
         asked = self.folder / "asked"
         program = self.folder / "program"
         program.write_text(f"""#!/bin/sh
-case "$*" in *" preprocess "*sub-01*) ulimit -d >> {asked}; [ $(ulimit -d) -ge 3072000 ] || kill -9 $$ ;;
-*" preprocess "*sub-02*) [ -e {self.folder}/mended ] || kill -9 $$ ;; esac
+case "$*" in *" preprocess "*) tr '\\0' ' ' < /proc/$PPID/cmdline | sed 's/ --given.*//; s/.*preprocess //' >> {asked}; echo >> {asked} ;; esac
+case "$*" in *" preprocess "*sub-02*) [ -e {self.folder}/mended ] || kill -9 $$ ;; esac
 exec {ECORCHE} "$@"
 """)
         program.chmod(0o755)
         config = self.folder / "cohort.yaml"
-        config.write_text(CONFIG + "law: {preprocess: {mib: 1000, mib_per_mtet: 0, mib_per_mvoxel: 0}}\n")
+        config.write_text(CONFIG + "law: {preprocess: {mib: 35, mib_per_mtet: 0, mib_per_mvoxel: 0}}\n")
         words = ("--config", config, "--snakemake", f"--config bids={bids} out={out} ecorche={program} from={self.base}")
         said = self.call(bids, out, *words)
-        self.assertEqual(asked.read_text().split(), ["1024000", "2048000", "4096000"])
+        planned = {name: re.findall(rf"{name} .*--mib (\d+) ", asked.read_text()) for name in self.expected}
+        self.assertEqual(planned, {"sub-01": ["35", "70", "140"], "sub-02": ["35", "70", "140"], "sub-03": ["35", "70", "140"], "sub-04": []})
         rows = group(out)
         self.assertNotEqual(rows["sub-01"]["status"], "failed")
         self.assertNotEqual(rows["sub-03"]["status"], "failed")
