@@ -57,7 +57,7 @@ class Step:
             record.write(self.folder, self.name, {**failed, "products": [], "facts": {}})
             return 0
         try:
-            products, facts = STEPS[self.name.split("-")[0]](self)
+            products, facts = self.make()
         except Fault as fault:
             machine = fault.code not in DATA_FAULTS
             if fault.code in STOPPED or (machine and self.options.attempt < self.options.attempts):
@@ -72,6 +72,16 @@ class Step:
         record.write(self.folder, self.name, {"ok": True, "step": self.name, "fault": None, "error": None,
                                               "products": record.products(self.folder, products), "facts": facts})
         return 0
+
+    def make(self):
+        """(products, facts) of the step. Whatever goes wrong here itself is the machine's fault: a full disk, a bug."""
+        try:
+            return STEPS[self.name.split("-")[0]](self)
+        except OSError as error:
+            raise Fault(74, {"kind": "io", "where": str(error.filename or self.name), "what": error.strerror or str(error),
+                             "mend": "check the disk's free space"}) from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise Fault(70, {"kind": "internal", "where": self.name, "what": f"{type(error).__name__}: {error}", "mend": "this is a bug: report it"}) from error
 
     def remember(self):
         """Times are measured, not made: they stand apart from what is the same in every run."""
