@@ -100,11 +100,12 @@ class Plan:
 
     @functools.cached_property
     def given(self):
-        """For each rule a function to JSON: all that its result depends on besides its input files."""
+        """For each rule a function to JSON: all that its result depends on besides its input files. It stands in a command line, where a
+        word has 128 KiB at most: no lists of files."""
         scan = lambda who: [] if self.is_case(who) else ["new"]  # noqa: E731
         depends = {
             "new": lambda who: {"files": self.sources(who)},
-            "check": lambda who: {"files": self.sources(who), "inputs": self.files(who), "is_case": self.is_case(who), "root": self.root,
+            "check": lambda who: {"files": self.sources(who), "is_case": self.is_case(who), "root": self.root,
                                   "repair": self.config["repair"] is not False, "after": scan(who)},
             "repair": lambda who: {"repair": self.config["repair"] is not False, "words": self.repair_words(), "after": ["check"]},
             "preprocess": lambda who: {"words": self.preprocess_words(who), "cache_gib": self.config["cache_gib"], "after": ["repair"]},

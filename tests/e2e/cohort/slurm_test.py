@@ -1,10 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The cohort on real Slurm, one node of it: the same bytes as on this machine alone; one job cancelled, one out of memory, all of it resumed."""
-import os
 import pathlib
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
