@@ -12,17 +12,12 @@ class EigenSolver final : public SpdSolver {
   std::string_view name() const override { return "eigen"; }
 
   void factor(const SparseMatrix& A, const Context& context) override {
-    auto state = std::make_shared<State>();
-    state->A = A;
-    state_ = nullptr;
-    context.run_unstoppable([state] { state->cholesky.compute(state->A); });
-    if (state->cholesky.info() != Eigen::Success) {
-      throw Error(ErrorKind::data, "solver eigen",
-                  "the matrix of " + std::to_string(A.rows()) + " unknowns is not positive definite",
-                  "look for degenerate tets and for parts of the mesh without a fixed node");
-    }
-    state->A = SparseMatrix();
-    state_ = std::move(state);
+    take(std::make_shared<State>(), A, context, [](State& state) { state.cholesky.compute(state.A); });
+  }
+
+  void refactor(const SparseMatrix& A, const Context& context) override {
+    if (!state_) return factor(A, context);
+    take(std::move(state_), A, context, [](State& state) { state.cholesky.factorize(state.A); });
   }
 
   Block solve(const Block& B, const Context& context) const override {
@@ -39,6 +34,20 @@ class EigenSolver final : public SpdSolver {
     SparseMatrix A;
     Eigen::SimplicialLLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>> cholesky;
   };
+
+  void take(std::shared_ptr<State> state, const SparseMatrix& A, const Context& context, void (*work)(State&)) {
+    state->A = A;
+    state_ = nullptr;
+    context.run_unstoppable([state, work] { work(*state); });
+    if (state->cholesky.info() != Eigen::Success) {
+      throw Error(ErrorKind::data, "solver eigen",
+                  "the matrix of " + std::to_string(A.rows()) + " unknowns is not positive definite",
+                  "look for degenerate tets and for parts of the mesh without a fixed node");
+    }
+    state->A = SparseMatrix();
+    state_ = std::move(state);
+  }
+
   std::shared_ptr<State> state_;
 };
 

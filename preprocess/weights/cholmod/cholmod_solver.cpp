@@ -121,13 +121,14 @@ class CholmodSolver final : public solve::SpdSolver {
       }
     });
     state->check(A.rows());
-    context.run_unstoppable([state, matrix] {
-      const OneThread one;
-      cholmod_sparse a = view(*matrix);
-      cholmod_factorize(&a, state->factor, &state->common);
-    });
-    state->check(A.rows());
-    state_ = std::move(state);
+    fill(std::move(state), std::move(matrix), context);
+  }
+
+  void refactor(const SparseMatrix& A, const Context& context) override {
+    if (!state_) return factor(A, context);
+    auto matrix = std::make_shared<SparseMatrix>(A);
+    matrix->makeCompressed();
+    fill(std::move(state_), std::move(matrix), context);
   }
 
   Block solve(const Block& B, const Context& context) const override {
@@ -154,6 +155,19 @@ class CholmodSolver final : public solve::SpdSolver {
   }
 
  private:
+  /// The numbers of a factor whose shape is known.
+  void fill(std::shared_ptr<State> state, std::shared_ptr<SparseMatrix> matrix, const Context& context) {
+    state_ = nullptr;
+    const auto unknowns = matrix->rows();
+    context.run_unstoppable([state, matrix] {
+      const OneThread one;
+      cholmod_sparse a = view(*matrix);
+      cholmod_factorize(&a, state->factor, &state->common);
+    });
+    state->check(unknowns);
+    state_ = std::move(state);
+  }
+
   std::shared_ptr<State> state_;
 };
 

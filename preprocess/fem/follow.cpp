@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/fem/follow.hpp"
+
+#include <algorithm>
+
+namespace ecorche::fem {
+namespace {
+
+void add(NewtonResult& sum, NewtonResult one) {
+  one.iterations += sum.iterations;
+  one.factors += sum.factors;
+  one.seconds.assemble += sum.seconds.assemble;
+  one.seconds.factor += sum.seconds.factor;
+  one.seconds.solve += sum.seconds.solve;
+  one.seconds.energy += sum.seconds.energy;
+  sum = std::move(one);
+}
+
+}  // namespace
+
+FollowResult follow(const Assembly& assembly, const Material& material, StepSolver& steps,
+                    const std::function<void(double t, Points& x)>& held_at, const FollowOptions& options,
+                    Points& x, const Context& context) {
+  FollowResult out;
+  out.newton.total = assembly.total(material, x);
+  const Total rest = out.newton.total;
+  double step = options.first_step;
+  while (out.reached < 1 && step >= options.least_step) {
+    context.check_stop();
+    const double t = std::min(1.0, out.reached + step);
+    Points goal = x;
+    held_at(t, goal);
+    const Points increment = goal - x;
+    NewtonResult told;
+    Points g;
+    bool exact = false;
+    const Points d = steps.step(material, x, &increment, exact, options.last.linear_tolerance, g, told, context);
+    Points next = moved(assembly.mesh(), goal, d, 1);
+    bool good = !inverts(rest, assembly.total(material, next));
+    if (good) {
+      NewtonOptions newton = options.last;
+      if (t < 1) newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
+      add(told, minimise(assembly, material, steps, newton, next, context));
+      good = told.converged;
+    }
+    if (!good) {
+      told.converged = false;
+      told.total = out.newton.total;
+      add(out.newton, std::move(told));
+      ++out.refused;
+      step /= 2;
+      continue;
+    }
+    add(out.newton, std::move(told));
+    x = std::move(next);
+    out.reached = t;
+    ++out.steps;
+    context.report(t);
+  }
+  if (out.reached < 1) out.newton.converged = false;
+  return out;
+}
+
+}  // namespace ecorche::fem

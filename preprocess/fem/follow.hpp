@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Continuation: from rest to a pose in steps small enough that no tet is turned inside out on the way.
+#pragma once
+
+#include <functional>
+
+#include "preprocess/fem/newton.hpp"
+
+namespace ecorche::fem {
+
+struct FollowOptions {
+  NewtonOptions last;              ///< of the pose itself
+  double between_mm = 0.1;         ///< tolerance of the poses on the way
+  double first_step = 0.25;        ///< of the way
+  double least_step = 1.0 / 256;  ///< smaller ones give up
+};
+
+struct FollowResult {
+  double reached = 0;  ///< of the way, 0 to 1
+  int steps = 0, refused = 0;
+  NewtonResult newton;  ///< of the last pose; iterations, factors and seconds of all
+};
+
+/// `held_at(t, x)` writes the places of held nodes at t of the way into their rows. `x`: at rest, all at t = 0;
+/// then as far as it came. A step first moves the free nodes by the linear answer to the held ones' move;
+/// where that inverts a tet, or Newton does not converge from there, the step is halved.
+FollowResult follow(const Assembly& assembly, const Material& material, StepSolver& steps,
+                    const std::function<void(double t, Points& x)>& held_at, const FollowOptions& options,
+                    Points& x, const Context& context);
+
+}  // namespace ecorche::fem
