@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "runtime/settle/carry_tissues.hpp"
 #include "runtime/settle/unfold.hpp"
 
 namespace ecorche::app {
@@ -32,22 +33,35 @@ Status MeasuredPose::run(const Pose& pose, runtime::Skinning skinning) {
                     runtime::Root::still);
 }
 
+// Changes the still body; what differs then goes along in the other one.
+template <class Change>
+void MeasuredPose::change(Change&& still) {
+  if (!moved_) return still(body_);
+  const std::vector<float> nodes = still_.nodes;
+  const std::vector<std::vector<float>> tissues = still_.tissues;
+  still(still_);
+  const RigidTransform& root = body_.segments[0];
+  carry(nodes, still_.nodes, root, body_.nodes);
+  for (std::size_t t = 0; t < tissues.size(); ++t)
+    carry(tissues[t], still_.tissues[t], root, body_.tissues[t]);
+}
+
 nlohmann::json MeasuredPose::unfold(const Context& context) {
-  runtime::PosedBody& still = moved_ ? still_ : body_;
-  const std::vector<float> nodes = still.nodes;
-  const std::vector<std::vector<float>> tissues = moved_ ? still.tissues : std::vector<std::vector<float>>();
-  const runtime::Unfolding done = runtime::unfold(poser_.model(), still, context);
-  if (moved_) {
-    const RigidTransform& root = body_.segments[0];
-    carry(nodes, still.nodes, root, body_.nodes);
-    for (std::size_t t = 0; t < tissues.size(); ++t)
-      carry(tissues[t], still.tissues[t], root, body_.tissues[t]);
-  }
+  runtime::Unfolding done;
+  change([&](runtime::PosedBody& body) { done = runtime::unfold(poser_.model(), body, context); });
   return {{"inverted_tets_before", done.inverted_before},
           {"inverted_rest_mm3_before", done.rest_mm3_before},
           {"squeezed_by_bones", done.held},
           {"moved_nodes", done.moved_nodes},
           {"largest_move_mm", done.largest_move_mm}};
+}
+
+void MeasuredPose::replace(const std::vector<float>& nodes, const std::vector<std::uint8_t>& moved) {
+  change([&](runtime::PosedBody& body) {
+    for (std::size_t n = 0; n < moved.size(); ++n)
+      if (moved[n] != 0) std::copy_n(&nodes[3 * n], 3, &body.nodes[3 * n]);
+    runtime::carry_tissues(poser_.model(), moved, body);
+  });
 }
 
 }  // namespace ecorche::app

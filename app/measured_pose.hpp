@@ -2,7 +2,9 @@
 // A posed body as it is written, and beside it as it is measured.
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/values/context.hpp>
@@ -21,10 +23,18 @@ class MeasuredPose {
   /// Unfolds both alike; what that did, as `unfolded` of quality.json.
   nlohmann::json unfold(const Context& context);
 
+  /// Puts nodes of the still body where `nodes` (3 * #nodes) has them, those with `moved`, and in both all that
+  /// hangs on them.
+  void replace(const std::vector<float>& nodes, const std::vector<std::uint8_t>& moved);
+
+  const runtime::BodyPoser& poser() const { return poser_; }
   const runtime::PosedBody& body() const { return body_; }
   const runtime::PosedBody& still() const { return moved_ ? still_ : body_; }
 
  private:
+  template <class Change>
+  void change(Change&& still);
+
   const runtime::BodyPoser& poser_;
   runtime::PosedBody body_, still_;
   bool moved_ = false;

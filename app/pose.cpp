@@ -75,6 +75,7 @@ class FrameWriter {
                         posed(model_.volumes[row]));
     }
     if (plan_.field) write_field();
+    if (quality.contains("fem")) files::write_text(next("fem.json"), quality["fem"].dump(2) + "\n");
     files::write_text(next("quality.json"), quality.dump(2) + "\n");
     return written_;
   }
@@ -84,7 +85,7 @@ class FrameWriter {
   fs::path next(const std::string& name) {
     context_.check_stop();
     const std::size_t files = plan_.tissues.size() * settings_.formats.size() + plan_.volumes.size() +
-                              (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) + 1;
+                              (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) + (settings_.by_fem() ? 2 : 1);
     context_.report(static_cast<double>(written_.size()) / static_cast<double>(files));
     written_.push_back((folder_ / name).string());
     return stage_ / name;
@@ -220,7 +221,7 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
   const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model);
-  const runtime::Skinning skinning = runtime::skinning_from_name(settings.skinning);
+  const runtime::Skinning skinning = runtime::skinning_from_name(settings.by_fem() ? "cor" : settings.skinning);
   MeasuredPose posed(poser);
   io::DicomFacts dicom;
   if (settings.writes_dicom())
@@ -237,11 +238,13 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
     const Status status = posed.run(frame.pose, skinning);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
     const json unfolded = settings.unfold ? posed.unfold(context) : json();
+    const json fem = settings.by_fem() ? pose_by_fem(settings.fem, posed, context) : json();
     const runtime::PosedBody& body = posed.body();
     const std::vector<float> det_f = runtime::tet_det_f(*model, posed.still().nodes);
     json quality =
         quality_json(*model, body, runtime::measure(*model, posed.still(), poser.all_tissues(), {}, closed),
-                     det_f, {skinning, settings.unfold});
+                     det_f, {skinning, settings.unfold, settings.by_fem()});
+    if (settings.by_fem()) add_fem(fem, quality);
     if (settings.unfold) quality["unfolded"] = unfolded;
     if (!frame.missed.empty()) {
       quality["verdict"] = "warn";
@@ -273,7 +276,9 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
   return 0;
 }
 
-int run(const Program& program, PoseSettings& settings) {
+}  // namespace
+
+int run_pose(const Program& program, PoseSettings& settings) {
   check_settings(settings);
   if (!settings.scan.wanted()) return pose_model(program, settings, {}, {{"model", settings.model.string()}});
   // What would fail only after minutes of work is refused first.
@@ -293,8 +298,6 @@ int run(const Program& program, PoseSettings& settings) {
                     }});
 }
 
-}  // namespace
-
 void declare_pose(CLI::App& app, Program& program, Run& chosen) {
   const auto s = std::make_shared<PoseSettings>();
   CLI::App* command = app.add_subcommand(
@@ -311,8 +314,8 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       ->add_option(
           "--skinning", s->skinning,
           "how segments blend: cor (neither collapses nor bulges, folds most), dqs (bulges, folds least) "
-          "or lbs (collapses)")
-      ->check(CLI::IsMember({"cor", "dqs", "lbs"}))
+          "or lbs (collapses); fem solves for balance instead (ecorche fem tells more)")
+      ->check(CLI::IsMember({"cor", "dqs", "lbs", "fem"}))
       ->capture_default_str();
   const char* choice =
       "What is not named is not written; without --tissues, --volumes, --tets and --field "
@@ -368,7 +371,7 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       "--as-case", s->as_case,
       "write the posed patient as a new case, ready for preprocess: surfaces, label map, volumes, "
       "skeleton in its new rest pose; and body.vtu");
-  command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
+  command->callback([&program, &chosen, s] { chosen = [&program, s] { return run_pose(program, *s); }; });
 }
 
 }  // namespace ecorche::app

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <ecorche/values/model.hpp>
+#include "app/fem_pose.hpp"
 #include "app/pose_frames.hpp"
 #include "app/posed_dicom.hpp"
 #include "app/scan/posed_scan.hpp"
@@ -21,6 +22,7 @@ struct PoseSettings {
   ScanPosing scan;  // instead of a model
   FrameChoice frames;
   std::string skinning = "cor";
+  FemSettings fem;  // where skinning is `fem`
   std::vector<std::string> tissues, volumes;
   std::vector<std::string> formats{"stl"};
   std::string volume_format = "nrrd";
@@ -31,6 +33,7 @@ struct PoseSettings {
   std::vector<std::string> tet_formats{"vtu"};
   DicomSettings dicom;
 
+  bool by_fem() const { return skinning == "fem"; }
   bool writes_dicom() const { return volume_format == "dicom"; }
   // Of fields, which no CT can hold.
   std::string field_format() const { return writes_dicom() ? "nrrd" : volume_format; }
@@ -43,6 +46,9 @@ struct Plan {
   bool tets = false, field = false;
   std::map<std::string, runtime::VolumeBalls> balls;  // of volumes that are refilled, by name
 };
+
+/// `ecorche pose`, or `ecorche fem` where that filled the settings. Returns the exit code.
+int run_pose(const Program& program, PoseSettings& settings);
 
 /// Refuses what contradicts itself, whatever the model. Throws Error{usage}.
 void check_settings(const PoseSettings& settings);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "app/fem_pose.hpp"
 #include "app/inverted_tets.hpp"
 #include "runtime/quality/bone_tets.hpp"
 #include "runtime/quality/tissue_limits.hpp"
@@ -115,6 +116,7 @@ std::string line_of(const json& frame) {
       quality["inverted_tets"].get<unsigned long long>(), 100 * quality["volume_change"].get<double>(),
       100 * quality["unsigned_volume_change"].get<double>(), quality["bone_rigidity_mm"].get<double>(),
       frame["files"].size());
+  if (quality.contains("fem")) out += fem_line(quality["fem"]);
   const json& warnings = quality["warnings"];
   for (std::size_t w = 0; w < std::min(kMostWarnings, warnings.size()); ++w) out += warning_line(warnings[w]);
   if (warnings.size() > kMostWarnings)

@@ -75,6 +75,7 @@ class Wording {
   // What helps against folds besides turning less.
   std::string folds() const {
     std::string out;
+    if (how_.finite_elements) return out;
     if (!how_.unfolded) out = "add --unfold, or ";
     if (how_.skinning == runtime::Skinning::cor) out += "use --skinning dqs, which folds less, or ";
     return out;

@@ -15,6 +15,7 @@ namespace ecorche::app {
 struct HowPosed {
   runtime::Skinning skinning = runtime::Skinning::cor;
   bool unfolded = false;
+  bool finite_elements = false;  ///< from that skinning on
 };
 
 /// `warnings` of quality.json, one object for each breach of a threshold, the worst tissues first. `det_f`:

@@ -10,7 +10,7 @@ namespace ecorche::fem {
 namespace {
 
 constexpr double kArmijo = 1e-4;
-constexpr double kRounding = 1e-11;  // of the energy: below it a change says nothing
+constexpr double kRounding = 1e-15;  // of energy, by volume: terms of order 1 cancel in it
 constexpr int kHalvings = 24;
 
 double largest_row(const Points& rows) {
@@ -63,6 +63,7 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     out.converged = true;
     return out;
   }
+  const double rounding = kRounding * std::abs(out.total.volume);
   bool exact = false, may_be_exact = true;
   Points g;
   while (out.iterations < options.most_iterations) {
@@ -79,7 +80,6 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     for (int halving = 0; halving < kHalvings && !taken; ++halving, times /= 2) {
       Points next = moved(mesh, x, d, times);
       Total there = total(next);
-      const double rounding = kRounding * std::abs(out.total.energy);
       const bool lower = there.energy <= out.total.energy + kArmijo * times * falls + rounding;
       if (!lower || inverts(out.total, there)) continue;
       x = std::move(next);

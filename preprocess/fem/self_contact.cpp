@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/fem/self_contact.hpp"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace ecorche::fem {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kInside = 1e-6;  // of barycentric coordinates: what only touches is not inside
+
+/// Nodes of faces that one tet alone has.
+std::vector<std::int32_t> surface_nodes(const Tets& T) {
+  constexpr std::array<std::array<int, 3>, 4> kFaces{{{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}}};
+  std::vector<std::array<std::int32_t, 3>> faces;
+  faces.reserve(4 * static_cast<std::size_t>(T.rows()));
+  for (Eigen::Index t = 0; t < T.rows(); ++t) {
+    for (const auto& face : kFaces) {
+      std::array<std::int32_t, 3> f{T(t, face[0]), T(t, face[1]), T(t, face[2])};
+      std::sort(f.begin(), f.end());
+      faces.push_back(f);
+    }
+  }
+  tbb::parallel_sort(faces.begin(), faces.end());
+  std::vector<std::int32_t> out;
+  for (std::size_t i = 0; i < faces.size();) {
+    std::size_t end = i + 1;
+    while (end < faces.size() && faces[end] == faces[i]) ++end;
+    if (end == i + 1) out.insert(out.end(), faces[i].begin(), faces[i].end());
+    i = end;
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+bool holds(const Points& x, const Tets& T, Eigen::Index t, const Vector3d& p) {
+  const Vector3d a = x.row(T(t, 0)), b = x.row(T(t, 1)), c = x.row(T(t, 2)), d = x.row(T(t, 3));
+  const double all = tet_det(a, b, c, d);
+  if (!(all > 0)) return false;
+  const double least = kInside * all;
+  return tet_det(p, b, c, d) > least && tet_det(a, p, c, d) > least && tet_det(a, b, p, d) > least &&
+         tet_det(a, b, c, p) > least;
+}
+
+/// Tets by the cells of a grid that their boxes touch.
+class Grid {
+ public:
+  Grid(const Points& x, const Tets& T) : x_(x), T_(T) {
+    low_ = x.colwise().minCoeff().transpose();
+    const Vector3d size = x.colwise().maxCoeff().transpose() - low_;
+    cell_ = 1.5 * std::cbrt(std::max(size.prod(), 1.0) / static_cast<double>(std::max<Eigen::Index>(T.rows(), 1)));
+    for (int a = 0; a < 3; ++a) count_[a] = static_cast<std::int64_t>(size[a] / cell_) + 1;
+    for (Eigen::Index t = 0; t < T.rows(); ++t) {
+      Vector3d least = x.row(T(t, 0)), most = least;
+      for (int c = 1; c < 4; ++c) {
+        least = least.cwiseMin(x.row(T(t, c)).transpose());
+        most = most.cwiseMax(x.row(T(t, c)).transpose());
+      }
+      const auto from = cell(least), to = cell(most);
+      for (std::int64_t i = from[0]; i <= to[0]; ++i)
+        for (std::int64_t j = from[1]; j <= to[1]; ++j)
+          for (std::int64_t k = from[2]; k <= to[2]; ++k) entries_.push_back({key(i, j, k), t});
+    }
+    tbb::parallel_sort(entries_.begin(), entries_.end());
+  }
+
+  /// Whether a tet that has not `node` as a corner holds its place.
+  bool foreign(std::int32_t node) const {
+    const Vector3d p = x_.row(node);
+    const auto [i, j, k] = cell(p);
+    const std::int64_t here = key(i, j, k);
+    for (auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair{here, Eigen::Index{0}});
+         at != entries_.end() && at->first == here; ++at) {
+      const auto tet = T_.row(at->second);
+      if (std::find(tet.begin(), tet.end(), node) == tet.end() && holds(x_, T_, at->second, p)) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::array<std::int64_t, 3> cell(const Vector3d& p) const {
+    std::array<std::int64_t, 3> out{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      out[a] = std::clamp<std::int64_t>(static_cast<std::int64_t>((p[axis] - low_[axis]) / cell_), 0, count_[a] - 1);
+    }
+    return out;
+  }
+  std::int64_t key(std::int64_t i, std::int64_t j, std::int64_t k) const {
+    return (i * count_[1] + j) * count_[2] + k;
+  }
+
+  const Points& x_;
+  const Tets& T_;
+  Vector3d low_;
+  double cell_ = 1;
+  std::array<std::int64_t, 3> count_{};
+  std::vector<std::pair<std::int64_t, Eigen::Index>> entries_;
+};
+
+std::vector<std::uint8_t> inside(const Points& x, const Tets& T, const std::vector<std::int32_t>& nodes) {
+  const Grid grid(x, T);
+  std::vector<std::uint8_t> out(nodes.size(), 0);
+  tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) { out[n] = grid.foreign(nodes[n]) ? 1 : 0; });
+  return out;
+}
+
+}  // namespace
+
+SelfContact self_contact(const Points& X, const Points& x, const Tets& T) {
+  const std::vector<std::int32_t> nodes = surface_nodes(T);
+  const std::vector<std::uint8_t> at_rest = inside(X, T, nodes), posed = inside(x, T, nodes);
+  SelfContact out;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (posed[n] == 0 || at_rest[n] != 0) continue;
+    ++out.nodes;
+    out.at += x.row(nodes[n]).transpose();
+  }
+  if (out.nodes > 0) out.at /= static_cast<double>(out.nodes);
+  return out;
+}
+
+}  // namespace ecorche::fem

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <numbers>
+
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/values/error.hpp>
+#include "preprocess/fem/reference.hpp"
+#include "tests/support/toy_model.hpp"
+#include "tests/unit/weights/box_mesh.hpp"
+
+namespace ecorche::fem {
+namespace {
+
+/// The toy beam with a bone along its corner in each segment, 30 mm apart at the joints.
+Model boned() {
+  Model model = test::toy_model();
+  std::vector<std::int32_t> order;
+  std::vector<std::uint16_t> label(model.tet_count(), TetMesh::soft);
+  for (std::size_t t = 0; t < model.tet_count(); ++t) {
+    Eigen::RowVector3f middle = Eigen::RowVector3f::Zero();
+    for (int c = 0; c < 4; ++c) middle += model.nodes.row(model.tets(static_cast<Eigen::Index>(t), c)) / 4;
+    if (middle.x() > 0 || middle.y() > 0) continue;
+    const float z = middle.z();
+    label[t] = z < 83 ? 1 : z > 117 && z < 183 ? 2 : z > 217 ? 3 : TetMesh::soft;
+  }
+  model.tet_label = label;
+  model.bone_segment = {0, 1, 2};
+  return model;
+}
+
+Pose bent(const Model& model, double degrees) {
+  Pose pose = Pose::rest(model.segment_count());
+  pose.rotation[1] = Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitX());
+  return pose;
+}
+
+/// LBS, as it is written.
+std::vector<float> skinned(const Model& model, const Pose& pose) {
+  const auto segments = kinematics::forward(model.rig, pose);
+  std::vector<float> out;
+  for (std::size_t n = 0; n < model.node_count(); ++n) {
+    const Eigen::Vector3d X = model.nodes.row(static_cast<Eigen::Index>(n)).cast<double>();
+    Eigen::Vector3d x = Eigen::Vector3d::Zero();
+    for (auto e = model.weights.offsets[n]; e < model.weights.offsets[n + 1]; ++e)
+      x += static_cast<double>(model.weights.weight[e]) * (segments[model.weights.segment[e]] * X);
+    for (Eigen::Index c = 0; c < 3; ++c) out.push_back(static_cast<float>(x[c]));
+  }
+  return out;
+}
+
+TEST(Body, HoldsBonesAndLeavesOutWhatNothingShapes) {
+  Model model = boned();
+  // A tet of its own, far off; and one that hangs on two nodes of a bone, a hinge: its part is the whole flesh.
+  const Eigen::Index n = model.nodes.rows(), t = model.tets.rows();
+  model.nodes.conservativeResize(n + 6, 3);
+  model.nodes.bottomRows(6) << 500, 0, 0, 510, 0, 0, 500, 10, 0, 500, 0, 10, -30, -30, 10, -40, -30, 10;
+  model.tets.conservativeResize(t + 2, 4);
+  model.tets.row(t) << static_cast<int>(n), static_cast<int>(n + 1), static_cast<int>(n + 2), static_cast<int>(n + 3);
+  model.tets.row(t + 1) << 0, static_cast<int>(n + 5), static_cast<int>(n + 4), 9;
+  model.tet_label.insert(model.tet_label.end(), 2, TetMesh::soft);
+  const auto corner = [&](int c) { return model.nodes.row(model.tets(t + 1, c)); };
+  if (tet_det(corner(0), corner(1), corner(2), corner(3)) < 0) std::swap(model.tets(t + 1, 0), model.tets(t + 1, 1));
+  for (const Element element : {Element::p1, Element::p2p0}) {
+    const Body body = body_of(model, element);
+    std::size_t bone = 0, on_bones = 0, soft = 0;
+    std::vector<std::int32_t> segment(static_cast<std::size_t>(n + 6), -1);
+    for (std::size_t i = 0; i < model.tet_count(); ++i)
+      for (int c = 0; c < 4 && model.tet_label[i] != TetMesh::soft; ++c)
+        segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] = model.tet_label[i] - 1;
+    for (std::size_t i = 0; i < model.tet_count(); ++i) {
+      int held = 0;
+      for (int c = 0; c < 4; ++c) held += segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] >= 0 ? 1 : 0;
+      ++(model.tet_label[i] != TetMesh::soft ? bone : soft);
+      if (model.tet_label[i] == TetMesh::soft && held == 4) ++on_bones;
+    }
+    EXPECT_GT(bone, 50U);
+    EXPECT_EQ(body.soft_tets, soft);
+    EXPECT_EQ(body.on_bones, on_bones);
+    EXPECT_EQ(body.floating, 1U);
+    EXPECT_EQ(body.mesh.tets(), soft - on_bones - 1);
+    EXPECT_TRUE(std::equal(segment.begin(), segment.end(), body.segment.begin()));
+    for (std::size_t i = 0; i < body.segment.size(); ++i)
+      if (body.segment[i] >= 0) EXPECT_LT(body.mesh.free[i], 0);
+    EXPECT_LT(body.mesh.free[static_cast<std::size_t>(n)], 0);
+  }
+}
+
+TEST(Reference, OfTheRestPoseIsRest) {
+  const Model model = boned();
+  const Pose rest = bent(model, 0);
+  const Reference solved = solve_pose(model, rest, skinned(model, rest), {}, {});
+  EXPECT_TRUE(solved.trusted());
+  EXPECT_LT((solved.nodes - model.nodes.cast<double>()).cwiseAbs().maxCoeff(), 1e-4);
+  EXPECT_NEAR(solved.posed_mm3, solved.rest_mm3, 1e-6 * solved.rest_mm3);
+  EXPECT_EQ(solved.to_skinned.nodes, 0U);
+}
+
+TEST(Reference, IsOneSolutionFromTwoStartsForAnyNumberOfThreads) {
+  const Model model = boned();
+  const Pose pose = bent(model, 45);
+  const auto segments = kinematics::forward(model.rig, pose);
+  const std::vector<float> start = skinned(model, pose);
+  for (const Element element : {Element::p1, Element::p2p0}) {
+    ReferenceOptions options;
+    options.element = element;
+    Points first;
+    for (const int threads : {1, 2}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+      const Reference solved = solve_pose(model, pose, start, options, {});
+      EXPECT_TRUE(solved.trusted());
+      EXPECT_EQ(solved.from, "skinned");
+      EXPECT_LT(solved.between_starts_mm, 1e-3);
+      EXPECT_LT(solved.newton.residual, 1e-4);
+      EXPECT_EQ(solved.newton.total.inverted_tets, 0U);
+      EXPECT_LT(std::abs(solved.posed_mm3 / solved.rest_mm3 - 1), 0.02);
+      EXPECT_GT(solved.to_skinned.nodes, 50U);
+      EXPECT_GT(solved.to_skinned.max_mm, 1);
+      EXPECT_GE(solved.to_skinned.max_mm, solved.to_skinned.p95_mm);
+      EXPECT_GE(solved.to_skinned.p95_mm, solved.to_skinned.mean_mm);
+      if (threads == 1) first = solved.nodes;
+      EXPECT_EQ(solved.nodes, first);
+      const Body body = body_of(model, element);
+      Points held = solved.nodes;
+      for (std::size_t n = 0; n < solved.solved.size(); ++n)
+        if (body.segment[n] >= 0) EXPECT_EQ(solved.solved[n], 0);
+    }
+  }
+}
+
+TEST(Reference, SaysWhereItIsNotToBeBelieved) {
+  const Model model = boned();
+  const Pose pose = bent(model, 140);
+  const Reference solved = solve_pose(model, pose, skinned(model, pose), {}, {});
+  EXPECT_FALSE(solved.trusted());
+  const Pose mild = bent(model, 20);
+  ReferenceOptions one;
+  one.two_starts = false;
+  const Reference alone = solve_pose(model, mild, skinned(model, mild), one, {});
+  EXPECT_TRUE(alone.converged());
+  EXPECT_FALSE(alone.trusted());
+}
+
+TEST(Reference, RefusesABodyWithoutBones) {
+  Model model = boned();
+  model.tet_label.assign(model.tet_count(), TetMesh::soft);
+  try {
+    solve_pose(model, bent(model, 0), skinned(model, bent(model, 0)), {}, {});
+    FAIL() << "solved for a body that nothing holds";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::data);
+    EXPECT_NE(error.problem().find("no soft tet hangs on a bone"), std::string::npos) << error.what();
+  }
+}
+
+/// A node of the surface in a tet that is not its own, asked of all pairs.
+TEST(SelfContact, AgreesWithAllPairs) {
+  const TetMesh box = test::box_mesh({3, 3, 3}, 10);
+  Points X(2 * box.V.rows(), 3);
+  X.topRows(box.V.rows()) = box.V;
+  X.bottomRows(box.V.rows()) = box.V.rowwise() + Eigen::RowVector3d(40, 0, 0);
+  Tets T(2 * box.T.rows(), 4);
+  T.topRows(box.T.rows()) = box.T;
+  T.bottomRows(box.T.rows()) = box.T.array() + static_cast<std::int32_t>(box.V.rows());
+  for (const double into : {5.0, 13.0, 22.7}) {
+    Points x = X;
+    x.bottomRows(box.V.rows()).rowwise() += Eigen::RowVector3d(-into, 3.3, -4.1);
+    std::size_t count = 0;
+    for (Eigen::Index n = 0; n < x.rows(); ++n) {
+      const Eigen::RowVector3d at = X.row(n).array() - (n < box.V.rows() ? 0 : 40) * Eigen::Array3d::UnitX().transpose();
+      if ((at.array() > 0.1 && at.array() < 29.9).all()) continue;  // no node of the surface
+      const bool first = n < box.V.rows();
+      const Eigen::RowVector3d low = x.row(first ? box.V.rows() : 0), p = x.row(n) - low;
+      if ((p.array() > 0 && p.array() < 30).all()) ++count;
+    }
+    const SelfContact found = self_contact(X, x, T);
+    EXPECT_EQ(found.nodes, count) << into;
+    EXPECT_EQ(count > 0, into > 10);
+  }
+  EXPECT_EQ(self_contact(X, X, T).nodes, 0U);
+}
+
+}  // namespace
+}  // namespace ecorche::fem
