@@ -21,31 +21,35 @@ json warnings_of(const fem::Reference& solved, bool two_starts) {
   if (!solved.converged() || solved.inverted()) {
     out.push_back(warning(
         "fem_no_solution",
-        solved.converged() ? fmt::format("finite elements end with {} tets inside out; the body is left as skinned",
-                                         solved.newton.total.inverted_tets)
-                           : fmt::format("finite elements do not converge: from rest they come {:.0f} % of the way; the "
-                                         "body is left as skinned",
-                                         100 * solved.reached),
+        solved.converged()
+            ? fmt::format("finite elements end with {} tets inside out; the body is left as skinned",
+                          solved.newton.total.inverted_tets)
+            : fmt::format("finite elements do not converge: from rest they come {:.0f} % of the way; the "
+                          "body is left as skinned",
+                          100 * solved.reached),
         "turn the joints less: this is beyond the range of a solution without contact"));
     return out;
   }
   if (!two_starts) {
-    out.push_back(warning("fem_one_start", "finite elements were solved from one start alone", "leave out --one-start"));
+    out.push_back(warning("fem_one_start", "finite elements were solved from one start alone",
+                          "leave out --one-start"));
   } else if (!solved.same_from_two_starts()) {
     const bool both = solved.skinned_good && solved.rest_good;
-    out.push_back(warning(
-        "fem_two_solutions",
-        both ? fmt::format("two starts of finite elements end {:.1f} mm apart, more than {:.1f} mm: there is more than "
-                           "one balance",
-                           solved.between_starts_mm, fem::kSameMm)
-             : fmt::format("finite elements find a balance from one start alone ({})", solved.from),
-        "turn the joints less: flesh that creases has no single shape"));
+    out.push_back(
+        warning("fem_two_solutions",
+                both ? fmt::format("two starts of finite elements end {:.1f} mm apart, more than {:.1f} mm: "
+                                   "there is more than "
+                                   "one balance",
+                                   solved.between_starts_mm, fem::kSameMm)
+                     : fmt::format("finite elements find a balance from one start alone ({})", solved.from),
+                "turn the joints less: flesh that creases has no single shape"));
   }
   if (solved.contact.nodes > 0) {
-    json contact = warning(
-        "fem_contact",
-        fmt::format("the flesh runs through itself at {} nodes: finite elements know no contact here", solved.contact.nodes),
-        "turn the joints less: the range of this solution ends where skin touches skin");
+    json contact =
+        warning("fem_contact",
+                fmt::format("the flesh runs through itself at {} nodes: finite elements know no contact here",
+                            solved.contact.nodes),
+                "turn the joints less: the range of this solution ends where skin touches skin");
     const Eigen::Vector3d& at = solved.contact.at;
     contact["at_mm"] = {at.x(), at.y(), at.z()};
     out.push_back(std::move(contact));
@@ -83,45 +87,50 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
   }
   const bool compared = options.two_starts && solved.skinned_good && solved.rest_good;
   const fem::Seconds& seconds = solved.newton.seconds;
-  return {{"verdict", solved.trusted() ? "pass" : "warn"},
-          {"element", settings.element},
-          {"material", settings.material},
-          {"poisson", options.poisson},
-          {"tets", solved.tets},
-          {"free_nodes", solved.free_nodes},
-          {"left_out", {{"on_bones", solved.on_bones}, {"floating", solved.floating}, {"of_soft_tets", solved.soft_tets}}},
-          {"converged", solved.converged()},
-          {"start", solved.from},
-          {"iterations", solved.newton.iterations},
-          {"factors", solved.newton.factors},
-          {"residual", solved.newton.residual},
-          {"last_step_mm", solved.newton.step_mm},
-          {"energy_mm3", solved.newton.total.energy},
-          {"inverted_tets", solved.newton.total.inverted_tets},
-          {"volume_change", solved.posed_mm3 / solved.rest_mm3 - 1},
-          {"to_cor",
-           {{"nodes", solved.to_skinned.nodes},
-            {"moved_mm", fem::kMovedMm},
-            {"mean_mm", solved.to_skinned.mean_mm},
-            {"p95_mm", solved.to_skinned.p95_mm},
-            {"max_mm", solved.to_skinned.max_mm}}},
-          {"two_starts",
-           {{"distance_mm", compared ? json(solved.between_starts_mm) : json()},
-            {"threshold_mm", fem::kSameMm},
-            {"skinned", solved.skinned_good},
-            {"rest", solved.rest_good},
-            {"rest_reached", solved.reached},
-            {"rest_steps", solved.steps},
-            {"rest_refused", solved.refused}}},
-          {"contact_nodes", solved.contact.nodes},
-          {"seconds",
-           {{"build", solved.seconds_build},
-            {"skinned_start", solved.seconds_skinned},
-            {"rest_start", solved.seconds_rest},
-            {"of_solution",
-             {{"assemble", seconds.assemble}, {"factor", seconds.factor}, {"solve", seconds.solve}, {"energy", seconds.energy}}}}},
-          {"warnings", warnings_of(solved, options.two_starts)},
-          {"purpose", "training and education, not planning of surgery"}};
+  return {
+      {"verdict", solved.trusted() ? "pass" : "warn"},
+      {"element", settings.element},
+      {"material", settings.material},
+      {"poisson", options.poisson},
+      {"tets", solved.tets},
+      {"free_nodes", solved.free_nodes},
+      {"left_out",
+       {{"on_bones", solved.on_bones}, {"floating", solved.floating}, {"of_soft_tets", solved.soft_tets}}},
+      {"converged", solved.converged()},
+      {"start", solved.from},
+      {"iterations", solved.newton.iterations},
+      {"factors", solved.newton.factors},
+      {"residual", solved.newton.residual},
+      {"last_step_mm", solved.newton.step_mm},
+      {"energy_mm3", solved.newton.total.energy},
+      {"inverted_tets", solved.newton.total.inverted_tets},
+      {"volume_change", solved.posed_mm3 / solved.rest_mm3 - 1},
+      {"to_cor",
+       {{"nodes", solved.to_skinned.nodes},
+        {"moved_mm", fem::kMovedMm},
+        {"mean_mm", solved.to_skinned.mean_mm},
+        {"p95_mm", solved.to_skinned.p95_mm},
+        {"max_mm", solved.to_skinned.max_mm}}},
+      {"two_starts",
+       {{"distance_mm", compared ? json(solved.between_starts_mm) : json()},
+        {"threshold_mm", fem::kSameMm},
+        {"skinned", solved.skinned_good},
+        {"rest", solved.rest_good},
+        {"rest_reached", solved.reached},
+        {"rest_steps", solved.steps},
+        {"rest_refused", solved.refused}}},
+      {"contact_nodes", solved.contact.nodes},
+      {"seconds",
+       {{"build", solved.seconds_build},
+        {"skinned_start", solved.seconds_skinned},
+        {"rest_start", solved.seconds_rest},
+        {"of_solution",
+         {{"assemble", seconds.assemble},
+          {"factor", seconds.factor},
+          {"solve", seconds.solve},
+          {"energy", seconds.energy}}}}},
+      {"warnings", warnings_of(solved, options.two_starts)},
+      {"purpose", "training and education, not planning of surgery"}};
 }
 
 void add_fem(const json& fem, json& quality) {
@@ -134,13 +143,15 @@ void add_fem(const json& fem, json& quality) {
 std::string fem_line(const json& fem) {
   const json &to_cor = fem["to_cor"], &distance = fem["two_starts"]["distance_mm"];
   return fmt::format(
-      "  finite elements: {}, {} at {:g}, {} tets, {} iterations, residual {:.0e}, volume {:+.2f} %; from cor {:.1f} mm (mean), "
+      "  finite elements: {}, {} at {:g}, {} tets, {} iterations, residual {:.0e}, volume {:+.2f} %; from "
+      "cor {:.1f} mm (mean), "
       "{:.1f} (95 %), {:.1f} (most); two starts {}\n",
       fem["verdict"].get<std::string>(), fem["element"].get<std::string>(), fem["poisson"].get<double>(),
       fem["tets"].get<std::size_t>(), fem["iterations"].get<int>(), fem["residual"].get<double>(),
-      100 * fem["volume_change"].get<double>(), to_cor["mean_mm"].get<double>(), to_cor["p95_mm"].get<double>(),
-      to_cor["max_mm"].get<double>(),
-      distance.is_null() ? std::string("not compared") : fmt::format("{:.1e} mm apart", distance.get<double>()));
+      100 * fem["volume_change"].get<double>(), to_cor["mean_mm"].get<double>(),
+      to_cor["p95_mm"].get<double>(), to_cor["max_mm"].get<double>(),
+      distance.is_null() ? std::string("not compared")
+                         : fmt::format("{:.1e} mm apart", distance.get<double>()));
 }
 
 }  // namespace ecorche::app

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose by finite elements: what was asked for, the solution put into the posed body, and what is said of it.
+// A pose by finite elements: what was asked for, the solution put into the posed body, and what is said of
+// it.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -23,8 +23,8 @@ class MeasuredPose {
   /// Unfolds both alike; what that did, as `unfolded` of quality.json.
   nlohmann::json unfold(const Context& context);
 
-  /// Puts nodes of the still body where `nodes` (3 * #nodes) has them, those with `moved`, and in both all that
-  /// hangs on them.
+  /// Puts nodes of the still body where `nodes` (3 * #nodes) has them, those with `moved`, and in both all
+  /// that hangs on them.
   void replace(const std::vector<float>& nodes, const std::vector<std::uint8_t>& moved);
 
   const runtime::BodyPoser& poser() const { return poser_; }

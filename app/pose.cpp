@@ -85,7 +85,8 @@ class FrameWriter {
   fs::path next(const std::string& name) {
     context_.check_stop();
     const std::size_t files = plan_.tissues.size() * settings_.formats.size() + plan_.volumes.size() +
-                              (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) + (settings_.by_fem() ? 2 : 1);
+                              (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) +
+                              (settings_.by_fem() ? 2 : 1);
     context_.report(static_cast<double>(written_.size()) / static_cast<double>(files));
     written_.push_back((folder_ / name).string());
     return stage_ / name;
@@ -221,7 +222,8 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
   const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model);
-  const runtime::Skinning skinning = runtime::skinning_from_name(settings.by_fem() ? "cor" : settings.skinning);
+  const runtime::Skinning skinning =
+      runtime::skinning_from_name(settings.by_fem() ? "cor" : settings.skinning);
   MeasuredPose posed(poser);
   io::DicomFacts dicom;
   if (settings.writes_dicom())

@@ -35,7 +35,8 @@ class EigenSolver final : public SpdSolver {
     Eigen::SimplicialLLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>> cholesky;
   };
 
-  void take(std::shared_ptr<State> state, const SparseMatrix& A, const Context& context, void (*work)(State&)) {
+  void take(std::shared_ptr<State> state, const SparseMatrix& A, const Context& context,
+            void (*work)(State&)) {
     state->A = A;
     state_ = nullptr;
     context.run_unstoppable([state, work] { work(*state); });

@@ -25,8 +25,8 @@ class SpdSolver {
   virtual std::string_view name() const = 0;
   /// Factors `A`, of which the lower triangle is read. Throws Error{data} when A is not positive definite.
   virtual void factor(const SparseMatrix& A, const Context& context) = 0;
-  /// The same for a matrix whose entries stand where those of the last one stood: what depends on that alone is
-  /// kept. After a refusal, and first of all, it is `factor`.
+  /// The same for a matrix whose entries stand where those of the last one stood: what depends on that alone
+  /// is kept. After a refusal, and first of all, it is `factor`.
   virtual void refactor(const SparseMatrix& A, const Context& context) { factor(A, context); }
   /// Solves A X = B. Only after `factor`.
   virtual Block solve(const Block& B, const Context& context) const = 0;

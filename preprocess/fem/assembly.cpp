@@ -47,7 +47,8 @@ Assembly::Assembly(const Mesh& mesh) : mesh_(mesh) {
         const std::int32_t i = mesh.free[static_cast<std::size_t>(mesh.corner[t * nodes + a])];
         const std::int32_t j = mesh.free[static_cast<std::size_t>(mesh.corner[t * nodes + b])];
         if (i < 0 || j < 0) continue;
-        pairs.push_back(static_cast<std::uint64_t>(std::min(i, j)) << 32U | static_cast<std::uint64_t>(std::max(i, j)));
+        pairs.push_back(static_cast<std::uint64_t>(std::min(i, j)) << 32U |
+                        static_cast<std::uint64_t>(std::max(i, j)));
       }
     }
   }

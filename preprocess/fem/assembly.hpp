@@ -43,12 +43,12 @@ class Assembly {
   void for_colours(F&& of_tet) const;
 
   const Mesh& mesh_;
-  solve::SparseMatrix pattern_;           // its values are 0
-  std::vector<std::int32_t> first_;       // by free node: where its neighbours begin
-  std::vector<std::int32_t> neighbour_;   // free nodes from itself on, ascending
-  std::vector<std::uint32_t> order_;      // tets by colour
-  std::vector<std::size_t> colour_;       // where each begins in order_
-  bool overflow_ = false;                 // the last colour's tets share nodes
+  solve::SparseMatrix pattern_;          // its values are 0
+  std::vector<std::int32_t> first_;      // by free node: where its neighbours begin
+  std::vector<std::int32_t> neighbour_;  // free nodes from itself on, ascending
+  std::vector<std::uint32_t> order_;     // tets by colour
+  std::vector<std::size_t> colour_;      // where each begins in order_
+  bool overflow_ = false;                // the last colour's tets share nodes
 };
 
 }  // namespace ecorche::fem

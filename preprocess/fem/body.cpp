@@ -48,7 +48,8 @@ Body body_of(const Model& model, Element element) {
     if (model.tet_label[t] == TetMesh::soft) continue;
     bone_tets.push_back(static_cast<std::int32_t>(t));
     for (int c = 0; c < 4; ++c)
-      out.segment[at(model.tets(static_cast<Eigen::Index>(t), c))] = model.bone_segment[model.tet_label[t] - 1U];
+      out.segment[at(model.tets(static_cast<Eigen::Index>(t), c))] =
+          model.bone_segment[model.tet_label[t] - 1U];
   }
   const auto is_held = [&](std::int32_t node) { return out.segment[at(node)] >= 0; };
   std::vector<std::int32_t> soft;

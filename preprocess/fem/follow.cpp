@@ -34,7 +34,8 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
     NewtonResult told;
     Points g;
     bool exact = false;
-    const Points d = steps.step(material, x, &increment, exact, options.last.linear_tolerance, g, told, context);
+    const Points d =
+        steps.step(material, x, &increment, exact, options.last.linear_tolerance, g, told, context);
     Points next = moved(assembly.mesh(), goal, d, 1);
     bool good = !inverts(rest, assembly.total(material, next));
     if (good) {

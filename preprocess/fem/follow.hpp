@@ -9,9 +9,9 @@
 namespace ecorche::fem {
 
 struct FollowOptions {
-  NewtonOptions last;              ///< of the pose itself
-  double between_mm = 0.1;         ///< tolerance of the poses on the way
-  double first_step = 0.25;        ///< of the way
+  NewtonOptions last;             ///< of the pose itself
+  double between_mm = 0.1;        ///< tolerance of the poses on the way
+  double first_step = 0.25;       ///< of the way
   double least_step = 1.0 / 256;  ///< smaller ones give up
 };
 
@@ -21,8 +21,8 @@ struct FollowResult {
   NewtonResult newton;  ///< of the last pose; iterations, factors and seconds of all
 };
 
-/// `held_at(t, x)` writes the places of held nodes at t of the way into their rows. `x`: at rest, all at t = 0;
-/// then as far as it came. A step first moves the free nodes by the linear answer to the held ones' move;
+/// `held_at(t, x)` writes the places of held nodes at t of the way into their rows. `x`: at rest, all at t =
+/// 0; then as far as it came. A step first moves the free nodes by the linear answer to the held ones' move;
 /// where that inverts a tet, or Newton does not converge from there, the step is halved.
 FollowResult follow(const Assembly& assembly, const Material& material, StepSolver& steps,
                     const std::function<void(double t, Points& x)>& held_at, const FollowOptions& options,

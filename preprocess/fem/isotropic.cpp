@@ -33,7 +33,8 @@ Matrix9d hessian(const Principal& at, const Stretched& density, bool filtered) {
   if (filtered) {
     const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(scaling);
     if (eigen.eigenvalues()[0] < 0)
-      scaling = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+      scaling = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
+                eigen.eigenvectors().transpose();
   }
   // In the principal axes an entry F_ij couples with F_ji alone, and the diagonal ones with each other.
   Matrix9d local = Matrix9d::Zero();

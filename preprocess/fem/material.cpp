@@ -33,7 +33,8 @@ class StableNeoHookean final : public Material {
     const double over = (s.array() - 1).square().sum() + 2 * (s.array() - 1).sum();
     const double pull = mu_ * i / (i + 1);
     Stretched out;
-    out.energy = mu_ / 2 * (over - std::log1p(over / 4)) - 0.75 * mu_ * (j - 1) + own_ / 2 * (j - 1) * (j - 1);
+    out.energy =
+        mu_ / 2 * (over - std::log1p(over / 4)) - 0.75 * mu_ * (j - 1) + own_ / 2 * (j - 1) * (j - 1);
     out.stress = pull * s;
     out.curvature = pull * Matrix3d::Identity() + 2 * mu_ / ((i + 1) * (i + 1)) * s * s.transpose();
     out.twist.setConstant(pull);
@@ -64,7 +65,8 @@ class Corotational final : public Material {
     for (Eigen::Index k = 0; k < 3; ++k) {
       // Two stretches that cancel have no rotation of their own: the material's known flaw.
       const double sum = s.sum() - s[k];
-      out.twist[k] = 2 * mu + 2 * (lambda * trace - 2 * mu) / std::copysign(std::max(std::abs(sum), 1e-9), sum);
+      out.twist[k] =
+          2 * mu + 2 * (lambda * trace - 2 * mu) / std::copysign(std::max(std::abs(sum), 1e-9), sum);
     }
     return out;
   }

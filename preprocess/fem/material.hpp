@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What flesh costs to deform: energy densities of isotropic materials as functions of the principal stretches.
+// What flesh costs to deform: energy densities of isotropic materials as functions of the principal
+// stretches.
 #pragma once
 
 #include <Eigen/Core>

@@ -113,7 +113,8 @@ Mesh make_mesh(Element element, const Points& V, const Tets& T, const std::vecto
   for (std::size_t n = 0; n < held.size(); ++n)
     if (held[n] != 0) mesh.free[n] = -1;
   for (std::size_t m = 0; m < mesh.middle.size(); ++m)
-    if (std::binary_search(held_edges.begin(), held_edges.end(), mesh.middle[m])) mesh.free[held.size() + m] = -1;
+    if (std::binary_search(held_edges.begin(), held_edges.end(), mesh.middle[m]))
+      mesh.free[held.size() + m] = -1;
   for (std::int32_t& f : mesh.free)
     if (f == 0) f = static_cast<std::int32_t>(mesh.free_nodes++);
   return mesh;

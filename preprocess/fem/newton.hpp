@@ -33,16 +33,16 @@ struct NewtonResult {
   Seconds seconds;
 };
 
-/// The linear systems of one Assembly: conjugate gradients on the Hessian of now, preconditioned by the factor
-/// of an earlier one; factored again (its shape is kept) where that takes too many rounds.
+/// The linear systems of one Assembly: conjugate gradients on the Hessian of now, preconditioned by the
+/// factor of an earlier one; factored again (its shape is kept) where that takes too many rounds.
 class StepSolver {
  public:
   StepSolver(const Assembly& assembly, solve::SpdSolver& solver) : assembly_(assembly), solver_(solver) {}
 
   /// H d = -g, in rows of the free nodes. `exact` is set to false, and H assembled filtered, where the true
   /// Hessian is not positive definite. `g` comes out as of `x`, and of `increment` (Assembly::derivatives).
-  Points step(const Material& material, const Points& x, const Points* increment, bool& exact, double tolerance,
-              Points& g, NewtonResult& told, const Context& context);
+  Points step(const Material& material, const Points& x, const Points* increment, bool& exact,
+              double tolerance, Points& g, NewtonResult& told, const Context& context);
 
  private:
   bool conjugate(const solve::SparseMatrix& H, const Eigen::VectorXd& b, double tolerance, int rounds,

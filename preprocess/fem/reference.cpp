@@ -39,8 +39,7 @@ Distances distances(const Mesh& mesh, const Points& skinned, const Points& x) {
   std::vector<double> all;
   for (Eigen::Index n = 0; n < skinned.rows(); ++n) {
     if (mesh.free[static_cast<std::size_t>(n)] < 0) continue;
-    const double moved =
-        std::max((skinned.row(n) - mesh.X.row(n)).norm(), (x.row(n) - mesh.X.row(n)).norm());
+    const double moved = std::max((skinned.row(n) - mesh.X.row(n)).norm(), (x.row(n) - mesh.X.row(n)).norm());
     if (moved > kMovedMm) all.push_back((x.row(n) - skinned.row(n)).norm());
   }
   Distances out;

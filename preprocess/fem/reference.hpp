@@ -34,9 +34,10 @@ struct Distances {
 };
 
 struct Reference {
-  Points nodes;                       ///< #nodes of the model, posed
-  std::vector<std::uint8_t> solved;   ///< #nodes: 1 where `nodes` is finite elements', 0 where it is skinning's
-  std::string from;                   ///< the start whose solution this is: `skinned` or `rest`
+  Points nodes;  ///< #nodes of the model, posed
+  std::vector<std::uint8_t>
+      solved;        ///< #nodes: 1 where `nodes` is finite elements', 0 where it is skinning's
+  std::string from;  ///< the start whose solution this is: `skinned` or `rest`
   std::size_t tets = 0, free_nodes = 0;
   std::size_t soft_tets = 0, on_bones = 0, floating = 0;  ///< see Body
   double rest_mm3 = 0, posed_mm3 = 0;                     ///< of the tets solved for
@@ -52,9 +53,7 @@ struct Reference {
   bool converged() const { return newton.converged; }
   bool inverted() const { return newton.total.inverted_tets > 0; }
   bool same_from_two_starts() const { return skinned_good && rest_good && between_starts_mm <= kSameMm; }
-  bool trusted() const {
-    return converged() && !inverted() && same_from_two_starts() && contact.nodes == 0;
-  }
+  bool trusted() const { return converged() && !inverted() && same_from_two_starts() && contact.nodes == 0; }
 };
 
 /// `pose`: within limits and coupled, its root at rest. `skinned`: 3 * #nodes as skinning poses them, root at

@@ -57,7 +57,8 @@ class Grid {
   Grid(const Points& x, const Tets& T) : x_(x), T_(T) {
     low_ = x.colwise().minCoeff().transpose();
     const Vector3d size = x.colwise().maxCoeff().transpose() - low_;
-    cell_ = 1.5 * std::cbrt(std::max(size.prod(), 1.0) / static_cast<double>(std::max<Eigen::Index>(T.rows(), 1)));
+    cell_ = 1.5 *
+            std::cbrt(std::max(size.prod(), 1.0) / static_cast<double>(std::max<Eigen::Index>(T.rows(), 1)));
     for (int a = 0; a < 3; ++a) count_[a] = static_cast<std::int64_t>(size[a] / cell_) + 1;
     for (Eigen::Index t = 0; t < T.rows(); ++t) {
       Vector3d least = x.row(T(t, 0)), most = least;
@@ -91,7 +92,8 @@ class Grid {
     std::array<std::int64_t, 3> out{};
     for (std::size_t a = 0; a < 3; ++a) {
       const auto axis = static_cast<Eigen::Index>(a);
-      out[a] = std::clamp<std::int64_t>(static_cast<std::int64_t>((p[axis] - low_[axis]) / cell_), 0, count_[a] - 1);
+      out[a] = std::clamp<std::int64_t>(static_cast<std::int64_t>((p[axis] - low_[axis]) / cell_), 0,
+                                        count_[a] - 1);
     }
     return out;
   }
@@ -110,7 +112,8 @@ class Grid {
 std::vector<std::uint8_t> inside(const Points& x, const Tets& T, const std::vector<std::int32_t>& nodes) {
   const Grid grid(x, T);
   std::vector<std::uint8_t> out(nodes.size(), 0);
-  tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) { out[n] = grid.foreign(nodes[n]) ? 1 : 0; });
+  tbb::parallel_for(std::size_t{0}, nodes.size(),
+                    [&](std::size_t n) { out[n] = grid.foreign(nodes[n]) ? 1 : 0; });
   return out;
 }
 

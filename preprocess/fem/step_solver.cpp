@@ -33,11 +33,14 @@ void StepSolver::factor(const solve::SparseMatrix& H, NewtonResult& told, const 
   ++told.factors;
 }
 
-bool StepSolver::conjugate(const solve::SparseMatrix& H, const Eigen::VectorXd& b, double tolerance, int rounds,
-                           Eigen::VectorXd& d, bool& definite, NewtonResult& told, const Context& context) const {
+bool StepSolver::conjugate(const solve::SparseMatrix& H, const Eigen::VectorXd& b, double tolerance,
+                           int rounds, Eigen::VectorXd& d, bool& definite, NewtonResult& told,
+                           const Context& context) const {
   const Stopwatch watch(told.seconds.solve);
   const auto A = H.selfadjointView<Eigen::Lower>();
-  const auto precondition = [&](const Eigen::VectorXd& r) -> Eigen::VectorXd { return solver_.solve(r, context); };
+  const auto precondition = [&](const Eigen::VectorXd& r) -> Eigen::VectorXd {
+    return solver_.solve(r, context);
+  };
   d.setZero(b.size());
   Eigen::VectorXd r = b, z = precondition(r), p = z;
   double rz = r.dot(z);

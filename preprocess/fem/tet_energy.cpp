@@ -88,7 +88,8 @@ TetDerivatives tet_derivatives(const Mesh& mesh, const Material& material, std::
     for (int a = 0; a < nodes; ++a) {
       out.gradient.segment<3>(3 * a).noalias() += weight * P * B.row(a).transpose();
       out.hessian.middleRows<3>(3 * a).noalias() +=
-          weight * (HB.middleRows<3>(0) * B(a, 0) + HB.middleRows<3>(3) * B(a, 1) + HB.middleRows<3>(6) * B(a, 2));
+          weight *
+          (HB.middleRows<3>(0) * B(a, 0) + HB.middleRows<3>(3) * B(a, 1) + HB.middleRows<3>(6) * B(a, 2));
     }
     if (!mean) continue;
     const Eigen::Vector3d c(at.s[1] * at.s[2], at.s[2] * at.s[0], at.s[0] * at.s[1]);

@@ -20,15 +20,20 @@ TEST(Analytic, PatchTest) {
     for (const std::string_view name : material_names()) {
       SCOPED_TRACE(std::string(element_name(element)) + " " + std::string(name));
       TetMesh body = test::box_mesh({3, 3, 3}, 10);
-      const auto outside = [](const Vector3d& X) { return (X.array() < 0.1).any() || (X.array() > 29.9).any(); };
+      const auto outside = [](const Vector3d& X) {
+        return (X.array() < 0.1).any() || (X.array() > 29.9).any();
+      };
       for (Eigen::Index n = 0; n < body.V.rows(); ++n)  // inner nodes out of line
-        if (!outside(body.V.row(n).transpose())) body.V.row(n) += Eigen::RowVector3d(1.5, -1, 2) * std::sin(3.0 * static_cast<double>(n));
-      const Solved solved = solve(mesh_of(element, body, outside), *make_material(name, 0.45),
-                                  [&](const Vector3d& X, double t) -> Vector3d { return (1 - t) * X + t * affine(X); }, 1, 1e-10);
+        if (!outside(body.V.row(n).transpose()))
+          body.V.row(n) += Eigen::RowVector3d(1.5, -1, 2) * std::sin(3.0 * static_cast<double>(n));
+      const Solved solved = solve(
+          mesh_of(element, body, outside), *make_material(name, 0.45),
+          [&](const Vector3d& X, double t) -> Vector3d { return (1 - t) * X + t * affine(X); }, 1, 1e-10);
       ASSERT_TRUE(solved.follow.newton.converged);
       EXPECT_GT(solved.mesh.free_nodes, 7U);
       for (Eigen::Index n = 0; n < solved.x.rows(); ++n)
-        EXPECT_LT((solved.x.row(n).transpose() - affine(solved.mesh.X.row(n).transpose())).norm(), 1e-12 * 40);
+        EXPECT_LT((solved.x.row(n).transpose() - affine(solved.mesh.X.row(n).transpose())).norm(),
+                  1e-12 * 40);
     }
   }
 }
@@ -38,9 +43,11 @@ TEST(Analytic, PatchTest) {
 TEST(Analytic, GuidedBeamAgainstTimoshenko) {
   const double a = 10, L = 100, d = 0.01;
   const Solved solved =
-      solve(mesh_of(Element::p2, test::box_mesh({2, 2, 20}, 5), [&](const Vector3d& X) { return X.z() < 0.1 || X.z() > L - 0.1; }),
-            *make_material("stable_neo_hookean", 0),
-            [&](const Vector3d& X, double t) -> Vector3d { return X + (X.z() > L / 2 ? t * d : 0) * Vector3d::UnitX(); });
+      solve(mesh_of(Element::p2, test::box_mesh({2, 2, 20}, 5),
+                    [&](const Vector3d& X) { return X.z() < 0.1 || X.z() > L - 0.1; }),
+            *make_material("stable_neo_hookean", 0), [&](const Vector3d& X, double t) -> Vector3d {
+              return X + (X.z() > L / 2 ? t * d : 0) * Vector3d::UnitX();
+            });
   ASSERT_TRUE(solved.follow.newton.converged);
   double force = 0;
   for (Eigen::Index n = 0; n < solved.x.rows(); ++n)
@@ -56,19 +63,20 @@ TEST(Analytic, SquareTorsion) {
     double sum = x * y;
     for (int n = 0; n < 12; ++n) {
       const double k = (2 * n + 1) * pi / a;
-      sum -= 8 * a * a / std::pow(pi, 3) * (n % 2 == 0 ? 1 : -1) / std::pow(2 * n + 1, 3) * std::sin(k * x) * std::sinh(k * y) /
-             std::cosh(k * a / 2);
+      sum -= 8 * a * a / std::pow(pi, 3) * (n % 2 == 0 ? 1 : -1) / std::pow(2 * n + 1, 3) * std::sin(k * x) *
+             std::sinh(k * y) / std::cosh(k * a / 2);
     }
     return sum;
   };
   const TetMesh body = test::box_mesh({4, 4, 8}, 10);
   ASSERT_EQ(body.T.rows(), 768);
   const auto ratio = [&](Element element) {
-    const Solved solved = solve(mesh_of(element, body, [&](const Vector3d& X) { return X.z() < 0.1 || X.z() > L - 0.1; }),
-                                *make_material("stable_neo_hookean", poisson), [&](const Vector3d& X, double t) -> Vector3d {
-                                  const double x = X.x() - a / 2, y = X.y() - a / 2, rate = t * twist / L, turn = rate * X.z();
-                                  return X + Vector3d(-turn * y, turn * x, rate * warp(x, y));
-                                });
+    const Solved solved =
+        solve(mesh_of(element, body, [&](const Vector3d& X) { return X.z() < 0.1 || X.z() > L - 0.1; }),
+              *make_material("stable_neo_hookean", poisson), [&](const Vector3d& X, double t) -> Vector3d {
+                const double x = X.x() - a / 2, y = X.y() - a / 2, rate = t * twist / L, turn = rate * X.z();
+                return X + Vector3d(-turn * y, turn * x, rate * warp(x, y));
+              });
     EXPECT_TRUE(solved.follow.newton.converged);
     const double G = lame(poisson).mu;
     return solved.follow.newton.total.energy / (0.5 * 0.1406 * std::pow(a, 4) * G * twist * twist / L);
@@ -87,13 +95,15 @@ TEST(Analytic, TwistedCylinder) {
   TetMesh body = test::box_mesh({n, n, 6}, 1);
   for (Eigen::Index v = 0; v < body.V.rows(); ++v) {  // squares onto circles
     const double x = 2 * body.V(v, 0) / n - 1, y = 2 * body.V(v, 1) / n - 1, z = body.V(v, 2);
-    body.V.row(v) = Eigen::RowVector3d(R * x * std::sqrt(1 - y * y / 2), R * y * std::sqrt(1 - x * x / 2), z * L / 6);
+    body.V.row(v) =
+        Eigen::RowVector3d(R * x * std::sqrt(1 - y * y / 2), R * y * std::sqrt(1 - x * x / 2), z * L / 6);
   }
   const auto turned = [&](const Vector3d& X, double t) -> Vector3d {
     return Eigen::AngleAxisd(t * twist * X.z() / L, Vector3d::UnitZ()) * X;
   };
-  const Solved solved = solve(mesh_of(Element::p2p0, body, [&](const Vector3d& X) { return X.z() < 0.1 || X.z() > L - 0.1; }),
-                              *make_material("stable_neo_hookean", 0.499), turned, 0.5);
+  const Solved solved =
+      solve(mesh_of(Element::p2p0, body, [&](const Vector3d& X) { return X.z() < 0.1 || X.z() > L - 0.1; }),
+            *make_material("stable_neo_hookean", 0.499), turned, 0.5);
   ASSERT_TRUE(solved.follow.newton.converged);
   EXPECT_EQ(solved.follow.newton.total.inverted_tets, 0U);
   double worst = 0;
@@ -103,8 +113,8 @@ TEST(Analytic, TwistedCylinder) {
   EXPECT_LT(worst, 0.1);
 }
 
-/// A bar bent by 40 degrees about its middle, its ends held (pressed together farther, its surface creases): linear tets
-/// come to quadratic ones.
+/// A bar bent by 40 degrees about its middle, its ends held (pressed together farther, its surface creases):
+/// linear tets come to quadratic ones.
 TEST(Analytic, LinearTetsComeToQuadraticOnes) {
   const double L = 120, a = 40;
   const auto held = [&](const Vector3d& X) { return X.z() < 30.1 || X.z() > L - 30.1; };
@@ -114,11 +124,14 @@ TEST(Analytic, LinearTetsComeToQuadraticOnes) {
     return Eigen::AngleAxisd(t * std::numbers::pi / 4.5, Vector3d::UnitX()) * (X - about) + about;
   };
   const auto material = make_material("stable_neo_hookean", 0.45);
-  const Solved best = solve(mesh_of(Element::p2p0, test::box_mesh({4, 4, 12}, 10), held), *material, bent, 0.25, 1e-3);
+  const Solved best =
+      solve(mesh_of(Element::p2p0, test::box_mesh({4, 4, 12}, 10), held), *material, bent, 0.25, 1e-3);
   ASSERT_TRUE(best.follow.newton.converged);
   const auto off = [&](int times) {
     const double edge = 10.0 / times;
-    const Solved one = solve(mesh_of(Element::p1, test::box_mesh({4 * times, 4 * times, 12 * times}, edge), held), *material, bent, 0.25, 1e-3);
+    const Solved one =
+        solve(mesh_of(Element::p1, test::box_mesh({4 * times, 4 * times, 12 * times}, edge), held), *material,
+              bent, 0.25, 1e-3);
     EXPECT_TRUE(one.follow.newton.converged);
     double sum = 0;
     int count = 0;
@@ -127,7 +140,8 @@ TEST(Analytic, LinearTetsComeToQuadraticOnes) {
       if (held(X)) continue;
       const Vector3d at = X / edge;
       if ((at - at.array().round().matrix()).norm() > 1e-6) continue;  // no node of the linear mesh
-      const auto row = static_cast<Eigen::Index>(at[0] + (4 * times + 1) * (at[1] + (4 * times + 1) * at[2]) + 0.5);
+      const auto row =
+          static_cast<Eigen::Index>(at[0] + (4 * times + 1) * (at[1] + (4 * times + 1) * at[2]) + 0.5);
       sum += (one.x.row(row) - best.x.row(i)).norm();
       ++count;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bent bar against CalculiX (Debian's calculix-ccx): quadratic tets (C3D10), large displacements (NLGEOM), and its
-// own neo-Hookean material.
+// A bent bar against CalculiX (Debian's calculix-ccx): quadratic tets (C3D10), large displacements (NLGEOM),
+// and its own neo-Hookean material.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -19,7 +19,8 @@ namespace {
 using Eigen::Vector3d;
 
 /// The job of `mesh` whose held nodes go to their rows of `x` in so many steps.
-void write_job(const std::filesystem::path& file, const Mesh& mesh, const NeoHooke& material, const Points& x) {
+void write_job(const std::filesystem::path& file, const Mesh& mesh, const NeoHooke& material,
+               const Points& x) {
   std::ofstream out(file);
   out.precision(17);
   out << "*NODE, NSET=NALL\n";
@@ -37,7 +38,8 @@ void write_job(const std::filesystem::path& file, const Mesh& mesh, const NeoHoo
   for (std::size_t n = 0; n < mesh.free.size(); ++n) {
     if (mesh.free[n] >= 0) continue;
     const auto row = static_cast<Eigen::Index>(n);
-    for (Eigen::Index c = 0; c < 3; ++c) out << n + 1 << ", " << c + 1 << ", " << c + 1 << ", " << x(row, c) - mesh.X(row, c) << "\n";
+    for (Eigen::Index c = 0; c < 3; ++c)
+      out << n + 1 << ", " << c + 1 << ", " << c + 1 << ", " << x(row, c) - mesh.X(row, c) << "\n";
   }
   out << "*NODE FILE\nU\n*END STEP\n";
 }
@@ -52,13 +54,15 @@ Points read_frd(const std::filesystem::path& file, Eigen::Index nodes) {
     if (line.starts_with(" -3")) of_displacement = false;
     if (!of_displacement || !line.starts_with(" -1")) continue;
     const auto node = static_cast<Eigen::Index>(std::stoll(line.substr(3, 10))) - 1;
-    for (Eigen::Index c = 0; c < 3; ++c) out(node, c) = std::stod(line.substr(static_cast<std::size_t>(13 + 12 * c), 12));
+    for (Eigen::Index c = 0; c < 3; ++c)
+      out(node, c) = std::stod(line.substr(static_cast<std::size_t>(13 + 12 * c), 12));
   }
   return out;
 }
 
 TEST(CalculiX, ABentBarOfQuadraticTets) {
-  if (std::system("command -v ccx > /dev/null") != 0) GTEST_SKIP() << "ccx is not installed (scripts/setup --all)";
+  if (std::system("command -v ccx > /dev/null") != 0)
+    GTEST_SKIP() << "ccx is not installed (scripts/setup --all)";
   const double L = 160, a = 40;
   const auto held = [&](const Vector3d& X) { return X.z() < 30.1 || X.z() > L - 30.1; };
   const NeoHooke material(lame(0.45));
@@ -68,17 +72,20 @@ TEST(CalculiX, ABentBarOfQuadraticTets) {
       const Vector3d about(a / 2, a / 2, L / 2);
       return Eigen::AngleAxisd(t * degrees * std::numbers::pi / 180, Vector3d::UnitX()) * (X - about) + about;
     };
-    const Solved ours = solve(mesh_of(Element::p2, test::box_mesh({2, 2, 8}, 20), held), material, bent, 0.25, 1e-8);
+    const Solved ours =
+        solve(mesh_of(Element::p2, test::box_mesh({2, 2, 8}, 20), held), material, bent, 0.25, 1e-8);
     ASSERT_TRUE(ours.follow.newton.converged);
     const files::ScratchFolder folder(std::filesystem::temp_directory_path() / "ecorche_calculix");
     write_job(folder.path() / "bar.inp", ours.mesh, material, ours.x);
-    const std::string command = "cd '" + folder.path().string() + "' && OMP_NUM_THREADS=1 ccx -i bar > bar.log 2>&1";
+    const std::string command =
+        "cd '" + folder.path().string() + "' && OMP_NUM_THREADS=1 ccx -i bar > bar.log 2>&1";
     ASSERT_EQ(std::system(command.c_str()), 0);
     const Points theirs = read_frd(folder.path() / "bar.frd", ours.x.rows());
     double worst = 0;
     for (std::size_t n = 0; n < ours.mesh.free.size(); ++n) {
       const auto row = static_cast<Eigen::Index>(n);
-      if (ours.mesh.free[n] >= 0) worst = std::max(worst, (ours.x.row(row) - ours.mesh.X.row(row) - theirs.row(row)).norm());
+      if (ours.mesh.free[n] >= 0)
+        worst = std::max(worst, (ours.x.row(row) - ours.mesh.X.row(row) - theirs.row(row)).norm());
     }
     RecordProperty("worst_mm_at_" + std::to_string(static_cast<int>(degrees)), std::to_string(worst));
     EXPECT_LT(worst, 1e-3) << degrees << " degrees";

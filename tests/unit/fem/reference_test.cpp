@@ -52,26 +52,31 @@ std::vector<float> skinned(const Model& model, const Pose& pose) {
 
 TEST(Body, HoldsBonesAndLeavesOutWhatNothingShapes) {
   Model model = boned();
-  // A tet of its own, far off; and one that hangs on two nodes of a bone, a hinge: its part is the whole flesh.
+  // A tet of its own, far off; and one that hangs on two nodes of a bone, a hinge: its part is the whole
+  // flesh.
   const Eigen::Index n = model.nodes.rows(), t = model.tets.rows();
   model.nodes.conservativeResize(n + 6, 3);
   model.nodes.bottomRows(6) << 500, 0, 0, 510, 0, 0, 500, 10, 0, 500, 0, 10, -30, -30, 10, -40, -30, 10;
   model.tets.conservativeResize(t + 2, 4);
-  model.tets.row(t) << static_cast<int>(n), static_cast<int>(n + 1), static_cast<int>(n + 2), static_cast<int>(n + 3);
+  model.tets.row(t) << static_cast<int>(n), static_cast<int>(n + 1), static_cast<int>(n + 2),
+      static_cast<int>(n + 3);
   model.tets.row(t + 1) << 0, static_cast<int>(n + 5), static_cast<int>(n + 4), 9;
   model.tet_label.insert(model.tet_label.end(), 2, TetMesh::soft);
   const auto corner = [&](int c) { return model.nodes.row(model.tets(t + 1, c)); };
-  if (tet_det(corner(0), corner(1), corner(2), corner(3)) < 0) std::swap(model.tets(t + 1, 0), model.tets(t + 1, 1));
+  if (tet_det(corner(0), corner(1), corner(2), corner(3)) < 0)
+    std::swap(model.tets(t + 1, 0), model.tets(t + 1, 1));
   for (const Element element : {Element::p1, Element::p2p0}) {
     const Body body = body_of(model, element);
     std::size_t bone = 0, on_bones = 0, soft = 0;
     std::vector<std::int32_t> segment(static_cast<std::size_t>(n + 6), -1);
     for (std::size_t i = 0; i < model.tet_count(); ++i)
       for (int c = 0; c < 4 && model.tet_label[i] != TetMesh::soft; ++c)
-        segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] = model.tet_label[i] - 1;
+        segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] =
+            model.tet_label[i] - 1;
     for (std::size_t i = 0; i < model.tet_count(); ++i) {
       int held = 0;
-      for (int c = 0; c < 4; ++c) held += segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] >= 0 ? 1 : 0;
+      for (int c = 0; c < 4; ++c)
+        held += segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] >= 0 ? 1 : 0;
       ++(model.tet_label[i] != TetMesh::soft ? bone : soft);
       if (model.tet_label[i] == TetMesh::soft && held == 4) ++on_bones;
     }
@@ -107,7 +112,8 @@ TEST(Reference, IsOneSolutionFromTwoStartsForAnyNumberOfThreads) {
     options.element = element;
     Points first;
     for (const int threads : {1, 2}) {
-      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                      static_cast<std::size_t>(threads));
       const Reference solved = solve_pose(model, pose, start, options, {});
       EXPECT_TRUE(solved.trusted());
       EXPECT_EQ(solved.from, "skinned");
@@ -168,7 +174,8 @@ TEST(SelfContact, AgreesWithAllPairs) {
     x.bottomRows(box.V.rows()).rowwise() += Eigen::RowVector3d(-into, 3.3, -4.1);
     std::size_t count = 0;
     for (Eigen::Index n = 0; n < x.rows(); ++n) {
-      const Eigen::RowVector3d at = X.row(n).array() - (n < box.V.rows() ? 0 : 40) * Eigen::Array3d::UnitX().transpose();
+      const Eigen::RowVector3d at =
+          X.row(n).array() - (n < box.V.rows() ? 0 : 40) * Eigen::Array3d::UnitX().transpose();
       if ((at.array() > 0.1 && at.array() < 29.9).all()) continue;  // no node of the surface
       const bool first = n < box.V.rows();
       const Eigen::RowVector3d low = x.row(first ? box.V.rows() : 0), p = x.row(n) - low;

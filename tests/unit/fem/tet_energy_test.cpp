@@ -14,7 +14,9 @@ namespace {
 
 constexpr std::array kElements{Element::p1, Element::p2, Element::p2p0};
 
-TetMesh box_body() { return test::box_mesh({2, 2, 2}, 10); }
+TetMesh box_body() {
+  return test::box_mesh({2, 2, 2}, 10);
+}
 
 Points shaken(const Points& x, double by, unsigned seed) {
   std::mt19937 random(seed);
@@ -38,7 +40,8 @@ TEST(TetEnergy, DerivativesByDifferences) {
         const TetDerivatives at = tet_derivatives(mesh, *material, t, x, false);
         const TetDerivatives filtered = tet_derivatives(mesh, *material, t, x, true);
         const double size = at.hessian.norm();
-        EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(filtered.hessian).eigenvalues()[0], -1e-12 * size);
+        EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(filtered.hessian).eigenvalues()[0],
+                  -1e-12 * size);
         for (std::size_t a = 0; a < nodes; ++a) {
           for (Eigen::Index c = 0; c < 3; ++c) {
             Points more = x, less = x;
@@ -46,10 +49,13 @@ TEST(TetEnergy, DerivativesByDifferences) {
             more(row, c) += h;
             less(row, c) -= h;
             const auto i = 3 * static_cast<Eigen::Index>(a) + c;
-            EXPECT_NEAR((tet_energy(mesh, *material, t, more).energy - tet_energy(mesh, *material, t, less).energy) / (2 * h),
-                        at.gradient[i], 1e-7 * (1 + at.gradient.norm()));
+            EXPECT_NEAR(
+                (tet_energy(mesh, *material, t, more).energy - tet_energy(mesh, *material, t, less).energy) /
+                    (2 * h),
+                at.gradient[i], 1e-7 * (1 + at.gradient.norm()));
             const Eigen::VectorXd column = (tet_derivatives(mesh, *material, t, more, false).gradient -
-                                            tet_derivatives(mesh, *material, t, less, false).gradient) / (2 * h);
+                                            tet_derivatives(mesh, *material, t, less, false).gradient) /
+                                           (2 * h);
             EXPECT_LT((column - at.hessian.col(i)).norm(), 1e-7 * size);
           }
         }
@@ -59,7 +65,8 @@ TEST(TetEnergy, DerivativesByDifferences) {
 }
 
 TEST(TetEnergy, ARigidTurnCostsNothing) {
-  const Eigen::Matrix3d R = Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d R =
+      Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
   for (const Element element : kElements) {
     for (const std::string_view name : material_names()) {
       const auto material = make_material(name, 0.49);
@@ -100,7 +107,8 @@ TEST(Assembly, IsTheSumOverTetsForAnyNumberOfThreads) {
     Points g, first;
     solve::SparseMatrix H, first_h;
     for (const int threads : {1, 2, 4}) {
-      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                      static_cast<std::size_t>(threads));
       assembly.derivatives(*material, x, true, &move, g, H);
       if (threads == 1) {
         first = g;
@@ -117,11 +125,22 @@ TEST(Assembly, IsTheSumOverTetsForAnyNumberOfThreads) {
       for (std::size_t n = 0; n < mesh.free.size(); ++n) {
         const auto i = mesh.free[m], j = mesh.free[n];
         if (i < 0 || j < 0 || i < j) continue;
-        Eigen::Matrix3d block = all.block<3, 3>(3 * static_cast<Eigen::Index>(m), 3 * static_cast<Eigen::Index>(n));
+        Eigen::Matrix3d block =
+            all.block<3, 3>(3 * static_cast<Eigen::Index>(m), 3 * static_cast<Eigen::Index>(n));
         if (i == j) block = block.triangularView<Eigen::Lower>();
         EXPECT_LT((dense.block<3, 3>(3 * i, 3 * j) - block).norm(), 1e-11);
       }
     }
+  }
+}
+
+TEST(Mesh, KnowsItsElementsByName) {
+  for (const Element element : kElements) EXPECT_EQ(element_from_name(element_name(element)), element);
+  try {
+    element_from_name("p3");
+    FAIL() << "an element that is not there";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.problem(), "there is no element 'p3'");
   }
 }
 

@@ -46,6 +46,28 @@ TEST(Solvers, AreChosenByNameAndAgree) {
   }
 }
 
+/// The shape stays, the numbers change; a refused matrix between them leaves nothing behind.
+TEST(Solvers, FactorOtherNumbersOfTheSameShape) {
+  const TetMesh mesh = test::shaken_box(6, 3);
+  SparseMatrix first = laplacian(mesh.V, mesh.T, nullptr), second = first, bad = first;
+  for (int c = 0; c < first.cols(); ++c) {
+    first.coeffRef(c, c) += 1;
+    second.coeffRef(c, c) += 30 + c;
+  }
+  bad.coeffRef(5, 5) = -1;
+  const solve::Block B = solve::Block::Random(first.rows(), 2);
+  for (const std::string_view name : solver_names()) {
+    const auto solver = make_solver(name);
+    solver->refactor(first, {});
+    EXPECT_LT(solve::relative_residual(first, solver->solve(B, {}), B), 1e-10) << name;
+    solver->refactor(second, {});
+    EXPECT_LT(solve::relative_residual(second, solver->solve(B, {}), B), 1e-10) << name;
+    EXPECT_THROW(solver->refactor(bad, {}), Error) << name;
+    solver->refactor(first, {});
+    EXPECT_LT(solve::relative_residual(first, solver->solve(B, {}), B), 1e-10) << name;
+  }
+}
+
 TEST(Solvers, RefuseAMatrixThatIsNotDefinite) {
   const TetMesh mesh = test::box_mesh({3, 3, 3}, 10);
   SparseMatrix L = laplacian(mesh.V, mesh.T, nullptr);

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A pose by finite elements, through the command: what it writes, what it says, what it refuses."""
+import json
+import pathlib
+import shutil
+import tempfile
+import unittest
+
+import numpy as np
+
+from posed_files import CASE, corners, run
+
+HEAD = "ecorche_pose: 1\nskeleton: phantom\n"
+
+
+class Fem(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.model = cls.folder / "coarse.hdf"
+        done = run("preprocess", CASE, "-o", cls.model, "--mesher", "lattice", "--max-tets", 40000)
+        assert done.returncode == 0, done.stderr
+
+    def solve(self, name, pose, *words, command=("fem",), code=0):
+        file = self.folder / f"{name}.yaml"
+        file.write_text(HEAD + pose)
+        out = self.folder / name
+        done = run(*command, self.model, "-o", out, "--pose", file, "--tissues", "skin,humerus_right,femur_right", *words)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return out, done
+
+    def test_an_elbow_is_solved_and_reported(self):
+        out, done = self.solve("elbow", "root: {translation_mm: [300, 20, -10], rotation: [0.9, 0.1, 0.3, 0.3]}\njoints: {elbow_right: {flexion_deg: 45}}\n")
+        fem = json.loads((out / "fem.json").read_text())
+        quality = json.loads((out / "quality.json").read_text())
+        self.assertEqual(quality["fem"], fem)
+        self.assertEqual((fem["verdict"], fem["warnings"]), ("pass", []))
+        self.assertTrue(fem["converged"])
+        self.assertEqual(fem["inverted_tets"], 0)
+        self.assertLess(fem["two_starts"]["distance_mm"], 0.1)
+        self.assertLess(fem["residual"], 1e-3)
+        self.assertLess(abs(fem["volume_change"]), 0.01)
+        self.assertEqual(fem["tets"] + fem["left_out"]["on_bones"] + fem["left_out"]["floating"], fem["left_out"]["of_soft_tets"])
+        self.assertGreater(fem["to_cor"]["max_mm"], fem["to_cor"]["p95_mm"])
+        self.assertRegex(done.stdout, r"  finite elements: pass, p1 at 0\.45, \d+ tets, \d+ iterations, ")
+        # The surfaces are those of the solution: as far from skinning's as it says, and bones where they were.
+        skinned, _ = self.solve("skinned", (self.folder / "elbow.yaml").read_text()[len(HEAD):], command=("pose",))
+        apart = {name: np.linalg.norm(corners(out / f"{name}.stl") - corners(skinned / f"{name}.stl"), axis=-1).max()
+                 for name in ("skin", "humerus_right", "femur_right")}
+        self.assertGreater(apart["skin"], 1)
+        self.assertLess(apart["skin"], 1.5 * fem["to_cor"]["max_mm"])
+        self.assertEqual((apart["humerus_right"], apart["femur_right"]), (0, 0))
+
+    def test_pose_by_fem_is_the_same_body(self):
+        pose = "joints: {elbow_right: {flexion_deg: 30}}\n"
+        fem, _ = self.solve("by_fem", pose)
+        pose_fem, _ = self.solve("by_pose", pose, "--skinning", "fem", command=("pose",))
+        self.assertEqual((fem / "skin.stl").read_bytes(), (pose_fem / "skin.stl").read_bytes())
+        self.assertIn('"skinning": "fem"', (pose_fem / "posed.json").read_text())
+
+    def test_beyond_its_range_it_warns(self):
+        out, done = self.solve("deep", "joints: {knee_right: {flexion_deg: 135}}\n", "--one-start")
+        fem = json.loads((out / "fem.json").read_text())
+        self.assertEqual(fem["verdict"], "warn")
+        self.assertEqual(json.loads((out / "quality.json").read_text())["verdict"], "warn")
+        self.assertIn(fem["warnings"][0]["what"], done.stdout)
+        self.assertIn("turn the joints less", fem["warnings"][-1]["mend"])
+
+    def test_what_does_not_go_together_is_refused(self):
+        _, done = self.solve("none", "", "--element", "p2p0", "--material", "corotational", code=64)
+        self.assertIn("error: --material corotational: its volume term is none that p2p0 could take a mean of "
+                      "(use --element p1 or p2, or --material stable_neo_hookean)", done.stderr)
+        _, done = self.solve("none", "", "--skinning", "fem", "--unfold", command=("pose",), code=64)
+        self.assertIn("error: --skinning fem: it refuses folds by itself (leave out --unfold)", done.stderr)
+        _, done = self.solve("none", "", "--skinning", "fem", "--deformer", "spheres", command=("pose",), code=64)
+        self.assertIn("error: --skinning fem: finite elements are tets (leave out --deformer)", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
