@@ -7,6 +7,7 @@
 
 #include "app/scan/ct_bones.hpp"
 #include "app/scan/label_names.hpp"
+#include "app/scan/nameless_labels.hpp"
 #include "app/scan/scan_borders.hpp"
 #include "app/scan/scan_doubts.hpp"
 #include "app/scan/scan_sides.hpp"
@@ -41,6 +42,9 @@ class Decider {
 
   ScanCase decide() {
     out_.notes = scan_.notes;
+    for (ScanLabels& labels : scan_.labels) {
+      if (labels.map.names.empty()) name_by_place(labels, options_, out_, context_.quiet());
+    }
     names_ = name_labels(scan_);
     // Labels that nobody knows may be bones: they are refused below.
     if (std::none_of(names_.named.begin(), names_.named.end(), [](const Named& named) {
@@ -210,6 +214,10 @@ class Decider {
       out_.skin = {"round the label of the skin, a shell, with what it encloses", 0.8, {}};
       return;
     }
+    if (body && exposed < kExposed && body_of_all()) {
+      out_.skin = {"round the label of the body and all that is labelled within it", 0.9, {}};
+      return;
+    }
     if (body)
       out_.doubts.push_back("the body's label leaves " + percent_of(bare) +
                             " of the bones outside: it is not used for the skin");
@@ -228,6 +236,13 @@ class Decider {
                     " of the outside of all that is labelled is bone",
                 "give the CT too, or a label of the whole body (TotalSegmentator -ta body), before or after "
                 "these files");
+  }
+
+  // Whether the one map there is holds a body: its labels exclude each other, so that the body's has holes.
+  bool body_of_all() const {
+    if (names_.of_map.size() != 1) return false;
+    return std::any_of(out_.entries.begin(), out_.entries.end(),
+                       [](const ScanEntry& e) { return e.role == Role::body && e.voxels > 0; });
   }
 
   // The share of the bones' voxels for which `within` is false.

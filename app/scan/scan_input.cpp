@@ -341,11 +341,6 @@ class Reader {
                     "name it like its label map: seg.nii.gz and seg.json");
       use(*nameless.front(), table);
     }
-    for (const ScanLabels& labels : out_.labels) {
-      if (labels.map.names.empty())
-        throw Error(ErrorKind::data, labels.path.string(), "does not say what its labels mean",
-                    "give a table with it: .json, .tsv, .ctbl or .txt (docs/reference/case.md, Labels)");
-    }
   }
 
   void use(ScanLabels& labels, const fs::path& table) {

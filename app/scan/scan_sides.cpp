@@ -8,18 +8,12 @@
 #include "io/case/case_rules.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "preprocess/scan/sides.hpp"
+#include "preprocess/scan/views.hpp"
 
 namespace ecorche::app {
 namespace {
 
 constexpr std::size_t kPoints = 150;  // of a piece, to measure distances by
-
-std::string without_side(std::string name) {
-  for (const char* side : {"_left", "_right"}) {
-    if (name.ends_with(side)) name.resize(name.size() - std::string_view(side).size());
-  }
-  return name;
-}
 
 // Segments of the template that hang together, without their sides.
 scan::Neighbours neighbours_of_template() {
@@ -29,7 +23,7 @@ scan::Neighbours neighbours_of_template() {
   for (const Segment& segment : placed.skeleton.segments) {
     if (segment.parent < 0) continue;
     const auto& parent = placed.skeleton.segments[static_cast<std::size_t>(segment.parent)];
-    out.push_back({without_side(segment.name), without_side(parent.name)});
+    out.push_back({scan::without_side(segment.name), scan::without_side(parent.name)});
   }
   return out;
 }

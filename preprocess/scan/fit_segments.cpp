@@ -7,14 +7,14 @@ namespace ecorche::scan {
 namespace {
 
 constexpr int kWholeRounds = 20, kRounds = 40;
-constexpr double kWideReach = 90;                    // mm: the same at first, for the whole
-constexpr double kFirstReach = 60, kLastReach = 14;  // mm: pairs farther apart are none
-constexpr double kGrowth = 1.05;  // of the whole over its first size: pairs far off shrink it
-constexpr double kSize = 1.18;    // of a segment over the body's
-constexpr double kJoint = 0.25;   // weight of a joint over that of its segment's pairs
-constexpr double kTurn = 0.04;    // the same for each of the points that keep it as its parent lies
-constexpr double kFewPairs = 12;  // what a segment weighs at least there
-constexpr double kArm = 60;       // mm: how far those points lie from the joint
+constexpr double kWideReach = 90;  // mm: the same at first, for the whole
+constexpr double kLastReach = 14;  // mm: pairs farther apart are none
+constexpr double kGrowth = 1.05;   // of the whole over its first size: pairs far off shrink it
+constexpr double kSize = 1.18;     // of a segment over the body's
+constexpr double kJoint = 0.25;    // weight of a joint over that of its segment's pairs
+constexpr double kTurn = 0.04;     // the same for each of the points that keep it as its parent lies
+constexpr double kFewPairs = 12;   // what a segment weighs at least there
+constexpr double kArm = 60;        // mm: how far those points lie from the joint
 
 std::vector<std::int32_t> all_rows(const Points& points) {
   std::vector<std::int32_t> rows(static_cast<std::size_t>(points.rows()));
@@ -82,7 +82,8 @@ Similarity fit_whole(const Points& own, const Points& bone, const ImageGrid& gri
 }
 
 void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clouds, const Points& bone,
-                  const ImageGrid& grid, std::vector<Similarity>& placed, const Context& context) {
+                  const ImageGrid& grid, std::vector<Similarity>& placed, const Context& context,
+                  double first_reach) {
   const geometry::NearestPoint nearest(bone, all_rows(bone));
   const std::vector<Similarity> first = placed;
   const std::size_t count = clouds.size();
@@ -93,7 +94,7 @@ void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clo
   for (int round = 0; round < kRounds; ++round) {
     context.check_stop();
     const double share = static_cast<double>(round) / (kRounds - 1);
-    const double reach = kFirstReach + (kLastReach - kFirstReach) * std::min(1.0, 1.25 * share);
+    const double reach = first_reach + (kLastReach - first_reach) * std::min(1.0, 1.25 * share);
     std::vector<SimilarityFit> fits(count);
     for (Eigen::Index p = 0; p < bone.rows(); ++p) {
       const Eigen::Vector3d at = bone.row(p).transpose();

@@ -19,8 +19,12 @@ double misfit_of(const std::vector<SegmentCloud>& clouds, const std::vector<Simi
 Similarity fit_whole(const Points& own, const Points& bone, const ImageGrid& grid, Similarity place,
                      const Context& context);
 
+/// mm: pairs farther apart than this at first are none.
+inline constexpr double kFirstReach = 60;
+
 /// From where `placed` has them.
 void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clouds, const Points& bone,
-                  const ImageGrid& grid, std::vector<Similarity>& placed, const Context& context);
+                  const ImageGrid& grid, std::vector<Similarity>& placed, const Context& context,
+                  double first_reach = kFirstReach);
 
 }  // namespace ecorche::scan

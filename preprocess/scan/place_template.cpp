@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/scan/place_template.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <numeric>
 
 #include "preprocess/scan/distance_lattice.hpp"
 #include "preprocess/scan/fit_segments.hpp"
+#include "preprocess/scan/views.hpp"
 
 namespace ecorche::scan {
 namespace {
@@ -27,54 +26,6 @@ constexpr double kUsual = 0.95,
                  kOddSize = 2;        // few are much larger or smaller: so much more misfit they need
 constexpr double kTheirs = 14;        // mm: bone of an arm so near to others' may be theirs
 constexpr double kMostShared = 0.35;  // ... and where so much of it is, the arm is not there
-constexpr double kRaised = 165 * std::numbers::pi / 180;
-
-bool starts(const std::string& name, std::string_view with) {
-  return name.starts_with(with);
-}
-
-bool of_arm(const std::string& name) {
-  return starts(name, "upper_arm") || starts(name, "forearm") || starts(name, "hand");
-}
-
-bool has(View view, const std::string& segment) {
-  const bool leg = starts(segment, "thigh") || starts(segment, "shank") || starts(segment, "foot") ||
-                   starts(segment, "toes");
-  switch (view) {
-    case View::body:
-    case View::arms_up:
-      break;
-    case View::leg_left:
-      return leg && segment.ends_with("_left");
-    case View::leg_right:
-      return leg && segment.ends_with("_right");
-    case View::arm_left:
-      return of_arm(segment) && segment.ends_with("_left");
-    case View::arm_right:
-      return of_arm(segment) && segment.ends_with("_right");
-  }
-  return true;
-}
-
-// Where the view has each segment of the template, before anything is placed: arms raised about the shoulder.
-std::vector<Similarity> held(const BodyTemplate& body, View view) {
-  std::vector<Similarity> out(body.segments.size());
-  if (view != View::arms_up) return out;
-  for (std::size_t s = 0; s < out.size(); ++s) {
-    const TemplateSegment& segment = body.segments[s];
-    if (!of_arm(segment.name)) continue;
-    const bool parent_too =
-        segment.parent >= 0 && of_arm(body.segments[static_cast<std::size_t>(segment.parent)].name);
-    if (parent_too) {
-      out[s] = out[static_cast<std::size_t>(segment.parent)];
-      continue;
-    }
-    const double side = segment.name.ends_with("_left") ? -1 : 1;
-    out[s].rotation = Eigen::AngleAxisd(side * kRaised, Eigen::Vector3d::UnitY()).toRotationMatrix();
-    out[s].shift = segment.joint - out[s].rotation * segment.joint;
-  }
-  return out;
-}
 
 struct Start {
   Similarity place;
@@ -100,9 +51,10 @@ class Search {
         scan_(scan),
         grid_(grid),
         context_(context),
-        held_(held(body, view)) {
+        held_(held_by(body, view)) {
     std::vector<std::uint8_t> in_play;
-    for (const TemplateSegment& segment : body.segments) in_play.push_back(has(view, segment.name) ? 1 : 0);
+    for (const TemplateSegment& segment : body.segments)
+      in_play.push_back(view_has(view, segment.name) ? 1 : 0);
     clouds_ = segment_clouds(body, in_play);
     Eigen::Index count = 0;
     for (const SegmentCloud& cloud : clouds_) count += cloud.points.rows();
@@ -119,7 +71,7 @@ class Search {
     if (own_.rows() == 0) return 1;
     const DistanceLattice lattice(own_, kLattice, kReach / kSizes[0], context_);
     std::vector<Start> starts;
-    for (const auto& [turn, along] : turns()) {
+    for (const auto& [turn, along] : turns_of(view_, own_, bone_)) {
       for (const double size : kSizes) sweep(turn, along, size, lattice, starts);
     }
     std::stable_sort(starts.begin(), starts.end(),
@@ -134,6 +86,8 @@ class Search {
     }
     return kept_.empty() ? 1 : kept_.front().misfit;
   }
+
+  void start_from(const Similarity& place) { kept_.assign(1, {place, 0}); }
 
   /// Segment by segment, from the best of those places.
   Placed fit() const {
@@ -211,33 +165,6 @@ class Search {
     return start.place.back(bone_.colwise().mean().transpose());
   }
 
-  // The turns that are tried, each with the way along which the template is then slid.
-  std::vector<std::pair<Eigen::Matrix3d, Eigen::Vector3d>> turns() const {
-    std::vector<std::pair<Eigen::Matrix3d, Eigen::Vector3d>> out;
-    if (!one_limb(view_)) {
-      out.emplace_back(Eigen::Matrix3d::Identity(), Eigen::Vector3d::UnitZ());
-      return out;
-    }
-    const auto axis_of = [](const Points& points) -> Eigen::Vector3d {
-      const Points centred = points.rowwise() - points.colwise().mean();
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(centred.transpose() * centred);
-      return solver.eigenvectors().col(2);
-    };
-    const Eigen::Vector3d own = axis_of(own_);
-    Eigen::Vector3d theirs = axis_of(bone_);
-    if (theirs.z() * own.z() < 0) theirs = -theirs;
-    const bool arm = view_ == View::arm_left || view_ == View::arm_right;
-    for (const double sign : {1.0, -1.0}) {
-      if (!arm && sign < 0 && std::abs(theirs.z()) > 0.5) continue;  // legs point down
-      const Eigen::Matrix3d onto = Eigen::Quaterniond::FromTwoVectors(own, sign * theirs).toRotationMatrix();
-      for (int spin = 0; spin < 4; ++spin) {
-        const double angle = spin * std::numbers::pi / 2;
-        out.emplace_back(Eigen::AngleAxisd(angle, theirs).toRotationMatrix() * onto, theirs);
-      }
-    }
-    return out;
-  }
-
   void sweep(const Eigen::Matrix3d& turn, const Eigen::Vector3d& along, double size,
              const DistanceLattice& lattice, std::vector<Start>& starts) const {
     Similarity place{size, turn, Eigen::Vector3d::Zero()};
@@ -310,30 +237,9 @@ class Search {
 
 }  // namespace
 
-std::string_view view_name(View view) {
-  switch (view) {
-    case View::body:
-      return "the body, arms hanging";
-    case View::arms_up:
-      return "the body, arms raised";
-    case View::leg_left:
-      return "a left leg";
-    case View::leg_right:
-      return "a right leg";
-    case View::arm_left:
-      return "a left arm";
-    case View::arm_right:
-      break;
-  }
-  return "a right arm";
-}
-
 std::vector<Placed> place_template(const BodyTemplate& body, const Points& bone, const ImageGrid& grid,
                                    Side side, const Context& context) {
-  std::vector<View> views{View::body,      View::arms_up,  View::leg_left,
-                          View::leg_right, View::arm_left, View::arm_right};
-  if (side == Side::left) views = {View::leg_left, View::arm_left};
-  if (side == Side::right) views = {View::leg_right, View::arm_right};
+  const std::vector<View> views = views_of(side);
   const Points fewer = thinned(bone, kMostPoints);
   const DistanceLattice scan(fewer, kLattice, kReach, context);
   std::vector<std::unique_ptr<Search>> searches;
@@ -352,6 +258,15 @@ std::vector<Placed> place_template(const BodyTemplate& body, const Points& bone,
   std::stable_sort(out.begin(), out.end(),
                    [](const Placed& a, const Placed& b) { return a.misfit < b.misfit; });
   return out;
+}
+
+Placed fit_placed(const BodyTemplate& body, View view, const Similarity& start, const Points& bone,
+                  const ImageGrid& grid, const Context& context) {
+  const Points fewer = thinned(bone, kMostPoints);
+  const DistanceLattice scan(fewer, kLattice, kReach, context);
+  Search search(body, view, fewer, scan, grid, context);
+  search.start_from(start);
+  return search.fit();
 }
 
 Points spread_points(const std::vector<std::uint8_t>& mask, const ImageGrid& grid, double mm) {

@@ -43,6 +43,10 @@ inline constexpr double kReach = 25;                       ///< mm: what is fart
 std::vector<Placed> place_template(const BodyTemplate& body, const Points& bone, const ImageGrid& grid,
                                    Side side, const Context& context);
 
+/// Fitted segment by segment to `bone` as above, from where `start` has the whole template.
+Placed fit_placed(const BodyTemplate& body, View view, const Similarity& start, const Points& bone,
+                  const ImageGrid& grid, const Context& context);
+
 /// The mean voxel of each cube of `mm` that holds voxels of `mask`, LPS mm.
 Points spread_points(const std::vector<std::uint8_t>& mask, const ImageGrid& grid, double mm);
 

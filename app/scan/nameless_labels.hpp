@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// Label maps that give numbers and no names.
+#pragma once
+
+#include "app/scan/scan_case.hpp"
+
+namespace ecorche::app {
+
+/// Names the labels of `labels` by their shape and place, each with how sure that is. A label that covers
+/// bones of several segments is cut by the template. What was decided goes to `notes` and `doubts` of `out`,
+/// with coordinates where it is not clear. Throws Error{data} where they look like no part of a body.
+void name_by_place(ScanLabels& labels, const ScanOptions& options, ScanCase& out, const Context& context);
+
+}  // namespace ecorche::app
