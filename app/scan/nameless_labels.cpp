@@ -8,6 +8,7 @@
 #include "core/values/text.hpp"
 #include "preprocess/scan/cut_bones.hpp"
 #include "preprocess/scan/nameless.hpp"
+#include "preprocess/scan/pieces.hpp"
 #include "preprocess/scan/views.hpp"
 
 namespace ecorche::app {
@@ -17,6 +18,7 @@ using Kind = scan::LabelMeaning::Kind;
 
 constexpr double kLeastScore = 0.3;     // else it is no part of a body
 constexpr double kSurestByPlace = 0.9;  // a template is no eye
+constexpr double kPart = 0.2;           // of a piece on the lesser side: it has bones of both
 constexpr double kDoubtfulByPlace = 0.65;
 constexpr const char* kGiveTable =
     "give a table with it: .json, .tsv, .ctbl or .txt (docs/reference/case.md, Labels)";
@@ -51,12 +53,14 @@ class Namer {
           std::string(kGiveTable) + "; where one limb alone was scanned, say --side left or right");
     labels_.names_from = "shape and place";
     std::vector<std::int64_t> to_cut;
+    std::map<std::int64_t, std::string> to_side;
     std::size_t bones = 0, others = 0;
     for (std::size_t l = 0; l < found.size(); ++l) {
       const scan::LabelMeaning& meaning = meant.of[l];
       bones += meaning.kind == Kind::bone || meaning.kind == Kind::bones ? 1 : 0;
       others += meaning.kind == Kind::other || meaning.kind == Kind::ambiguous ? 1 : 0;
       if (meaning.kind == Kind::bones) to_cut.push_back(found[l].id);
+      if (meaning.kind == Kind::bone && two_sided(meaning)) to_side[found[l].id] = bone_name(meaning);
       say(found[l], meaning);
     }
     out_.notes.push_back(
@@ -66,7 +70,7 @@ class Namer {
         (others > 0 ? "; " + std::to_string(others) + " are taken for tissues" : ""));
     out_.doubts.push_back(name_ +
                           ": its labels were named by shape and place: compare them with picture.png");
-    if (!to_cut.empty()) cut(to_cut, meant);
+    if (!to_cut.empty() || !to_side.empty()) cut(to_cut, to_side, meant);
   }
 
  private:
@@ -112,33 +116,69 @@ class Namer {
     return meaning.both_sides ? scan::without_side(name) : name;
   }
 
-  // What covers bones of several segments, by a watershed; each part gets a number of its own.
-  void cut(const std::vector<std::int64_t>& which, const scan::LabelMeanings& meant) {
-    Image numbers(layer_.grid, ScalarType::i32);
+  bool two_sided(const scan::LabelMeaning& meaning) const {
+    const std::string& name = body_.bones[static_cast<std::size_t>(meaning.bone)].name;
+    return meaning.both_sides && name != scan::without_side(name);
+  }
+
+  // The number of a bone that was parted.
+  std::int64_t number_of(const std::string& name, const LabelGuess& guess) {
+    for (const auto& [id, known] : labels_.map.names) {
+      if (id > first_ && known == name) {
+        labels_.guesses[id].confidence = std::min(labels_.guesses[id].confidence, guess.confidence);
+        return id;
+      }
+    }
+    const std::int64_t id = std::max(first_, labels_.map.names.rbegin()->first) + 1;
+    labels_.map.names[id] = name;
+    labels_.guesses[id] = guess;
+    return id;
+  }
+
+  // By a watershed with the template's seeds: labels of several segments' bones, each part with a number of
+  // its own, and labels of bones of both sides, whose pieces go to the side that most of them lies on.
+  void cut(const std::vector<std::int64_t>& which, const std::map<std::int64_t, std::string>& to_side,
+           const scan::LabelMeanings& meant) {
+    first_ = labels_.map.names.rbegin()->first;
+    Image numbers(layer_.grid, ScalarType::i32), sided(layer_.grid, ScalarType::u16);
     const auto to = numbers.scalars<std::int32_t>();
-    std::vector<std::uint8_t> mask(to.size(), 0);
+    const auto piece_of = sided.scalars<std::uint16_t>();
+    std::vector<std::uint8_t> mask(to.size(), 0), all(to.size(), 0);
+    std::map<std::int64_t, std::uint16_t> row;
+    for (const auto& [id, name] : to_side) row.emplace(id, static_cast<std::uint16_t>(row.size() + 1));
     with_scalar_type(layer_.type, [&](auto zero) {
       const auto from = layer_.scalars<decltype(zero)>();
       for (std::size_t v = 0; v < from.size(); ++v) {
         to[v] = static_cast<std::int32_t>(from[v]);
-        mask[v] = std::find(which.begin(), which.end(), static_cast<std::int64_t>(from[v])) != which.end();
+        const auto id = static_cast<std::int64_t>(from[v]);
+        mask[v] = std::find(which.begin(), which.end(), id) != which.end() ? 1 : 0;
+        const auto own = row.find(id);
+        if (own != row.end()) piece_of[v] = own->second;
+        all[v] = mask[v] != 0 || own != row.end() ? 1 : 0;
       }
     });
-    const scan::CutBones parts = scan::cut_bones(mask, layer_.grid, body_, meant.placed, context_.quiet());
-    const std::int64_t first = labels_.map.names.rbegin()->first;
+    const scan::CutBones parts = scan::cut_bones(all, layer_.grid, body_, meant.placed, context_.quiet());
+    give_pieces(sided, to_side, parts, to);
+    if (which.empty()) {
+      layer_ = std::move(numbers);
+      return;
+    }
+    std::vector<std::int32_t> number(parts.bones.size(), 0);
     std::size_t left_out = 0;
     for (std::size_t v = 0; v < to.size(); ++v) {
       if (mask[v] == 0) continue;
-      to[v] = parts.of[v] == 0 ? 0 : static_cast<std::int32_t>(first + parts.of[v]);
-      left_out += parts.of[v] == 0 ? 1 : 0;
-    }
-    for (std::size_t b = 0; b < parts.bones.size(); ++b) {
-      if (parts.bones[b].voxels == 0) continue;
-      const std::int64_t id = first + static_cast<std::int64_t>(b) + 1;
-      labels_.map.names[id] = body_.bones[b].name;
-      labels_.guesses[id] = {"cut out of a label of several bones by a template, of whose bone " +
-                                 share_in_words(parts.bones[b].agreement) + " agree",
-                             kSurestByPlace * parts.bones[b].agreement};
+      if (parts.of[v] == 0) {
+        to[v] = 0;
+        ++left_out;
+        continue;
+      }
+      const std::size_t b = parts.of[v] - 1U;
+      if (number[b] == 0)
+        number[b] = static_cast<std::int32_t>(number_of(
+            body_.bones[b].name, {"cut out of a label of several bones by a template, of whose bone " +
+                                      share_in_words(parts.bones[b].agreement) + " agree",
+                                  kSurestByPlace * parts.bones[b].agreement}));
+      to[v] = number[b];
     }
     for (const std::int64_t id : which) {
       labels_.map.names.erase(id);
@@ -151,6 +191,52 @@ class Namer {
     if (left_out > 0)
       out_.notes.push_back(name_ + ": " + std::to_string(left_out) +
                            " voxels of that lie near no bone of the template, and are left out");
+  }
+
+  // Pieces of `sided`, row by row of `to_side`, become the left or the right one's in `to`.
+  void give_pieces(const Image& sided, const std::map<std::int64_t, std::string>& to_side,
+                   const scan::CutBones& parts, std::span<std::int32_t> to) {
+    if (to_side.empty()) return;
+    const scan::Pieces pieces =
+        scan::find_pieces(sided, std::vector<std::uint8_t>(to_side.size() + 1, 1), context_.quiet());
+    std::vector<std::array<std::size_t, 2>> on(pieces.pieces.size());
+    const auto each = [&](const scan::Run& run, auto&& f) {
+      const std::size_t at = layer_.grid.offset(run.begin, run.j, run.k);
+      for (std::size_t v = at; v < at + static_cast<std::size_t>(run.end - run.begin); ++v) f(v);
+    };
+    const auto side_of = [&](std::size_t v) -> int {
+      if (parts.of[v] == 0) return -1;
+      const std::string& name = body_.bones[parts.of[v] - 1U].name;
+      return name.ends_with("_left") ? 0 : name.ends_with("_right") ? 1 : -1;
+    };
+    for (const scan::Run& run : pieces.runs) {
+      if (pieces.pieces[run.piece].id == 0) continue;
+      each(run, [&](std::size_t v) {
+        if (const int side = side_of(v); side >= 0) ++on[run.piece][static_cast<std::size_t>(side)];
+      });
+    }
+    std::vector<std::array<std::int32_t, 2>> number;
+    for (const auto& [id, name] : to_side) {
+      const LabelGuess guess = labels_.guesses.at(id);
+      number.push_back({static_cast<std::int32_t>(number_of(name + "_left", guess)),
+                        static_cast<std::int32_t>(number_of(name + "_right", guess))});
+    }
+    for (const scan::Run& run : pieces.runs) {
+      const std::size_t id = pieces.pieces[run.piece].id;
+      if (id == 0) continue;
+      const auto& [left, right] = on[run.piece];
+      const double share =
+          static_cast<double>(left) / static_cast<double>(std::max<std::size_t>(1, left + right));
+      each(run, [&](std::size_t v) {
+        int side = share > 0.5 ? 0 : 1;
+        if (share > kPart && share < 1 - kPart && side_of(v) >= 0) side = side_of(v);  // both in one piece
+        to[v] = number[id - 1][static_cast<std::size_t>(side)];
+      });
+    }
+    for (const auto& [id, name] : to_side) {
+      labels_.map.names.erase(id);
+      labels_.guesses.erase(id);
+    }
   }
 
   static std::vector<std::string> numbers_of(const std::vector<std::int64_t>& ids) {
@@ -166,12 +252,19 @@ class Namer {
   const Context& context_;
   scan::BodyTemplate body_;
   std::string name_;
+  std::int64_t first_ = 0;  // numbers above are of what was parted
 };
 
 }  // namespace
 
-void name_by_place(ScanLabels& labels, const ScanOptions& options, ScanCase& out, const Context& context) {
-  Namer(labels, options, out, context).run();
+void name_nameless(Scan& scan, const ScanOptions& options, ScanCase& out, const Context& context) {
+  for (ScanLabels& labels : scan.labels) {
+    if (!labels.map.names.empty()) continue;
+    if (scan.labels.size() > 1)
+      throw Error(ErrorKind::data, labels.path.string(),
+                  "does not say what its labels mean, beside label maps that do", kGiveTable);
+    Namer(labels, options, out, context).run();
+  }
 }
 
 }  // namespace ecorche::app

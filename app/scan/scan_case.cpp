@@ -42,9 +42,7 @@ class Decider {
 
   ScanCase decide() {
     out_.notes = scan_.notes;
-    for (ScanLabels& labels : scan_.labels) {
-      if (labels.map.names.empty()) name_by_place(labels, options_, out_, context_.quiet());
-    }
+    name_nameless(scan_, options_, out_, context_.quiet());
     names_ = name_labels(scan_);
     // Labels that nobody knows may be bones: they are refused below.
     if (std::none_of(names_.named.begin(), names_.named.end(), [](const Named& named) {

@@ -12,6 +12,7 @@
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/mirrored_joints.hpp"
+#include "preprocess/rig/plausible.hpp"
 #include "preprocess/rig/present_part.hpp"
 
 namespace ecorche::rig {
@@ -135,6 +136,8 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
   Joint& joint = rig.skeleton.segments[row].joint;
   const auto [axes, of_axes] = sources.axes(row);
   const FoundPoint found = of_kind(joint, sources.center(row), axes);
+  const double off = far_off(sources, rig.skeleton, row, found.at, context);
+  const double tilted = tilted_by(sources, rig.skeleton, row, context);
   const bool two_bones = joint.rule == CenterRule::sphere_fit && !joint.facing_bone.empty();
   if (two_bones) need_sphere(patient, joint, found);
   rig.fits.push_back(found.fit);
@@ -144,7 +147,7 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
   } else {
     warn_rule(found.fit, of_axes, context);
   }
-  rig.fits.back().confidence = std::min(found.fit.confidence, of_axes);
+  rig.fits.back().confidence = std::min(found.fit.confidence, of_axes) * off * tilted;
 }
 
 // `outer`, whose warnings of joints end with what to do.

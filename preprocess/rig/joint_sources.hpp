@@ -37,6 +37,8 @@ class JointSources {
   std::string shown_on(std::size_t row) const;
   /// The axis (0 x, 1 y, 2 z) of a joint where a shape shows it, before anything is settled.
   std::optional<FoundDirection> shown_axis(std::size_t row, int axis);
+  /// Whether the joint's axis should cross a shaft, and its parent's bones are too short to show one.
+  bool lacks_shaft(std::size_t row);
   /// All bones of a segment.
   const SurfaceMesh& bones(const std::string& segment) { return bones_.segment(segment); }
   /// What was found for the joint and not used, since `JointRule::possible` leaves it out: lines without its

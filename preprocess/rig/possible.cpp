@@ -49,6 +49,11 @@ std::optional<Eigen::Vector3d> JointSources::shaft(int row) {
   return Eigen::Vector3d(eigen.eigenvectors().col(2));
 }
 
+bool JointSources::lacks_shaft(std::size_t row) {
+  const JointRule* how = rule_of(static_cast<int>(row));
+  return how != nullptr && !how->possible.axis_to_shaft.any() && !shaft(static_cast<int>(row));
+}
+
 bool JointSources::crosses_shaft(const Eigen::Vector3d& axis) {
   const JointRule* how = rule_of(bounded_);
   if (how == nullptr || how->possible.axis_to_shaft.any()) return true;

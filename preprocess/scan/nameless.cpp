@@ -333,8 +333,9 @@ void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, 
     if (grow) {
       for (const std::size_t l : judge.further(now.of)) bones.push_back(l);
     }
-    if (round + 1 >= static_cast<int>(std::size(kSteps)) && now.score > out.score) out = now;
-    if (bones == last || bones.empty() || round == kRefineRounds) break;
+    const bool strict = round + 1 >= static_cast<int>(std::size(kSteps));
+    if (strict && now.score > out.score) out = now;
+    if ((strict && bones == last) || bones.empty() || round == kRefineRounds) break;
     fit_segments(body, clouds, points_of(labels, bones, kFitPoints), grid, placed.segments, context.quiet(),
                  bones.size() > sure ? kGrowReach : kFitReach);
     last = std::move(bones);

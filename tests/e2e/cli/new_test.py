@@ -138,7 +138,7 @@ class New(unittest.TestCase):
         case = self.folder / "refused"
         for words, code, line in (
                 ([scan / "none.nii.gz"], 66, "no such file or folder"),
-                ([self.folder / "totalsegmentator_case" / "labels.nrrd"], 65, "does not say what its labels mean (give a table"),
+                ([self.folder / "totalsegmentator_case" / "labels.nrrd", scan / "total.nii.gz"], 65, "does not say what its labels mean, beside label maps that do (give a table"),
         ):
             result = run("new", *words, "-o", case)
             self.assertEqual(result.returncode, code, result.stderr)

@@ -283,7 +283,7 @@ ROWS = [
     ("names_shouted", lambda f, s: legs(s).renamed(lambda name: "  " + name.upper().replace("_", " - ") + "! ").write(f), Prepared()),
     ("names_of_sides_exchanged", lambda f, s: mirrored_names(legs(s)).write(f), Prepared(said=("left and right are exchanged",))),
     ("femora_as_one_label", lambda f, s: fused(legs(s)).write(f), Prepared()),
-    ("labels_without_names", lambda f, s: legs(s).write(f, named=False), Refused(65, "does not say what its labels mean")),
+    ("labels_without_names", lambda f, s: legs(s).write(f, named=False), Refused(65, "does not say what its labels mean, beside label maps that do")),
     ("labels_as_float", lambda f, s: floating_labels(f, legs(s), 0), Prepared()),
     ("labels_with_fractions", lambda f, s: floating_labels(f, legs(s), 0.5), Refused(65, "labels are no whole numbers")),
     ("labels_below_zero", lambda f, s: negative(f, legs(s)), Prepared()),
