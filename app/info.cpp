@@ -8,6 +8,7 @@
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
 #include "app/joint_json.hpp"
+#include "app/pose_report.hpp"
 #include "app/text_line.hpp"
 #include "core/model_file/figures.hpp"
 #include "core/values/text.hpp"
@@ -49,6 +50,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"volumes", Json::array()},
            {"spheres", Json::array()},
            {"contacts", contacts_json(model)},
+           {"skin_caps", caps_json(model)},
            {"provenance", model.provenance}};
   out["identity"] = text::hex(model_file::identity(model));
   for (std::size_t row = 0; row < model.segment_count(); ++row)
@@ -150,6 +152,13 @@ std::string info_text(const Json& info) {
         text_line("  %-20s %5d x %5d x %5d  %.3f x %.3f x %.3f  %s%s", text(row["name"]).c_str(),
                   n[0].get<int>(), n[1].get<int>(), n[2].get<int>(), s[0].get<double>(), s[1].get<double>(),
                   s[2].get<double>(), text(row["type"]).c_str(), row["labels"].get<bool>() ? ", labels" : "");
+  }
+  if (!info["skin_caps"].empty())
+    out += "\nthe skin's caps, where the scan's border cuts the body: no skin, and in no figure of a pose\n";
+  for (const Json& cap : info["skin_caps"]) {
+    const Json& at = cap["at_mm"];
+    out += text_line("  %.0f cm2 about [%.0f, %.0f, %.0f] mm", cap["cm2"].get<double>(), at[0].get<double>(),
+                     at[1].get<double>(), at[2].get<double>());
   }
   if (!info["contacts"].empty()) out += "\n" + printable_lines(contacts_text(info["contacts"]));
   out += "\ncertificate\n";

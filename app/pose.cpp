@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche pose`: offline posing, from a pose file or frames of a motion clip, into files.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -11,6 +12,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/runtime/resample.hpp>
+#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
 #include "app/bridge_option.hpp"
 #include "app/command.hpp"
@@ -102,11 +104,30 @@ class FrameWriter {
     for (const std::string& format : settings_.formats) {
       const fs::path file = next(named.name + "." + format);
       if (format == "glb") {
-        io::write_surfaces(file, {&named, 1});  // with the tissue's name and material
+        io::write_surfaces(file, without_caps(named, row));  // with the tissue's name and material
       } else {
         io::write_surface(file, mesh);
       }
     }
+  }
+
+  // A skin that its scan's border cuts in two: the skin, and its caps.
+  std::vector<io::NamedSurface> without_caps(const io::NamedSurface& whole, std::uint32_t row) const {
+    const Tissue& tissue = model_.tissues[row];
+    const std::vector<std::uint8_t> caps =
+        row == 0 ? runtime::cap_faces(tissue, runtime::skin_caps(model_)) : std::vector<std::uint8_t>{};
+    if (std::find(caps.begin(), caps.end(), 1) == caps.end()) return {whole};
+    std::vector<io::NamedSurface> out{{whole.name, whole.group, {whole.mesh.V, {}}},
+                                      {whole.name + "_cap", Group::other, {whole.mesh.V, {}}}};
+    const auto count = static_cast<Eigen::Index>(std::count(caps.begin(), caps.end(), 1));
+    out[0].mesh.F.resize(tissue.F.rows() - count, 3);
+    out[1].mesh.F.resize(count, 3);
+    std::array<Eigen::Index, 2> at{0, 0};
+    for (Eigen::Index f = 0; f < tissue.F.rows(); ++f) {
+      const std::size_t part = caps[static_cast<std::size_t>(f)];
+      out[part].mesh.F.row(at[part]++) = tissue.F.row(f);
+    }
+    return out;
   }
 
   // The posed tets, with the way of every node from rest: the forward displacement field.

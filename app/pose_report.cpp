@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include <ecorche/runtime/skin_caps.hpp>
 #include "app/fem_pose.hpp"
 #include "app/inverted_tets.hpp"
 #include "runtime/quality/bone_tets.hpp"
@@ -37,6 +38,16 @@ json thresholds_json(const runtime::QualityThresholds& most) {
 
 }  // namespace
 
+json caps_json(const Model& model) {
+  json out = json::array();
+  for (const runtime::SkinCap& cap : runtime::skin_caps(model)) {
+    out.push_back({{"at_mm", {cap.at[0], cap.at[1], cap.at[2]}},
+                   {"out", {cap.out[0], cap.out[1], cap.out[2]}},
+                   {"cm2", cap.cm2}});
+  }
+  return out;
+}
+
 json quality_json(const Model& model, const runtime::PosedBody& body, const runtime::PoseQuality& quality,
                   std::span<const float> det_f, const HowPosed& how) {
   const runtime::BoneTets bones = runtime::measure_bone_tets(model, body.nodes);
@@ -66,6 +77,7 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
            {{"edge_mm", quality.places.edge_mm},
             {"inverted", place_json(quality.places.inverted)},
             {"changed", place_json(quality.places.changed)}}},
+          {"skin_caps", caps_json(model)},
           {"volume_change", quality.volume_change},
           {"unsigned_volume_change", quality.unsigned_volume_change},
           {"bone_rigidity_mm", quality.bone_rigidity_mm},

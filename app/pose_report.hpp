@@ -12,6 +12,9 @@
 
 namespace ecorche::app {
 
+/// at_mm, out and cm2 of each cap of the skin, LPS mm.
+nlohmann::json caps_json(const Model& model);
+
 /// `quality.json`, every key of which docs/reference/quality.md explains. `det_f`: of every tet, measured as
 /// `quality`.
 nlohmann::json quality_json(const Model& model, const runtime::PosedBody& body,

@@ -22,6 +22,7 @@
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/provenance.hpp"
 #include "preprocess/rig/fit_rig.hpp"
+#include "preprocess/skin_caps.hpp"
 #include "preprocess/tet/default_size.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "preprocess/tet/relax_slivers.hpp"
@@ -379,6 +380,9 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   Options used = options;
   used.max_tets = max_tets;
   model.provenance = provenance(patient, used, mesher_name, solver_name, voxel_mm);
+  if (std::string caps = patient.labels ? caps_text(patient.skin, patient.labels->image.grid) : "";
+      !caps.empty())
+    model.provenance["skin_caps"] = std::move(caps);
   model.certificate = showing_worst_tets(
       hooks, [&] { return stage([&] { return certify(model, context); }); },
       [&] {

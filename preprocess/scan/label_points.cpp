@@ -7,6 +7,11 @@
 #include "preprocess/scan/pieces.hpp"
 
 namespace ecorche::scan {
+namespace {
+
+constexpr double kBeyondLabels = 30;  // mm
+
+}  // namespace
 
 std::vector<NamelessLabel> label_points(const Image& layer, const Context& context) {
   const ImageGrid& grid = layer.grid;
@@ -120,6 +125,29 @@ std::vector<NamelessLabel> label_points(const Image& layer, const Context& conte
   const double mm = std::cbrt(grid.spacing[0] * grid.spacing[1] * grid.spacing[2]);
   for (std::size_t l = 0; l < out.size(); ++l)
     out[l].thickness = surface[l] > 0 ? 2 * mm * static_cast<double>(out[l].voxels) / surface[l] : 0;
+  return out;
+}
+
+ImageGrid part_with_labels(const std::vector<NamelessLabel>& labels, const ImageGrid& whole) {
+  std::array<double, 3> low{1e30, 1e30, 1e30}, high{-1e30, -1e30, -1e30};
+  for (const NamelessLabel& label : labels) {
+    for (Eigen::Index p = 0; p < label.points.rows(); ++p) {
+      const auto index = whole.index({label.points(p, 0), label.points(p, 1), label.points(p, 2)});
+      for (std::size_t a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], index[a]);
+        high[a] = std::max(high[a], index[a]);
+      }
+    }
+  }
+  ImageGrid out = whole;
+  std::array<double, 3> first{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double beyond = kBeyondLabels / whole.spacing[a];
+    first[a] = std::max(0.0, std::floor(low[a] - beyond));
+    const double last = std::min(whole.size[a] - 1.0, std::ceil(high[a] + beyond));
+    out.size[a] = static_cast<std::int32_t>(last - first[a]) + 1;
+  }
+  out.origin = whole.point(first[0], first[1], first[2]);
   return out;
 }
 

@@ -345,7 +345,7 @@ void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, 
 }  // namespace
 
 LabelMeanings know_labels(const BodyTemplate& body, const std::vector<NamelessLabel>& labels,
-                          const ImageGrid& grid, Side side, const Context& context) {
+                          const ImageGrid& whole, Side side, const Context& context) {
   LabelMeanings out;
   out.of.resize(labels.size());
   find_bodies(labels, out.of);
@@ -356,6 +356,8 @@ LabelMeanings know_labels(const BodyTemplate& body, const std::vector<NamelessLa
     within.push_back(labels[l]);
     row.push_back(l);
   }
+  if (within.empty()) return out;
+  const ImageGrid grid = part_with_labels(within, whole);
   std::vector<RoughPlace> places = rough_places(body, within, grid, side, context.quiet());
   context.report(0.4);
   for (std::size_t i = 0; i < places.size() && out.score < kGood; ++i) {

@@ -24,6 +24,9 @@ inline constexpr double kLabelCubes = 6;
 /// Every value of `layer` but 0, in increasing order. `layer` has one component of whole numbers. O(voxels).
 std::vector<NamelessLabel> label_points(const Image& layer, const Context& context);
 
+/// The part of the field of view that any of the labels lies in or near: where none was drawn none is missed.
+ImageGrid part_with_labels(const std::vector<NamelessLabel>& labels, const ImageGrid& whole);
+
 /// What became of one label.
 struct LabelMeaning {
   enum class Kind : std::uint8_t {

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/verdict.hpp>
 #include "runtime/quality/floats.hpp"
 
@@ -23,13 +24,16 @@ constexpr std::size_t kTetsPerBlock = 8192;
 struct TetSums {
   double rest = 0, posed = 0, changed = 0;  // determinants; of changes without their signs
   double inverted_rest = 0;
-  std::uint64_t inverted = 0;
+  std::uint64_t tets = 0, inverted = 0;
   double min_det_f = 1;
 };
 
-TetSums sum_block(const Model& model, std::span<const float> posed, std::size_t begin, std::size_t end) {
+TetSums sum_block(const Model& model, std::span<const float> posed, std::span<const std::uint8_t> left_out,
+                  std::size_t begin, std::size_t end) {
   TetSums sums;
   for (std::size_t t = begin; t < end; ++t) {
+    if (!left_out.empty() && left_out[t] != 0) continue;
+    ++sums.tets;
     const double before = det_of(model.tets, floats(model.nodes), t), after = det_of(model.tets, posed, t);
     sums.rest += before;
     sums.posed += after;
@@ -43,17 +47,19 @@ TetSums sum_block(const Model& model, std::span<const float> posed, std::size_t 
   return sums;
 }
 
-TetSums sum_tets(const Model& model, std::span<const float> posed) {
+TetSums sum_tets(const Model& model, std::span<const float> posed, std::span<const std::uint8_t> left_out) {
   const std::size_t count = model.tet_count();
   std::vector<TetSums> blocks((count + kTetsPerBlock - 1) / kTetsPerBlock);
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-    blocks[b] = sum_block(model, posed, b * kTetsPerBlock, std::min(count, (b + 1) * kTetsPerBlock));
+    blocks[b] =
+        sum_block(model, posed, left_out, b * kTetsPerBlock, std::min(count, (b + 1) * kTetsPerBlock));
   });
   TetSums all;
   for (const TetSums& block : blocks) {
     all.rest += block.rest;
     all.posed += block.posed;
     all.changed += block.changed;
+    all.tets += block.tets;
     all.inverted += block.inverted;
     all.inverted_rest += block.inverted_rest;
     all.min_det_f = std::min(all.min_det_f, block.min_det_f);
@@ -167,8 +173,9 @@ std::vector<std::uint8_t> closed_surfaces(const Model& model) {
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
                     const QualityThresholds& thresholds, std::span<const std::uint8_t> closed) {
   PoseQuality out;
-  const TetSums sums = sum_tets(model, body.nodes);
-  out.tets_measured = model.tet_count();
+  const std::vector<std::uint8_t> at_caps = cap_tets(model);
+  const TetSums sums = sum_tets(model, body.nodes, at_caps);
+  out.tets_measured = sums.tets;
   out.inverted_tets = sums.inverted;
   out.inverted_rest_mm3 = sums.inverted_rest / 6;
   out.min_det_f = sums.min_det_f;
@@ -177,7 +184,7 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
     out.volume_change = sums.posed / sums.rest - 1;
     out.unsigned_volume_change = sums.changed / sums.rest;
   }
-  out.places = worst_places(model, body.nodes);
+  out.places = worst_places(model, body.nodes, at_caps);
 
   out.tissues.resize(tissues.size());
   std::vector<double> residuals(tissues.size(), 0);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/verdict.hpp>
 #include "runtime/quality/floats.hpp"
 
@@ -61,9 +62,11 @@ struct QualityMeter::Sums {
 QualityMeter::QualityMeter(std::shared_ptr<const Model> model, std::size_t most_tets)
     : model_(std::move(model)), parts_(model_->tissues.size()) {
   const std::size_t all = model_->tet_count(), count = std::min(all, most_tets);
+  const std::vector<std::uint8_t> at_caps = cap_tets(*model_);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t begin = all * i / count, end = all * (i + 1) / count;
     const auto t = static_cast<Eigen::Index>(begin + drawn(i, end - begin));
+    if (!at_caps.empty() && at_caps[static_cast<std::size_t>(t)] != 0) continue;
     corners_.push_back({});
     for (int c = 0; c < 4; ++c) {
       corners_.back()[static_cast<std::size_t>(c)] = static_cast<std::uint32_t>(model_->tets(t, c));

@@ -46,7 +46,8 @@ Lattice lattice_of(const Model& model, double volume) {
 
 }  // namespace
 
-WorstPlaces worst_places(const Model& model, std::span<const float> nodes) {
+WorstPlaces worst_places(const Model& model, std::span<const float> nodes,
+                         std::span<const std::uint8_t> left_out) {
   WorstPlaces out;
   const std::vector<float> det_f = tet_det_f(model, nodes);
   std::vector<double> rest(det_f.size());
@@ -65,6 +66,7 @@ WorstPlaces worst_places(const Model& model, std::span<const float> nodes) {
                           static_cast<std::size_t>(lattice.size.y()) *
                           static_cast<std::size_t>(lattice.size.z()));
   for (std::size_t t = 0; t < det_f.size(); ++t) {
+    if (!left_out.empty() && left_out[t] != 0) continue;
     const Eigen::Vector3d middle =
         (corner(t, 0) + corner(t, 1) + corner(t, 2) + corner(t, 3)).cast<double>().transpose() / 4;
     Cube& cube = cubes[lattice.of(middle)];

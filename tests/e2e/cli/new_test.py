@@ -132,6 +132,26 @@ class New(unittest.TestCase):
         self.assertTrue(any("femur_left: cut by the lower border" in note for note in made["notes"]))
         result = run("preprocess", self.folder / "cut_case", "-o", self.folder / "cut.hdf", "--mesher", "lattice", "--max-tets", "60000")
         self.assertEqual(result.returncode, 0, result.stderr)
+        self.caps_are_marked(self.folder / "cut.hdf", made["skin"]["caps"])
+
+    def caps_are_marked(self, model, told):
+        """In the model, where `new` says that they are; posed, as a surface of their own."""
+        info = json.loads(run("--json", "info", model).stdout)
+        said = sorted((float(area), json.loads(place)) for area, place in (re.search(r": ([\d.e+]+) cm2 about (\[.*\])", cap).groups() for cap in told))
+        marked = sorted((cap["cm2"], cap["at_mm"]) for cap in info["skin_caps"])
+        self.assertEqual(len(marked), len(said))
+        for (area, place), (known, where) in zip(marked, said):
+            self.assertLess(abs(area - known), 0.15 * known)
+            self.assertLess(np.linalg.norm(np.subtract(place, where)), 20)
+        self.assertIn("the skin's caps, where the scan's border cuts the body", run("info", model).stdout)
+        result = run("pose", model, "-o", self.folder / "cut_posed", "--tissues", "skin", "--format", "glb", "--pose", "lib:anatomical")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        raw = (self.folder / "cut_posed" / "skin.glb").read_bytes()
+        gltf = json.loads(raw[20:20 + int.from_bytes(raw[12:16], "little")])
+        self.assertEqual([node["name"] for node in gltf["nodes"]], ["skin", "skin_cap"])
+        self.assertEqual(len({mesh["primitives"][0]["material"] for mesh in gltf["meshes"]}), 2)
+        quality = json.loads((self.folder / "cut_posed" / "quality.json").read_text())
+        self.assertEqual(len(quality["skin_caps"]), len(said))
 
     def test_refusals_say_what_to_do(self):
         scan = self.folder / "totalsegmentator_ml"

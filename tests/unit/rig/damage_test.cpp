@@ -158,6 +158,29 @@ TEST(Damage, both_femurs_cut_by_the_field_of_view_rest_as_bodies_do) {
   }
 }
 
+TEST(Damage, axes_of_a_body_that_lies_askew_are_not_called_sure) {
+  EXPECT_GT(whole().confidence("pelvis"), 0.5);
+  for (const auto& [degrees, sure] : {std::pair(5.0, true), std::pair(25.0, false)}) {
+    std::vector<CaseBone> bones = legs();
+    const Eigen::Matrix3d tilt =
+        Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vector3d::UnitX()).toRotationMatrix();
+    for (CaseBone& bone : bones) bone.surface.V = bone.surface.V * tilt.transpose();
+    const Found now = found(bones);
+    EXPECT_EQ(now.confidence("pelvis") > 0.5, sure) << degrees;
+    EXPECT_NE(now.said("pelvis", "its axes are the scan's, in which the body lies askew by"), sure)
+        << degrees;
+  }
+}
+
+TEST(Damage, a_hinge_on_the_cut_end_of_a_stub_is_not_called_sure) {
+  const double top = whole().joint("hip_right").center.z();
+  for (const double left : {130.0, 90.0, 60.0}) {
+    const Found now = found(cut("thigh_right", [&](const Vector3d& p) { return p.z() > top - left; }));
+    const Vector3d off = now.joint("knee_right").center - whole().joint("knee_right").center;
+    if (off.norm() > 30) EXPECT_LT(now.confidence("knee_right"), JointSources::least_confidence) << left;
+  }
+}
+
 TEST(OtherSide, names) {
   EXPECT_EQ(other_side("thigh_left"), "thigh_right");
   EXPECT_EQ(other_side("thigh_right"), "thigh_left");

@@ -10,6 +10,7 @@
 
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/runtime/quality_meter.hpp>
+#include <ecorche/runtime/skin_caps.hpp>
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -54,6 +55,67 @@ TEST(PoseQuality, RestIsPerfect) {
   EXPECT_NEAR(q.tissues[0].rest_mm3, 42.0 * 42 * 302, 1);
   for (const TissueChange& t : q.tissues) EXPECT_EQ(t.share, 0);
   EXPECT_TRUE(q.pass);
+}
+
+// A toy whose upper end is a border of its scan.
+Model capped_toy() {
+  Model model = test::toy_model();
+  const float top = model.tissues[0].V.col(2).maxCoeff();
+  model.provenance["skin_caps"] = "0 0 " + std::to_string(top) + " 0 0 1 0.5 17.6; nonsense ;1 2 3";
+  return model;
+}
+
+TEST(SkinCaps, AreTheTrianglesAtTheBorderThatLookOut) {
+  const Model model = capped_toy();
+  const std::vector<SkinCap> caps = skin_caps(model);
+  ASSERT_EQ(caps.size(), 1u);
+  EXPECT_EQ(caps[0].cm2, 17.6);
+  const Tissue& skin = model.tissues[0];
+  const std::vector<std::uint8_t> faces = cap_faces(skin, caps);
+  double area = 0;
+  for (Eigen::Index f = 0; f < skin.F.rows(); ++f) {
+    const auto corner = [&](int c) -> Vector3d {
+      return skin.V.row(skin.F(f, c)).cast<double>().transpose();
+    };
+    const bool there = corner(0).z() > caps[0].at.z() - 0.5 && corner(1).z() > caps[0].at.z() - 0.5 &&
+                       corner(2).z() > caps[0].at.z() - 0.5;
+    EXPECT_EQ(faces[static_cast<std::size_t>(f)] != 0, there);
+    if (there) area += 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+  }
+  EXPECT_NEAR(area, 42.0 * 42, 1);
+  EXPECT_TRUE(cap_tets(test::toy_model()).empty());
+}
+
+TEST(SkinCaps, AreLeftOutOfTheFigures) {
+  Posed posed;
+  posed.model = std::make_shared<const Model>(capped_toy());
+  const std::vector<std::uint8_t> at_caps = cap_tets(*posed.model);
+  const auto count = static_cast<std::uint64_t>(std::count(at_caps.begin(), at_caps.end(), 1));
+  ASSERT_GT(count, 0u);
+  EXPECT_EQ(posed.measured().tets_measured, posed.model->tet_count() - count);
+  // What is turned inside out at the cap alone is in no figure.
+  PosedBody& body = posed.body;
+  std::vector<std::uint8_t> elsewhere(posed.model->node_count(), 0);
+  for (std::size_t t = 0; t < at_caps.size(); ++t) {
+    for (int c = 0; c < 4 && at_caps[t] == 0; ++c)
+      elsewhere[static_cast<std::size_t>(posed.model->tets(static_cast<Eigen::Index>(t), c))] = 1;
+  }
+  bool moved = false;
+  for (std::size_t n = 0; n < elsewhere.size(); ++n) {
+    if (elsewhere[n] != 0) continue;
+    body.nodes[3 * n + 2] -= 200;
+    moved = true;
+  }
+  ASSERT_TRUE(moved);
+  const PoseQuality left_out = posed.measured();
+  EXPECT_EQ(left_out.inverted_tets, 0u);
+  EXPECT_EQ(left_out.min_det_f, 1);
+  EXPECT_EQ(left_out.places.inverted.share, 0);
+  Model without = *posed.model;
+  without.provenance.erase("skin_caps");
+  EXPECT_GT(measure(without, body, posed.poser.all_tissues(), {}).inverted_tets, 0u);
+  QualityMeter meter(posed.model, 1 << 20);
+  EXPECT_EQ(meter.measure(body, posed.poser.all_tissues()).tets_measured, posed.model->tet_count() - count);
 }
 
 TEST(PoseQuality, AStretchIsMeasuredAsWhatItIs) {

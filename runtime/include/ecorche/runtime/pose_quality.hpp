@@ -53,7 +53,8 @@ struct PoseQuality {
   double volume_change = 0;  ///< of the tets, all together
   double unsigned_volume_change =
       0;  ///< sum of |posed - rest| over the tets, over that of rest: folds cannot cancel
-  std::uint64_t tets_measured = 0;  ///< all, or the subset that the figures above are estimated from
+  std::uint64_t tets_measured =
+      0;  ///< all but those at the skin's caps (skin_caps.hpp), or the subset that these are estimated from
   double inverted_share_error = 0;  ///< standard error of the estimate; 0 where all tets were measured
   double volume_change_error = 0;   ///< likewise
   std::vector<TissueChange> tissues;

@@ -23,7 +23,9 @@ struct WorstPlaces {
 };
 
 /// A tet counts for the cube that its middle lies in; cubes less than a quarter full are left out, since a
-/// tet or two would be all of them. `nodes`: 3 * #nodes, posed, LPS mm. O(#T).
-WorstPlaces worst_places(const Model& model, std::span<const float> nodes);
+/// tet or two would be all of them. `nodes`: 3 * #nodes, posed, LPS mm;
+/// `left_out`: empty, or 1 for each tet that counts nowhere. O(#T).
+WorstPlaces worst_places(const Model& model, std::span<const float> nodes,
+                         std::span<const std::uint8_t> left_out = {});
 
 }  // namespace ecorche::runtime
