@@ -71,7 +71,7 @@ internal static partial class Check
                     if (file.Position == file.Length) break;
                 }
                 double best = double.PositiveInfinity;
-                for (int i = 0; i < 40; ++i)
+                for (int i = 0; i < 200; ++i)
                 {
                     var watch = Stopwatch.StartNew();
                     var reader = new WireReader(bytes.Envelope);

@@ -32,6 +32,7 @@ namespace Ecorche
         private Client _client;
         private Pose _next, _sending;
         private bool _hasNext, _shownPose, _closed;
+        private LinkState _state;
 
         public ClientThread(string address, ClientOptions options = null, StreamOptions stream = null, string model = "", string session = "")
         {
@@ -42,7 +43,14 @@ namespace Ecorche
             _thread.Start();
         }
 
-        public LinkState State { get; private set; }
+        public LinkState State
+        {
+            get
+            {
+                lock (_lock) return _state;
+            }
+        }
+
         /// <summary>What went wrong last; null: nothing.</summary>
         public EcorcheException Error { get; private set; }
         /// <summary>Grows with each model that was opened: what was built for the last one is no good then. 0: none yet.</summary>
@@ -128,7 +136,7 @@ namespace Ecorche
                     (_next, _sending) = (client.NewPose(), client.NewPose());
                     (_hasNext, _shownPose, Controls, Error) = (false, false, client.Controls, null);
                     ++Generation;
-                    State = LinkState.Open;
+                    _state = LinkState.Open;
                 }
             }
             catch
@@ -144,7 +152,7 @@ namespace Ecorche
             lock (_lock)
             {
                 _hasNext |= _shownPose;
-                (State, Error, Controls) = (LinkState.Open, null, _client.Controls);
+                (_state, Error, Controls) = (LinkState.Open, null, _client.Controls);
             }
         }
 
@@ -181,7 +189,7 @@ namespace Ecorche
             lock (_lock)
             {
                 (_client, _next) = (null, null);
-                State = LinkState.Connecting;
+                _state = LinkState.Connecting;
             }
             FailAsked(new EcorcheException(Code.Aborted, "the model was replaced"));
         }
@@ -221,8 +229,8 @@ namespace Ecorche
             lock (_lock)
             {
                 Error = error;
-                if (!again) State = LinkState.Failed;
-                else if (_client != null) State = LinkState.Lost;
+                if (!again) _state = LinkState.Failed;
+                else if (_client != null) _state = LinkState.Lost;
             }
             return again;
         }

@@ -45,13 +45,24 @@ namespace Ecorche
             ushort* second = by.From1 == 0 ? x : by.From1 == 1 ? y : z;
             ushort* third = by.From2 == 0 ? x : by.From2 == 1 ? y : z;
             double s0 = by.Scale0, s1 = by.Scale1, s2 = by.Scale2, o0 = by.Offset0, o1 = by.Offset1, o2 = by.Offset2;
-            for (int i = 0; i < count; ++i, to += 4)
+            if (normals == null)
             {
-                to[0] = (float)(o0 + s0 * first[i]);
-                to[1] = (float)(o1 + s1 * second[i]);
-                to[2] = (float)(o2 + s2 * third[i]);
+                for (float* end = to + 4 * count; to < end; ++first, ++second, ++third, to += 4)
+                {
+                    to[0] = (float)(o0 + s0 * *first);
+                    to[1] = (float)(o1 + s1 * *second);
+                    to[2] = (float)(o2 + s2 * *third);
+                    *(uint*)(to + 3) = 0;
+                }
+                return;
             }
-            WriteNormals(normals, count, table, (uint*)to - 4 * count);
+            for (float* end = to + 4 * count; to < end; ++first, ++second, ++third, ++normals, to += 4)
+            {
+                to[0] = (float)(o0 + s0 * *first);
+                to[1] = (float)(o1 + s1 * *second);
+                to[2] = (float)(o2 + s2 * *third);
+                *(uint*)(to + 3) = table[*normals];
+            }
         }
 
         /// <summary>Positions of three floats, LPS mm, likewise.</summary>

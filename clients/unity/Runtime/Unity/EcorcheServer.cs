@@ -53,7 +53,8 @@ namespace Ecorche.Components
         /// <summary>This client poses the body; others look on.</summary>
         public bool Controls => _thread != null && _thread.Controls;
 
-        private void OnEnable()
+        /// <summary>With the first frame, so that settings made beside AddComponent count.</summary>
+        private void Connect()
         {
             var options = new ClientOptions { Token = token.Length == 0 ? null : token, Tls = tls, Authorities = authorities == null ? null : authorities.text };
             var stream = new StreamOptions { Tissues = tissues, Level = level, Adaptive = adaptive && !motions, Motions = motions, Encoding = Encoding.U16Delta };
@@ -62,13 +63,14 @@ namespace Ecorche.Components
 
         private void OnDisable()
         {
-            _thread.Dispose();
+            _thread?.Dispose();
             _thread = null;
             Frame = null;
         }
 
         private void Update()
         {
+            if (_thread == null) Connect();
             if (_shown != _thread.Generation)
             {
                 _shown = _thread.Generation;
@@ -83,6 +85,7 @@ namespace Ecorche.Components
         /// <summary>Where points of the world on the posed body lie in the scan (LPS mm, NaN outside), and which tissues hold them.</summary>
         public Task<Probed> Probe(Transform body, params UnityEngine.Vector3[] points)
         {
+            if (_thread == null) return Task.FromException<Probed>(new EcorcheException(Code.Unavailable, "the client is not connected"));
             var axes = Axes.Of(Space.Unity);
             var numbers = new double[3 * points.Length];
             for (int i = 0; i < points.Length; ++i)

@@ -8,7 +8,7 @@ public sealed class FiveSteps : MonoBehaviour
 {
     public Material material;
     private EcorcheServer _server;
-    private Pose _pose;
+    private Ecorche.Pose _pose;  // UnityEngine has one, too
     private bool _probed;
 
     private void Start()
@@ -22,7 +22,7 @@ public sealed class FiveSteps : MonoBehaviour
     private async void Update()
     {
         if (_server.State != LinkState.Open) return;
-        if (_pose == null) _pose = new Pose(_server.Body);
+        if (_pose == null) _pose = new Ecorche.Pose(_server.Body);
         _server.SetPose(_pose.SetAngle("elbow_left", "flexion", 0.8 + 0.6 * Mathf.Sin(Time.time)));  // 3. pose: radians
         if (_probed || _server.Frame == null) return;
         _probed = true;

@@ -74,8 +74,10 @@ namespace UnityEngine
 
     public struct Matrix4x4 { }
 
-    /// Named as one of the package's.
+    // Named as types of the package are.
     public enum Space { World, Self }
+
+    public struct Pose { }
 
     public struct Bounds
     {

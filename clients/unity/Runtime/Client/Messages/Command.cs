@@ -20,7 +20,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ControlGranted : IMessage
+    public sealed class ControlGranted
     {
         public ulong LastSequence;
         public bool HasPose; public readonly PoseState Pose = new PoseState();
@@ -30,8 +30,6 @@ namespace Ecorche.Wire
             LastSequence = default;
             HasPose = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -59,7 +57,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ControlChanged : IMessage
+    public sealed class ControlChanged
     {
         public Role Role;
         public bool Vacant;
@@ -71,8 +69,6 @@ namespace Ecorche.Wire
             Vacant = default;
             ReservedSeconds = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -117,7 +113,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Probed : IMessage
+    public sealed class Probed
     {
         public ulong PoseSequence;
         public bool HasPoints; public readonly Array Points = new Array();
@@ -133,8 +129,6 @@ namespace Ecorche.Wire
             HasValues = false;
             HasDeformationGradient = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -165,7 +159,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ClipList : IMessage
+    public sealed class ClipList
     {
         public readonly Repeated<ClipSummary> Clips = new Repeated<ClipSummary>();
 
@@ -173,8 +167,6 @@ namespace Ecorche.Wire
         {
             Clips.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -190,7 +182,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ClipSummary : IMessage
+    public sealed class ClipSummary
     {
         public string Name = "";
         public double Seconds;
@@ -202,8 +194,6 @@ namespace Ecorche.Wire
             Seconds = default;
             FramesPerSecond = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -249,7 +239,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ModelChanged : IMessage
+    public sealed class ModelChanged
     {
         public ulong Identity;
 
@@ -257,8 +247,6 @@ namespace Ecorche.Wire
         {
             Identity = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {

@@ -31,7 +31,7 @@ namespace Ecorche.Wire
         Lbs = 3,
     }
 
-    public sealed class Status : IMessage
+    public sealed class Status
     {
         public uint Code;
         public string Message = "";
@@ -41,8 +41,6 @@ namespace Ecorche.Wire
             Code = default;
             Message = "";
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -66,7 +64,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Vector3 : IMessage
+    public sealed class Vector3
     {
         public double X;
         public double Y;
@@ -78,8 +76,6 @@ namespace Ecorche.Wire
             Y = default;
             Z = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -104,7 +100,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Array : IMessage
+    public sealed class Array
     {
         public ScalarType Type;
         public uint Components;
@@ -118,8 +114,6 @@ namespace Ecorche.Wire
             Count = default;
             Offset = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -146,7 +140,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class JointTranslation : IMessage
+    public sealed class JointTranslation
     {
         public uint Joint;
         public bool HasOffset; public readonly Vector3 Offset = new Vector3();
@@ -156,8 +150,6 @@ namespace Ecorche.Wire
             Joint = default;
             HasOffset = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -180,7 +172,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class PoseState : IMessage
+    public sealed class PoseState
     {
         public ulong Sequence;
         public bool HasRootTranslation; public readonly Vector3 RootTranslation = new Vector3();
@@ -196,8 +188,6 @@ namespace Ecorche.Wire
             Translation.Clear();
             Skinning = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {

@@ -2,7 +2,7 @@
 // Made by scripts/csharp_messages of proto/ecorche/v1/envelope.proto, which says what these mean.
 namespace Ecorche.Wire
 {
-    public sealed class Envelope : IMessage
+    public sealed class Envelope
     {
         public ulong RequestId;
         public bool HasClientHello; public readonly ClientHello ClientHello = new ClientHello();
@@ -66,8 +66,6 @@ namespace Ecorche.Wire
             HasClipList = false;
             HasModelChanged = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {

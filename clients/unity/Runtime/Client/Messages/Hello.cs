@@ -61,7 +61,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ServerHello : IMessage
+    public sealed class ServerHello
     {
         public uint Protocol;
         public string Server = "";
@@ -83,8 +83,6 @@ namespace Ecorche.Wire
             HasResumed = false;
             Connection = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -111,7 +109,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Resumed : IMessage
+    public sealed class Resumed
     {
         public string Model = "";
         public string Session = "";
@@ -129,8 +127,6 @@ namespace Ecorche.Wire
             Subscriptions.Clear();
             HasPose = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -153,7 +149,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ResumedSubscription : IMessage
+    public sealed class ResumedSubscription
     {
         public uint Was;
         public uint Is;
@@ -163,8 +159,6 @@ namespace Ecorche.Wire
             Was = default;
             Is = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -181,7 +175,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Limits : IMessage
+    public sealed class Limits
     {
         public uint HelloBytes;
         public double HelloSeconds;
@@ -230,8 +224,6 @@ namespace Ecorche.Wire
             ConnectionShare = default;
         }
 
-        void IMessage.Read(ref WireReader from) => Read(ref from);
-
         internal void Read(ref WireReader from)
         {
             Clear();
@@ -266,7 +258,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Ping : IMessage
+    public sealed class Ping
     {
         public byte[] Data = System.Array.Empty<byte>();
 
@@ -274,8 +266,6 @@ namespace Ecorche.Wire
         {
             Data = System.Array.Empty<byte>();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -297,7 +287,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Pong : IMessage
+    public sealed class Pong
     {
         public byte[] Data = System.Array.Empty<byte>();
 
@@ -305,8 +295,6 @@ namespace Ecorche.Wire
         {
             Data = System.Array.Empty<byte>();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -328,7 +316,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Goodbye : IMessage
+    public sealed class Goodbye
     {
         public bool HasStatus; public readonly Status Status = new Status();
         public double RetrySeconds;
@@ -338,8 +326,6 @@ namespace Ecorche.Wire
             HasStatus = false;
             RetrySeconds = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {

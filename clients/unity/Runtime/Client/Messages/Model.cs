@@ -30,7 +30,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ModelList : IMessage
+    public sealed class ModelList
     {
         public readonly Repeated<ModelSummary> Models = new Repeated<ModelSummary>();
 
@@ -38,8 +38,6 @@ namespace Ecorche.Wire
         {
             Models.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -55,7 +53,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ModelSummary : IMessage
+    public sealed class ModelSummary
     {
         public string Name = "";
         public ulong Identity;
@@ -77,8 +75,6 @@ namespace Ecorche.Wire
             Tets = default;
             Volumes.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -126,7 +122,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ModelOpened : IMessage
+    public sealed class ModelOpened
     {
         public string Model = "";
         public ulong Identity;
@@ -155,8 +151,6 @@ namespace Ecorche.Wire
             LastSequence = default;
         }
 
-        void IMessage.Read(ref WireReader from) => Read(ref from);
-
         internal void Read(ref WireReader from)
         {
             var oldModel = Model;
@@ -183,7 +177,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Skeleton : IMessage
+    public sealed class Skeleton
     {
         public string Name = "";
         public readonly Repeated<Segment> Segments = new Repeated<Segment>();
@@ -193,8 +187,6 @@ namespace Ecorche.Wire
             Name = "";
             Segments.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -212,7 +204,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Segment : IMessage
+    public sealed class Segment
     {
         public string Name = "";
         public int Parent;
@@ -226,8 +218,6 @@ namespace Ecorche.Wire
             HasJoint = false;
             Aliases.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -247,7 +237,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Joint : IMessage
+    public sealed class Joint
     {
         public string Name = "";
         public JointKind Kind;
@@ -269,8 +259,6 @@ namespace Ecorche.Wire
             Sequence.Clear();
             Coupled.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -294,7 +282,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class JointCoupling : IMessage
+    public sealed class JointCoupling
     {
         public uint Joint;
         public uint Angle;
@@ -310,8 +298,6 @@ namespace Ecorche.Wire
             HasSlideAxis = false; SlideAxis = default;
             Ratio = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -331,7 +317,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class AngleAxis : IMessage
+    public sealed class AngleAxis
     {
         public string Name = "";
         public uint Axis;
@@ -349,8 +335,6 @@ namespace Ecorche.Wire
             Min = default;
             Max = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {

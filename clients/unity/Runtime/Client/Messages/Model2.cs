@@ -2,7 +2,7 @@
 // Made by scripts/csharp_messages of proto/ecorche/v1/model.proto, which says what these mean.
 namespace Ecorche.Wire
 {
-    public sealed class Tissue : IMessage
+    public sealed class Tissue
     {
         public string Name = "";
         public string Group = "";
@@ -22,8 +22,6 @@ namespace Ecorche.Wire
             HasPackedTriangles = false;
             TriangleCount = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -47,7 +45,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Volume : IMessage
+    public sealed class Volume
     {
         public string Name = "";
         public bool HasGrid; public readonly Grid Grid = new Grid();
@@ -67,8 +65,6 @@ namespace Ecorche.Wire
             Labels = default;
             Table.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -91,7 +87,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class VolumeTableEntry : IMessage
+    public sealed class VolumeTableEntry
     {
         public long Key;
         public string Value = "";
@@ -101,8 +97,6 @@ namespace Ecorche.Wire
             Key = default;
             Value = "";
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -120,7 +114,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Grid : IMessage
+    public sealed class Grid
     {
         public uint SizeI;
         public uint SizeJ;
@@ -138,8 +132,6 @@ namespace Ecorche.Wire
             HasSpacing = false;
             Direction.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {

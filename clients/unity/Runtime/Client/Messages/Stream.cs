@@ -167,7 +167,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class Subscribed : IMessage
+    public sealed class Subscribed
     {
         public uint Subscription;
         public readonly Repeated<MeshLevel> Levels = new Repeated<MeshLevel>();
@@ -183,8 +183,6 @@ namespace Ecorche.Wire
             Step = default;
             HasSkinning = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -204,7 +202,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class MeshLevel : IMessage
+    public sealed class MeshLevel
     {
         public uint Level;
         public readonly Repeated<MeshPart> Parts = new Repeated<MeshPart>();
@@ -214,8 +212,6 @@ namespace Ecorche.Wire
             Level = default;
             Parts.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -232,7 +228,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class MeshPart : IMessage
+    public sealed class MeshPart
     {
         public uint Tissue;
         public bool HasVertices; public readonly Array Vertices = new Array();
@@ -244,8 +240,6 @@ namespace Ecorche.Wire
             HasVertices = false;
             HasTriangles = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -263,7 +257,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class TissueBinding : IMessage
+    public sealed class TissueBinding
     {
         public uint Tissue;
         public int Segment;
@@ -279,8 +273,6 @@ namespace Ecorche.Wire
             HasCorners = false;
             HasBarycentric = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -300,7 +292,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class SkinningData : IMessage
+    public sealed class SkinningData
     {
         public bool HasBox; public readonly QuantiseBox Box = new QuantiseBox();
         public readonly Repeated<TissueSkinning> Tissues = new Repeated<TissueSkinning>();
@@ -318,8 +310,6 @@ namespace Ecorche.Wire
             UsualNormalError = default;
             Measured.Clear();
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -340,7 +330,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class TissueSkinning : IMessage
+    public sealed class TissueSkinning
     {
         public uint Tissue;
         public uint Vertices;
@@ -361,8 +351,6 @@ namespace Ecorche.Wire
             HungCount = default;
         }
 
-        void IMessage.Read(ref WireReader from) => Read(ref from);
-
         internal void Read(ref WireReader from)
         {
             Clear();
@@ -380,6 +368,21 @@ namespace Ecorche.Wire
                     default: from.Skip(key); break;
                 }
             }
+        }
+    }
+
+    public sealed class Unsubscribe
+    {
+        public uint Subscription;
+
+        public void Clear()
+        {
+            Subscription = default;
+        }
+
+        internal void Write(WireWriter to)
+        {
+            if (Subscription != 0) to.UInt32(8, Subscription);
         }
     }
 }

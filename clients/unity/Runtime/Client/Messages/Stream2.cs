@@ -2,21 +2,6 @@
 // Made by scripts/csharp_messages of proto/ecorche/v1/stream.proto, which says what these mean.
 namespace Ecorche.Wire
 {
-    public sealed class Unsubscribe
-    {
-        public uint Subscription;
-
-        public void Clear()
-        {
-            Subscription = default;
-        }
-
-        internal void Write(WireWriter to)
-        {
-            if (Subscription != 0) to.UInt32(8, Subscription);
-        }
-    }
-
     public sealed class PoseUpdate
     {
         public ulong Sequence;
@@ -47,7 +32,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class PoseAck : IMessage
+    public sealed class PoseAck
     {
         public ulong Sequence;
         public bool HasStatus; public readonly Status Status = new Status();
@@ -65,8 +50,6 @@ namespace Ecorche.Wire
             SkippedSequences.Clear();
             HasTimings = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -88,7 +71,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ClampedJoint : IMessage
+    public sealed class ClampedJoint
     {
         public uint Joint;
         public string Name = "";
@@ -100,8 +83,6 @@ namespace Ecorche.Wire
             Name = "";
             Removed = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -120,7 +101,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class ServerTimings : IMessage
+    public sealed class ServerTimings
     {
         public ulong Waited;
         public ulong Posed;
@@ -134,8 +115,6 @@ namespace Ecorche.Wire
             Encoded = default;
             Measured = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -154,7 +133,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class MeshFrame : IMessage
+    public sealed class MeshFrame
     {
         public uint Subscription;
         public ulong Frame;
@@ -189,8 +168,6 @@ namespace Ecorche.Wire
             Skinning = default;
         }
 
-        void IMessage.Read(ref WireReader from) => Read(ref from);
-
         internal void Read(ref WireReader from)
         {
             Clear();
@@ -218,7 +195,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class QuantiseBox : IMessage
+    public sealed class QuantiseBox
     {
         public float LowX;
         public float LowY;
@@ -232,8 +209,6 @@ namespace Ecorche.Wire
             LowZ = default;
             Step = default;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -252,7 +227,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class MeshArray : IMessage
+    public sealed class MeshArray
     {
         public uint Tissue;
         public MeshArrayKind Kind;
@@ -264,8 +239,6 @@ namespace Ecorche.Wire
             Kind = default;
             HasArray = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -283,7 +256,7 @@ namespace Ecorche.Wire
         }
     }
 
-    public sealed class VolumeFrame : IMessage
+    public sealed class VolumeFrame
     {
         public uint Subscription;
         public ulong Frame;
@@ -311,8 +284,6 @@ namespace Ecorche.Wire
             HasBricks = false;
             HasContent = false;
         }
-
-        void IMessage.Read(ref WireReader from) => Read(ref from);
 
         internal void Read(ref WireReader from)
         {
@@ -353,6 +324,71 @@ namespace Ecorche.Wire
         {
             if (Frame != 0) to.UInt64(16, Frame);
             if (Subscription != 0) to.UInt32(8, Subscription);
+        }
+    }
+
+    public sealed class PoseQuality
+    {
+        public PoseQualityVerdict Verdict;
+        public ulong InvertedTets;
+        public double InvertedShare;
+        public double MinDetF;
+        public double VolumeChange;
+        public readonly Repeated<TissueChange> Tissues = new Repeated<TissueChange>();
+        public double BoneRigidity;
+        public double MaxInvertedShare;
+        public double MaxVolumeChange;
+        public double MaxBoneRigidity;
+        public ulong PoseSequence;
+        public double UnsignedVolumeChange;
+        public bool HasWorstTissue; public uint WorstTissue;
+        public readonly Repeated<DoubtfulJoint> Doubtful = new Repeated<DoubtfulJoint>();
+        public double TissueFactor;
+
+        public void Clear()
+        {
+            Verdict = default;
+            InvertedTets = default;
+            InvertedShare = default;
+            MinDetF = default;
+            VolumeChange = default;
+            Tissues.Clear();
+            BoneRigidity = default;
+            MaxInvertedShare = default;
+            MaxVolumeChange = default;
+            MaxBoneRigidity = default;
+            PoseSequence = default;
+            UnsignedVolumeChange = default;
+            HasWorstTissue = false; WorstTissue = default;
+            Doubtful.Clear();
+            TissueFactor = default;
+        }
+
+        internal void Read(ref WireReader from)
+        {
+            Clear();
+            for (uint key; (key = from.Key()) != 0;)
+            {
+                switch (key)
+                {
+                    case 8: Verdict = (PoseQualityVerdict)from.UInt32(); break;
+                    case 16: InvertedTets = from.UInt64(); break;
+                    case 25: InvertedShare = from.Double(); break;
+                    case 33: MinDetF = from.Double(); break;
+                    case 41: VolumeChange = from.Double(); break;
+                    case 50: { var inner = from.Message(); Tissues.Add().Read(ref inner); } break;
+                    case 57: BoneRigidity = from.Double(); break;
+                    case 65: MaxInvertedShare = from.Double(); break;
+                    case 73: MaxVolumeChange = from.Double(); break;
+                    case 81: MaxBoneRigidity = from.Double(); break;
+                    case 88: PoseSequence = from.UInt64(); break;
+                    case 97: UnsignedVolumeChange = from.Double(); break;
+                    case 104: WorstTissue = from.UInt32(); HasWorstTissue = true; break;
+                    case 114: { var inner = from.Message(); Doubtful.Add().Read(ref inner); } break;
+                    case 121: TissueFactor = from.Double(); break;
+                    default: from.Skip(key); break;
+                }
+            }
         }
     }
 }

@@ -3,11 +3,6 @@ using System;
 
 namespace Ecorche.Wire
 {
-    internal interface IMessage
-    {
-        void Read(ref WireReader from);
-    }
-
     /// <summary>A repeated field. Cleared, it keeps its items for the next message, so that none is allocated again.</summary>
     public sealed class Repeated<T>
     {
