@@ -168,8 +168,8 @@ class Unity(unittest.TestCase):
         self.assertIn("Cor within", check("skin", self.server.address))
 
     def test_nothing_is_allocated(self):
-        out = check("allocate", self.server.address, 200)
-        self.assertEqual(out.count(" 0 bytes in 200 frames, 0 collections"), 3, out)
+        out = check("allocate", self.server.address, 100)
+        self.assertEqual(out.count(" 0 bytes in 100 frames, 0 collections"), 3, out)
 
     def test_volumes_with_changed_bricks(self):
         out = check("volume", self.server.address).splitlines()
@@ -195,7 +195,7 @@ class Unity(unittest.TestCase):
         self.assertEqual(check("cut"), "cut 73 times\n")
 
     def test_who_lies_is_refused(self):
-        self.assertEqual(check("hostile", 300), "refused 300\n")
+        self.assertEqual(check("hostile", 120), "refused 120\n")
 
     def test_the_line_is_cut_and_mended(self):
         with Relay(self.server.port) as relay, subprocess.Popen(command("resume", relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
