@@ -100,6 +100,9 @@ class Package(unittest.TestCase):
     @unittest.skipUnless(shutil.which("glslangValidator"), "no glslangValidator (scripts/setup --tests installs it)")
     def test_shaders_compile(self):
         shaders = PACKAGE / "Runtime" / "Unity" / "Shaders"
+        chosen = re.findall(r"(?:defined\((\w+)\)|#else)\n#define (METHOD|INFLUENCES) (\d)", (shaders / "EcorcheSkinning.compute").read_text())
+        self.assertEqual(chosen, [("METHOD_LBS", "METHOD", "1"), ("METHOD_DQS", "METHOD", "2"), ("", "METHOD", "3"), ("INFLUENCES_1", "INFLUENCES", "1"),
+                                  ("INFLUENCES_4", "INFLUENCES", "4"), ("", "INFLUENCES", "8")])
         for method in ("LBS", "DQS", "COR"):
             for influences in (1, 4, 8):
                 self.glslang("comp", "main", shaders / "EcorcheSkinning.compute", f"-DMETHOD_{method}=1", f"-DINFLUENCES_{influences}=1")
