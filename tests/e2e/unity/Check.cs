@@ -199,7 +199,8 @@ internal static partial class Check
             }
             Console.ReadLine();
             client.Resume();
-            Wait(client, stream, sent);
+            // A new session shows the scan.
+            Wait(client, stream, client.Server.HasResumed ? sent : 0);
             ulong next = client.SendPose(pose.SetAngle("knee_left", "flexion", 0.7));
             True(next > sent && client.Controls, "poses go on");
             Wait(client, stream, next);

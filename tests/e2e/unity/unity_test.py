@@ -197,18 +197,39 @@ class Unity(unittest.TestCase):
     def test_who_lies_is_refused(self):
         self.assertEqual(check("hostile", 120), "refused 120\n")
 
+    def test_the_library_is_not_unloaded_from_under_its_threads(self):
+        told = subprocess.run(["readelf", "-d", LIBRARIES / "libecorche.so"], capture_output=True, text=True, check=True).stdout
+        self.assertIn("NODELETE", told)
+
     def test_the_line_is_cut_and_mended(self):
-        with Relay(self.server.port) as relay, subprocess.Popen(command("resume", relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                                               text=True) as client:
+        self.comes_back_by_resume(self.server, lambda: None, "back resumed\n")
+
+    def test_a_model_that_was_read_anew_meanwhile_is_opened_anew(self):
+        with tempfile.TemporaryDirectory() as name:
+            served = pathlib.Path(name) / "body.hdf"
+            shutil.copy(MODEL, served)
+            with Server(served) as server:
+                def replace():
+                    with Client("127.0.0.1", server.port) as other:
+                        other.open(session="mine")
+                        shutil.copy(OTHER_MODEL, served.with_suffix(".new"))
+                        served.with_suffix(".new").rename(served)
+                        other.reload("body")
+                self.comes_back_by_resume(server, replace, "back anew\n")
+
+    def comes_back_by_resume(self, server, meanwhile, told):
+        with Relay(server.port) as relay, subprocess.Popen(command("resume", relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                                           text=True) as client:
             self.assertEqual(client.stdout.readline(), "shown 1\n")
             relay.cut()
+            meanwhile()
             client.stdin.write("\n")
             client.stdin.flush()
             self.assertIn("lost the connection was lost", client.stdout.readline())
             relay.mend()
             client.stdin.write("\n")
             client.stdin.flush()
-            self.assertEqual(client.stdout.readline(), "back resumed\n")
+            self.assertEqual(client.stdout.readline(), told)
             client.stdin.close()
             self.assertEqual(client.wait(30), 0)
 
