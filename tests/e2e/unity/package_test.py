@@ -105,7 +105,7 @@ class Package(unittest.TestCase):
                                   ("INFLUENCES_4", "INFLUENCES", "4"), ("", "INFLUENCES", "8")])
         for method in ("LBS", "DQS", "COR"):
             for influences in (1, 4, 8):
-                self.glslang("comp", "main", shaders / "EcorcheSkinning.compute", f"-DMETHOD_{method}=1", f"-DINFLUENCES_{influences}=1")
+                self.glslang("comp", "EcorcheSkinning", shaders / "EcorcheSkinning.compute", f"-DMETHOD_{method}=1", f"-DINFLUENCES_{influences}=1")
         text = (shaders / "EcorcheSkinned.shader").read_text()
         program = re.search(r"HLSLPROGRAM(.*)ENDHLSL", text, re.S).group(1)
         plain = self.folder / "drawn.hlsl"
