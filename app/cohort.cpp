@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
 #include <filesystem>
 #include <sstream>
 
@@ -23,6 +24,8 @@ struct CohortSettings {
   std::vector<std::string> levels, labels, words;
   std::string profile = "local";
   bool dry_run = false;
+  int sample = 0;
+  std::int64_t seed = 1;
 };
 
 // Beside the program where it was installed, or above it where it was built.
@@ -84,6 +87,9 @@ std::vector<std::string> words_of(const CohortSettings& settings, int threads) {
                 "ecorche=" + fs::read_symlink(platform::own_program(), ignored).string(),
                 "from=" + fs::current_path().string(), "levels=" + text::joined(settings.levels, ",")});
   if (!settings.labels.empty()) words.push_back("labels=" + joined_labels(settings.labels));
+  if (settings.sample > 0)
+    words.insert(words.end(),
+                 {"sample=" + std::to_string(settings.sample), "seed=" + std::to_string(settings.seed)});
   if (settings.dry_run) words.emplace_back("--dry-run");
   for (const std::string& more : settings.words) {
     std::istringstream parts(more);
@@ -154,6 +160,17 @@ void declare_cohort(CLI::App& app, Program& program, Run& chosen) {
   command
       ->add_option("--profile", settings->profile,
                    "where it runs: local, slurm, or a folder of a Snakemake profile")
+      ->capture_default_str();
+  CLI::Option* sample =
+      command
+          ->add_option(
+              "--sample", settings->sample,
+              "draw so many poses of each participant within the limits of its joints, for training: images, "
+              "labels, displacements, joints, radiographs")
+          ->check(CLI::Range(1, 99999));
+  command->add_option("--seed", settings->seed, "of those poses")
+      ->needs(sample)
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1} << 53))
       ->capture_default_str();
   command->add_flag("-n,--dry-run", settings->dry_run, "only say which steps would run, and why");
   command->add_option("--snakemake", settings->words, "further words for Snakemake, as \"--until check\"");

@@ -51,6 +51,6 @@ def mib(law, step, size, attempt, beside=0):
     return math.ceil(linear(law[step], "mib", size) + beside) * 2 ** (attempt - 1)
 
 
-def minutes(law, step, size, attempt):
-    """Four times what it takes: a node may be slower than the one that was measured."""
-    return max(1, math.ceil(4 * linear(law[step], "s", size) / 60)) * attempt
+def minutes(law, step, size, attempt, times=1):
+    """Four times what it takes: a node may be slower than the one that was measured. `times`: of a step that does one thing often."""
+    return max(1, math.ceil(4 * times * linear(law[step], "s", size) / 60)) * attempt

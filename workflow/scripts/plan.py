@@ -111,6 +111,8 @@ class Plan:
             "preprocess": lambda who: {"words": self.preprocess_words(who), "cache_gib": self.config["cache_gib"], "after": ["repair"]},
             "verify": lambda who: {"after": ["preprocess"]},
             "pose": lambda pose: {"words": self.pose_words(pose), "after": ["verify"]},
+            "sample": lambda: {"count": self.config["sample"], "seed": self.config["seed"], "reach": self.config["reach"], "views": self.config["views"],
+                               "words": ["--tissues", "none", "--volumes", "all", "--field", "--volume-format", "nii.gz"], "after": ["verify"]},
             "subject": lambda who: {"options": self.options(who), "after": self.told(who)},
             "group": lambda: {"names": self.group_names(), "unfinished": self.unfinished()},
             "description": lambda: {"source": self.root},
@@ -159,7 +161,7 @@ class Plan:
     def told(self, participant):
         """The steps that a participant's page tells of."""
         scan = [] if self.is_case(participant) else ["new"]
-        return [*scan, "check", "repair", "preprocess", "verify", *(f"pose-{pose}" for pose in self.poses)]
+        return [*scan, "check", "repair", "preprocess", "verify", *(f"pose-{pose}" for pose in self.poses), *(["sample"] if self.config["sample"] else [])]
 
     def options(self, participant):
         return {"preprocess": self.preprocess_words(participant), "repair": self.config["repair"] if self.config["repair"] is False else self.repair_words(),
@@ -176,7 +178,7 @@ class Plan:
         beside = self.law["job"]["mib"] if self.config.get("cluster") else 0  # a Snakemake of its own
         return {"mem_mb": lambda wc, attempt: law.mib(self.law, step, size(wc), attempt, beside),
                 "hold_mib": lambda wc, attempt: law.mib(self.law, step, size(wc), attempt) if hold else 0,
-                "runtime": lambda wc, attempt: law.minutes(self.law, step, size(wc), attempt),
+                "runtime": lambda wc, attempt: law.minutes(self.law, step, size(wc), attempt, self.config["sample"] if step == "sample" else 1),
                 "attempt": lambda wc, attempt: attempt, "attempts": ATTEMPTS, "at_once": 1}
 
     # What is to be made.

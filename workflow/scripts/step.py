@@ -23,6 +23,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import participants  # noqa: E402
 import record  # noqa: E402
+import samples  # noqa: E402
 import summary  # noqa: E402
 
 DATA_FAULTS = {64, 65, 66, 77, 78}
@@ -229,7 +230,7 @@ def subject(step):
     return ["status.json", "quality.tsv", "provenance.json", "report.html", *(["picture.png"] if found["ok"] else [])], {}
 
 
-STEPS = {"new": new, "check": check, "repair": repair, "preprocess": preprocess, "verify": verify, "pose": pose, "subject": subject}
+STEPS = {"new": new, "check": check, "repair": repair, "preprocess": preprocess, "verify": verify, "pose": pose, "sample": samples.make, "subject": subject}
 TAKE_ON = {"subject"}  # tells of what failed instead of passing it on
 
 

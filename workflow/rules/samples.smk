@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
+# Training sets: one job a participant, which goes on where it was.
+
+rule sample:
+    input: "{participant}/steps/verify.json"
+    output: "{participant}/steps/sample.json"
+    params: given=lambda wc: plan.given["sample"]()
+    threads: plan.threads
+    resources: **plan.resources("sample")
+    group: "participant"
+    shell: STEP
