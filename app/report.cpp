@@ -77,6 +77,7 @@ int report_group(const Program& program, const ReportSettings& settings) {
   }
   std::sort(names.begin(), names.end());
   std::vector<Participant> cohort;
+  cohort.reserve(names.size());
   for (const std::string& name : names) cohort.push_back(report::read_participant(settings.folder / name));
   const std::vector<report::Figure> figures = report::figures_of(cohort);
   files::write_text(settings.folder / "group.tsv", report::to_tsv(cohort, figures));

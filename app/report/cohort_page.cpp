@@ -138,6 +138,7 @@ std::string outliers(const std::vector<Participant>& cohort, const std::vector<F
   }
   if (lines.empty()) return "<h2>Unlike the others</h2>\n<p>Nobody.</p>\n";
   std::vector<std::size_t> order;
+  order.reserve(lines.size());
   for (const auto& [i, line] : lines) order.push_back(i);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return times[a] > times[b]; });

@@ -47,7 +47,7 @@ std::optional<std::filesystem::path> find_program(const std::string& name) {
 }
 
 int run_program(const std::filesystem::path& program, const std::vector<std::string>& words,
-                std::stop_token stop) {
+                const std::stop_token& stop) {
   // Made before the fork: the child may not allocate.
   std::string name = program.string();
   std::vector<std::string> kept = words;

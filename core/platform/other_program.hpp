@@ -18,6 +18,6 @@ std::optional<std::filesystem::path> find_program(const std::string& name);
 /// waited for. It is told to stop as well when this process dies. Returns its exit code, or 128 and the
 /// signal that ended it. Throws Error{internal} when it cannot be started.
 int run_program(const std::filesystem::path& program, const std::vector<std::string>& words,
-                std::stop_token stop);
+                const std::stop_token& stop);
 
 }  // namespace ecorche::platform

@@ -25,9 +25,15 @@ def cut(path):
 
 
 def make(ecorche, folder, count, broken=("typo",), voxel=12, size="small", first_seed=1, workers=2):
-    """BIDS tree FOLDER with sub-01, sub-02, ...; the last ones are broken as named. Returns {name: exit code expected, 0 where sound}."""
+    """BIDS tree FOLDER with sub-01, sub-02, ...; the last ones are broken as named. Returns {name: exit code
+    expected, 0 where sound}. What is there already is not made again."""
     folder = pathlib.Path(folder)
     names = [f"sub-{i + 1:02d}" for i in range(count)]
+    wanted = json.dumps({"Name": "phantoms", "BIDSVersion": "1.8.0", "Phantoms": [count, list(broken), voxel, size, first_seed]})
+    description = folder / "dataset_description.json"  # written last
+    if description.exists() and description.read_text() == wanted:
+        return expected_of(names, broken)
+    shutil.rmtree(folder, ignore_errors=True)
 
     def one(at):
         case = folder / names[at]
@@ -41,10 +47,12 @@ def make(ecorche, folder, count, broken=("typo",), voxel=12, size="small", first
         list(pool.map(one, range(sound)))
     for name in names[sound:]:
         shutil.copytree(folder / names[0], folder / name)
-    expected = dict.fromkeys(names, 0)
     for name, how in zip(names[sound:], broken):
-        do, expected[name] = BROKEN[how]
-        do(folder / name)
-    (folder / "dataset_description.json").write_text(json.dumps({"Name": "phantoms", "BIDSVersion": "1.8.0"}))
+        BROKEN[how][0](folder / name)
     (folder / "participants.tsv").write_text("participant_id\tseed\n" + "".join(f"{name}\t{first_seed + at}\n" for at, name in enumerate(names)))
-    return expected
+    description.write_text(wanted)
+    return expected_of(names, broken)
+
+
+def expected_of(names, broken):
+    return dict.fromkeys(names, 0) | {name: BROKEN[how][1] for name, how in zip(names[len(names) - len(broken):], broken)}
