@@ -6,6 +6,7 @@
 
 #include "proto/arrays.hpp"
 #include "proto/delta.hpp"
+#include "proto/float_kernels.hpp"
 #include "proto/oct16.hpp"
 
 namespace ecorche::wire {
@@ -18,13 +19,9 @@ Status bad_mesh(const std::string& what) {
 }
 
 void to_positions(const v1::QuantiseBox& box, DecodedTissue& tissue) {
-  const double low[3] = {box.low_x(), box.low_y(), box.low_z()};
-  const double step = box.step();
   tissue.positions.resize(tissue.numbers.size());
-  for (std::size_t i = 0; i + 2 < tissue.numbers.size(); i += 3) {
-    for (std::size_t c = 0; c < 3; ++c)
-      tissue.positions[i + c] = static_cast<float>(low[c] + step * tissue.numbers[i + c]);
-  }
+  kernels::to_positions(tissue.numbers, {box.low_x(), box.low_y(), box.low_z()}, box.step(),
+                        tissue.positions);
 }
 
 Status read_normals(const v1::Array& array, const Payload& payload, DecodedTissue& tissue) {
@@ -32,8 +29,9 @@ Status read_normals(const v1::Array& array, const Payload& payload, DecodedTissu
   if (!find(array, payload, 2, packed) || packed.size() / 2 != tissue.positions.size() / 3)
     return bad_mesh("its normals are not one per vertex");
   tissue.normals.resize(tissue.positions.size());
+  const Oct16Table& table = oct16_table();
   for (std::size_t v = 0; v < packed.size() / 2; ++v) {
-    const auto normal = from_oct16(packed[2 * v], packed[2 * v + 1]);
+    const std::array<float, 3>& normal = table.of(packed[2 * v], packed[2 * v + 1]);
     std::copy(normal.begin(), normal.end(), &tissue.normals[3 * v]);
   }
   return {};

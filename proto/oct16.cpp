@@ -51,4 +51,18 @@ std::array<float, 3> from_oct16(std::int8_t u, std::int8_t v) {
   return {x / length, y / length, z / length};
 }
 
+Oct16Table::Oct16Table() : units_(std::size_t{1} << 16U) {
+  for (int u = -128; u < 128; ++u) {
+    for (int v = -128; v < 128; ++v) {
+      const auto a = static_cast<std::int8_t>(u), b = static_cast<std::int8_t>(v);
+      units_[row(a, b)] = from_oct16(a, b);
+    }
+  }
+}
+
+const Oct16Table& oct16_table() {
+  static const Oct16Table table;
+  return table;
+}
+
 }  // namespace ecorche::wire

@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <functional>
 #include <random>
+#include <span>
+#include <vector>
 
 #include "proto/arrays.hpp"
 #include "proto/delta.hpp"
+#include "proto/float_kernels.hpp"
 
 namespace ecorche::wire {
 namespace {
@@ -79,6 +83,23 @@ TEST(MeshDecoder, KeyframesAndDeltas) {
   const Status status = decoder.decode(late.frame, late.payload, out);
   EXPECT_EQ(status.code, StatusCode::failed_precondition);
   EXPECT_NE(status.message.find("its keyframe 11 did not come"), std::string::npos);
+}
+
+// The vector kernel beside its plain twin, whatever is left over behind the last whole vector.
+TEST(MeshDecoder, NumbersBecomeMillimetres) {
+  std::mt19937 random(4);
+  const std::array<double, 3> low{-812.25, 1e-3, 977.0F / 3};
+  const double step = 0.0613F;
+  for (std::size_t vertices = 0; vertices < 70; ++vertices) {
+    std::vector<std::uint16_t> numbers(3 * vertices);
+    for (std::uint16_t& number : numbers) number = static_cast<std::uint16_t>(random());
+    if (vertices > 0) numbers.back() = 65535;
+    std::vector<float> out(numbers.size() + 1, -1.0F);
+    kernels::to_positions(numbers, low, step, std::span(out).first(numbers.size()));
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      EXPECT_EQ(out[i], static_cast<float>(low[i % 3] + step * numbers[i])) << i << " of " << numbers.size();
+    EXPECT_EQ(out.back(), -1.0F);
+  }
 }
 
 TEST(MeshDecoder, WhatIsNoFrameIsRefused) {

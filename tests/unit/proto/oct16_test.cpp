@@ -28,6 +28,15 @@ TEST(Oct16, EveryDirectionComesBackWithinADegree) {
   EXPECT_GT(worst, 0.1);
 }
 
+TEST(Oct16, TheTableIsThatOfAllPairs) {
+  for (int u = -128; u < 128; ++u) {
+    for (int v = -128; v < 128; ++v) {
+      const auto a = static_cast<std::int8_t>(u), b = static_cast<std::int8_t>(v);
+      ASSERT_EQ(oct16_table().of(a, b), from_oct16(a, b)) << u << " " << v;
+    }
+  }
+}
+
 TEST(Oct16, GoldenNumbers) {
   const std::int16_t unit[] = {32767, 0, 0,      0, -32767, 0, 0,      0,     32767,
                                0,     0, -32767, 0, 0,      0, -18918, 18918, -18918};
