@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # From a participant's files to a verified model, and what is said of it in the end.
 
+# Later steps come first, so that participants are done one by one.
+#
 # What every step's command line holds. `given` is all that a step depends on besides its input files: when it changes, the step is made
 # again. Threads, memory and attempts change no result, so they are none of it.
 STEP = (f"{plan.python} {plan.scripts}/step.py {{rule}} {{wildcards.participant}} --out {plan.out_q} --ecorche {plan.ecorche_q} "
@@ -23,6 +25,7 @@ rule check:
     input: lambda wc: plan.files(wc.participant) if plan.is_case(wc.participant) else f"{wc.participant}/steps/new.json"
     output: "{participant}/steps/check.json"
     params: given=lambda wc: plan.given["check"](wc.participant)
+    priority: 1
     threads: plan.threads
     resources: **plan.resources("check")
     group: "participant"
@@ -32,6 +35,7 @@ rule repair:
     input: "{participant}/steps/check.json"
     output: "{participant}/steps/repair.json"
     params: given=lambda wc: plan.given["repair"](wc.participant)
+    priority: 2
     threads: plan.threads
     resources: **plan.resources("repair")
     group: "participant"
@@ -41,6 +45,7 @@ rule preprocess:
     input: "{participant}/steps/repair.json"
     output: "{participant}/steps/preprocess.json"
     params: given=lambda wc: plan.given["preprocess"](wc.participant)
+    priority: 3
     threads: plan.threads
     resources: **plan.resources("preprocess")
     group: "participant"
@@ -50,6 +55,7 @@ rule verify:
     input: "{participant}/steps/preprocess.json"
     output: "{participant}/steps/verify.json"
     params: given=lambda wc: plan.given["verify"](wc.participant)
+    priority: 4
     threads: plan.threads
     resources: **plan.resources("verify")
     group: "participant"
@@ -60,6 +66,7 @@ rule subject:
         lambda wc: [f"{wc.participant}/steps/{name}.json" for name in plan.told(wc.participant)]
     output: "{participant}/steps/subject.json"
     params: given=lambda wc: plan.given["subject"](wc.participant)
+    priority: 6
     threads: plan.threads
     resources: **plan.resources("subject")
     group: "participant"

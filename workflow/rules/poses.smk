@@ -7,6 +7,7 @@ rule pose:
         lambda wc: plan.pose_files(wc.pose)
     output: "{participant}/steps/pose-{pose}.json"
     params: given=lambda wc: plan.given["pose"](wc.pose)
+    priority: 5
     threads: plan.threads
     resources: **plan.resources("pose")
     group: "participant"

@@ -5,6 +5,7 @@ rule sample:
     input: "{participant}/steps/verify.json"
     output: "{participant}/steps/sample.json"
     params: given=lambda wc: plan.given["sample"]()
+    priority: 5
     threads: plan.threads
     resources: **plan.resources("sample")
     group: "participant"
