@@ -44,7 +44,11 @@ std::string case_text(const ScanCase& scan, const std::string& name, const std::
                     ".hdf\n";
   out += comments("To be looked at:", scan.doubts);
   out += comments("Also:", scan.notes);
-  out += "name: " + write_text(name) + "\nskeleton: human\nlabels:\n  file: labels.nrrd\n  table:\n";
+  out += "name: " + write_text(name) + "\n";
+  if (scan.parted)
+    out += "# human, of bones that a template parted: its joints are as sure as those were right before.\n";
+  out += std::string("skeleton: ") + (scan.parted ? "human_parted" : "human") +
+         "\nlabels:\n  file: labels.nrrd\n  table:\n";
   for (std::size_t e = 0; e < scan.entries.size(); ++e) {
     if (scan.entries[e].voxels > 0)
       out += "    " + std::to_string(e + 1) + ": " + write_text(scan.entries[e].name) + "\n";

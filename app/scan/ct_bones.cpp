@@ -157,10 +157,11 @@ class Bones {
                          " (size " + text::number(placed.scale, 2) + " of the template's, misfit " +
                          text::number(placed.misfit, 2) + "; --bone-hu " + text::number(options_.bone_hu, 6) +
                          ", --skin-hu " + text::number(options_.skin_hu, 6) + ")");
+    out_.parted = true;
     out_.doubts.push_back(
         name_ +
         ": its bones are parted by a template, not segmented: joints, above all of collar bones and jaw, "
-        "may lie 2 to 3 cm off, however sure they are called; look at them by ecorche rig");
+        "may lie 2 to 3 cm off; look at them by ecorche rig");
     const double left_out = ml_ * static_cast<double>(cut.left_out);
     if (cut.left_out > 0)
       (left_out > kMuch ? out_.doubts : out_.notes)

@@ -185,6 +185,7 @@ class Namer {
       labels_.guesses.erase(id);
     }
     layer_ = std::move(numbers);
+    out_.parted = true;
     out_.doubts.push_back(name_ + ": label " + text::joined(numbers_of(which)) +
                           " covers bones of several segments: they are parted by a template, so that joints "
                           "may lie 2 to 3 cm off");

@@ -56,6 +56,7 @@ struct ScanCase {
   Image labels;  ///< u16; id i is `entries[i - 1]`
   std::vector<ScanEntry> entries;
   ScanSkin skin;
+  bool parted = false;  ///< bones were parted by a template, so that joints are less sure
   std::vector<LabelFate> fates;
   std::vector<std::string> notes;   ///< what a user should know, a line each
   std::vector<std::string> doubts;  ///< what should be looked at

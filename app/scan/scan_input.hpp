@@ -23,7 +23,7 @@ struct LabelGuess {
 struct ScanLabels {
   std::filesystem::path path;
   io::Segmentation map;
-  std::string names_from;                           ///< for a reader: `its header`; empty where it has no names
+  std::string names_from;  ///< for a reader: `its header`; empty where it has no names
   std::map<std::int64_t, LabelGuess> guesses = {};  ///< by id, where its names were guessed
 };
 

@@ -58,6 +58,11 @@ void place_vertices(PlacedRegion& placed, const Case& patient) {
 }  // namespace
 
 std::optional<std::string> skeleton_template(const std::string& name) {
+  if (name == "human_parted") {
+    std::string text = embedded::human;
+    const std::string_view own = "\nname: human\n";
+    return text.replace(text.find(own), own.size(), "\nname: human_parted\n");
+  }
   const std::map<std::string, const char*> known{{"human", embedded::human},
                                                  {"hand", embedded::hand},
                                                  {"knee", embedded::knee},

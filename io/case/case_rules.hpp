@@ -11,7 +11,8 @@
 
 namespace ecorche::io {
 
-/// The YAML of a skeleton template: human, hand, knee, quadruped.
+/// The YAML of a skeleton template: human, hand, knee, quadruped, and human_parted, which is human for bones
+/// that were parted by a template (preprocess/rig/parted_bones.hpp).
 std::optional<std::string> skeleton_template(const std::string& name);
 
 /// A `regions.yaml`; `frame` is the case's.

@@ -12,6 +12,7 @@
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/mirrored_joints.hpp"
+#include "preprocess/rig/parted_bones.hpp"
 #include "preprocess/rig/plausible.hpp"
 #include "preprocess/rig/present_part.hpp"
 
@@ -148,6 +149,8 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
     warn_rule(found.fit, of_axes, context);
   }
   rig.fits.back().confidence = std::min(found.fit.confidence, of_axes) * off * tilted;
+  if (is_parted(rig.skeleton))
+    rig.fits.back().confidence = std::min(rig.fits.back().confidence, parted_confidence(joint.name));
 }
 
 // `outer`, whose warnings of joints end with what to do.
