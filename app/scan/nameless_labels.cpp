@@ -16,7 +16,7 @@ namespace {
 
 using Kind = scan::LabelMeaning::Kind;
 
-constexpr double kLeastScore = 0.3;     // else it is no part of a body
+constexpr double kLeastScore = 0.4;     // else it is no part of a body
 constexpr double kSurestByPlace = 0.9;  // a template is no eye
 constexpr double kPart = 0.2;           // of a piece on the lesser side: it has bones of both
 constexpr double kDoubtfulByPlace = 0.65;
