@@ -103,6 +103,11 @@ Total Assembly::total(const Material& material, const Points& x) const {
   });
   out.energy = std::accumulate(energy.begin(), energy.end(), 0.0);
   out.volume = std::accumulate(volume.begin(), volume.end(), 0.0);
+  for (std::size_t t = 0; t < mesh_.squeezed.size(); ++t) {
+    if (mesh_.squeezed[t] == 0 || out.inverted[t] == 0) continue;
+    out.inverted[t] = 0;
+    ++out.squeezed_tets;
+  }
   out.inverted_tets = static_cast<std::size_t>(std::count(out.inverted.begin(), out.inverted.end(), 1));
   return out;
 }

@@ -86,6 +86,16 @@ Body body_of(const Model& model, Element element) {
     const bool fixed = std::binary_search(held_edges.begin(), held_edges.end(), std::array{a, b});
     out.segment.push_back(fixed ? out.segment[at(a)] : -1);
   }
+  for (const std::int32_t t : out.tet) {
+    std::int32_t one = -1;
+    bool two = false;
+    for (int c = 0; c < 4; ++c) {
+      const std::int32_t s = out.segment[at(model.tets(t, c))];
+      two = two || (s >= 0 && one >= 0 && s != one);
+      if (s >= 0) one = s;
+    }
+    out.mesh.squeezed.push_back(two ? 1 : 0);
+  }
   for (const RestTet& tet : out.mesh.rest) out.rest_mm3 += tet.volume;
   return out;
 }

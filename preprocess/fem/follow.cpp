@@ -37,13 +37,10 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
     const Points d =
         steps.step(material, x, &increment, exact, options.last.linear_tolerance, g, told, context);
     Points next = moved(assembly.mesh(), goal, d, 1);
-    bool good = !inverts(rest, assembly.total(material, next));
-    if (good) {
-      NewtonOptions newton = options.last;
-      if (t < 1) newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
-      add(told, minimise(assembly, material, steps, newton, next, context));
-      good = told.converged;
-    }
+    NewtonOptions newton = options.last;
+    if (t < 1) newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
+    add(told, minimise(assembly, material, steps, newton, next, context));
+    const bool good = told.converged && !inverts(rest, told.total);
     if (!good) {
       told.converged = false;
       told.total = out.newton.total;

@@ -23,7 +23,7 @@ struct FollowResult {
 
 /// `held_at(t, x)` writes the places of held nodes at t of the way into their rows. `x`: at rest, all at t =
 /// 0; then as far as it came. A step first moves the free nodes by the linear answer to the held ones' move;
-/// where that inverts a tet, or Newton does not converge from there, the step is halved.
+/// where Newton does not converge from there, or a tet ends inside out, the step is halved.
 FollowResult follow(const Assembly& assembly, const Material& material, StepSolver& steps,
                     const std::function<void(double t, Points& x)>& held_at, const FollowOptions& options,
                     Points& x, const Context& context);

@@ -49,6 +49,10 @@ struct Mesh {
   /// Middles of edges: the rows of their two ends. Row r of X stands at r - (#X - #middle).
   std::vector<std::array<std::int32_t, 2>> middle;
 
+  /// #tets or none: 1 where bones of two segments hold corners. What they squeeze between them no flesh can
+  /// keep from being turned inside out, so that is counted apart.
+  std::vector<std::uint8_t> squeezed;
+
   std::size_t tets() const { return rest.size(); }
   const Rule& rule() const { return rule_of(element); }
 };

@@ -12,6 +12,7 @@ namespace {
 constexpr double kArmijo = 1e-4;
 constexpr double kRounding = 1e-15;  // of energy, by volume: terms of order 1 cancel in it
 constexpr int kHalvings = 24;
+constexpr int kWhole = 4;  // of them that are tried so that no tet is turned inside out
 
 double largest_row(const Points& rows) {
   return rows.rows() == 0 ? 0 : rows.rowwise().norm().maxCoeff();
@@ -81,7 +82,7 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
       Points next = moved(mesh, x, d, times);
       Total there = total(next);
       const bool lower = there.energy <= out.total.energy + kArmijo * times * falls + rounding;
-      if (!lower || inverts(out.total, there)) continue;
+      if (!lower || (halving < kWhole && inverts(out.total, there))) continue;
       x = std::move(next);
       out.total = std::move(there);
       taken = true;
