@@ -15,33 +15,35 @@ json warning(const char* kind, std::string what, std::string mend) {
   return {{"kind", kind}, {"what", std::move(what)}, {"mend", std::move(mend)}};
 }
 
-/// The first thing that keeps the solution from being believed.
+/// What keeps the solution from being believed.
 json warnings_of(const fem::Reference& solved, bool two_starts) {
   json out = json::array();
-  if (!solved.converged() || solved.inverted()) {
-    out.push_back(warning(
-        "fem_no_solution",
-        solved.converged()
-            ? fmt::format("finite elements end with {} tets inside out; the body is left as skinned",
-                          solved.newton.total.inverted_tets)
-            : fmt::format("finite elements do not converge: from rest they come {:.0f} % of the way; the "
-                          "body is left as skinned",
-                          100 * solved.reached),
-        "turn the joints less: this is beyond the range of a solution without contact"));
+  if (!solved.converged()) {
+    out.push_back(
+        warning("fem_no_solution",
+                fmt::format("finite elements do not converge: from rest they come {:.0f} % of the way; "
+                            "the body is left as skinned",
+                            100 * solved.reached),
+                "turn the joints less: this is beyond the range of a solution without contact"));
     return out;
   }
+  if (solved.inverted())
+    out.push_back(
+        warning("fem_inverted",
+                fmt::format("finite elements end with {} tets inside out", solved.newton.total.inverted_tets),
+                "turn the joints less, or prepare the model with more tets (--max-tets)"));
   if (!two_starts) {
     out.push_back(warning("fem_one_start", "finite elements were solved from one start alone",
                           "leave out --one-start"));
   } else if (!solved.same_from_two_starts()) {
-    const bool both = solved.skinned_good && solved.rest_good;
     out.push_back(
         warning("fem_two_solutions",
-                both ? fmt::format("two starts of finite elements end {:.1f} mm apart, more than {:.1f} mm: "
-                                   "there is more than "
-                                   "one balance",
-                                   solved.between_starts_mm, fem::kSameMm)
-                     : fmt::format("finite elements find a balance from one start alone ({})", solved.from),
+                solved.compared
+                    ? fmt::format("two starts of finite elements end {:.1f} mm apart, more than {:.1f} mm: "
+                                  "there is more than "
+                                  "one balance",
+                                  solved.between_starts_mm, fem::kSameMm)
+                    : fmt::format("finite elements find a balance from one start alone ({})", solved.from),
                 "turn the joints less: flesh that creases has no single shape"));
   }
   if (solved.contact.nodes > 0) {
@@ -80,12 +82,10 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
   pose.root_translation.setZero();
   pose.rotation[0].setIdentity();
   const fem::Reference solved = fem::solve_pose(model, pose, posed.still().nodes, options, context);
-  const bool is_solution = solved.converged() && !solved.inverted();
-  if (is_solution) {
+  if (solved.converged()) {
     const PointsF nodes = solved.nodes.cast<float>();
     posed.replace({nodes.data(), nodes.data() + nodes.size()}, solved.solved);
   }
-  const bool compared = options.two_starts && solved.skinned_good && solved.rest_good;
   const fem::Seconds& seconds = solved.newton.seconds;
   return {
       {"verdict", solved.trusted() ? "pass" : "warn"},
@@ -104,6 +104,7 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
       {"last_step_mm", solved.newton.step_mm},
       {"energy_mm3", solved.newton.total.energy},
       {"inverted_tets", solved.newton.total.inverted_tets},
+      {"squeezed_by_bones", solved.newton.total.squeezed_tets},
       {"volume_change", solved.posed_mm3 / solved.rest_mm3 - 1},
       {"to_cor",
        {{"nodes", solved.to_skinned.nodes},
@@ -112,7 +113,7 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
         {"p95_mm", solved.to_skinned.p95_mm},
         {"max_mm", solved.to_skinned.max_mm}}},
       {"two_starts",
-       {{"distance_mm", compared ? json(solved.between_starts_mm) : json()},
+       {{"distance_mm", solved.compared ? json(solved.between_starts_mm) : json()},
         {"threshold_mm", fem::kSameMm},
         {"skinned", solved.skinned_good},
         {"rest", solved.rest_good},

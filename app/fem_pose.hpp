@@ -25,8 +25,8 @@ double poisson_of(const FemSettings& settings);
 /// Throws Error{usage} for what does not go together.
 void check_fem(const FemSettings& settings);
 
-/// Solves from `posed` (which skinning posed) and puts the solution there where it converged without
-/// inversions; else the body stays as skinned. Returns fem.json.
+/// Solves from `posed` (which skinning posed) and puts the solution there where it converged; else the
+/// body stays as skinned. Returns fem.json.
 nlohmann::json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context& context);
 
 /// Into quality.json: all of it under `fem`, its warnings first, and its verdict.

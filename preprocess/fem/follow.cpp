@@ -23,7 +23,6 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
                     Points& x, const Context& context) {
   FollowResult out;
   out.newton.total = assembly.total(material, x);
-  const Total rest = out.newton.total;
   double step = options.first_step;
   while (out.reached < 1 && step >= options.least_step) {
     context.check_stop();
@@ -40,7 +39,8 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
     NewtonOptions newton = options.last;
     if (t < 1) newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
     add(told, minimise(assembly, material, steps, newton, next, context));
-    const bool good = told.converged && !inverts(rest, told.total);
+    const bool folds = step > options.folds_below && inverts(out.newton.total, told.total);
+    const bool good = told.converged && !folds;
     if (!good) {
       told.converged = false;
       told.total = out.newton.total;
@@ -53,6 +53,7 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
     x = std::move(next);
     out.reached = t;
     ++out.steps;
+    step = std::min(options.first_step, 2 * step);
     context.report(t);
   }
   if (out.reached < 1) out.newton.converged = false;

@@ -12,6 +12,7 @@ struct FollowOptions {
   NewtonOptions last;             ///< of the pose itself
   double between_mm = 0.1;        ///< tolerance of the poses on the way
   double first_step = 0.25;       ///< of the way
+  double folds_below = 1.0 / 20;  ///< so small a step may turn a tet inside out: nothing else is left
   double least_step = 1.0 / 256;  ///< smaller ones give up
 };
 
@@ -23,7 +24,8 @@ struct FollowResult {
 
 /// `held_at(t, x)` writes the places of held nodes at t of the way into their rows. `x`: at rest, all at t =
 /// 0; then as far as it came. A step first moves the free nodes by the linear answer to the held ones' move;
-/// where Newton does not converge from there, or a tet ends inside out, the step is halved.
+/// where Newton does not converge from there, or a tet that was not is inside out in
+/// the end, the step is halved; folds that smaller steps do not undo are there to be counted.
 FollowResult follow(const Assembly& assembly, const Material& material, StepSolver& steps,
                     const std::function<void(double t, Points& x)>& held_at, const FollowOptions& options,
                     Points& x, const Context& context);

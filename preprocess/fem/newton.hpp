@@ -55,7 +55,9 @@ class StepSolver {
 };
 
 /// Moves the free nodes of `x` (held ones stand where they are wanted). A step is halved until the energy
-/// falls by a part of what was foreseen (Armijo's 1e-4) and no tet that is not inverted becomes so.
+/// falls by a part of what was foreseen (Armijo's 1e-4) and no tet that is not inverted becomes so; where
+/// that would leave less than an eighth of the step, the energy alone decides, since a material that has a
+/// price for inversion finds the way back out of it. Whoever calls looks at what is inverted in the end.
 NewtonResult minimise(const Assembly& assembly, const Material& material, StepSolver& steps,
                       const NewtonOptions& options, Points& x, const Context& context);
 

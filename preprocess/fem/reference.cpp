@@ -105,8 +105,13 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
     out.steps = followed.steps;
     out.refused = followed.refused;
     out.rest_good = good(followed.newton);
-    if (out.skinned_good && out.rest_good) out.between_starts_mm = largest_distance(body->mesh, x, other);
-    if (!out.skinned_good && out.rest_good) {
+    if (out.newton.converged && followed.newton.converged) {
+      out.compared = true;
+      out.between_starts_mm = largest_distance(body->mesh, x, other);
+    }
+    const bool better =
+        !out.newton.converged || followed.newton.total.inverted_tets < out.newton.total.inverted_tets;
+    if (followed.newton.converged && better) {
       x = std::move(other);
       out.newton = std::move(followed.newton);
       out.from = "rest";
