@@ -87,8 +87,6 @@ class Search {
     return kept_.empty() ? 1 : kept_.front().misfit;
   }
 
-  void start_from(const Similarity& place) { kept_.assign(1, {place, 0}); }
-
   /// Segment by segment, from the best of those places.
   Placed fit() const {
     Placed out;
@@ -258,15 +256,6 @@ std::vector<Placed> place_template(const BodyTemplate& body, const Points& bone,
   std::stable_sort(out.begin(), out.end(),
                    [](const Placed& a, const Placed& b) { return a.misfit < b.misfit; });
   return out;
-}
-
-Placed fit_placed(const BodyTemplate& body, View view, const Similarity& start, const Points& bone,
-                  const ImageGrid& grid, const Context& context) {
-  const Points fewer = thinned(bone, kMostPoints);
-  const DistanceLattice scan(fewer, kLattice, kReach, context);
-  Search search(body, view, fewer, scan, grid, context);
-  search.start_from(start);
-  return search.fit();
 }
 
 Points spread_points(const std::vector<std::uint8_t>& mask, const ImageGrid& grid, double mm) {

@@ -37,15 +37,11 @@ inline constexpr double kReach = 25;                       ///< mm: what is fart
 /// `bone` are points on the scan's bones, LPS mm, evenly spread, about one in a cube of 8 mm (spread_points);
 /// `grid` is the field of view: what lies beyond counts for nothing. With a side only a limb of that side is
 /// looked for; else whatever is in view. The patient's axis is within about 30 degrees of z, a limb alone may
-/// lie as it likes. Where along the body the view lies is tried in steps
-/// at several sizes; the best are then fitted segment by segment (iterated nearest points, neighbours held
-/// together at their joints). The answers, the best first, one for each view that was tried.
+/// lie as it likes. Where along the body the view lies is tried in steps at several sizes; the best are then
+/// fitted segment by segment (iterated nearest points, neighbours held together at their joints). The
+/// answers, the best first, one for each view that was tried.
 std::vector<Placed> place_template(const BodyTemplate& body, const Points& bone, const ImageGrid& grid,
                                    Side side, const Context& context);
-
-/// Fitted segment by segment to `bone` as above, from where `start` has the whole template.
-Placed fit_placed(const BodyTemplate& body, View view, const Similarity& start, const Points& bone,
-                  const ImageGrid& grid, const Context& context);
 
 /// The mean voxel of each cube of `mm` that holds voxels of `mask`, LPS mm.
 Points spread_points(const std::vector<std::uint8_t>& mask, const ImageGrid& grid, double mm);
