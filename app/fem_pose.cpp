@@ -19,12 +19,12 @@ json warning(const char* kind, std::string what, std::string mend) {
 json warnings_of(const fem::Reference& solved, bool two_starts) {
   json out = json::array();
   if (!solved.converged()) {
-    out.push_back(
-        warning("fem_no_solution",
-                fmt::format("finite elements do not converge: from rest they come {:.0f} % of the way; "
-                            "the body is left as skinned",
-                            100 * solved.reached),
-                "turn the joints less: this is beyond the range of a solution without contact"));
+    const std::string way = two_starts
+                                ? fmt::format("from rest they come {:.0f} % of the way", 100 * solved.reached)
+                                : "the skinned body led nowhere";
+    out.push_back(warning("fem_no_solution",
+                          "finite elements do not converge: " + way + "; the body is left as skinned",
+                          "turn the joints less: this is beyond the range of a solution without contact"));
     return out;
   }
   if (solved.inverted())

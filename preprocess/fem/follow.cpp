@@ -24,7 +24,7 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
   FollowResult out;
   out.newton.total = assembly.total(material, x);
   double step = options.first_step;
-  while (out.reached < 1 && step >= options.least_step) {
+  while (out.reached < 1 && step >= options.least_step && out.newton.iterations < options.most_iterations) {
     context.check_stop();
     const double t = std::min(1.0, out.reached + step);
     Points goal = x;

@@ -12,6 +12,7 @@ struct FollowOptions {
   NewtonOptions last;             ///< of the pose itself
   double between_mm = 0.1;        ///< tolerance of the poses on the way
   double first_step = 0.25;       ///< of the way
+  int most_iterations = 150;      ///< of Newton on the whole way
   double folds_below = 1.0 / 20;  ///< so small a step may turn a tet inside out: nothing else is left
   double least_step = 1.0 / 256;  ///< smaller ones give up
 };

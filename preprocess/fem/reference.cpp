@@ -91,7 +91,7 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
   context.report(0.4);
 
   // From rest: the second opinion, and what is left where skinning's folds do not come undone.
-  if (options.two_starts || !out.skinned_good) {
+  if (options.two_starts) {
     FollowOptions way;
     way.last = newton;
     way.first_step = std::min(1.0, kStep / std::max(largest_turn(pose), 1e-9));
