@@ -70,7 +70,8 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
   while (out.iterations < options.most_iterations) {
     context.check_stop();
     const bool asked = exact;
-    const Points d = steps.step(material, x, nullptr, exact, options.linear_tolerance, g, out, context);
+    const double enough = exact ? options.linear_tolerance : options.far_tolerance;
+    const Points d = steps.step(material, x, nullptr, exact, enough, g, out, context);
     if (asked && !exact) may_be_exact = false;  // once indefinite near the end, filtered to the end
     out.residual = residual(mesh, g);
     out.step_mm = largest_row(d);

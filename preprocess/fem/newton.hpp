@@ -16,7 +16,8 @@ struct NewtonOptions {
   /// Filtered Hessians until a step moves no node farther than this, then the true ones while they are
   /// positive definite: far off they point nowhere, near the end they converge quadratically.
   double exact_below_mm = 2;
-  double linear_tolerance = 1e-3;  ///< of the linear systems, relative residual
+  double far_tolerance = 2e-2;     ///< of the linear systems while Hessians are filtered, relative residual
+  double linear_tolerance = 1e-3;  ///< of those of true Hessians
 };
 
 /// Where the time went, s.
