@@ -126,7 +126,8 @@ void dress_help(CLI::App& app) {
       command->formatter(formatter);
       std::string footer = command->get_footer();
       if (!footer.empty()) footer += "\n\n";
-      command->footer(footer + "Example: " + line + "\nAlso: --json, --threads N (ecorche --help).");
+      footer.append("Example: ").append(line).append("\nAlso: --json, --threads N (ecorche --help).");
+      command->footer(footer);
     }
   }
 }

@@ -88,7 +88,7 @@ class Cli(unittest.TestCase):
         self.assert_error(run("phantom", "-o", self.folder / "p", "--size", "huge"), 64, "huge not in {small,standard,paper}")
         self.assert_error(run("phantom", "-o", self.folder / "p", "--voxel", "0.1"), 64, "--voxel")
         self.assert_error(run("phantom", "-o", self.folder / "p", "--voxel", "5", "--bar"), 64, "--voxel")
-        self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--skinning", "fem"), 64, "fem")
+        self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--skinning", "flesh"), 64, "flesh")
         self.assert_error(run("pose", MODEL, "-o", self.folder / "p", "--tissues", "nonsense"), 64, "nonsense")
         self.assertEqual(list(self.folder.glob("**/*.hdf")), [])
 
