@@ -149,8 +149,8 @@ class Namer {
     with_scalar_type(layer_.type, [&](auto zero) {
       const auto from = layer_.scalars<decltype(zero)>();
       for (std::size_t v = 0; v < from.size(); ++v) {
-        to[v] = static_cast<std::int32_t>(from[v]);
-        const auto id = static_cast<std::int64_t>(from[v]);
+        const auto id = static_cast<std::int64_t>(+from[v]);
+        to[v] = static_cast<std::int32_t>(id);
         mask[v] = std::find(which.begin(), which.end(), id) != which.end() ? 1 : 0;
         const auto own = row.find(id);
         if (own != row.end()) piece_of[v] = own->second;
@@ -242,6 +242,7 @@ class Namer {
 
   static std::vector<std::string> numbers_of(const std::vector<std::int64_t>& ids) {
     std::vector<std::string> out;
+    out.reserve(ids.size());
     for (const std::int64_t id : ids) out.push_back(std::to_string(id));
     return out;
   }

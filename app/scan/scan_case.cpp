@@ -212,7 +212,7 @@ class Decider {
       out_.skin = {"round the label of the skin, a shell, with what it encloses", 0.8, {}};
       return;
     }
-    if (body && exposed < kExposed && body_of_all()) {
+    if (body && ct() == nullptr && exposed < kExposed && body_of_all()) {
       out_.skin = {"round the label of the body and all that is labelled within it", 0.9, {}};
       return;
     }
@@ -270,10 +270,16 @@ class Decider {
     }
   }
 
-  bool from_ct() {
-    const auto ct =
+  // Null where the scan has none.
+  const ScanImage* ct() const {
+    const auto found =
         std::find_if(scan_.images.begin(), scan_.images.end(), [](const ScanImage& i) { return i.ct; });
-    if (ct == scan_.images.end()) return false;
+    return found == scan_.images.end() ? nullptr : &*found;
+  }
+
+  bool from_ct() {
+    const ScanImage* const ct = this->ct();
+    if (ct == nullptr) return false;
     std::vector<std::uint8_t> known(grid_.voxels(), 0);
     const auto labels = out_.labels.scalars<std::uint16_t>();
     for (std::size_t v = 0; v < known.size(); ++v) known[v] = labels[v] != 0 ? 1 : 0;

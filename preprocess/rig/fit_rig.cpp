@@ -196,6 +196,8 @@ Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* e
       measure_rest(parent, joint, rig.fits[row], context);
     }
   }
+  // Its poses and clips are those of the same joints.
+  if (is_parted(asked)) rig.skeleton.name = whole_of_parted;
   return rig;
 }
 

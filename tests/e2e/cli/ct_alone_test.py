@@ -100,7 +100,9 @@ class CtAlone(unittest.TestCase):
         """Not even on the body that the template was made after."""
         self.assertIn("\nskeleton: human_parted\n", (self.folder / "case" / "case.yaml").read_text())
         self.assertIn("\nskeleton: human\n", (self.folder / "truth" / "case.yaml").read_text())
-        sure = {row["joint"]: row["fit"]["confidence"] for row in self.ok("rig", self.folder / "case")["rig"]}
+        said = self.ok("rig", self.folder / "case")
+        self.assertEqual(said["skeleton"], "human", "its poses are written for that")
+        sure = {row["joint"]: row["fit"]["confidence"] for row in said["rig"]}
         self.assertLess(max(sure.values()), 0.68)
         for joint in ("temporomandibular", "sternoclavicular_left", "sternoclavicular_right"):
             self.assertLess(sure[joint], 0.3, joint)
