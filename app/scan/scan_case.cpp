@@ -191,13 +191,8 @@ class Decider {
   }
 
   void find_skin() {
-    const bool bone = std::any_of(out_.entries.begin(), out_.entries.end(),
-                                  [](const ScanEntry& e) { return e.role == Role::bone && e.voxels > 0; });
     const double bare = bare_share([&](std::size_t v) { return body_[v] != 0; });
-    if (!bone) check_sides();
-    if (!bone)
-      throw Error(ErrorKind::data, scan_.labels.front().path.string(), "no label of a bone is known",
-                  "see the names that are known in docs/reference/structures.md, or write the case by hand");
+    if (!has(Role::bone)) refuse_without_bones();
     bool body = false, shell = false;
     for (std::size_t e = 0; e < out_.entries.size(); ++e) {
       if (out_.entries[e].role != Role::body || original_[e] == 0) continue;
@@ -212,7 +207,8 @@ class Decider {
       out_.skin = {"round the label of the skin, a shell, with what it encloses", 0.8, {}};
       return;
     }
-    if (body && ct() == nullptr && exposed < kExposed && body_of_all()) {
+    // Labels of one map exclude each other, so that the body's has holes.
+    if (body && has(Role::body) && names_.of_map.size() == 1 && ct() == nullptr && exposed < kExposed) {
       out_.skin = {"round the label of the body and all that is labelled within it", 0.9, {}};
       return;
     }
@@ -236,11 +232,9 @@ class Decider {
                 "these files");
   }
 
-  // Whether the one map there is holds a body: its labels exclude each other, so that the body's has holes.
-  bool body_of_all() const {
-    if (names_.of_map.size() != 1) return false;
+  bool has(Role role) const {
     return std::any_of(out_.entries.begin(), out_.entries.end(),
-                       [](const ScanEntry& e) { return e.role == Role::body && e.voxels > 0; });
+                       [role](const ScanEntry& e) { return e.role == role && e.voxels > 0; });
   }
 
   // The share of the bones' voxels for which `within` is false.
@@ -259,7 +253,7 @@ class Decider {
   }
 
   // Bones that are known, but of which none found its side.
-  void check_sides() const {
+  [[noreturn]] void refuse_without_bones() const {
     for (std::size_t e = 0; e < names_.named.size(); ++e) {
       if (!sides_given(e) || original_[e] == 0) continue;
       throw Error(
@@ -268,6 +262,8 @@ class Decider {
           "say it where one limb alone was scanned (--side left or --side right), or give labels that "
           "have sides with it");
     }
+    throw Error(ErrorKind::data, scan_.labels.front().path.string(), "no label of a bone is known",
+                "see the names that are known in docs/reference/structures.md, or write the case by hand");
   }
 
   // Null where the scan has none.
