@@ -2,7 +2,6 @@
 // The client's end of its link: a worker's, where there is one, else one on this thread.
 import type { Post, ToClient, ToLink } from "./channel.js";
 import { describeFault } from "./errors.js";
-import { makeLink } from "./make_link.js";
 import { workers } from "./workers.js";
 
 /** The name of the worker's bundle, beside the page's: set by build.mjs. */
@@ -34,7 +33,8 @@ function inWorker(url: string | URL, hear: (message: ToClient) => void): Bridge 
 }
 
 function onThisThread(hear: (message: ToClient) => void): Bridge {
-  const link = makeLink(hear);
+  // A page with a worker has it there, and does not load it twice.
+  const link = import("./make_link.js").then(({ makeLink }) => makeLink(hear));
   link.catch((error: unknown) => hear({ kind: "failed", message: describeFault(error) }));
   return { post: (message) => void link.then((made) => made.take(message)), end: () => {} };
 }
