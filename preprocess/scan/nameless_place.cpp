@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "preprocess/scan/distance_lattice.hpp"
 #include "preprocess/scan/fit_segments.hpp"
@@ -96,7 +97,7 @@ class Best {
     places_.insert(at, std::move(place));
     if (places_.size() > kPlaces) places_.pop_back();
   }
-  std::vector<RoughPlace> take() { return std::move(places_); }
+  std::vector<RoughPlace> take() { return std::exchange(places_, {}); }
 
  private:
   std::vector<RoughPlace> places_;
@@ -145,8 +146,10 @@ class Look {
     const double least = theirs.minCoeff(), most = theirs.maxCoeff();
     const Eigen::Vector3d to_back =
         one_limb(view_) ? Eigen::Vector3d::Zero().eval() : Eigen::Vector3d::UnitY().eval();
-    for (double way = least - high + kLeastSeen; way <= most - low - kLeastSeen; way += kStride) {
+    const double first = least - high + kLeastSeen, last = most - low - kLeastSeen;
+    for (int step = 0; first + step * kStride <= last; ++step) {
       context_.check_stop();
+      const double way = first + step * kStride;
       const auto middle = [&](const Points& points, const Eigen::VectorXd& at, double from, double to) {
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         int count = 0;

@@ -121,14 +121,14 @@ class CholmodSolver final : public solve::SpdSolver {
       }
     });
     state->check(A.rows());
-    fill(std::move(state), std::move(matrix), context);
+    fill(std::move(state), matrix, context);
   }
 
   void refactor(const SparseMatrix& A, const Context& context) override {
     if (!state_) return factor(A, context);
     auto matrix = std::make_shared<SparseMatrix>(A);
     matrix->makeCompressed();
-    fill(std::move(state_), std::move(matrix), context);
+    fill(std::move(state_), matrix, context);
   }
 
   Block solve(const Block& B, const Context& context) const override {
@@ -156,7 +156,8 @@ class CholmodSolver final : public solve::SpdSolver {
 
  private:
   /// The numbers of a factor whose shape is known.
-  void fill(std::shared_ptr<State> state, std::shared_ptr<SparseMatrix> matrix, const Context& context) {
+  void fill(std::shared_ptr<State> state, const std::shared_ptr<SparseMatrix>& matrix,
+            const Context& context) {
     state_ = nullptr;
     const auto unknowns = matrix->rows();
     context.run_unstoppable([state, matrix] {

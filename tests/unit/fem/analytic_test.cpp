@@ -140,8 +140,7 @@ TEST(Analytic, LinearTetsComeToQuadraticOnes) {
       if (held(X)) continue;
       const Vector3d at = X / edge;
       if ((at - at.array().round().matrix()).norm() > 1e-6) continue;  // no node of the linear mesh
-      const auto row =
-          static_cast<Eigen::Index>(at[0] + (4 * times + 1) * (at[1] + (4 * times + 1) * at[2]) + 0.5);
+      const auto row = std::lround(at[0] + (4 * times + 1) * (at[1] + (4 * times + 1) * at[2]));
       sum += (one.x.row(row) - best.x.row(i)).norm();
       ++count;
     }
