@@ -35,7 +35,7 @@ constexpr double kGrowReach = 60;
 constexpr double kOfOne = 0.65;     // share of one segment: the rest is the template's error
 constexpr double kBothSides = 0.2;  // share on the lesser side
 constexpr int kRefineRounds = 13, kGrowFrom = 2, kGrowTo = 9;
-constexpr Eigen::Index kJudged = 600;  // points of a label
+constexpr Eigen::Index kSampled = 600;  // points of a label that are looked at
 constexpr Eigen::Index kFitPoints = 9000;
 constexpr double kFound = 0.5;                 // share of a bone of the template that is there
 constexpr double kGood = 0.4;                  // score: no other place is tried
@@ -46,10 +46,11 @@ constexpr double kAtBone = 0.25,
                      0.85;  // share of faces at bones, and of it at the template's: one of a bone's parts
 constexpr double kTemplateSpacing = 9;  // mm, of the template's points
 
-class Judge {
+// What each label is, beside the template where it lies now: by whose points are nearest to its own.
+class LabelClassifier {
  public:
-  Judge(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, const ImageGrid& grid,
-        const Placed& placed)
+  LabelClassifier(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, const ImageGrid& grid,
+                  const Placed& placed)
       : body_(body),
         labels_(labels),
         grid_(grid),
@@ -154,7 +155,7 @@ class Judge {
     if (!free(out)) return;
     out.kind = LabelMeaning::Kind::other;
     double near = 0, asked = 0;
-    const Eigen::Index step = std::max<Eigen::Index>(1, points.rows() / kJudged);
+    const Eigen::Index step = std::max<Eigen::Index>(1, points.rows() / kSampled);
     for (Eigen::Index p = 0; p < points.rows(); p += step) {
       asked += 1;
       const NearestBone found = nearest_bone(clouds_, placed_.segments, points.row(p).transpose(), near_);
@@ -306,12 +307,12 @@ Points points_of(const std::vector<NamelessLabel>& labels, const std::vector<std
 std::vector<std::size_t> bones_of(const std::vector<LabelMeaning>& of) {
   std::vector<std::size_t> out;
   for (std::size_t l = 0; l < of.size(); ++l) {
-    if (Judge::bone(of[l])) out.push_back(l);
+    if (LabelClassifier::bone(of[l])) out.push_back(l);
   }
   return out;
 }
 
-// Judged and fitted in turn, until the bones stay the same.
+// Classified and fitted in turn, until the bones stay the same.
 void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, const ImageGrid& grid,
             const RoughPlace& rough, View view, LabelMeanings& out, const Context& context) {
   Placed placed;
@@ -323,15 +324,16 @@ void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, 
   const std::vector<SegmentCloud> clouds = segment_clouds(body, placed.in_play);
   std::vector<std::size_t> last;
   for (int round = 0; round <= kRefineRounds; ++round) {
-    Judge judge(body, labels, grid, placed);
+    LabelClassifier classifier(body, labels, grid, placed);
     LabelMeanings now{placed, 0, out.of};
-    judge.run(now.of, kSteps[std::min<std::size_t>(static_cast<std::size_t>(round), std::size(kSteps) - 1)]);
-    now.score = judge.score(now.of);
+    classifier.run(now.of,
+                   kSteps[std::min<std::size_t>(static_cast<std::size_t>(round), std::size(kSteps) - 1)]);
+    now.score = classifier.score(now.of);
     std::vector<std::size_t> bones = bones_of(now.of);
     const bool grow = round >= kGrowFrom && round <= kGrowTo;
     const std::size_t sure = bones.size();
     if (grow) {
-      for (const std::size_t l : judge.further(now.of)) bones.push_back(l);
+      for (const std::size_t l : classifier.further(now.of)) bones.push_back(l);
     }
     const bool strict = round + 1 >= static_cast<int>(std::size(kSteps));
     if (strict && now.score > out.score) out = now;

@@ -55,7 +55,7 @@ struct LabelMeanings {
 
 /// Which labels are bones, and whose. Where the template lies is looked for among all labels: there, the
 /// labels that lie on its bones with most of what they are cover as much of it as they can. To those it is
-/// fitted (place_template), and they are judged anew, until nothing changes. What lies at a bone, but is
+/// fitted (place_template), and they are classified anew, until nothing changes. What lies at a bone, but is
 /// nearer to it nowhere than another label, is none (muscles, cords), except where bone encloses it (marrow).
 /// `score` is 0 where no label may be bone.
 LabelMeanings know_labels(const BodyTemplate& body, const std::vector<NamelessLabel>& labels,

@@ -169,15 +169,15 @@ class Look {
       for (const double back : kBeside) {
         if (one_limb(view_) && back != 0) continue;
         place.shift = beside - beside.dot(along) * along + way * along + back * to_back;
-        const double score = judge(place, turned, lattice, spanned, likely);
+        const double score = score_of(place, turned, lattice, spanned, likely);
         keep(place, score, likely, best);
       }
     }
   }
 
   // The score of a place; `likely` becomes what may be bone there.
-  double judge(const Similarity& place, const Points& turned, const DistanceLattice& lattice, double spanned,
-               std::vector<std::uint8_t>& likely) const {
+  double score_of(const Similarity& place, const Points& turned, const DistanceLattice& lattice,
+                  double spanned, std::vector<std::uint8_t>& likely) const {
     likely.assign(labels_.size(), 0);
     double near_sum = 0, near_count = 0;
     for (std::size_t l = 0; l < labels_.size(); ++l) {
@@ -245,7 +245,7 @@ class Look {
           }
           const Points turned = (next.scale * (own_ * next.rotation.transpose())).eval();
           const double score =
-              judge(next, turned, lattice, one_limb(view_) ? 1 : spanned(turned, next), likely);
+              score_of(next, turned, lattice, one_limb(view_) ? 1 : spanned(turned, next), likely);
           if (score <= best.score) continue;
           best.place = next;
           best.score = score;
