@@ -56,6 +56,14 @@ def paper_model():
     return model
 
 
+def spheres_model():
+    """The same body with a volumetric skeleton, of the thinness of Gagvani01."""
+    model = MADE / "paper_spheres.hdf"
+    if not model.exists():
+        ecorche("preprocess", phantom(), "-o", model, "--mesher", "lattice", "--spheres", 0.48)
+    return model
+
+
 def example_model(body, data, tets=300_000):
     """The model of examples/BODY, whose files lie in the folder `data`."""
     model = MADE / "examples" / f"{body}_{tets}.hdf"

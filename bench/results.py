@@ -66,7 +66,8 @@ def page(entry, words, start, about, printed):
     took = datetime.datetime.now().astimezone() - start
     head = {"command": f"`{command}`", "date": f"{start:%Y-%m-%d %H:%M %Z}, {took.total_seconds() / 60:.1f} minutes", "commit": commit(), **machine()}
     rows = "".join(f"| {name} | {value} |\n" for name, value in head.items())
-    return f"<!-- SPDX-License-Identifier: Apache-2.0 -->\n# Results of bench/{entry.parent.name}\n\n{(about or '').strip()}\n\n| | |\n|---|---|\n{rows}\n{printed.strip()}\n"
+    bench = entry.parent.name if entry.name == "run" else entry.name
+    return f"<!-- SPDX-License-Identifier: Apache-2.0 -->\n# Results of bench/{bench}\n\n{(about or '').strip()}\n\n| | |\n|---|---|\n{rows}\n{printed.strip()}\n"
 
 
 def without_places(text, words):
@@ -82,7 +83,7 @@ def without_places(text, words):
 def commit():
     git = lambda *words: subprocess.run(["git", "-C", ROOT, *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout.strip()  # noqa: E731
     # Pages of other benches, made one after another, change nothing that is measured.
-    changed = git("status", "--porcelain", "--", ".", ":(exclude)bench/*/RESULTS.md")
+    changed = git("status", "--porcelain", "--", ".", ":(exclude)bench/*/RESULTS.md", ":(exclude)bench/RESULTS.md")
     return (git("rev-parse", "--short=12", "HEAD") or "not in a repository") + (", with changes that are not committed" if changed else "")
 
 

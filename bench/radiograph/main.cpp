@@ -85,13 +85,13 @@ double measure(const bench::Table& table, const std::shared_ptr<const Model>& mo
   const double floor = bench::time(kRuns, [&](int) { sum += read_once(posed); }).median;
   runtime::AttenuationMap map;
   line(table, "attenuation of it, once a pose", threads,
-       bench::time(kRuns, [&](int) { runtime::attenuation_map(posed, usual, map); }), floor);
+       bench::time(kRuns, [&](int) { runtime::attenuation_map(posed, usual, map); }), {floor});
   double slowest = 0;
   for (const Shot& shot : shots(*model, body)) {
     std::vector<float> integrals;
     const bench::Figure figure =
         bench::time(kRuns, [&](int) { integrals = runtime::line_integrals(map, shot.setup); });
-    line(table, std::string("tracing ") + shot.name, threads, figure, floor);
+    line(table, std::string("tracing ") + shot.name, threads, figure, {floor});
     slowest = std::max(slowest, figure.median);
     line(table, std::string("surfaces instead, ") + shot.name, threads, bench::time(kRuns, [&](int) {
            integrals = runtime::line_integrals(*model, body, usual, shot.setup);

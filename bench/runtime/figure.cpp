@@ -25,16 +25,18 @@ Table table_of_times() {
                 {"median ms", 9},
                 {"best", 9},
                 {"worst", 9},
-                {"floor ms", 8},
-                {"over floor"},
+                {"memory ms", 9},
+                {"arithmetic ms", 9},
+                {"over the larger"},
                 {"plain Eigen"}});
 }
 
-void line(const Table& table, const std::string& what, int threads, const Figure& figure, double floor_ms,
-          double against) {
+void line(const Table& table, const std::string& what, int threads, const Figure& figure,
+          const Floors& floors, double against) {
+  const auto known = [](double value, int digits) { return value > 0 ? fixed(value, digits) : ""; };
   table.row({what, std::to_string(threads), fixed(figure.median, 3), fixed(figure.best, 3),
-             fixed(figure.worst, 3), floor_ms > 0 ? fixed(floor_ms, 3) : "",
-             floor_ms > 0 ? fixed(figure.median / floor_ms, 2) : "",
+             fixed(figure.worst, 3), known(floors.memory, 3), known(floors.arithmetic, 3),
+             known(floors.larger() > 0 ? figure.median / floors.larger() : 0, 2),
              against > 0 ? fixed(against / figure.median, 1) + " x" : ""});
 }
 

@@ -2,6 +2,7 @@
 // A time, and the table of times.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <string>
 
@@ -19,8 +20,16 @@ Figure time(int frames, const std::function<void(int)>& work);
 /// What line() adds to.
 Table table_of_times();
 
-/// One row; `floor_ms` and the time of plain Eigen, where they are known.
-void line(const Table& table, const std::string& what, int threads, const Figure& figure, double floor_ms = 0,
-          double against = 0);
+/// What no version of the work can be faster than, ms; 0 where it is not known.
+struct Floors {
+  double memory = 0;      // its bytes over the bandwidth
+  double arithmetic = 0;  // the same kernels on data in the first cache
+
+  double larger() const { return std::max(memory, arithmetic); }
+};
+
+/// One row; `against` is the time of plain Eigen, where it is known.
+void line(const Table& table, const std::string& what, int threads, const Figure& figure,
+          const Floors& floors = {}, double against = 0);
 
 }  // namespace ecorche::bench

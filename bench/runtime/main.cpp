@@ -5,9 +5,10 @@
 //
 // Every joint moves in every frame. Working sets of whole frames of at least four last caches: as many copies
 // of the body as that takes, but no more than twelve, are posed in turn; the number is printed. The floor is
-// the fewest bytes that the layout needs (what it holds of each node and vertex, and each result once) over
-// the bandwidth measured with as many threads in this run; the time of a store's own fetch of its line is the
-// kernel's loss. Each figure is the median over the walk, with the best and the worst beside it.
+// twofold. Memory: the fewest bytes that the layout needs (what it holds of each node and vertex, and each
+// result once) over the bandwidth measured with as many threads in this run; the time of a store's own fetch
+// of its line is the kernel's loss. Arithmetic: the same kernels on pieces of the body that stay in the first
+// cache. Each figure is the median over the walk, with the best and the worst beside it.
 #include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -23,6 +24,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/runtime/quality_meter.hpp>
+#include "bench/runtime/arithmetic_floor.hpp"
 #include "bench/runtime/bandwidth.hpp"
 #include "bench/runtime/clip_poses.hpp"
 #include "bench/runtime/figure.hpp"
@@ -181,7 +183,8 @@ class Bench {
     for (const Skinning skinning : kAll) {
       const Figure figure = time(kFrames, [&](int f) { skin(skinning, needed, f); });
       line(table, std::string("nodes, ") + std::string(runtime::skinning_name(skinning)), threads, figure,
-           floor_of(bytes_.nodes[static_cast<std::size_t>(skinning)]), plain_nodes(skinning));
+           {floor_of(bytes_.nodes[static_cast<std::size_t>(skinning)]), nodes_alone(skinning, plain_frames_)},
+           plain_nodes(skinning));
     }
     const double plain = time(9, [&](int f) {
                            plain_.nodes(segments_[static_cast<std::size_t>(f)], Skinning::cor);
@@ -190,12 +193,15 @@ class Bench {
     std::size_t all = 0;
     for (const Tissue& tissue : model_->tissues) all += static_cast<std::size_t>(tissue.V.rows());
     const double body = bytes_.nodes[2] + bytes_.tissues;
-    line(table, "frame, CoR, float32", threads, frames(plain_frames_), floor_of(body + size_of(all, 12)),
-         plain);
-    line(table, "frame, CoR, u16", threads, frames(wire_frames_), floor_of(body + bytes_.quantised), plain);
-    line(table, "frame, CoR, u16 and normals", threads, frames(full_frames_),
-         floor_of(body + bytes_.quantised + bytes_.normals));
-    line(table, "plain Eigen, CoR, float32", threads, {plain, plain, plain}, 0);
+    const auto whole = [&](const char* what, std::vector<runtime::PosedBody>& bodies, double results,
+                           double against) {
+      const Figure figure = frames(bodies);
+      line(table, what, threads, figure, {floor_of(body + results), frame_alone(bodies)}, against);
+    };
+    whole("frame, CoR, float32", plain_frames_, size_of(all, 12), plain);
+    whole("frame, CoR, u16", wire_frames_, bytes_.quantised, plain);
+    whole("frame, CoR, u16 and normals", full_frames_, bytes_.quantised + bytes_.normals, 0);
+    line(table, "plain Eigen, CoR, float32", threads, {plain, plain, plain});
   }
 
   // As Sujar18 table 2: all tissues as float32, frames a second over a walk and in its worst frame.
@@ -245,6 +251,16 @@ class Bench {
     std::vector<std::uint32_t> out((parts_.clusters().needed + 63) / 64);
     std::iota(out.begin(), out.end(), 0U);
     return out;
+  }
+
+  // The kernels alone, on frames that have been posed.
+  double nodes_alone(Skinning skinning, std::vector<runtime::PosedBody>& bodies) {
+    const runtime::RootMotion root =
+        runtime::make_motions(segments_[0], {0, 0, 0}, bodies[0].scratch.motions);
+    return arithmetic_of_nodes(parts_, skinning, bodies[0], root);
+  }
+  double frame_alone(std::vector<runtime::PosedBody>& bodies) {
+    return nodes_alone(Skinning::cor, bodies) + arithmetic_of_tissues(*model_, parts_, bodies[0]);
   }
 
   double plain_nodes(Skinning skinning) {

@@ -66,18 +66,15 @@ void time_volumes(const Table& table, const std::shared_ptr<const Model>& model,
     for (const auto sampling : {runtime::Sampling::nearest, runtime::Sampling::trilinear}) {
       const std::string how = std::string(wide ? "16" : "8") +
                               (sampling == runtime::Sampling::nearest ? " bit, nearest" : " bit, trilinear");
-      const auto row = [&](const std::string& name, const ImageGrid& grid, int runs) {
+      const auto row = [&](const std::string& name, const ImageGrid& grid, int runs, const Floors& floors) {
         Image out;
         line(table, std::string(name).append(", ").append(how), threads,
-             time(runs, [&](int) { poser.pose(nodes, sampled, sampling, grid, out, scratch); }));
+             time(runs, [&](int) { poser.pose(nodes, sampled, sampling, grid, out, scratch); }), floors);
       };
-      row("290 x 169 x 940", fine, 5);
-      row("slice of 512 x 512", slice, 15);
-      row("region of 256^3", region, 5);
-      line(table, "region of 256^3, " + how + ", its samples alone", threads,
-           samples_alone(sampled, sampling, region));
-      if (sampling == runtime::Sampling::nearest)
-        line(table, "region of 256^3, its bytes copied", threads, copy_alone(sampled, region));
+      row("290 x 169 x 940", fine, 5, {});
+      row("slice of 512 x 512", slice, 15, {});
+      const Figure samples = samples_alone(sampled, sampling, region);
+      row("region of 256^3", region, 5, {copy_alone(sampled, region).median, samples.median});
     }
   }
 }
