@@ -269,7 +269,7 @@ void region(const Settings& settings) {
 }
 
 constexpr const char* kLoads[] = {"body",    "f32",  "organ",    "posers", "observers",
-                                  "stalled", "idle", "dripping", "volume"};
+                                  "stalled", "idle", "dripping", "volume", "clients"};
 
 void run_loads(const Settings& settings, Loads& loads, const std::function<bool(const char*)>& chosen) {
   if (chosen("body"))
@@ -283,6 +283,11 @@ void run_loads(const Settings& settings, Loads& loads, const std::function<bool(
   if (chosen("posers"))
     posing(settings, loads, "64 clients with their own poses, 33 k vertices, delta u16", 33'000,
            v1::ENCODING_U16_DELTA, 64, "all at 90, p99 11");
+  if (chosen("clients")) {
+    for (const int count : {1, 8, 64, 256})
+      posing(settings, loads, std::to_string(count) + " posing for themselves, 33 k vertices, delta u16",
+             33'000, v1::ENCODING_U16_DELTA, count, "");
+  }
   if (chosen("observers")) observers(settings, loads);
   if (chosen("stalled")) {
     beside(
