@@ -44,7 +44,16 @@ def parse():
     parser.add_argument("--grey", action="store_true", help="volumes of bytes are grey values, not labels")
     parser.add_argument("--view", choices=sorted(scene.VIEWS), default="front",
                         help="from where surfaces side by side are seen (default %(default)s)")
+    parser.add_argument("--around", type=place, metavar="X,Y,Z,R", help="of a case, a model or a posed folder: only what lies within R of a place, LPS mm, from "
+                        "--view, without words")
     return parser.parse_args()
+
+
+def place(text):
+    numbers = [float(word) for word in text.split(",")]
+    if len(numbers) != 4 or not numbers[3] > 0:
+        raise argparse.ArgumentTypeError(f"{text}: not four numbers, the last above 0 (give x,y,z and a radius in mm)")
+    return numbers
 
 
 def main():
@@ -78,6 +87,10 @@ def main():
         raise SystemExit("error: render: several inputs must all be surfaces or all volumes (name one case, model or posed folder)")
     else:
         body = bodies.read(first)
+        if args.around:
+            save(scene.around(body, args.view, args.height, args.around[:3], args.around[3]), args.view)
+            print(written[0])
+            return
         if body.tissues and args.only in (None, "tissues"):
             for view in ("front", "side"):
                 save(scene.translucent(body, view, args.height), view)

@@ -155,12 +155,20 @@ def caption(text, x, y, size=22):
     return actor
 
 
-def translucent(body, view, height):
+def seen_through(body):
     """Skin translucent over everything else."""
-    actors = [surface_actor(t.surface, colour_of(t), 0.28 if t.group == "skin" else 1.0) for t in body.tissues]
+    return [surface_actor(t.surface, colour_of(t), 0.28 if t.group == "skin" else 1.0) for t in body.tissues]
+
+
+def translucent(body, view, height):
     groups = [group for group in GROUP_COLOURS if any(t.group == group for t in body.tissues)]
-    return Picture(annotate.image_of(annotate.annotated(annotate.pixels(shoot(actors, view, height).image), f"{body.name}, {SEEN[view]}", view,
+    return Picture(annotate.image_of(annotate.annotated(annotate.pixels(shoot(seen_through(body), view, height).image), f"{body.name}, {SEEN[view]}", view,
                                                         legend=[(group, GROUP_COLOURS[group]) for group in groups])))
+
+
+def around(body, view, height, centre, radius):
+    """What lies about a place, without words: a picture that does not say how it was made."""
+    return shoot(seen_through(body), view, height, (np.array(centre) - radius, np.array(centre) + radius))
 
 
 def row_of_surfaces(surfaces, view, height):
