@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The programs that benches run, and the built-in bodies that many of them take, made once under build/bench."""
+import importlib.machinery
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -31,6 +33,14 @@ def show(*words, **more):
     if code not in (0, 1):
         raise SystemExit(f"error: {pathlib.Path(words[0]).name} ended with {code} (see above)")
     return code
+
+
+def bench(name):
+    """The bench `name` as a module."""
+    loader = importlib.machinery.SourceFileLoader(name, str(ROOT / "bench" / name / "run"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
+    loader.exec_module(module)
+    return module
 
 
 def build(*targets, **settings):

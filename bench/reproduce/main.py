@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Both papers by one command: writes docs/results.md with its pictures.
+
+  scripts/reproduce [--data DIR]               every part, on the bodies that the page is of; on two quiet cores some two hours
+  scripts/reproduce --only NAME,...            these parts; the page keeps of the others what was found last
+  scripts/reproduce --size small -o PAGE.md    every part on the small phantom, to see that it runs: its figures mean nothing
+
+What was found stays in a file a part beside the page's bodies (build/bench/reproduce/SIZE, or --made DIR).
+"""
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import sys
+import time
+
+import programs
+import results
+from reproduce import (bodies, gagvani_effects, gagvani_fill, gagvani_thin, page, sujar_fem, sujar_pose, sujar_prepare, sujar_study, zhang)
+from reproduce.rows import Kit, to_json
+
+PARTS = [part for group in (sujar_prepare, sujar_pose, sujar_fem, sujar_study, gagvani_thin, gagvani_fill, gagvani_effects, zhang, bodies)
+         for part in group.PARTS]
+PAGE = programs.ROOT / "docs/results.md"
+
+
+def parse():
+    names = ", ".join(part.name for part in PARTS)
+    parser = argparse.ArgumentParser(prog="reproduce", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=pathlib.Path, help="folder of the public data sets that examples/ name")
+    parser.add_argument("--size", choices=("small", "full"), default="full", help="(default: %(default)s)")
+    parser.add_argument("--only", type=lambda words: words.split(","), help=f"parts, with commas between, of: {names}")
+    parser.add_argument("-o", "--output", type=pathlib.Path, help="the page (default: docs/results.md; with --size small beside its bodies)")
+    parser.add_argument("--made", type=pathlib.Path, help="folder of bodies and of what was found (default: build/bench/reproduce/SIZE)")
+    parser.add_argument("--no-pictures", action="store_true", help="figures alone")
+    options = parser.parse_args()
+    unknown = set(options.only or ()) - {part.name for part in PARTS}
+    if unknown:
+        parser.error(f"--only {', '.join(sorted(unknown))}: no such part (name some of: {names})")
+    if options.data and not options.data.is_dir():
+        parser.error(f"--data {options.data}: no such folder (give the one that holds the public data sets)")
+    options.made = (options.made or programs.MADE / "reproduce" / options.size).resolve()
+    options.output = (options.output or (PAGE if options.size == "full" else options.made / "results.md")).resolve()
+    return options
+
+
+def found_by(part, kit):
+    """What a part finds, with when and by which commit."""
+    missing = [bench for bench in part.benches if not (programs.BIN / bench).exists()]
+    if missing:
+        programs.build(*missing)
+    load, start, commit = os.getloadavg()[0], time.monotonic(), results.commit()
+    found = part.find(kit)
+    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit, "load": load,
+            "seconds": time.monotonic() - start, "found": to_json(found)}
+
+
+def main():
+    options = parse()
+    pictures = options.output.parent / "pictures/results"
+    kit = Kit(options.size, options.made, pictures, options.data and options.data.resolve(), not options.no_pictures)
+    chosen = [part for part in PARTS if part.name in (options.only or [each.name for each in PARTS])]
+    left_out = [part for part in chosen if part.needs_data and not kit.data]
+    for part in left_out:
+        print(f"{part.name}: left out, it needs --data", file=sys.stderr)
+    file_of = lambda part: options.made / f"found_{part.name}.json"  # noqa: E731
+    for part in chosen:
+        if part not in left_out:
+            kept = found_by(part, kit)
+            file_of(part).write_text(json.dumps(kept, indent=1) + "\n")
+            print(f"{part.name}: {len(kept['found']['rows'])} rows, {kept['seconds']:.0f} s", file=sys.stderr)
+    kept = {part.name: json.loads(file_of(part).read_text()) for part in PARTS if file_of(part).exists()}
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options.output.write_text(page.text(PARTS, kept, "pictures/results", " --size small" if kit.small else ""))
+    print(options.output)
+    return 0
