@@ -39,10 +39,8 @@ def posed(kit):
 
 def seconds(kit):
     bench = programs.bench("volumetric")
-    bench.OUT.mkdir(parents=True, exist_ok=True)
-    if kit.small:
-        bench.phantom = kit.phantom
-        bench.OUT = folder_of(kit, "refill")
+    bench.OUT = folder_of(kit, "refill")
+    bench.phantom = lambda: kit.phantom(small_or(kit, "small", "paper"))
     r = bench.refill(None)["refill"]
     command = "bench/volumetric/run --only refill"
     return Found([
