@@ -45,15 +45,23 @@ def parse():
     return options
 
 
+def processor_seconds():
+    """What all processes of the machine have taken together, and what this one and its children have."""
+    user, nice, system, _, _, interrupts, soft, stolen = map(int, pathlib.Path("/proc/stat").read_text().split()[1:9])
+    own = os.times()
+    return (user + nice + system + interrupts + soft + stolen) / os.sysconf("SC_CLK_TCK"), own.user + own.system + own.children_user + own.children_system
+
+
 def found_by(part, kit):
-    """What a part finds, with when and by which commit."""
+    """What a part finds, with when, by which commit, and what share of the processors others took meanwhile."""
     missing = [bench for bench in part.benches if not (programs.BIN / bench).exists()]
     if missing:
         programs.build(*missing)
-    load, start, commit = os.getloadavg()[0], time.monotonic(), results.commit()
+    commit, start, (machine, own) = results.commit(), time.monotonic(), processor_seconds()
     found = part.find(kit)
-    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit, "load": load,
-            "seconds": time.monotonic() - start, "found": to_json(found)}
+    seconds, (machine_after, own_after) = time.monotonic() - start, processor_seconds()
+    others = (machine_after - machine - (own_after - own)) / seconds / os.cpu_count()
+    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit, "others": max(0, others), "seconds": seconds, "found": to_json(found)}
 
 
 def main():

@@ -36,7 +36,7 @@ def section(part, kept, pictures):
     lines = [f"\n### {part.title}\n"]
     if kept is None:
         return lines + [f"Not run: `scripts/reproduce --only {part.name}{' --data DIR' if part.needs_data else ''}` does.\n"]
-    busy = f"; **not quiet**, {kept['load']:.0f} others wanted its cores" if part.timed and kept["load"] >= 1 else ""
+    busy = f"; **not quiet**: others took {100 * kept['others']:.0f} % of the processors" if part.timed and kept["others"] > 0.05 else ""
     lines.append(f"`scripts/reproduce --only {part.name}`: {kept['date']}, commit {kept['commit']}{busy}.\n")
     lines.append("| in the paper | there | here | command | what differs |\n|---|---|---|---|---|")
     found = from_json(kept["found"])
