@@ -61,7 +61,8 @@ def found_by(part, kit):
     found = part.find(kit)
     seconds, (machine_after, own_after) = time.monotonic() - start, processor_seconds()
     others = (machine_after - machine - (own_after - own)) / seconds / os.cpu_count()
-    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit, "others": max(0, others), "seconds": seconds, "found": to_json(found)}
+    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit, "others": max(0, others), "seconds": seconds,
+            "found": to_json(found)}
 
 
 def main():

@@ -20,7 +20,8 @@ def solved(kit, joint, degrees, material):
 def row(kit, joint, degrees, material):
     fem, out = solved(kit, joint, degrees, material)
     to, ended = fem["to_cor"], "" if fem["converged"] else "did not converge; "
-    return Row(f"figure 9: {joint.replace('_', ' ')} {degrees} degrees, {material.replace('_', '-')}", "CoR shown beside a co-rotational solution; no figure is stated in what we hold",
+    return Row(f"figure 9: {joint.replace('_', ' ')} {degrees} degrees, {material.replace('_', '-')}",
+               "CoR shown beside a co-rotational solution; no figure is stated in what we hold",
                f"{ended}CoR is {to['mean_mm']:.1f} mm from it (95 % within {to['p95_mm']:.1f}, most {to['max_mm']:.1f}); {fem['inverted_tets']} inverted, "
                f"volume {100 * fem['volume_change']:+.2f} %", f"ecorche fem MODEL --pose POSE --material {material} -o DIR",
                "Co-rotational is the paper's own material; it softens under pressure and lets tets turn over." if material == "corotational" else ""), out
@@ -44,7 +45,8 @@ def figure_9(kit):
     for body in (cor, fem):
         programs.call(programs.ROOT / "scripts/render", body, "-o", kit.made / "pictures", "--name", body.name, "--view", "oblique", "--height", 700, around)
         files.append(kit.made / f"pictures/{body.name}_oblique.png")
-    return Found(rows, [kit.row_of(files, "sujar_fem", f"The {joint.split('_')[0]} turned by {degrees} degrees: CoR at the left, stable neo-Hookean finite elements at the right")])
+    about = f"The {joint.split('_')[0]} turned by {degrees} degrees: CoR at the left, stable neo-Hookean finite elements at the right"
+    return Found(rows, [kit.row_of(files, "sujar_fem", about)])
 
 
 PARTS = [Part("fem", "Sujar18", "Beside finite elements (figure 9)", figure_9)]

@@ -7,6 +7,8 @@ from reproduce.rows import Found, Part, Row, UNKNOWN, folder_of, small_or
 
 WALK = re.compile(r"(?m)^\| (lbs|dqs|cor) +\| +(\d+) \| +([\d.]+) \| +(\d+) \| +([\d.]+) \| +(\d+) \|")
 
+TITLES = {"lbs": "LBS", "dqs": "DQS", "cor": "CoR"}
+
 
 def walk_rows(printed):
     """Of bench_runtime's walk: a row a method, with as many threads as it tried."""
@@ -16,7 +18,7 @@ def walk_rows(printed):
     if len(best) != 3:
         raise SystemExit(f"error: reproduce: bench_runtime told of {', '.join(best) or 'no method'} (expected lbs, dqs and cor)")
     theirs = {"cor": "mean 60 to 142 a second (7 to 17 ms), worst 50 (20 ms); GTX 770"}
-    return [Row(f"table 2: {name.upper() if name != 'cor' else 'CoR'}", theirs.get(name, UNKNOWN), best[name], "bench_runtime MODEL --only walk --clip walk.bvh",
+    return [Row(f"table 2: {TITLES[name]}", theirs.get(name, UNKNOWN), best[name], "bench_runtime MODEL --only walk --clip walk.bvh",
                 "Processor, not graphics card: drawing is not in it." if name == "cor" else "") for name in ("lbs", "dqs", "cor")]
 
 
@@ -49,13 +51,12 @@ def bar(kit):
         programs.ecorche("preprocess", case, "-o", model, "--mesher", "lattice", "--max-tets", tets)
     env = {"ECORCHE_BAR_MODEL": str(model), "ECORCHE_BAR_OUT": str(out / "posed")}
     found = bar_rows(programs.call(programs.BIN / "property_bar", env=env).splitlines())
-    said = {"lbs": "loses", "dqs": "gains", "cor": "nearest to rest"}
-    row = lambda where, pose, note: Row(where, ", ".join(f"{name.upper() if name != 'cor' else 'CoR'} {word}" for name, word in said.items()) + "; no figure is stated in what we hold",
-                                        ", ".join(f"{name} {found[pose][name][0]:+.2f} %" for name in said) + " of the tets' volume", "bench/bar/run --pictures", note)  # noqa: E731
-    rows = [row("figure 7: 100, -100 bent, 135 degrees twisted", "100, -100, 135 deg",
-                "On a bar that is symmetric about its joints DQS keeps volume best; with joints off its middle line, as in a knee, the figure's order comes out (next row)."),
-            row("figure 7: bent by 100 degrees, joints at the inside", "bend 100, axis inside", "")]
-    skins = [out / f"posed/{name}_skin.vtp" for name in said]
+    methods, theirs = ("lbs", "dqs", "cor"), "LBS loses, DQS gains, CoR is nearest to rest; no figure is stated in what we hold"
+    told = {pose: ", ".join(f"{TITLES[name]} {changes[name][0]:+.2f} %" for name in methods) + " of the tets' volume" for pose, changes in found.items()}
+    rows = [Row("figure 7: 100, -100 bent, 135 degrees twisted", theirs, told["100, -100, 135 deg"], "bench/bar/run --pictures",
+                "On a bar that is symmetric about its joints DQS keeps volume best; with joints off its middle line, as in a knee, it gains (next row)."),
+            Row("figure 7: bent by 100 degrees, joints at the inside", theirs, told["bend 100, axis inside"], "bench/bar/run --pictures")]
+    skins = [out / f"posed/{name}_skin.vtp" for name in methods]
     return Found(rows, kit.render(*skins, name="sujar_bar", suffix="row", words=("--view", "side"), about="The bar of figure 7 from the side: LBS, DQS, CoR"))
 
 
@@ -65,10 +66,12 @@ def shown(kit):
     quality = programs.ecorche("info", kit.model())
     pictures = []
     if kit.draw:
-        pictures = kit.render(kit.phantom(), name="sujar_rest", suffix="front", words=("--only", "tissues"), about="The built-in patient as scanned, its skin seen through")
+        pictures = kit.render(kit.phantom(), name="sujar_rest", suffix="front", words=("--only", "tissues"),
+                              about="The built-in patient as scanned, its skin seen through")
         pictures += kit.render(walk, name="sujar_walk", suffix="side", words=("--only", "tissues"), about="The same in a frame of its walk, by CoR")
     return Found([Row("figures 1, 2, 6, 8, 12, 13, 14", "what they show is not stated in what we hold",
-                      f"the built-in patient with {len(quality['tissues'])} surfaces, at rest and in a walk", "ecorche pose MODEL --motion walk.bvh --frames 12 -o DIR",
+                      f"the built-in patient with {len(quality['tissues'])} surfaces, at rest and in a walk",
+                      "ecorche pose MODEL --motion walk.bvh --frames 12 -o DIR",
                       "These pictures stand for the method, not for those figures.")], pictures)
 
 

@@ -15,8 +15,8 @@ def table_1(kit):
                 f"{report['tets'] / 1e6:.2f} M tets, {report['tissues']['vertices'] / 1e6:.2f} M vertices, {report['segments']} segments with bones",
                 f"ecorche phantom -o body --size {size}", "The built-in patient: its organs are simpler shapes than a segmented person's.")]
     for title, seconds, peak, theirs in programs.bench("paper").figures(report):
-        rows.append(Row(f"table 1: {title}", theirs or UNKNOWN,
-                        f"{number(seconds)} s, {peak:.0f} MiB", "bench/paper/run", "Most joints of the built-in patient are given, some are fitted." if title == "rig" else ""))
+        rows.append(Row(f"table 1: {title}", theirs or UNKNOWN, f"{number(seconds)} s, {peak:.0f} MiB", "bench/paper/run",
+                        "Most joints of the built-in patient are given, some are fitted." if title == "rig" else ""))
     return Found(rows)
 
 
@@ -30,7 +30,8 @@ def mapping(kit):
     theirs = "three ways (which ones is not stated in what we hold)"
     return Found([
         Row("3.4: a vertex within a tet", theirs, f"{tissues['vertices'] - held - tissues['outside']} of {tissues['vertices']}: barycentric coordinates", command),
-        Row("3.4: a vertex outside of all tets", theirs, f"{tissues['outside']}, at most {tissues['max_outside_mm']:.1f} mm away: the affine map of the nearest tet", command,
+        Row("3.4: a vertex outside of all tets", theirs,
+            f"{tissues['outside']}, at most {tissues['max_outside_mm']:.1f} mm away: the affine map of the nearest tet", command,
             "The mesh cuts corners of the skin; finer meshes leave fewer outside."),
         Row("3.4: a vertex of a bone", theirs, f"{held}: moved by its segment, rigid within {found['bones']['rigidity']:.0e} mm", command),
     ])
@@ -49,8 +50,9 @@ def tets(kit):
 
 def tets_row(kit):
     found = programs.ecorche("verify", kit.model())
+    mesh = found["mesh"]
     return Row("figures 3, 4, 5, 11: tets by label, by segment, by a weight", "pictures of its own body; figures of quality are not stated in what we hold",
-               f"{found['tets']} tets, {found['mesh']['inverted']} inverted, {found['mesh']['min_dihedral_deg']:.0f} to {found['mesh']['max_dihedral_deg']:.0f} degrees; "
+               f"{found['tets']} tets, {mesh['inverted']} inverted, {mesh['min_dihedral_deg']:.0f} to {mesh['max_dihedral_deg']:.0f} degrees; "
                f"weights {found['weights']['min']:.1e} to {found['weights']['max']:g}, {found['weights']['repaired_rows']} rows repaired",
                "scripts/render MODEL --only tets -o DIR", "Another body, and another mesher: theirs fits the surface more closely than this lattice.")
 

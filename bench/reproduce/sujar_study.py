@@ -24,9 +24,10 @@ def study(kit):
     if missing:
         raise SystemExit(f"error: reproduce: {folder}: {', '.join(missing)} is not there (run examples/study/draw MODEL)")
     count = {method: sum(row["method"] == method for row in shown) for method in ("fem", "cor")}
-    return Found([Row("figure 10: plausibility as people see it", "22 pictures, 11 by finite elements and 11 by CoR, six poses, Likert 1 to 8, Wilcoxon's signed-rank test; "
-                      "its answers are not stated in what we hold",
-                      f"a page with {len(shown)} pictures, {count['fem']} by finite elements and {count['cor']} by CoR, {len({row['pose'] for row in shown})} poses; **nobody was asked**",
+    poses = len({row["pose"] for row in shown})
+    theirs = "22 pictures, 11 by finite elements and 11 by CoR, six poses, Likert 1 to 8, Wilcoxon's signed-rank test"
+    return Found([Row("figure 10: plausibility as people see it", f"{theirs}; its answers are not stated in what we hold",
+                      f"a page with {len(shown)} pictures, {count['fem']} by finite elements and {count['cor']} by CoR, {poses} poses; **nobody was asked**",
                       "examples/study/draw MODEL", "Our wording, our poses: theirs are not stated in what we hold.")])
 
 

@@ -36,13 +36,15 @@ def shape_rows(kit, name, model, poses):
     posed(model, out, bones, "--pose", rest, "--tets")
     there, back = surfaces.apart(surfaces.boundary(out / "body.vtu"), surfaces.read(out / "skin.stl"))
     rows = [Row(f"{name}: scaffold to skin, chamfer", "15.8 ± 4.0 mm, three subjects", f"{(there + back) / 2:.2f} mm (to the skin {there:.2f}, from it {back:.2f})",
-                "ecorche pose MODEL --tets --tissues skin -o DIR", "Nothing is fitted here: our scaffold is made from the same skin, theirs is a template. Mean of both ways."),
-            Row(f"{name}: bones within the skin, as scanned", "95.9 ± 1.8 %", f"{100 * enclosed(out, bones):.1f} % of their vertices", "ecorche pose MODEL --tissues all -o DIR",
-                "Bones and skin are of one scan.")]
+                "ecorche pose MODEL --tets --tissues skin -o DIR",
+                "Nothing is fitted here: our scaffold is made from the same skin, theirs is a template. Mean of both ways."),
+            Row(f"{name}: bones within the skin, as scanned", "95.9 ± 1.8 %", f"{100 * enclosed(out, bones):.1f} % of their vertices",
+                "ecorche pose MODEL --tissues all -o DIR", "Bones and skin are of one scan.")]
     shares = {pose: enclosed(posed(model, out, bones, "--pose", pose), bones) for pose in poses}
     if shares:
         said = ", ".join(f"{pose.split(':')[1].replace('_', ' ')} {100 * share:.1f} %" for pose, share in shares.items())
-        rows.append(Row(f"{name}: bones within the skin, posed", "94.4 % over unseen poses", said, "ecorche pose MODEL --pose lib:sitting --tissues all -o DIR", "Poses are ours."))
+        rows.append(Row(f"{name}: bones within the skin, posed", "94.4 % over unseen poses", said, "ecorche pose MODEL --pose lib:sitting --tissues all -o DIR",
+                        "Poses are ours."))
     return rows
 
 
@@ -52,12 +54,13 @@ def radiograph(kit, model, view, *words):
 
     out = folder_of(kit, "zhang") / f"{view}{'_surfaces' if words else ''}.png"
     pixels = small_or(kit, 128, 512)
-    programs.ecorche("radiograph", model, "-o", out, "--view", view, "--size", "700,1900", "--sid", 6000, "--pixels", f"{pixels // 2},{pixels}", "--window", "0,12", *words)
+    programs.ecorche("radiograph", model, "-o", out, "--view", view, "--size", "700,1900", "--sid", 6000, "--pixels", f"{pixels // 2},{pixels}",
+                     "--window", "0,12", *words)
     return out, np.asarray(Image.open(out), float) / 65535
 
 
 def alike(a, b, edge=0):
-    """SSIM (Wang 2004: Gaussian of 1.5 pixels, k of 0.01 and 0.03) and PSNR in dB of two pictures from 0 to 1. `edge` pixels are left out of SSIM."""
+    """SSIM (Wang04: Gaussian of 1.5 pixels, k of 0.01 and 0.03) and PSNR in dB of two pictures from 0 to 1. `edge` pixels are left out of SSIM."""
     from scipy.ndimage import gaussian_filter
 
     mean = lambda x: gaussian_filter(x, 1.5, truncate=10 / 3)  # noqa: E731
@@ -74,8 +77,8 @@ def radiographs(kit):
         (scan, a), (made, b) = radiograph(kit, model, view), radiograph(kit, model, view, "--surfaces")
         ssim, psnr = alike(a, b)
         shown += [scan, made]
-        rows.append(Row(f"radiographs, recomposed as scanned, {view.replace('_', ' ')}", "SSIM 0.872 ± 0.016, PSNR 18.5 ± 1.4 dB", f"SSIM {ssim:.3f}, PSNR {psnr:.1f} dB",
-                        f"ecorche radiograph MODEL --view {view} --surfaces -o made.png",
+        rows.append(Row(f"radiographs, recomposed as scanned, {view.replace('_', ' ')}", "SSIM 0.872 ± 0.016, PSNR 18.5 ± 1.4 dB",
+                        f"SSIM {ssim:.3f}, PSNR {psnr:.1f} dB", f"ecorche radiograph MODEL --view {view} --surfaces -o made.png",
                         "The built-in patient: its CT was made from the same surfaces, so a real one would be less alike."))
     rows.append(Row("radiographs, the CT itself carried", "-", "the scan's own, to the bit: at rest nothing is sampled anew", "ecorche radiograph MODEL -o scan.png",
                     "Theirs recompose segmented parts; here the CT follows the tets (section 4 of Sujar18)."))
