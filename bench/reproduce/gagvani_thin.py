@@ -56,7 +56,7 @@ def curves(kit):
         a, b, r2 = exponential(points) if len(points) > 1 else (float("nan"),) * 3
         rows.append(Row(where, "three curves, exponential; values are not stated in what we hold",
                         f"{a:.2g} exp({b:.1f} TP){unit}, r2 {r2:.2f}, TP {points[0][0]:.1f} to {points[-1][0]:.1f}", command,
-                        f"The built-in patient, {number(thing)} voxels; theirs are three other objects."))
+                        f"The built-in patient, {number(thing)} voxels; one curve; of which objects theirs are is not stated in what we hold."))
     tree = thinner(kit, 0.48, "--tree")[1]
     share = 100 * tree["skeletal"] / thing
     rows.append(Row("4: skeletal voxels of the body", "42 298, 0.33 % of the object; 33 630 refilled; of what 9666, 3980, 1017 and 231 are is not stated in what we hold",

@@ -7,6 +7,8 @@ from reproduce.rows import Found, Part, Row, folder_of, small_or
 
 ELBOW, KNEE = ("elbow_left", 60), ("knee_left", 45)
 
+NOTES = {"corotational": "The paper's own material; it softens under pressure and does not resist inversion.", "stable_neo_hookean": "Not the paper's material."}
+
 
 def solved(kit, joint, degrees, material):
     """What fem.json says of one joint turned, and the folder of its surfaces."""
@@ -23,8 +25,8 @@ def row(kit, joint, degrees, material):
     return Row(f"figure 9: {joint.replace('_', ' ')} {degrees} degrees, {material.replace('_', '-')}",
                "CoR shown beside a co-rotational solution; no figure is stated in what we hold",
                f"{ended}CoR is {to['mean_mm']:.1f} mm from it (95 % within {to['p95_mm']:.1f}, most {to['max_mm']:.1f}); {fem['inverted_tets']} inverted, "
-               f"volume {100 * fem['volume_change']:+.2f} %", f"ecorche fem MODEL --pose POSE --material {material} -o DIR",
-               "Co-rotational is the paper's own material; it softens under pressure and lets tets turn over." if material == "corotational" else ""), out
+               f"volume {100 * fem['volume_change']:+.2f} %", f"ecorche fem MODEL --pose POSE --material {material} --one-start -o DIR",
+               NOTES[material] + (" Tets are inside out: not a solution to trust." if fem["inverted_tets"] else "")), out
 
 
 def figure_9(kit):

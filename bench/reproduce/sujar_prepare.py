@@ -54,7 +54,7 @@ def tets_row(kit):
     return Row("figures 3, 4, 5, 11: tets by label, by segment, by a weight", "pictures of its own body; figures of quality are not stated in what we hold",
                f"{found['tets']} tets, {mesh['inverted']} inverted, {mesh['min_dihedral_deg']:.0f} to {mesh['max_dihedral_deg']:.0f} degrees; "
                f"weights {found['weights']['min']:.1e} to {found['weights']['max']:g}, {found['weights']['repaired_rows']} rows repaired",
-               "scripts/render MODEL --only tets -o DIR", "Another body, and another mesher: theirs fits the surface more closely than this lattice.")
+               "scripts/render MODEL --only tets -o DIR", "Another body; which mesher theirs are by is not stated in what we hold.")
 
 
 PARTS = [
