@@ -13,4 +13,8 @@ namespace ecorche::wire::kernels {
 void to_positions(std::span<const std::uint16_t> numbers, const std::array<double, 3>& low, double step,
                   std::span<float> out);
 
+/// On the calling thread; allocates nothing. `packed`: 2 per vertex; `out`: from_oct16() of each, 3 per
+/// vertex.
+void to_normals(std::span<const std::int8_t> packed, std::span<float> out);
+
 }  // namespace ecorche::wire::kernels

@@ -1,46 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ecorche/wire/mesh_decoder.hpp>
 
-#include <algorithm>
+#include <cstring>
 #include <string>
 
 #include "proto/arrays.hpp"
 #include "proto/delta.hpp"
 #include "proto/float_kernels.hpp"
-#include "proto/oct16.hpp"
 
 namespace ecorche::wire {
 namespace {
 
 constexpr std::uint32_t kMostLevels = 16;  // kept keyframes: what a server says must not fill the memory
 
+constexpr std::uint64_t kThreeNumbers = (std::uint64_t{1} << 48U) - 1;
+constexpr std::uint16_t kOct16 = 0x8080;  // from two int8 to "oct16" and back
+
 Status bad_mesh(const std::string& what) {
   return {StatusCode::invalid_argument, "mesh frame: " + what + " (use a server that keeps the protocol)"};
 }
 
-void to_positions(const v1::QuantiseBox& box, DecodedTissue& tissue) {
-  tissue.positions.resize(tissue.numbers.size());
-  kernels::to_positions(tissue.numbers, {box.low_x(), box.low_y(), box.low_z()}, box.step(),
-                        tissue.positions);
-}
-
 Status read_normals(const v1::Array& array, const Payload& payload, DecodedTissue& tissue) {
   std::span<const std::int8_t> packed;
-  if (!find(array, payload, 2, packed) || packed.size() / 2 != tissue.positions.size() / 3)
+  if (!find(array, payload, 2, packed) || packed.size() / 2 != tissue.vertices())
     return bad_mesh("its normals are not one per vertex");
-  tissue.normals.resize(tissue.positions.size());
-  const Oct16Table& table = oct16_table();
-  for (std::size_t v = 0; v < packed.size() / 2; ++v) {
-    const std::array<float, 3>& normal = table.of(packed[2 * v], packed[2 * v + 1]);
-    std::copy(normal.begin(), normal.end(), &tissue.normals[3 * v]);
-  }
+  tissue.normal_numbers.assign(packed.begin(), packed.end());
   return {};
 }
 
 }  // namespace
 
+void make_positions(const DecodedTissue& tissue, std::size_t first, std::span<float> out) {
+  kernels::to_positions(std::span(tissue.numbers).subspan(3 * first, out.size()), tissue.low, tissue.step,
+                        out);
+}
+
+void make_normals(const DecodedTissue& tissue, std::size_t first, std::span<float> out) {
+  kernels::to_normals(std::span(tissue.normal_numbers).subspan(2 * first, out.size() / 3 * 2), out);
+}
+
+void make_positions(DecodedTissue& tissue) {
+  if (tissue.numbers.empty()) return;
+  tissue.positions.resize(tissue.numbers.size());
+  make_positions(tissue, 0, tissue.positions);
+}
+
+void make_normals(DecodedTissue& tissue) {
+  tissue.normals.resize(tissue.normal_numbers.size() / 2 * 3);
+  make_normals(tissue, 0, tissue.normals);
+}
+
+void interleave(const DecodedTissue& tissue, std::byte* out) {
+  const std::size_t count = tissue.vertices();
+  const std::uint16_t* numbers = tissue.numbers.data();
+  const bool normals = !tissue.normal_numbers.empty();
+  for (std::size_t v = 0; v < count; ++v, numbers += 3, out += 8) {
+    // One word, written at once. Of the last vertex alone there is nothing to read behind it.
+    std::uint64_t word = 0;
+    std::memcpy(&word, numbers, v + 1 < count ? 8 : 6);
+    std::uint16_t normal = kOct16;
+    if (normals) std::memcpy(&normal, &tissue.normal_numbers[2 * v], 2);
+    normal ^= kOct16;
+    word = (word & kThreeNumbers) | std::uint64_t{normal} << 48U;
+    std::memcpy(out, &word, 8);
+  }
+}
+
 Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
                            std::vector<DecodedTissue>& out) {
+  if (Status status = decode_numbers(frame, payload, out); !status.ok()) return status;
+  for (DecodedTissue& tissue : out) {
+    make_positions(tissue);
+    make_normals(tissue);
+  }
+  return {};
+}
+
+Status MeshDecoder::decode_numbers(const v1::MeshFrame& frame, const Payload& payload,
+                                   std::vector<DecodedTissue>& out) {
   const bool delta = frame.encoding() == v1::ENCODING_U16_DELTA;
   const bool is_key = delta && frame.keyframe() == frame.frame();
   if (!delta && frame.encoding() != v1::ENCODING_F32 && frame.encoding() != v1::ENCODING_U16)
@@ -64,8 +101,9 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
     if (out.size() == count) out.emplace_back();
     DecodedTissue& tissue = out[count];
     tissue.tissue = array.tissue();
-    tissue.normals.clear();
-    tissue.numbers.clear();
+    tissue.normal_numbers.clear();
+    tissue.low = {frame.box().low_x(), frame.box().low_y(), frame.box().low_z()};
+    tissue.step = frame.box().step();
     const auto bad_positions = [&](const std::string& what) {
       return bad_mesh("the positions of tissue " + std::to_string(array.tissue()) + what);
     };
@@ -73,6 +111,7 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
       std::span<const float> positions;
       if (!find(array.array(), payload, 3, positions)) return bad_positions(" are no float32");
       tissue.positions.assign(positions.begin(), positions.end());
+      tissue.numbers.clear();
     } else if (delta && !is_key) {
       std::span<const std::uint8_t> bytes;
       if (!find(array.array(), payload, 1, bytes)) return bad_positions(" are no deltas");
@@ -88,7 +127,7 @@ Status MeshDecoder::decode(const v1::MeshFrame& frame, const Payload& payload,
       if (!find(array.array(), payload, 3, numbers)) return bad_positions(" are no u16");
       tissue.numbers.assign(numbers.begin(), numbers.end());
     }
-    if (frame.encoding() != v1::ENCODING_F32) to_positions(frame.box(), tissue);
+    if (frame.encoding() != v1::ENCODING_F32 && tissue.numbers.empty()) tissue.positions.clear();
     ++count;
   }
   out.resize(count);

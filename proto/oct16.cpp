@@ -2,11 +2,13 @@
 #include "proto/oct16.hpp"
 
 #include <cmath>
+#include <cstdlib>
 
 namespace ecorche::wire {
 namespace {
 
 constexpr std::int8_t kNone = -128;
+constexpr int kOne = 127;
 
 float sign(float x) {
   return x < 0 ? -1.0F : 1.0F;
@@ -40,29 +42,16 @@ void to_oct16(std::span<const std::int16_t> unit, std::span<std::int8_t> out) {
 
 std::array<float, 3> from_oct16(std::int8_t u, std::int8_t v) {
   if (u == kNone && v == kNone) return {0, 0, 0};
-  float x = static_cast<float>(u) / 127, y = static_cast<float>(v) / 127;
-  const float z = 1 - std::abs(x) - std::abs(y);
+  // In 127ths, whole numbers: kernels::to_normals() has the same bits on any processor.
+  int x = u, y = v;
+  const int z = kOne - std::abs(x) - std::abs(y);
   if (z < 0) {
-    const float folded = (1 - std::abs(y)) * sign(x);
-    y = (1 - std::abs(x)) * sign(y);
+    const int folded = x < 0 ? std::abs(y) - kOne : kOne - std::abs(y);
+    y = y < 0 ? std::abs(x) - kOne : kOne - std::abs(x);
     x = folded;
   }
-  const float length = std::sqrt(x * x + y * y + z * z);
-  return {x / length, y / length, z / length};
-}
-
-Oct16Table::Oct16Table() : units_(std::size_t{1} << 16U) {
-  for (int u = -128; u < 128; ++u) {
-    for (int v = -128; v < 128; ++v) {
-      const auto a = static_cast<std::int8_t>(u), b = static_cast<std::int8_t>(v);
-      units_[row(a, b)] = from_oct16(a, b);
-    }
-  }
-}
-
-const Oct16Table& oct16_table() {
-  static const Oct16Table table;
-  return table;
+  const float length = std::sqrt(static_cast<float>(x * x + y * y + z * z));
+  return {static_cast<float>(x) / length, static_cast<float>(y) / length, static_cast<float>(z) / length};
 }
 
 }  // namespace ecorche::wire

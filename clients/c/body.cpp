@@ -106,7 +106,12 @@ ecorche_code ecorche_body_copy(const ecorche_body* body, uint32_t tissue, ecorch
     const std::vector<std::int16_t>& turned = all.empty() ? none : all[tissue];
     if (normals != nullptr && turned.empty() && !posed.empty())
       return c::fail(ECORCHE_FAILED_PRECONDITION, "normals: the body has none (see ecorche_body_options)");
-    return c::copy_vertices(posed, turned, 1.0 / 32767, space,
+    const auto points = [&](std::size_t first, std::size_t, c::Batch&) { return &posed[3 * first]; };
+    const auto directions = [&](std::size_t first, std::size_t count, c::Batch& batch) {
+      std::copy_n(&turned[3 * first], 3 * count, batch.begin());
+      return batch.data();
+    };
+    return c::copy_vertices(posed.size() / 3, points, directions, 1.0 / 32767, space,
                             {positions, position_stride, normals, normal_stride, capacity});
   });
 }

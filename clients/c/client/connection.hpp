@@ -10,7 +10,7 @@
 #include <ecorche/ecorche_client.h>
 #include <ecorche/client/client.hpp>
 #include <ecorche/wire/address.hpp>
-#include <ecorche/wire/mesh_decoder.hpp>
+#include "clients/c/client/shown_frame.hpp"
 #include "clients/c/edited_pose.hpp"
 #include "clients/c/guard.hpp"
 
@@ -50,8 +50,7 @@ struct ecorche_client {
 
   std::optional<ecorche::v1::Subscribe> wanted = {};  ///< what was subscribed to last
   std::optional<std::uint32_t> subscription = {};
-  ecorche::wire::MeshDecoder decoder = {};
-  std::vector<ecorche::wire::DecodedTissue> frame = {};
+  mutable ecorche::c::ShownFrame frame = {};  ///< that floats are made of it later nobody sees
   std::optional<ecorche::c::ToldQuality> quality = {};
 };
 
@@ -83,8 +82,5 @@ std::unique_ptr<OpenedBody> read_opened(wire::Frame opened);
 
 /// Frames of what is wanted come from now on.
 void subscribe(ecorche_client& client);
-
-/// Of the last frame; null where it does not hold the tissue.
-const wire::DecodedTissue* find_decoded(const ecorche_client& client, std::uint32_t tissue);
 
 }  // namespace ecorche::c

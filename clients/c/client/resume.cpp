@@ -14,7 +14,7 @@ bool take_place(ecorche_client& client) {
   const v1::Resumed& resumed = hello.resumed();
   client.controls = resumed.role() == v1::ROLE_CONTROLLER;
   client.body->sequence = std::max(client.body->sequence, resumed.last_sequence());
-  client.decoder = {};
+  client.frame.forget_keyframes();
   const auto was = std::exchange(client.subscription, std::nullopt);
   for (const v1::ResumedSubscription& one : resumed.subscriptions()) {
     if (was == one.was()) client.subscription = one.is();

@@ -2,11 +2,9 @@
 // Poses out, frames in.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include <ecorche/wire/convert.hpp>
 #include "clients/c/client/connection.hpp"
-#include "clients/c/space.hpp"
 
 namespace ecorche::c {
 namespace {
@@ -39,12 +37,12 @@ ToldQuality to_c(const v1::PoseQuality& told) {
 // Whether the frame is of the present subscription; then it is the client's.
 bool take_frame(ecorche_client& client, const v1::MeshFrame& frame, const wire::Payload& payload) {
   if (client.subscription != frame.subscription()) return false;
-  if (const Status status = client.decoder.decode(frame, payload, client.frame); !status.ok())
+  if (const Status status = client.frame.take(frame, payload); !status.ok())
     throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
   const v1::ModelOpened& opened = client.body->opened;
-  for (const wire::DecodedTissue& tissue : client.frame) {
+  for (const wire::DecodedTissue& tissue : client.frame.tissues()) {
     if (tissue.tissue >= static_cast<std::uint32_t>(opened.tissues_size()) ||
-        tissue.positions.size() != 3 * opened.tissues(static_cast<int>(tissue.tissue)).vertices()) {
+        tissue.vertices() != opened.tissues(static_cast<int>(tissue.tissue)).vertices()) {
       client.frame.clear();
       throw Error(ErrorKind::protocol, "server", "a frame holds other tissues than the model",
                   "check that it is ecorche serve");
@@ -89,15 +87,8 @@ void subscribe(ecorche_client& client) {
   v1::Envelope request;
   *request.mutable_subscribe() = *client.wanted;
   client.frame.clear();
-  client.decoder = {};
   const wire::Frame answer = client.connection->call(std::move(request));
   client.subscription = answer.envelope.subscribed().subscription();
-}
-
-const wire::DecodedTissue* find_decoded(const ecorche_client& client, std::uint32_t tissue) {
-  const auto found = std::find_if(client.frame.begin(), client.frame.end(),
-                                  [&](const wire::DecodedTissue& one) { return one.tissue == tissue; });
-  return found == client.frame.end() ? nullptr : &*found;
 }
 
 }  // namespace ecorche::c
@@ -213,31 +204,6 @@ ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche
       if (c::take(*client, *came, event)) break;
     }
     return c::fill(out, event);
-  });
-}
-
-const float* ecorche_client_positions(const ecorche_client* client, uint32_t tissue) {
-  const wire::DecodedTissue* const found = client == nullptr ? nullptr : c::find_decoded(*client, tissue);
-  return found == nullptr ? nullptr : found->positions.data();
-}
-
-const float* ecorche_client_normals(const ecorche_client* client, uint32_t tissue) {
-  const wire::DecodedTissue* const found = client == nullptr ? nullptr : c::find_decoded(*client, tissue);
-  return found == nullptr || found->normals.empty() ? nullptr : found->normals.data();
-}
-
-ecorche_code ecorche_client_copy(const ecorche_client* client, uint32_t tissue, ecorche_space space,
-                                 float* positions, size_t position_stride, float* normals,
-                                 size_t normal_stride, size_t capacity) {
-  return c::with_client(client, true, [&] {
-    const wire::DecodedTissue* const found = c::find_decoded(*client, tissue);
-    if (found == nullptr)
-      return c::fail(ECORCHE_FAILED_PRECONDITION, "tissue: no frame has brought it (subscribe, and poll)");
-    if (normals != nullptr && found->normals.empty() && !found->positions.empty())
-      return c::fail(ECORCHE_FAILED_PRECONDITION,
-                     "normals: the frames have none (see ecorche_stream_options)");
-    return c::copy_vertices(found->positions, found->normals, 1, space,
-                            {positions, position_stride, normals, normal_stride, capacity});
   });
 }
 

@@ -4,6 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
+#include <vector>
+
+#include "proto/float_kernels.hpp"
 
 namespace ecorche::wire {
 namespace {
@@ -28,12 +32,26 @@ TEST(Oct16, EveryDirectionComesBackWithinADegree) {
   EXPECT_GT(worst, 0.1);
 }
 
-TEST(Oct16, TheTableIsThatOfAllPairs) {
+TEST(Oct16, TheKernelIsThatOfAllPairs) {
+  std::vector<std::int8_t> packed;
   for (int u = -128; u < 128; ++u) {
     for (int v = -128; v < 128; ++v) {
-      const auto a = static_cast<std::int8_t>(u), b = static_cast<std::int8_t>(v);
-      ASSERT_EQ(oct16_table().of(a, b), from_oct16(a, b)) << u << " " << v;
+      packed.push_back(static_cast<std::int8_t>(u));
+      packed.push_back(static_cast<std::int8_t>(v));
     }
+  }
+  std::vector<float> unit(packed.size() / 2 * 3);
+  kernels::to_normals(packed, unit);
+  for (std::size_t i = 0; i < packed.size() / 2; ++i) {
+    const auto one = from_oct16(packed[2 * i], packed[2 * i + 1]);
+    for (std::size_t c = 0; c < 3; ++c) ASSERT_EQ(unit[3 * i + c], one[c]) << i << " axis " << c;
+  }
+  // Whatever is left over behind the last whole vector; nothing is written behind it.
+  for (std::size_t count = 0; count < 70; ++count) {
+    std::vector<float> few(3 * count + 1, 7.0F);
+    kernels::to_normals(std::span(packed).subspan(1000, 2 * count), std::span(few).first(3 * count));
+    for (std::size_t i = 0; i < 3 * count; ++i) ASSERT_EQ(few[i], unit[1500 + i]) << i << " of " << count;
+    ASSERT_EQ(few.back(), 7.0F);
   }
 }
 

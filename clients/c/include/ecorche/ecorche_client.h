@@ -149,14 +149,35 @@ typedef struct ecorche_event {
 ECORCHE_API ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche_event* out);
 
 /* Of the last frame: 3 * vertex_count, LPS mm; NULL before the first, or for a tissue that was not asked for.
- */
+ * Pointers into a frame are good until the next poll. Floats are made at the first of these calls, so who
+ * only copies, or draws by numbers, does not wait for them. */
 ECORCHE_API const float* ecorche_client_positions(const ecorche_client* client, uint32_t tissue);
 /* 3 * vertex_count, unit vectors; NULL where there are none. */
 ECORCHE_API const float* ecorche_client_normals(const ecorche_client* client, uint32_t tissue);
-/* As ecorche_body_copy. */
+/* As ecorche_body_copy. Faster than to turn what the two above return. */
 ECORCHE_API ecorche_code ecorche_client_copy(const ecorche_client* client, uint32_t tissue,
                                              ecorche_space space, float* positions, size_t position_stride,
                                              float* normals, size_t normal_stride, size_t capacity);
+/* A tissue of the last frame as it came, for a vertex shader to make floats of (clients/shaders). */
+typedef struct ecorche_packed {
+  size_t struct_size;
+  uint32_t vertex_count;
+  const uint16_t* positions; /* 3 * vertex_count; LPS mm: low + step * number */
+  const int8_t* normals;     /* 2 * vertex_count, octahedral, in 127ths; NULL where there are none */
+  double low[3], step;       /* mm; they may change from frame to frame */
+} ecorche_packed;
+#define ECORCHE_PACKED_INIT \
+  { sizeof(ecorche_packed), 0, 0, 0, {0, 0, 0}, 0 }
+
+/* FAILED_PRECONDITION where no frame has brought the tissue, or frames of ECORCHE_ENCODING_F32. */
+ECORCHE_API ecorche_code ecorche_client_packed(const ecorche_client* client, uint32_t tissue,
+                                               ecorche_packed* out);
+/* The same numbers into the caller's vertices of 8 bytes, a mapped buffer of the graphics card for one: three
+ * uint16, and a uint16 "oct16" as clients/shaders have it (u + 128 in the low byte, v + 128 in the high one;
+ * 0: no normal). Room for `capacity` vertices; INVALID_ARGUMENT where that is too little. Allocates nothing.
+ */
+ECORCHE_API ecorche_code ecorche_client_copy_packed(const ecorche_client* client, uint32_t tissue,
+                                                    void* vertices, size_t capacity);
 /* The last quality that frames told, and of which pose it is (`sequence` may be NULL). FAILED_PRECONDITION
  * where none has yet. A server measures as ecorche_body_measure does when it samples, and tells no reasons:
  * reason_count is 0. */
