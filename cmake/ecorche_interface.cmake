@@ -5,6 +5,15 @@
 #   ecorche::runtime     poses prepared models: bodies, volumes, probes, quality
 #   ecorche::client      speaks with a server
 #   ecorche::preprocess  reads cases and prepares models (with ECORCHE_TOOLS)
+if(NOT ECORCHE_RUNTIME)
+  # The client library and its headers, for programs of a system that ecorche does not run on.
+  if(ECORCHE_INSTALL)
+    install(TARGETS ecorche_c_client)
+    install(FILES clients/c/include/ecorche/ecorche.h clients/c/include/ecorche/ecorche_client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecorche)
+  endif()
+  return()
+endif()
+
 set(_components runtime client)
 add_library(ecorche_api_runtime INTERFACE)
 target_link_libraries(ecorche_api_runtime INTERFACE ecorche_runtime ecorche_kinematics ecorche_model_file)

@@ -26,7 +26,7 @@ set_property(GLOBAL PROPERTY JOB_POOLS cgal_pool=1)
 
 # There are a hundred executables to link, and lld links them in a tenth of the time.
 find_program(LLD ld.lld)
-if(LLD AND PROJECT_IS_TOP_LEVEL)
+if(LLD AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CROSSCOMPILING)
   add_link_options(-fuse-ld=lld)
 endif()
 

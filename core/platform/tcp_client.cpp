@@ -26,13 +26,17 @@ class LookupCategory final : public std::error_category {
   std::string message(int error) const override { return gai_strerror(error); }
 };
 
+int descriptor_of(SocketHandle socket) {
+  return static_cast<int>(socket);
+}
+
 std::error_code of(int error) {
   return {error, std::generic_category()};
 }
 
-bool wait(int socket, short events, Clock::time_point until) {
+bool wait(SocketHandle socket, short events, Clock::time_point until) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
-  pollfd poll_fd{.fd = socket, .events = events, .revents = 0};
+  pollfd poll_fd{.fd = descriptor_of(socket), .events = events, .revents = 0};
   constexpr std::int64_t longest = std::numeric_limits<int>::max();
   const int ready = poll(&poll_fd, 1, static_cast<int>(std::clamp<std::int64_t>(left, 0, longest)));
   // An interrupted wait is over early, like a ready one: the caller tries and comes back.
@@ -58,26 +62,27 @@ TcpClient::TcpClient(const std::string& host, std::uint16_t port, Clock::time_po
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(list, freeaddrinfo);
   int error = EADDRNOTAVAIL;
   for (const addrinfo* a = list; a && error != 0; a = a->ai_next) {
-    if (socket_ >= 0) close(socket_);
+    if (socket_ >= 0) close(descriptor_of(socket_));
     socket_ = socket(a->ai_family, a->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, a->ai_protocol);
     if (socket_ < 0) {
       error = errno;
       continue;
     }
-    error = connect(socket_, a->ai_addr, a->ai_addrlen) == 0 ? 0 : errno;
+    error = connect(descriptor_of(socket_), a->ai_addr, a->ai_addrlen) == 0 ? 0 : errno;
     if (error != EINPROGRESS) continue;
     error = ETIMEDOUT;
     socklen_t size = sizeof error;
-    if (wait(socket_, POLLOUT, until)) getsockopt(socket_, SOL_SOCKET, SO_ERROR, &error, &size);
+    if (wait(socket_, POLLOUT, until))
+      getsockopt(descriptor_of(socket_), SOL_SOCKET, SO_ERROR, &error, &size);
   }
   problem = of(error);
   if (problem) return;
   const int on = 1;
-  setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  setsockopt(descriptor_of(socket_), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 
 TcpClient::~TcpClient() {
-  if (socket_ >= 0) close(socket_);
+  if (socket_ >= 0) close(descriptor_of(socket_));
 }
 
 std::size_t TcpClient::read(std::span<std::byte> out, Clock::time_point until, std::size_t enough,
@@ -85,7 +90,7 @@ std::size_t TcpClient::read(std::span<std::byte> out, Clock::time_point until, s
   error = {};
   bool late = false;
   while (true) {
-    const ssize_t n = recv(socket_, out.data(), out.size(), 0);
+    const ssize_t n = recv(descriptor_of(socket_), out.data(), out.size(), 0);
     if (n > 0) return static_cast<std::size_t>(n);
     ended_ = n == 0;
     if (ended_) return 0;
@@ -103,7 +108,7 @@ void TcpClient::wake_at(std::size_t bytes) {
   if (std::exchange(wakes_at_, bytes) == bytes) return;
   const int least = static_cast<int>(bytes);
   // Where it cannot be set, waits end sooner, that is all.
-  static_cast<void>(setsockopt(socket_, SOL_SOCKET, SO_RCVLOWAT, &least, sizeof least));
+  static_cast<void>(setsockopt(descriptor_of(socket_), SOL_SOCKET, SO_RCVLOWAT, &least, sizeof least));
 }
 
 std::size_t TcpClient::write(std::span<const std::byte> bytes, Clock::time_point until,
@@ -111,7 +116,8 @@ std::size_t TcpClient::write(std::span<const std::byte> bytes, Clock::time_point
   error = {};
   std::size_t written = 0;
   while (written < bytes.size()) {
-    const ssize_t n = send(socket_, bytes.data() + written, bytes.size() - written, MSG_NOSIGNAL);
+    const ssize_t n =
+        send(descriptor_of(socket_), bytes.data() + written, bytes.size() - written, MSG_NOSIGNAL);
     if (n > 0) {
       written += static_cast<std::size_t>(n);
       continue;

@@ -9,6 +9,8 @@
 #include <string>
 #include <system_error>
 
+#include "core/platform/socket_options.hpp"
+
 namespace ecorche::platform {
 
 /// Errors of looking up a host's address.
@@ -38,8 +40,9 @@ class TcpClient {
  private:
   void wake_at(std::size_t bytes);
 
-  int socket_ = -1;
-  std::size_t wakes_at_ = 1;  ///< bytes that must have come before a wait for them ends
+  SocketHandle socket_ = -1;
+  std::size_t wakes_at_ =
+      1;  ///< bytes that must have come before a wait for them ends, where the system has it
   bool ended_ = false;
 };
 

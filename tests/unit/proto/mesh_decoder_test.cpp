@@ -85,6 +85,36 @@ TEST(MeshDecoder, KeyframesAndDeltas) {
   EXPECT_NE(status.message.find("its keyframe 11 did not come"), std::string::npos);
 }
 
+// For graphics cards, and for who makes a few floats: of exactly the bytes that are there.
+TEST(MeshDecoder, NumbersAloneAreEnough) {
+  MeshDecoder decoder;
+  std::vector<DecodedTissue> out;
+  const Made key = keyframe(7);
+  ASSERT_TRUE(decoder.decode_numbers(key.frame, key.payload, out).ok());
+  ASSERT_EQ(out.size(), 1U);
+  EXPECT_TRUE(out[0].positions.empty() && out[0].normals.empty()) << "no floats were asked for";
+  EXPECT_EQ(out[0].vertices(), 3U);
+  std::vector<std::array<std::uint16_t, 4>> vertices(3);
+  interleave(out[0], std::as_writable_bytes(std::span(vertices)).data());
+  // 127, 0 is +x; 0, 0 is +z; -128, -128 is none.
+  EXPECT_EQ(vertices, (std::vector<std::array<std::uint16_t, 4>>{
+                          {0, 1, 2, 255 + 256 * 128}, {10, 11, 12, 128 + 256 * 128}, {65535, 0, 5, 0}}));
+  std::array<float, 3> one{};
+  make_positions(out[0], 1, one);
+  EXPECT_EQ(one, (std::array<float, 3>{4, 7.5, 6}));
+  make_normals(out[0], 1, one);
+  EXPECT_EQ(one, (std::array<float, 3>{0, 0, 1}));
+
+  // A frame without vertices leaves none of those before.
+  make_positions(out[0]);
+  Made empty = keyframe(8);
+  empty.frame.mutable_arrays(0)->mutable_array()->set_count(0);
+  empty.frame.mutable_arrays(1)->mutable_array()->set_count(0);
+  ASSERT_TRUE(decoder.decode_numbers(empty.frame, empty.payload, out).ok());
+  EXPECT_EQ(out[0].vertices(), 0U);
+  EXPECT_TRUE(out[0].positions.empty());
+}
+
 // The vector kernel beside its plain twin, whatever is left over behind the last whole vector.
 TEST(MeshDecoder, NumbersBecomeMillimetres) {
   std::mt19937 random(4);

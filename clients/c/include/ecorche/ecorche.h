@@ -38,7 +38,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#if defined(ECORCHE_BUILDING) && defined(__GNUC__)
+#if defined(_WIN32) && defined(ECORCHE_BUILDING)
+#define ECORCHE_API __declspec(dllexport)
+#elif defined(_WIN32)
+#define ECORCHE_API __declspec(dllimport)
+#elif defined(ECORCHE_BUILDING) && defined(__GNUC__)
 #define ECORCHE_API __attribute__((visibility("default")))
 #else
 #define ECORCHE_API
