@@ -80,7 +80,8 @@ void Program::result(const std::string& text, const nlohmann::json& object) cons
   if (json) {
     nlohmann::json whole{{"ok", true}};
     whole.update(object);
-    out = whole.dump();
+    // Text of files may be anything, but JSON is UTF-8.
+    out = whole.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   }
   std::fwrite(out.data(), 1, out.size(), stdout);
   if (out.empty() || out.back() != '\n') std::fputc('\n', stdout);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // The `ecorche` command: chooses a subcommand, owns the one TBB arena, turns errors into lines and exit
 // codes.
+#include <google/protobuf/stubs/logging.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
@@ -131,5 +132,8 @@ int exit_code_of(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   ecorche::model_file::leave_hdf5_open_at_exit();
+  // What a peer sends that is no message is refused, and logged as all is; Protobuf would write lines of its
+  // own.
+  google::protobuf::SetLogHandler(nullptr);
   return ecorche::app::leave(ecorche::app::exit_code_of(argc, argv));
 }

@@ -55,5 +55,7 @@ if(ECORCHE_SANITIZE)
   add_link_options(-fsanitize=${_sanitizers})
 endif()
 if(ECORCHE_FUZZ)
-  target_compile_options(ecorche_sanitizers INTERFACE -fsanitize=fuzzer-no-link)
+  # Coverage, too, so that one build tells both what breaks and what was reached (scripts/fuzz).
+  target_compile_options(ecorche_sanitizers INTERFACE -fsanitize=fuzzer-no-link -fprofile-instr-generate -fcoverage-mapping)
+  add_link_options(-fprofile-instr-generate)
 endif()

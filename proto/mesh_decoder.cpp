@@ -20,10 +20,26 @@ Status bad_mesh(const std::string& what) {
   return {StatusCode::invalid_argument, "mesh frame: " + what + " (use a server that keeps the protocol)"};
 }
 
-Status read_normals(const v1::Array& array, const Payload& payload, DecodedTissue& tissue) {
+// Of the payload, which no two arrays share: else a frame would grow as many times as it names one.
+class Share {
+ public:
+  explicit Share(const Payload& payload) : left_(payload.size()) {}
+  template <class T>
+  bool take(std::span<const T> array) {
+    if (array.size_bytes() > left_) return false;
+    left_ -= array.size_bytes();
+    return true;
+  }
+
+ private:
+  std::size_t left_;
+};
+
+Status read_normals(const v1::Array& array, const Payload& payload, Share& share, DecodedTissue& tissue) {
   std::span<const std::int8_t> packed;
   if (!find(array, payload, 2, packed) || packed.size() / 2 != tissue.vertices())
     return bad_mesh("its normals are not one per vertex");
+  if (!share.take(packed)) return bad_mesh("its arrays lie in one another");
   tissue.normal_numbers.assign(packed.begin(), packed.end());
   return {};
 }
@@ -90,10 +106,12 @@ Status MeshDecoder::decode_numbers(const v1::MeshFrame& frame, const Payload& pa
                                                  " did not come (wait for the next keyframe)"};
   }
   std::size_t count = 0;  // of tissues
+  Share share(payload);
   for (const v1::MeshArray& array : frame.arrays()) {
     if (array.kind() == v1::MeshArray::KIND_NORMALS) {
       if (count == 0 || out[count - 1].tissue != array.tissue()) return bad_mesh("normals without positions");
-      if (Status status = read_normals(array.array(), payload, out[count - 1]); !status.ok()) return status;
+      if (Status status = read_normals(array.array(), payload, share, out[count - 1]); !status.ok())
+        return status;
       continue;
     }
     if (array.kind() != v1::MeshArray::KIND_POSITIONS) continue;
@@ -110,11 +128,13 @@ Status MeshDecoder::decode_numbers(const v1::MeshFrame& frame, const Payload& pa
     if (frame.encoding() == v1::ENCODING_F32) {
       std::span<const float> positions;
       if (!find(array.array(), payload, 3, positions)) return bad_positions(" are no float32");
+      if (!share.take(positions)) return bad_positions(" lie where others do");
       tissue.positions.assign(positions.begin(), positions.end());
       tissue.numbers.clear();
     } else if (delta && !is_key) {
       std::span<const std::uint8_t> bytes;
       if (!find(array.array(), payload, 1, bytes)) return bad_positions(" are no deltas");
+      if (!share.take(bytes)) return bad_positions(" lie where others do");
       const auto& tissues = key->second.tissues;
       if (count >= tissues.size() || tissues[count].tissue != array.tissue())
         return bad_positions(" are not in the keyframe");
@@ -125,6 +145,7 @@ Status MeshDecoder::decode_numbers(const v1::MeshFrame& frame, const Payload& pa
     } else {
       std::span<const std::uint16_t> numbers;
       if (!find(array.array(), payload, 3, numbers)) return bad_positions(" are no u16");
+      if (!share.take(numbers)) return bad_positions(" lie where others do");
       tissue.numbers.assign(numbers.begin(), numbers.end());
     }
     if (frame.encoding() != v1::ENCODING_F32 && tissue.numbers.empty()) tissue.positions.clear();

@@ -34,4 +34,9 @@ class Digest {
   std::unique_ptr<XXH64_state_t, XXH_errorcode (*)(XXH64_state_t*)> state_;
 };
 
+/// What guards the contents page: of its paths, then of its digests, both as they stand in the file.
+inline std::uint64_t contents_digest(std::span<const std::byte> paths, std::span<const std::byte> digests) {
+  return Digest().bytes(paths).bytes(digests).value();
+}
+
 }  // namespace ecorche::model_file

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ecorche/values/error.hpp>
 
-#include <utility>
+#include "core/values/utf8.hpp"
 
 namespace ecorche {
 
@@ -33,23 +33,13 @@ int exit_code(ErrorKind kind) noexcept {
   return 70;
 }
 
-namespace {
-
-// Foreign messages (HDF5, YAML, the file system) may hold line breaks; an error is one line.
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  }
-  return text;
-}
-
-}  // namespace
-
+// Foreign messages (HDF5, YAML, the file system) may hold line breaks, and names of a damaged file any bytes;
+// an error is one line, and text: it goes into JSON, and on the wire.
 Error::Error(ErrorKind kind, std::string where, std::string what, std::string mend)
     : kind_(kind),
-      where_(one_line(std::move(where))),
-      problem_(one_line(std::move(what))),
-      mend_(one_line(std::move(mend))),
+      where_(text::one_line(where)),
+      problem_(text::one_line(what)),
+      mend_(text::one_line(mend)),
       line_(where_ + ": " + problem_ + " (" + mend_ + ")") {}
 
 Status to_status(const Error& error) {

@@ -84,9 +84,9 @@ void write_tied_surfaces(const std::filesystem::path& path, const TiedSurfaces& 
   file.commit();
 }
 
-TiedSurfaces read_tied_surfaces(const std::filesystem::path& path) {
+TiedSurfaces read_tied_surfaces(const std::filesystem::path& path, const files::ReadLimits& limits) {
   const std::string where = path.string(), text = files::read_text(path, kLargestTiedFile);
-  files::Budget budget(text.size(), {}, where);
+  files::Budget budget(text.size(), limits, where);
   const vtk_xml::Document document =
       vtk_xml::parse(text, "PolyData", {"Points", "Polys", "PointData"}, "pose again", budget);
   if (document.pieces.size() != 1) bytes::refuse(where, "is not one piece of surfaces", "pose again");

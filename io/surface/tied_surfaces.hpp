@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <vector>
 
+#include <ecorche/files/budget.hpp>
 #include <ecorche/values/mesh.hpp>
 
 namespace ecorche::io {
@@ -23,7 +24,7 @@ struct TiedSurfaces {
 void write_tied_surfaces(const std::filesystem::path& path, const TiedSurfaces& surfaces);
 
 /// Throws Error{missing_input}, and Error{data} for a file without those arrays, for a corner that is no
-/// vertex, for a tet below -1 and for a number that is not finite.
-TiedSurfaces read_tied_surfaces(const std::filesystem::path& path);
+/// vertex, for a tet below -1, for a number that is not finite and for more than `limits` allow.
+TiedSurfaces read_tied_surfaces(const std::filesystem::path& path, const files::ReadLimits& limits = {});
 
 }  // namespace ecorche::io

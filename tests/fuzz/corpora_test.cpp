@@ -23,9 +23,10 @@ void run(const Target& target, const std::string& bytes) {
 
 // Every byte, but where each reading is a file written and read by a library: fewer of them.
 std::size_t step_of(const std::string& target, std::size_t size) {
-  if (target == "model") return 1 + size / 3;
+  if (target == "model" || target == "model_parts") return 1 + size / 3;
+  if (target == "requests" || target == "web") return 1 + size / 16;
   const bool library = target.starts_with("dicom") || target == "nrrd" || target == "mha" ||
-                       target == "nifti" || target == "case_yaml";
+                       target == "nifti" || target == "case_yaml" || target == "named_labels";
   return library ? 1 + size / 48 : 1;
 }
 

@@ -9,16 +9,25 @@
 
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/values/error.hpp>
+#include <ecorche/values/volumetric_skeleton_check.hpp>
+#include "app/point_table.hpp"
+#include "app/posed_manifest.hpp"
 #include "io/case/attachment_file.hpp"
+#include "io/case/case_rules.hpp"
 #include "io/case/ik_file.hpp"
 #include "io/case/motion_map.hpp"
+#include "io/case/pose_sequence.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/label_json.hpp"
+#include "io/image/label_table.hpp"
 #include "io/image/segmentation.hpp"
 #include "io/surface/gltf.hpp"
 #include "io/surface/obj.hpp"
 #include "io/surface/off.hpp"
 #include "io/surface/ply.hpp"
 #include "io/surface/stl.hpp"
+#include "io/surface/tied_surfaces.hpp"
+#include "io/surface/volumetric_skeleton_file.hpp"
 #include "io/surface/vtk_legacy.hpp"
 #include "io/surface/vtp.hpp"
 #include "io/surface/vtu.hpp"
@@ -64,6 +73,17 @@ void look_at(const Image& image) {
   must(image.grid.voxels() > 0 && image.bytes.size() == image.grid.voxels() * voxel, "a voxel has its bytes");
 }
 
+void look_at(const io::VolumetricSkeletonFile& file) {
+  must(first_defect(file.skeleton).empty(), "a skeleton has no defect");
+}
+
+void look_at(const io::TiedSurfaces& surfaces) {
+  must(surfaces.V.allFinite() && surfaces.share.allFinite(), "points and shares are finite");
+  must(surfaces.F.size() == 0 || (surfaces.F.minCoeff() >= 0 && surfaces.F.maxCoeff() < surfaces.V.rows()),
+       "corners are points");
+  must(surfaces.tet.size() == static_cast<std::size_t>(surfaces.V.rows()), "a vertex has a tet");
+}
+
 // With what the cases and pose files of the corpora name.
 const Place& place() {
   static const Place place;
@@ -89,6 +109,17 @@ const Rig& rig() {
 // gzip is told by the ending of the name.
 std::filesystem::path put_nifti(const std::string& text) {
   return place().put(text.starts_with("\x1f\x8b") ? "a.nii.gz" : "a.nii", text);
+}
+
+std::filesystem::path put_labels(const std::string& text) {
+  return place().put(text.starts_with("NRRD")       ? "l.seg.nrrd"
+                     : text.starts_with("\x1f\x8b") ? "l.nii.gz"
+                                                    : "l.nii",
+                     text);
+}
+
+std::filesystem::path put_table(const std::string& text) {
+  return place().put(text.starts_with("index") ? "l.tsv" : "l.txt", text);
 }
 
 template <class Read>
@@ -144,6 +175,22 @@ ECORCHE_IMAGE(dicom, place().put("a.dcm", text))
 ECORCHE_READER(dicom_segmentation, kBesideImage, kLimits.per_byte,
                look_at(io::read_segmentation(place().put("s.dcm", text), {limits, {}}).layers.at(0)),
                ErrorKind::data, ErrorKind::missing_input)
+// By the ending of the name, which the first bytes choose: labels' names lie in headers and extensions, too.
+ECORCHE_READER(named_labels, kBesideImage, kLimits.per_byte,
+               look_at(io::read_segmentation(put_labels(text), {limits, {}}).layers.at(0)), ErrorKind::data,
+               ErrorKind::missing_input)
+ECORCHE_READER(label_table, kBeside, kPerByteOfText, (void)io::read_label_table(put_table(text)),
+               ErrorKind::data)
+ECORCHE_READER(label_json, kBeside, kPerByteOfText,
+               (void)io::read_label_json(place().put("labels.json", text)), ErrorKind::data)
+ECORCHE_SURFACE(volumetric_skeleton, io::decode_volumetric_skeleton(text, "fuzzed", limits))
+ECORCHE_SURFACE(tied_surfaces, io::read_tied_surfaces(place().put("scan.vtp", text), limits))
+ECORCHE_READER(point_table, kBeside, kPerByteOfText,
+               (void)app::read_named_points(place().put("points.csv", text)), ErrorKind::data)
+ECORCHE_READER(posed_manifest, kBeside, kPerByteOfText,
+               (void)app::read_manifest(place().put("posed.json", text).parent_path()), ErrorKind::data)
+ECORCHE_YAML(pose_sequence_yaml, kBeside, io::read_pose_sequence(place().put("sequence.yaml", text), rig()))
+ECORCHE_YAML(regions_yaml, kBeside, io::read_regions_file(place().put("regions.yaml", text), {}))
 ECORCHE_YAML(case_yaml, kBesideImage, io::read_case(place().put("case.yaml", text), {{}, {}, limits}, {}))
 ECORCHE_YAML(skeleton_yaml, kBeside, io::read_skeleton(place().put("skeleton.yaml", text)))
 ECORCHE_YAML(pose_yaml, kBeside, io::read_pose(place().put("pose.yaml", text), rig()))

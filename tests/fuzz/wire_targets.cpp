@@ -3,13 +3,16 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 
 #include <ecorche/wire/convert.hpp>
 #include <ecorche/wire/framing.hpp>
 #include <ecorche/wire/mesh_decoder.hpp>
 #include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
+#include "proto/oct16.hpp"
 #include "proto/recording.hpp"
+#include "tests/fuzz/peak_bytes.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace ecorche::fuzz {
@@ -99,6 +102,13 @@ void messages(Bytes bytes) {
 
 namespace {
 
+// What frames of a few KiB may take: a frame's declared size, which its limits bound, and of messages that
+// are all tags what Protobuf makes of them.
+void must_stay_small(Bytes bytes, const std::function<void()>& work) {
+  constexpr std::int64_t kBase = 1 << 18, kPerByte = 128;
+  must(peak_bytes(work) <= kBase + kPerByte * static_cast<std::int64_t>(bytes.size()));
+}
+
 // Every frame of the bytes, up to the first that is none.
 template <class Look>
 void each_frame(Bytes bytes, Look&& look) {
@@ -116,20 +126,23 @@ void each_frame(Bytes bytes, Look&& look) {
 }  // namespace
 
 void meshes(Bytes bytes) {
-  wire::MeshDecoder decoder;
-  std::vector<wire::DecodedTissue> tissues;
-  each_frame(bytes, [&](const wire::Frame& frame) {
-    const v1::MeshFrame& mesh = frame.envelope.mesh_frame();
-    if (!decoder.decode(mesh, frame.payload, tissues).ok()) return;
-    must(tissues.size() <= static_cast<std::size_t>(mesh.arrays_size()));
-    for (std::size_t t = 0; t < tissues.size(); ++t) {
-      const wire::DecodedTissue& tissue = tissues[t];
-      must(t == 0 || tissues[t - 1].tissue < tissue.tissue);
-      must(tissue.positions.size() % 3 == 0);
-      must(tissue.normals.empty() || tissue.normals.size() == tissue.positions.size());
-      must(tissue.numbers.size() == (mesh.encoding() == v1::ENCODING_F32 ? 0 : tissue.positions.size()));
-      for (const float x : tissue.normals) must(std::abs(x) <= 1.001F);
-    }
+  wire::oct16_table();  // made once, and no input's fault
+  must_stay_small(bytes, [&] {
+    wire::MeshDecoder decoder;
+    std::vector<wire::DecodedTissue> tissues;
+    each_frame(bytes, [&](const wire::Frame& frame) {
+      const v1::MeshFrame& mesh = frame.envelope.mesh_frame();
+      if (!decoder.decode(mesh, frame.payload, tissues).ok()) return;
+      must(tissues.size() <= static_cast<std::size_t>(mesh.arrays_size()));
+      for (std::size_t t = 0; t < tissues.size(); ++t) {
+        const wire::DecodedTissue& tissue = tissues[t];
+        must(t == 0 || tissues[t - 1].tissue < tissue.tissue);
+        must(tissue.positions.size() % 3 == 0);
+        must(tissue.normals.empty() || tissue.normals.size() == tissue.positions.size());
+        must(tissue.numbers.size() == (mesh.encoding() == v1::ENCODING_F32 ? 0 : tissue.positions.size()));
+        for (const float x : tissue.normals) must(std::abs(x) <= 1.001F);
+      }
+    });
   });
 }
 
@@ -145,15 +158,17 @@ void volumes(Bytes bytes) {
 }
 
 void recording(Bytes bytes) {
-  wire::RecordedSession session;
-  if (!wire::read_recording(bytes, session).ok()) return;
-  std::uint64_t last = 0;
-  for (const wire::RecordedStep& step : session.steps) {
-    must(step.pose.sequence() > last);
-    last = step.pose.sequence();
-    for (const v1::RecordedFrame& frame : step.frames)
-      must(session.subscriptions.contains(frame.subscription()));
-  }
+  must_stay_small(bytes, [&] {
+    wire::RecordedSession session;
+    if (!wire::read_recording(bytes, session).ok()) return;
+    std::uint64_t last = 0;
+    for (const wire::RecordedStep& step : session.steps) {
+      must(step.pose.sequence() > last);
+      last = step.pose.sequence();
+      for (const v1::RecordedFrame& frame : step.frames)
+        must(session.subscriptions.contains(frame.subscription()));
+    }
+  });
 }
 
 }  // namespace ecorche::fuzz

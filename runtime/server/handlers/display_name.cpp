@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/values/text.hpp"
+#include "core/values/utf8.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -35,25 +36,6 @@ bool controls(std::uint32_t character) {
   return false;
 }
 
-// The character that begins `text`, and its bytes; none of those where it is no UTF-8.
-std::pair<std::uint32_t, std::size_t> first_character(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint8_t lead = byte(0);
-  const std::size_t size = lead < 0x80   ? 1
-                           : lead < 0xC2 ? 0
-                           : lead < 0xE0 ? 2
-                           : lead < 0xF0 ? 3
-                           : lead < 0xF5 ? 4
-                                         : 0;
-  if (size == 0 || size > text.size()) return {0, 0};
-  std::uint32_t character = size == 1 ? lead : lead & (0x7FU >> size);
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xC0U) != 0x80U) return {0, 0};
-    character = character << 6U | (byte(i) & 0x3FU);
-  }
-  return {character, size};
-}
-
 }  // namespace
 
 std::string display_name(std::string_view text) {
@@ -61,7 +43,7 @@ std::string display_name(std::string_view text) {
   std::size_t characters = 0;
   text = text::trim(text);
   while (!text.empty() && characters < kMostCharacters) {
-    const auto [character, size] = first_character(text);
+    const auto [character, size] = text::first_character(text);
     if (size > 0 && !controls(character)) {
       name += text.substr(0, size);
       ++characters;

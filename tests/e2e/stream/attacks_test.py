@@ -10,7 +10,9 @@ import time
 import unittest
 import urllib.request
 
+from ecorche.v1 import envelope_pb2
 from ecorche_client import Client
+from ecorche_frames import encode
 from serving import Server
 
 MODEL = pathlib.Path(os.environ["ECORCHE_MODEL"])
@@ -30,6 +32,21 @@ class Attacks(unittest.TestCase):
         lines = [line for line in log.splitlines() if "127.0.0.1:" in line]
         self.assertGreaterEqual(len(lines), 20, log)
         self.assertLess(len(lines), 120, "2 a second after the first 20")
+
+    def test_a_flood_of_text_that_is_none_writes_few_lines(self):
+        """Not Protobuf either, which would tell of each."""
+        hello = envelope_pb2.Envelope()
+        hello.client_hello.client = "~"
+        bad_hello = encode(hello).replace(b"~", b"\xff")
+        with Server(MODEL, options=["--log", "info"]) as server:
+            for _ in range(200):
+                with socket.create_connection(("127.0.0.1", server.port), timeout=10) as bad:
+                    bad.sendall(bad_hello)
+                    bad.recv(1)
+            code, _, log = server.stop()
+        self.assertEqual(code, 0, log)
+        self.assertIn("is no ecorche.v1.Envelope", log)
+        self.assertLess(len(log.splitlines()), 120, log)
 
     def test_health_is_told_and_websockets_begin_beside_a_flood_of_requests(self):
         """What is turned away is the flood."""

@@ -42,6 +42,8 @@ def xxh64(data):
 
 
 def renew(file, dataset):
-    """Writes the digest of `dataset` as it now stands into /ecorche/digests."""
-    names = [name.decode().rstrip("\0") for name in file["ecorche/digests/dataset"][()]]
-    file["ecorche/digests/xxh64"][names.index(dataset)] = xxh64(file[dataset][()].tobytes())
+    """Writes the digest of `dataset` as it now stands into /ecorche/digests, and that page's own."""
+    page = file["ecorche/digests"]
+    names = [name.decode().rstrip("\0") for name in page["dataset"][()]]
+    page["xxh64"][names.index(dataset)] = xxh64(file[dataset][()].tobytes())
+    page["own"][0] = xxh64(page["dataset"][()].tobytes() + page["xxh64"][()].tobytes())

@@ -6,7 +6,7 @@
 #include <array>
 
 #include "core/model_file/guard.hpp"
-#include "tests/unit/model_file/forge.hpp"
+#include "tests/unit/model_file/hostile.hpp"
 
 namespace ecorche::test {
 namespace {
@@ -15,6 +15,32 @@ TEST_F(Hostile, TheForgeItselfIsHarmless) {
   {
     Forge forge(file("a.hdf"));
     forge.edit<float>(kWeight, H5T_NATIVE_FLOAT, [](auto&) {});
+  }
+  expect_same(model_file::read(file("a.hdf"), {}), toy_model());
+}
+
+// A path that names a group of nobody is passed over: what it stood for would be gone without a word.
+TEST_F(Hostile, APathOfTheContentsPageThatWasDamaged) {
+  const std::string confidence = "/ecorche/skeleton/fit_confidence";
+  Bytes bytes = load(file("a.hdf"));
+  const auto at = std::search(bytes.begin(), bytes.end(), confidence.begin(), confidence.end());
+  ASSERT_NE(at, bytes.end());
+  at[16] = 'm';  // skeletom
+  store(file("a.hdf"), bytes);
+  expect_refused([](Forge&) {}, {"/ecorche/digests", "is damaged: its XXH64 is not the stored one"});
+}
+
+TEST_F(Hostile, ADigestOfTheContentsPageThatIsNone) {
+  const auto early = [](hid_t creation) { H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY); };
+  expect_refused([&](Forge& f) { f.dataset("/ecorche/digests/own", H5T_STD_U64LE, {2}, early); },
+                 {"/ecorche/digests/own", "is not one u64"});
+}
+
+// As of versions that wrote none.
+TEST_F(Hostile, AContentsPageWithoutADigest) {
+  {
+    Forge forge(file("a.hdf"));
+    forge.remove("/ecorche/digests/own");
   }
   expect_same(model_file::read(file("a.hdf"), {}), toy_model());
 }

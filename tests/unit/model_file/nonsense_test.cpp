@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files with all their signatures in order that are no model: parts missing, of the wrong kind, or saying
 // nonsense.
-#include "tests/unit/model_file/forge.hpp"
+#include "tests/unit/model_file/hostile.hpp"
 
 namespace ecorche::test {
 namespace {

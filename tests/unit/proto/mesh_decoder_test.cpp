@@ -141,6 +141,18 @@ TEST(MeshDecoder, WhatIsNoFrameIsRefused) {
       {"normals are not one per vertex",
        [](Made& m) { m.frame.mutable_arrays(1)->mutable_array()->set_count(2); }},
       {"tissues do not ascend", [](Made& m) { *m.frame.mutable_arrays(1) = m.frame.arrays(0); }},
+      // Else 4 KiB of names would make a MiB out of each KiB.
+      {"tissue 6 lie where others do",
+       [](Made& m) {
+         for (const std::uint32_t tissue : {5U, 6U}) {
+           *m.frame.add_arrays() = m.frame.arrays(0);
+           m.frame.mutable_arrays()->rbegin()->set_tissue(tissue);
+         }
+       }},
+      {"lie in one another",
+       [](Made& m) {
+         for (int i = 0; i < 6; ++i) *m.frame.add_arrays() = m.frame.arrays(1);
+       }},
   };
   for (const auto& [what, spoil] : cases) {
     Made made = keyframe(7);

@@ -7,8 +7,10 @@
 #include <string>
 #include <vector>
 
+#include <ecorche/values/error.hpp>
 #include "core/values/identifier.hpp"
 #include "core/values/text.hpp"
+#include "core/values/utf8.hpp"
 
 namespace ecorche {
 namespace {
@@ -65,6 +67,28 @@ TEST(Text, NumbersAreThoseOfPrintf) {
 TEST(Text, HexHasAllDigits) {
   EXPECT_EQ(text::hex(0), "0000000000000000");
   EXPECT_EQ(text::hex(0xFEDC'BA98'7654'3210), "fedcba9876543210");
+}
+
+// Of RFC 3629: no longer than need be, no half of a pair, nothing beyond U+10FFFF, nothing cut.
+TEST(Text, KnowsWhatIsACharacter) {
+  using Character = std::pair<std::uint32_t, std::size_t>;
+  EXPECT_EQ(text::first_character("a\xC3"), Character('a', 1));
+  EXPECT_EQ(text::first_character("\xC3\xA9!"), Character(0xE9, 2));
+  EXPECT_EQ(text::first_character("\xE0\xA0\x80"), Character(0x800, 3));
+  EXPECT_EQ(text::first_character("\xF0\x90\x80\x80"), Character(0x10000, 4));
+  EXPECT_EQ(text::first_character("\xF4\x8F\xBF\xBF"), Character(0x10FFFF, 4));
+  for (const char* const bad : {"\x80", "\xC1\xBF", "\xE0\x9F\xBF", "\xED\xA0\x80", "\xF0\x8F\xBF\xBF",
+                                "\xF4\x90\x80\x80", "\xF5\x80\x80\x80", "\xC3", "\xE2\x82", "\xC3(", "\xFF"})
+    EXPECT_EQ(text::first_character(bad), Character(0, 0)) << bad;
+}
+
+// What a damaged file names goes into JSON, onto terminals and on the wire.
+TEST(Text, ErrorsAreOneLineOfText) {
+  const Error error(ErrorKind::data, "a\nb\xC3\xA9", "\x1b[2J\xA3\xFF",
+                    "\xC2\x9B"
+                    "31m");
+  EXPECT_STREQ(error.what(), "a b\xC3\xA9:  [2J?? ( 31m)");
+  EXPECT_EQ(to_status(error).message, error.what());
 }
 
 TEST(Identifier, HasOneTo64Characters) {
