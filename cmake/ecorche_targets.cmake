@@ -34,7 +34,7 @@ function(ecorche_library name)
     ecorche_unity(${name})
   elseif(ECORCHE_FUZZ)
     # libFuzzer goes where it sees branches: those of tinygltf decide what a glTF holds.
-    target_compile_options(${name} PRIVATE -fsanitize=fuzzer-no-link,address)
+    target_compile_options(${name} PRIVATE -fsanitize=fuzzer-no-link,address -fprofile-instr-generate -fcoverage-mapping)
   else()
     ecorche_list_objects(${name})
   endif()

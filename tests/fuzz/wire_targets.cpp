@@ -102,11 +102,11 @@ void messages(Bytes bytes) {
 
 namespace {
 
-// What frames of a few KiB may take: a frame's declared size, which its limits bound, and of messages that
-// are all tags what Protobuf makes of them.
-void must_stay_small(Bytes bytes, const std::function<void()>& work) {
-  constexpr std::int64_t kBase = 1 << 18, kPerByte = 128;
-  must(peak_bytes(work) <= kBase + kPerByte * static_cast<std::int64_t>(bytes.size()));
+// What frames of a few KiB may take: what the limits let a frame declare, and of messages that are all tags
+// what Protobuf makes of them.
+void must_stay_small(Bytes bytes, std::int64_t declared, const std::function<void()>& work) {
+  constexpr std::int64_t kBeside = 1 << 17, kPerByte = 128;
+  must(peak_bytes(work) <= kBeside + declared + kPerByte * static_cast<std::int64_t>(bytes.size()));
 }
 
 // Every frame of the bytes, up to the first that is none.
@@ -127,7 +127,7 @@ void each_frame(Bytes bytes, Look&& look) {
 
 void meshes(Bytes bytes) {
   wire::oct16_table();  // made once, and no input's fault
-  must_stay_small(bytes, [&] {
+  must_stay_small(bytes, kLimits.envelope_bytes + kLimits.payload_bytes, [&] {
     wire::MeshDecoder decoder;
     std::vector<wire::DecodedTissue> tissues;
     each_frame(bytes, [&](const wire::Frame& frame) {
@@ -158,7 +158,7 @@ void volumes(Bytes bytes) {
 }
 
 void recording(Bytes bytes) {
-  must_stay_small(bytes, [&] {
+  must_stay_small(bytes, 1 << 20, [&] {
     wire::RecordedSession session;
     if (!wire::read_recording(bytes, session).ok()) return;
     std::uint64_t last = 0;

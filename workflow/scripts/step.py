@@ -21,10 +21,9 @@ import time
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import participants  # noqa: E402
 import record  # noqa: E402
-import samples  # noqa: E402
-import summary  # noqa: E402
+
+# What one step alone needs is imported by it: a participant has seven, each a Python of its own, and half of their time went there.
 
 DATA_FAULTS = {64, 65, 66, 77, 78}
 STOPPED = {130, 143}  # somebody wants an end: neither tried again at once nor written down
@@ -163,6 +162,7 @@ def new(step):
 
 def check(step):
     """An error that check finds is a fact, not an end, where repair may come."""
+    import participants
     case = step.given["files"][0] if step.given["is_case"] else step.fact("case")
     inputs = participants.Participant(step.options.participant, [pathlib.Path(path) for path in step.given["files"]], []).files()
     step.fresh("check.json")
@@ -215,8 +215,14 @@ def pose(step):
     return [target], {}
 
 
+def sample(step):
+    import samples
+    return samples.make(step)
+
+
 def subject(step):
     """The participant's own results: figures, quality of all poses, digests, and a page."""
+    import summary
     keep = {name.partition("-")[2] for name in step.given["after"] if name.startswith("pose-")}
     posed = step.folder / "posed"
     step.fresh(*(f"posed/{path.name}" for path in (posed.iterdir() if posed.is_dir() else []) if path.name not in keep), "report.html", "picture.png")
@@ -230,7 +236,7 @@ def subject(step):
     return ["status.json", "quality.tsv", "provenance.json", "report.html", *(["picture.png"] if found["ok"] else [])], {}
 
 
-STEPS = {"new": new, "check": check, "repair": repair, "preprocess": preprocess, "verify": verify, "pose": pose, "sample": samples.make, "subject": subject}
+STEPS = {"new": new, "check": check, "repair": repair, "preprocess": preprocess, "verify": verify, "pose": pose, "sample": sample, "subject": subject}
 TAKE_ON = {"subject"}  # tells of what failed instead of passing it on
 
 
