@@ -381,6 +381,7 @@ void declare_stream(CLI::App& app, Program& program, Run& chosen) {
   command->callback([settings, &program, &chosen] {
     chosen = [settings, &program] {
       if (!settings->token_file.empty()) settings->access.token = read_token(settings->token_file);
+      settings->access.session = settings->session;
       if (!settings->replay.empty())
         return replay(program, settings->replay, wire::parse_address(settings->address), settings->access);
       return Stream(*settings, program).run();

@@ -51,6 +51,7 @@ Client::Client(const wire::Address& address, const std::string& name, const Acce
     hello.add_encodings(encoding);
   hello.set_token(access.token);
   hello.set_resume_token(access.resume_token);
+  hello.set_session(access.session);
   wire::Frame answer = call(std::move(envelope));
   if (!answer.envelope.has_server_hello()) {
     throw Error(ErrorKind::protocol, "hello", "the server answered with something else",

@@ -33,9 +33,10 @@ from ecorche_frames import ENCODINGS, Body, MeshFrame, Part, ServerError, Volume
 class Client:
     """One connection. Not for several threads. Frames are acknowledged as they are read, so read often."""
 
-    def __init__(self, host, port, name="python", timeout=30.0, tls_ca=None, token=b"", resume_token=b""):
+    def __init__(self, host, port, name="python", timeout=30.0, tls_ca=None, token=b"", resume_token=b"", session=""):
         """`tls_ca`: a PEM file whose certificates are trusted; None: no TLS. `token`: of the right to connect.
-        `resume_token`: `server.resume_token` of an earlier connection."""
+        `resume_token`: `server.resume_token` of an earlier connection. `session`: that open() will name, by which a balancer in
+        front of several servers chooses one."""
         self.timeout = timeout
         self.body = None
         self.acks = []            # v1.PoseAck since the last look
@@ -53,12 +54,12 @@ class Client:
         self._socket = socket.create_connection((host, port), timeout)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:
-            self._greet(host, name, tls_ca, token, resume_token)
+            self._greet(host, name, tls_ca, token, resume_token, session)
         except BaseException:
             self._socket.close()
             raise
 
-    def _greet(self, host, name, tls_ca, token, resume_token):
+    def _greet(self, host, name, tls_ca, token, resume_token, session):
         if tls_ca is not None:
             self._socket = ssl.create_default_context(cafile=tls_ca).wrap_socket(self._socket, server_hostname=host)
         hello = envelope_pb2.Envelope()
@@ -66,6 +67,7 @@ class Client:
         hello.client_hello.client = name
         hello.client_hello.token = token
         hello.client_hello.resume_token = resume_token
+        hello.client_hello.session = session
         hello.client_hello.encodings.extend(ENCODINGS.values())
         hello.client_hello.features.extend([hello_pb2.FEATURE_PRESENCE, hello_pb2.FEATURE_CLIP_STATE])
         self.server = self._call(hello)[0].server_hello

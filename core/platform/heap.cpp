@@ -3,6 +3,7 @@
 
 #include <malloc.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include <climits>
@@ -34,6 +35,11 @@ void use_tidy_heap() {
   mallopt(M_MMAP_THRESHOLD, 1 << 18);  // does not grow by itself any more
   mallopt(M_TRIM_THRESHOLD, 1 << 25);  // nor is what a frame frees given back and taken again for the next
 #endif
+}
+
+bool merge_equal_pages() {
+  constexpr int kMemoryMerge = 67;  // PR_SET_MEMORY_MERGE, younger than Debian 12's headers
+  return prctl(kMemoryMerge, 1, 0, 0, 0) == 0;
 }
 
 }  // namespace ecorche::platform

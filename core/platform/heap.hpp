@@ -19,4 +19,10 @@ void use_big_heap();
 /// threads start. Does nothing where the C library is not glibc.
 void use_tidy_heap();
 
+/// Lets the kernel keep one copy of what this process and others that ask for it have alike, page by page,
+/// and give each a copy of its own where it writes (KSM). It does so where its administrator has switched
+/// that on, beside all else. Who shares a page with another process can find out by timing that it does: only
+/// for those that may know of each other. False where the kernel cannot (before Linux 6.4).
+bool merge_equal_pages();
+
 }  // namespace ecorche::platform

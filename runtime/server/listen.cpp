@@ -5,6 +5,8 @@
 #include <string>
 
 #include <ecorche/values/error.hpp>
+#include "runtime/server/net/tls.hpp"
+#include "runtime/server/server.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -21,6 +23,23 @@ boost::system::error_code try_listening(tcp::acceptor& acceptor, const tcp::endp
 
 }  // namespace
 
+void check_options(const Options& options) {
+  if (options.certificate.empty() != options.key.empty())
+    throw Error(ErrorKind::usage, "TLS", "a certificate and its key go together",
+                "give both --tls-certificate and --tls-key");
+  constexpr std::size_t shortest = 16, longest = 1024;
+  if (!options.token.empty() && (options.token.size() < shortest || options.token.size() > longest))
+    throw Error(ErrorKind::config, "token", "it has " + std::to_string(options.token.size()) + " characters",
+                "use 16 to 1024 that nobody can guess, e.g. of openssl rand -hex 32");
+}
+
+void Server::check(const Options& options) {
+  check_options(options);
+  endpoint_of(options.listen, options);
+  if (options.http) endpoint_of(*options.http, options);
+  const Carrier carrier(options.certificate, options.key);
+}
+
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   boost::system::error_code ec;
   const net::ip::address address =
@@ -28,7 +47,7 @@ tcp::endpoint endpoint_of(const Endpoint& where, const Options& options) {
   if (ec)
     throw Error(ErrorKind::usage, "listen", "'" + where.host + "' is no address",
                 "use a numeric one such as 127.0.0.1:7070");
-  const bool guarded = !options.certificate.empty() && !options.token.empty();
+  const bool guarded = !options.certificate.empty() && (!options.token.empty() || !options.passes.empty());
   if (!address.is_loopback() && !guarded && !options.insecure) {
     throw Error(ErrorKind::refused, where.host, "is reachable by others, who could read and take part",
                 "give --tls-certificate, --tls-key and --token-file, listen on 127.0.0.1 and tunnel, or add "

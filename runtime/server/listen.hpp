@@ -10,6 +10,9 @@
 
 namespace ecorche::server {
 
+/// Throws Error{usage} for half of TLS, Error{config} for a token that is too short.
+void check_options(const Options& options);
+
 /// The address of `where`. Throws Error{usage} for none, and Error{refused} for one that others reach where
 /// nothing keeps them out: neither TLS with a token nor `options.insecure`.
 tcp::endpoint endpoint_of(const Endpoint& where, const Options& options);

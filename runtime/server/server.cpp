@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <new>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -39,15 +40,8 @@ constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
 // served go on between them.
 constexpr Clock::duration kBetween = std::chrono::microseconds(500);
 
-void check_options(const Options& options) {
-  if (options.certificate.empty() != options.key.empty())
-    throw Error(ErrorKind::usage, "TLS", "a certificate and its key go together",
-                "give both --tls-certificate and --tls-key");
-  constexpr std::size_t shortest = 16, longest = 1024;
-  if (!options.token.empty() && (options.token.size() < shortest || options.token.size() > longest))
-    throw Error(ErrorKind::config, "token", "it has " + std::to_string(options.token.size()) + " characters",
-                "use 16 to 1024 that nobody can guess, e.g. of openssl rand -hex 32");
-}
+// Of the token that a request had; null: none.
+using Shown = std::shared_ptr<const Pass>;
 
 }  // namespace
 
@@ -64,7 +58,6 @@ struct Server::Impl {
     }
     carrier = std::make_unique<Carrier>(options.certificate, options.key);
     web_context = {
-        .token = options.token,
         .origins = options.origins,
         .tls = !options.certificate.empty(),
         .hosts = options.http ? HostList(http_acceptor.local_endpoint().address(), options.host_names)
@@ -72,14 +65,16 @@ struct Server::Impl {
         .viewer = options.viewer,
         .header_bytes = options.limits.hello_bytes,
         .messages_per_second = options.limits.messages_per_second,
-        .ready = [this] { return !stopping; },
+        .ready = [this] { return !stopping && !drained_at; },
         .metrics = [this] { return metrics(); },
         .denied = [this] { registry->metrics().denied(); },
         .admit = [this](WebKind kind, const std::string& peer) { return admit(kind, peer); },
-        .welcome = [this](std::unique_ptr<Transport> transport, std::string peer,
-                          bool proven) { welcome(std::move(transport), std::move(peer), proven, {}); }};
+        .welcome = [this](
+                       std::unique_ptr<Transport> transport, std::string peer,
+                       Shown pass) { welcome(std::move(transport), std::move(peer), std::move(pass), {}); }};
     registry = std::make_unique<SessionRegistry>(io, workers, std::move(options), std::move(models),
                                                  std::move(hooks));
+    web_context.passes = registry->shared_passes();
   }
 
   net::awaitable<void> accept(tcp::acceptor& at, bool http);
@@ -88,10 +83,11 @@ struct Server::Impl {
   bool admit(WebKind kind, const std::string& peer);
   Clock::duration look_after(Clock::time_point now);
   void receive(tcp::socket socket, bool http);
-  void welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven, Clock::duration waited);
+  void welcome(std::unique_ptr<Transport> transport, std::string peer, Shown pass, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
   bool admit_request(Clock::time_point now);
   void drop_unread(Clock::time_point now, Clock::duration patience);
+  void begin_stop();
   void begin_shutdown();
   void without_memory();
   std::string metrics();
@@ -108,7 +104,8 @@ struct Server::Impl {
   std::unique_ptr<SessionRegistry> registry;
   std::vector<std::shared_ptr<Connection>> connections;
   std::vector<std::shared_ptr<WebRequest>> requests;
-  Reserve* reserve = nullptr;  ///< while it runs
+  Reserve* reserve = nullptr;                   ///< while it runs
+  std::optional<Clock::time_point> drained_at;  ///< then the shutdown begins
   bool stopping = false;
   std::map<WebKind, Rates> admitted;  ///< requests
 };
@@ -150,13 +147,17 @@ void Server::run() {
 }
 
 void Server::stop() {
-  post_back(impl_->io, [this] { impl_->begin_shutdown(); });
+  post_back(impl_->io, [this] { impl_->begin_stop(); });
 }
 
 void Server::reload(std::function<void()> done) {
   post_back(impl_->io, [this, done = std::move(done)]() mutable {
     spdlog::info("asked to read the models again");
-    impl_->registry->reload_all(std::move(done));
+    impl_->registry->reload_passes([this, done = std::move(done)](bool others) mutable {
+      for (const auto& connection : impl_->connections)
+        if (others) connection->check_pass();
+      impl_->registry->reload_all(std::move(done));
+    });
   });
 }
 
@@ -193,7 +194,7 @@ void Server::Impl::receive(tcp::socket socket, bool http) {
     transport = carrier->carry(std::move(socket));
     if (wrap) transport = wrap(std::move(transport));
   }
-  if (!http) return welcome(std::move(transport), std::move(peer), false, in_kernel);
+  if (!http) return welcome(std::move(transport), std::move(peer), nullptr, in_kernel);
   if (!admit_request(Clock::now())) return registry->metrics().hit("connections");
   {
     const MayFail may_fail;
@@ -222,7 +223,7 @@ bool Server::Impl::admit(WebKind kind, const std::string& peer) {
   return false;
 }
 
-void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, bool proven,
+void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string peer, Shown pass,
                            Clock::duration waited) {
   if (stopping) return;
   const auto limit = registry->limits().connections;
@@ -242,8 +243,8 @@ void Server::Impl::welcome(std::unique_ptr<Transport> transport, std::string pee
   if (connections.size() >= limit + kMostRefusals) return;
   {
     const MayFail may_fail;  // as in receive()
-    connections.push_back(
-        std::make_shared<Connection>(std::move(transport), std::move(peer), proven, waited, *registry));
+    connections.push_back(std::make_shared<Connection>(std::move(transport), std::move(peer), std::move(pass),
+                                                       waited, *registry));
   }
   if (let_in) return connections.back()->start();
   connections.back()->start_refused(
@@ -303,6 +304,7 @@ net::awaitable<void> Server::Impl::watch() {
 // How long until a deadline could be broken.
 Clock::duration Server::Impl::look_after(Clock::time_point now) {
   Clock::duration next = kTick;
+  if (drained_at && now >= *drained_at) begin_shutdown();
   for (const auto& connection : connections) next = std::min(next, connection->check(now));
   std::erase_if(connections, [](const auto& c) { return c->closed(); });
   for (const auto& request : requests) {
@@ -336,6 +338,15 @@ std::string Server::Impl::metrics() {
   figures.set_sessions(registry->sessions());
   figures.set_memory(registry->memory().bytes(), registry->memory().kept());
   return figures.text();
+}
+
+// Clients go on, and newcomers come in, until who asks /readyz has had time to send them elsewhere.
+void Server::Impl::begin_stop() {
+  const double patience = registry->options().drain_seconds;
+  if (patience <= 0 || stopping) return begin_shutdown();
+  if (drained_at) return;
+  spdlog::info("draining: {} connections have {} s", connections.size(), patience);
+  drained_at = Clock::now() + duration(patience);
 }
 
 void Server::Impl::begin_shutdown() {

@@ -32,6 +32,8 @@ class Server {
   /// Error{config} for too many models or two of one name, and for files that are no certificate.
   Server(Options options, std::vector<NamedModel> models, Workers& workers);
   ~Server();
+  /// Throws what the constructor would for these options, without listening.
+  static void check(const Options& options);
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
@@ -44,9 +46,10 @@ class Server {
   /// and returns once the last job has ended.
   void run();
 
-  /// From any thread, any number of times, also before run().
+  /// From any thread, any number of times, also before run(). Clients first have Options::drain_seconds.
   void stop();
-  /// Reads all models again, in the background, as ReloadModel does; the log tells how each went. As stop().
+  /// Reads the passes and all models again, in the background, as ReloadModel does; the log tells how each
+  /// went. Whose pass is gone is ended. As stop().
   /// `done` is called on the thread that serves, where that has not stopped before.
   void reload(std::function<void()> done = {});
 

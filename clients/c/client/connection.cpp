@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/c/client/connection.hpp"
 
+#include <random>
 #include <span>
+#include <string_view>
 
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
@@ -26,6 +28,15 @@ void check_triangles(const OpenedBody& body) {
         throw lie("a triangle of '" + tissue.name() + "' has a corner that is not there");
     }
   }
+}
+
+// For one's own session behind a balancer: the same for as long as the client lives.
+std::string random_key() {
+  std::random_device random;
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string key;
+  while (key.size() < 32) key += digits[random() & 15U];
+  return key;
 }
 
 // The session may have been posed before: whoever controls it goes on from there.
@@ -83,6 +94,7 @@ ecorche_code ecorche_client_connect(const char* address, const ecorche_client_op
     client::Access access;
     access.authorities = text(chosen.authorities, "");
     access.token = text(chosen.token, "");
+    access.session = chosen.session == nullptr ? random_key() : chosen.session;
     auto made = std::make_unique<ecorche_client>(
         ecorche_client{wire::parse_address(address), text(chosen.name, "ecorche_client"), access, nullptr});
     made->connection = std::make_unique<client::Client>(made->address, made->name, access);

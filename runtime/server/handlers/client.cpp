@@ -10,27 +10,50 @@
 
 namespace ecorche::server {
 
-Client::Client(const std::string& peer, bool authenticated, const net::any_io_executor& executor,
+Client::Client(std::string peer, std::shared_ptr<const Pass> pass, const net::any_io_executor& executor,
                SessionRegistry& registry)
     : registry_(registry),
       number_(registry.next_connection()),
-      peer_("#" + std::to_string(number_) + " " + peer),
-      address_(address_of(peer)),
+      peer_(std::move(peer)),
+      address_(address_of(peer_)),
       kept_share_(std::make_shared<const Pool>(
           portion(registry.limits().kept_bytes, registry.limits().connection_share),
           registry.share_of(address_)->kept)),
       account_(std::make_shared<Account>(registry.share_of(address_)->account)),
       output_(executor, registry.limits(), registry.memory(), registry.metrics()),
-      authenticated_(authenticated) {}
+      pass_(std::move(pass)) {}
 
 Client::~Client() = default;
 
 void Client::log(spdlog::level::level_enum level, std::string_view what,
                  std::string_view why) const noexcept {
   try {
-    registry_.journal().line(level, address_, peer_, std::string(what).append(why));
+    registry_.journal().line(level,
+                             {.text = std::string(what).append(why),
+                              .connection = number_,
+                              .peer = peer_,
+                              .pass = pass_ ? pass_->name : std::string(),
+                              .session = session_ ? session_->name() : std::string()},
+                             address_);
   } catch (const std::exception&) {
   }
+}
+
+bool Client::admit(std::shared_ptr<const Pass> pass) {
+  pass_ = std::move(pass);
+  seat_ = registry_.passes().take_seat(*pass_);
+  return seat_ != nullptr;
+}
+
+void Client::check_pass() {
+  if (!pass_ || over()) return;
+  std::shared_ptr<const Pass> now = registry_.passes().again(*pass_);
+  if (!now) {
+    return end({StatusCode::unauthenticated,
+                "connection: the token that it showed is no longer good (ask who runs the server)"});
+  }
+  pass_ = std::move(now);
+  if (has_control() && !may_control()) session_->control().release(*this, Clock::now());
 }
 
 void Client::introduce(const v1::ClientHello& hello) {
@@ -87,6 +110,7 @@ void Client::on_goodbye() {
 
 void Client::on_closed() {
   closed_ = true;
+  seat_.reset();
   if (pending_.radiograph) pending_.radiograph->request_stop();
   output_.wake().cancel();
   leave_place();
@@ -104,7 +128,8 @@ void Client::leave_place() {
     try {
       place = SavedPlace{.session = session,
                          .subscriptions = session->subscriptions().requests_of(*this),
-                         .controlled = session->control().controls(*this)};
+                         .controlled = session->control().controls(*this),
+                         .watches = watches_};
     } catch (const std::bad_alloc&) {  // then nobody comes back to it
     }
   }
@@ -125,7 +150,7 @@ void Client::evict() {
   leave_place();
 }
 
-void Client::join(std::shared_ptr<Session> session) {
+void Client::join(std::shared_ptr<Session> session, bool watches) {
   if (session_) {
     if (session_->control().controls(*this)) inherited_ = session_->name();
     session_->leave(*this, false);
@@ -133,13 +158,15 @@ void Client::join(std::shared_ptr<Session> session) {
     subscriptions_.clear();
     last_sequence_ = 0;
   }
+  watches_ = watches;
   session_ = std::move(session);
   role_ = session_->join(*this, std::exchange(inherited_, {}) == session_->name());
 }
 
-void Client::rejoin(std::shared_ptr<Session> session, bool controlled) {
+void Client::rejoin(std::shared_ptr<Session> session, const SavedPlace& place) {
+  watches_ = place.watches;
   session_ = std::move(session);
-  role_ = session_->rejoin(*this, controlled);
+  role_ = session_->rejoin(*this, place.controlled);
   last_sequence_ = session_->poses().last_sequence();
 }
 

@@ -25,8 +25,8 @@ namespace ecorche::server {
 /// is answered nothing more.
 class Client final : public std::enable_shared_from_this<Client>, public Member {
  public:
-  /// `peer`: peer_of() its socket. `authenticated`: it has shown its right to connect already.
-  Client(const std::string& peer, bool authenticated, const net::any_io_executor& executor,
+  /// `peer`: peer_of() its socket. `pass`: of the token that it has shown already; null: none.
+  Client(std::string peer, std::shared_ptr<const Pass> pass, const net::any_io_executor& executor,
          SessionRegistry& registry);
   ~Client() override;
 
@@ -42,7 +42,13 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   const ClientOutput& output() const { return output_; }
 
   // How far the conversation is.
-  bool authenticated() const { return authenticated_; }
+  /// Of the token that it showed; null: none yet.
+  const std::shared_ptr<const Pass>& pass() const { return pass_; }
+  /// Takes a place of the pass; false where all are taken.
+  bool admit(std::shared_ptr<const Pass> pass);
+  /// The tokens are others now: what it may do may be another thing, or nothing any more.
+  void check_pass();
+  bool may(Right right) const { return pass_ && pass_->right >= right; }
   /// The hellos are exchanged; `token` is the key to its place.
   void greet(std::string token);
   bool greeted() const { return greeted_; }
@@ -79,16 +85,19 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
 
   // Its place in a session.
   const std::shared_ptr<Session>& session() const { return session_; }
+  bool may_control() const override { return may(Right::pose); }
+  bool seeks_control() const override { return may_control() && !watches_; }
   bool has_control() const { return role_ == v1::ROLE_CONTROLLER; }
   v1::Role role() const { return role_; }
   std::set<std::uint32_t>& subscriptions() { return subscriptions_; }
   /// Of its newest pose.
   std::uint64_t last_sequence() const { return last_sequence_; }
   void set_last_sequence(std::uint64_t sequence) { last_sequence_ = sequence; }
-  /// Leaves the session that it has, whose model was read again, for this one.
-  void join(std::shared_ptr<Session> session);
+  /// Leaves the session that it has, whose model was read again, for this one. `watches`: it wants no
+  /// control.
+  void join(std::shared_ptr<Session> session, bool watches);
   /// Takes its place in the session again.
-  void rejoin(std::shared_ptr<Session> session, bool controlled);
+  void rejoin(std::shared_ptr<Session> session, const SavedPlace& place);
   /// Gives it back, for another try.
   void undo_rejoin() { std::exchange(session_, nullptr)->leave(*this, true); }
   /// False while another holds control or may come back to it.
@@ -151,13 +160,15 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
 
   SessionRegistry& registry_;
   const std::uint64_t number_;
-  const std::string peer_;  ///< and the number before it, for the log
+  const std::string peer_;
   const std::string address_;
   std::shared_ptr<const Pool> kept_share_;  ///< its part of what is kept
   std::shared_ptr<Account> account_;
   ClientOutput output_;
 
-  const bool authenticated_;
+  std::shared_ptr<const Pass> pass_;
+  Seat seat_;             ///< of the pass
+  bool watches_ = false;  ///< it wants no control
   bool greeted_ = false;
   bool resuming_ = false;
   bool said_goodbye_ = false;

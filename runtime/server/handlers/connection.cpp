@@ -14,16 +14,17 @@ namespace {
 
 // Bytes of one read: a client that sends its messages in smaller pieces pays for each as for a message.
 constexpr std::size_t kSmallRead = 64;
-// After a server that stops: until a supervisor has started it again.
-constexpr double kRetrySeconds = 1;
+// After a server that stops: until a supervisor has started it again; or, after one that was drained, at
+// once, since another is there.
+constexpr double kRetrySeconds = 1, kRetryElsewhere = 0.1;
 
 }  // namespace
 
-Connection::Connection(std::unique_ptr<Transport> transport, const std::string& peer, bool authenticated,
-                       Clock::duration waited, SessionRegistry& registry)
+Connection::Connection(std::unique_ptr<Transport> transport, std::string peer,
+                       std::shared_ptr<const Pass> pass, Clock::duration waited, SessionRegistry& registry)
     : transport_(std::move(transport)),
       registry_(registry),
-      client_(std::make_shared<Client>(peer, authenticated, transport_->executor(), registry)),
+      client_(std::make_shared<Client>(std::move(peer), std::move(pass), transport_->executor(), registry)),
       reader_({.envelope_bytes = limits().hello_bytes, .payload_bytes = 0}),
       rate_(limits().messages_per_second, std::max(1.0, limits().messages_per_second)),
       pause_(transport_->executor()),
@@ -67,8 +68,25 @@ void Connection::start_refused(const Status& status) {
 void Connection::say_goodbye(const Status& status) {
   v1::Envelope last;
   wire::to_proto(status, *last.mutable_goodbye()->mutable_status());
-  last.mutable_goodbye()->set_retry_seconds(kRetrySeconds);
+  const Options& options = registry_.options();
+  const bool replaced = options.drain_seconds > 0 || !options.elsewhere.empty();
+  last.mutable_goodbye()->set_retry_seconds(replaced ? kRetryElsewhere : kRetrySeconds);
+  last.mutable_goodbye()->set_elsewhere(options.elsewhere);
   client_->end(std::move(last), farewell_of(status.code));
+}
+
+void Connection::check_pass() {
+  if (closed()) return;
+  client_->guard("connection: the server failed at it (report it)", [&] { client_->check_pass(); });
+  set_rate();
+}
+
+// The rate of its token, where that has one.
+void Connection::set_rate() {
+  const auto& pass = client_->pass();
+  const double rate =
+      pass && pass->messages_per_second ? *pass->messages_per_second : limits().messages_per_second;
+  rate_ = Rate(rate, std::max(1.0, rate));
 }
 
 void Connection::close(const char* why) {
@@ -213,9 +231,11 @@ bool Connection::handle_next() {
     handled = true;
     const bool greeted = client_->greeted();
     dispatch(*client_, *message);
-    if (!greeted && client_->greeted())
+    if (!greeted && client_->greeted()) {
       reader_.set_limits(
           {.envelope_bytes = limits().envelope_bytes, .payload_bytes = limits().payload_bytes});
+      set_rate();
+    }
     if (client_->aborted()) close(client_->aborted());
   });
   return handled;

@@ -27,9 +27,9 @@ namespace ecorche::server {
 /// Whatever goes wrong ends this connection alone: its client hears why, and has a second to read it.
 class Connection final : public std::enable_shared_from_this<Connection> {
  public:
-  /// `authenticated`: the client has shown its right to connect already. `waited`: to be let in; half of the
+  /// `pass`: of the token that the client has shown already, or null. `waited`: to be let in; half of the
   /// time for a hello is left in any case.
-  Connection(std::unique_ptr<Transport> transport, const std::string& peer, bool authenticated,
+  Connection(std::unique_ptr<Transport> transport, std::string peer, std::shared_ptr<const Pass> pass,
              Clock::duration waited, SessionRegistry& registry);
 
   /// address_of() its peer.
@@ -40,6 +40,8 @@ class Connection final : public std::enable_shared_from_this<Connection> {
   void start_refused(const Status& status);
   /// First step of the shutdown: the last word is queued, what is queued may still leave.
   void say_goodbye(const Status& status);
+  /// The tokens are others now.
+  void check_pass();
   /// Second step: now.
   void close(const char* why);
 
@@ -65,6 +67,7 @@ class Connection final : public std::enable_shared_from_this<Connection> {
   net::awaitable<bool> open_transport();
   /// Waits while the client asks faster than it may or reads, or its hello is not answered yet.
   net::awaitable<void> throttle();
+  void set_rate();
   /// Reads past what is left, until the client hangs up.
   net::awaitable<void> drain();
   /// Takes what was read.

@@ -35,6 +35,8 @@ Status handle_give_control(Client& client, const v1::GiveControl& give, const Re
   Member* const to = find_member(control, give.connection());
   const std::string who = "control: connection " + std::to_string(give.connection());
   if (!to) return {StatusCode::not_found, who + " is not in this session (see Members)"};
+  if (!to->may_control())
+    return {StatusCode::failed_precondition, who + " showed a token to watch by (give it to another)"};
   if (!to->hears_of(v1::FEATURE_PRESENCE)) {
     return {StatusCode::failed_precondition,
             who + " takes none that it did not claim (ReleaseControl, and it may claim it)"};

@@ -67,10 +67,16 @@ Status check_hello(const v1::ClientHello& hello) {
 Status handle_client_hello(Client& client, const v1::ClientHello& hello, const Request& request) {
   if (Status status = check_hello(hello); !status.ok()) return status;
   SessionRegistry& registry = client.registry();
-  const std::string& token = registry.options().token;
-  if (!token.empty() && !client.authenticated() && !same_token(hello.token(), token)) {
+  std::shared_ptr<const Pass> pass = client.pass() ? client.pass() : registry.passes().find(hello.token());
+  if (!pass) {
     registry.metrics().denied();
     return {StatusCode::unauthenticated, "hello: the token is missing or wrong (ask who runs the server)"};
+  }
+  if (!client.admit(pass)) {
+    registry.metrics().hit("token");
+    return {StatusCode::resource_exhausted, "hello: " + std::to_string(pass->connections) +
+                                                " connections of your token are there (leave one, or ask "
+                                                "for another token)"};
   }
   v1::Envelope envelope;
   v1::ServerHello& out = *envelope.mutable_server_hello();

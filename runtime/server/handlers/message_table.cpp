@@ -22,7 +22,8 @@ using E = v1::Envelope;
 constexpr auto kStatus = Refusal::status;
 constexpr Needs kHello{};
 constexpr Needs kModel{.model = true};
-constexpr Needs kControl{.model = true, .control = Needs::Control::yes};
+constexpr Needs kClaim{.right = Right::pose, .model = true};
+constexpr Needs kControl{.right = Right::pose, .model = true, .control = Needs::Control::yes};
 
 // In the order of envelope.proto. docs/reference/protocol.md ("What a message needs") says the same, as a
 // test holds.
@@ -36,20 +37,24 @@ constexpr std::array kMessages{
     MessageRow{E::kPoseUpdate, "pose", kControl, Refusal::pose_ack,
                call<&E::pose_update, handle_pose_update>},
     MessageRow{E::kFrameAck, "ack", kHello, kStatus, call<&E::frame_ack, handle_frame_ack>},
-    MessageRow{E::kClaimControl, "control", kModel, kStatus, call<&E::claim_control, handle_claim_control>},
+    MessageRow{E::kClaimControl, "control", kClaim, kStatus, call<&E::claim_control, handle_claim_control>},
     MessageRow{E::kReleaseControl, "control", kControl, kStatus,
                call<&E::release_control, handle_release_control>},
     MessageRow{E::kProbePoints, "probe", kModel, kStatus, call<&E::probe_points, handle_probe_points>},
     MessageRow{E::kSolveIk, "ik", Needs{.model = true, .control = Needs::Control::where_applied}, kStatus,
                call<&E::solve_ik, handle_solve_ik>},
-    MessageRow{E::kRecord, "record", Needs{.model = true, .control = Needs::Control::yes, .recording = true},
-               kStatus, call<&E::record, handle_record>},
+    MessageRow{
+        E::kRecord, "record",
+        Needs{.right = Right::manage, .model = true, .control = Needs::Control::yes, .recording = true},
+        kStatus, call<&E::record, handle_record>},
     MessageRow{E::kListClips, "clips", kModel, kStatus, call<&E::list_clips, handle_list_clips>},
     MessageRow{E::kPlayClip, "clip", kControl, kStatus, call<&E::play_clip, handle_play_clip>},
-    MessageRow{E::kReloadModel, "reload", kControl, kStatus, call<&E::reload_model, handle_reload_model>},
+    MessageRow{E::kReloadModel, "reload",
+               Needs{.right = Right::manage, .model = true, .control = Needs::Control::yes}, kStatus,
+               call<&E::reload_model, handle_reload_model>},
     MessageRow{E::kSetThresholds, "thresholds", kControl, kStatus,
                call<&E::set_thresholds, handle_set_thresholds>},
-    MessageRow{E::kAskControl, "control", kModel, kStatus, call<&E::ask_control, handle_ask_control>},
+    MessageRow{E::kAskControl, "control", kClaim, kStatus, call<&E::ask_control, handle_ask_control>},
     MessageRow{E::kGiveControl, "control", kControl, kStatus, call<&E::give_control, handle_give_control>},
     MessageRow{E::kSteerClip, "clip", kControl, kStatus, call<&E::steer_clip, handle_steer_clip>},
     MessageRow{E::kRenderRadiograph, "radiograph", kModel, kStatus,
@@ -64,12 +69,18 @@ constexpr std::array kMessages{
 };
 
 static_assert(std::all_of(kMessages.begin(), kMessages.end(), [](const MessageRow& row) {
-  return row.needs.model || row.needs.control == Needs::Control::no;
+  const bool control = row.needs.control == Needs::Control::yes;
+  return (row.needs.model || row.needs.control == Needs::Control::no) &&
+         (!control || row.needs.right >= Right::pose);
 }));
 
 bool needs_control(const Needs& needs, const v1::Envelope& request) {
   if (needs.control == Needs::Control::where_applied) return request.solve_ik().apply_as() != 0;
   return needs.control == Needs::Control::yes;
+}
+
+Right needed_right(const Needs& needs, const v1::Envelope& request) {
+  return needs_control(needs, request) ? std::max(needs.right, Right::pose) : needs.right;
 }
 
 void refuse(Client& client, Refusal refusal, const v1::Envelope& request, const Status& status) {
@@ -102,6 +113,11 @@ const MessageRow* find_message(v1::Envelope::MessageCase message) {
 Status check_needs(const Client& client, const v1::Envelope& request) {
   const MessageRow& row = *find_message(request.message_case());
   const Needs& needs = row.needs;
+  if (const Right right = needed_right(needs, request); !client.may(right)) {
+    return {StatusCode::permission_denied,
+            std::string(row.name) + ": the token of this connection may only " +
+                right_name(client.pass()->right) + " (show one that may " + right_name(right) + ")"};
+  }
   if (needs.model && !client.session()) {
     return {StatusCode::failed_precondition, std::string(row.name) + ": no model is open (OpenModel first)"};
   }

@@ -16,11 +16,12 @@ struct Request {
   std::uint64_t id() const { return envelope.request_id(); }
 };
 
-/// What must hold before a message is handled; looked at in this order.
+/// What must hold before a message is handled. Looked at in this order.
 struct Needs {
   enum class Control : std::uint8_t { no, yes, where_applied /* SolveIk.apply_as is not 0 */ };
 
-  bool hello = true;  ///< the hellos are exchanged; false: they are not, it comes first
+  bool hello = true;           ///< the hellos are exchanged; false: they are not, it comes first
+  Right right = Right::watch;  ///< of the token that the client showed; where control is needed, Right::pose
   bool model = false;
   Control control = Control::no;  ///< of the session; only with a model
   bool recording = false;         ///< this server keeps recordings

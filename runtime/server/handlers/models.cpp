@@ -21,7 +21,7 @@ Status handle_open_model(Client& client, const v1::OpenModel& open, const Reques
   }
   std::shared_ptr<Session> session;
   if (Status status = client.registry().open(open, client.address(), session); !status.ok()) return status;
-  client.join(std::move(session));
+  client.join(std::move(session), open.watch());
   const ServedModel& model = *client.session()->model();
   v1::Envelope envelope;
   v1::ModelOpened& opened = *envelope.mutable_model_opened();

@@ -90,7 +90,7 @@ void resume(Client& client, ResumeRequest request) {
   if (!lacking_streams(request.subscriptions, *session).empty())
     return remake_aside(client, std::move(request), *session);
   try {
-    client.rejoin(session, place->controlled);
+    client.rejoin(session, *place);
     take_place(client, request);
   } catch (...) {  // no memory: the place stays, for another try
     client.undo_rejoin();

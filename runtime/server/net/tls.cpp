@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/server/net/tls.hpp"
 
-#include <openssl/crypto.h>
-#include <openssl/sha.h>
-
-#include <array>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/ssl/stream.hpp>
 #include <optional>
@@ -15,14 +11,6 @@
 
 namespace ecorche::server {
 namespace {
-
-using Digest = std::array<unsigned char, SHA256_DIGEST_LENGTH>;
-
-Digest digest(std::string_view text) {
-  Digest out;
-  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), out.data());
-  return out;
-}
 
 class TlsTransport final : public Transport {
  public:
@@ -106,11 +94,6 @@ Carrier::~Carrier() = default;
 std::unique_ptr<Transport> Carrier::carry(tcp::socket socket) const {
   if (!context_) return tcp_transport(std::move(socket));
   return std::make_unique<TlsTransport>(std::move(socket), context_->tls);
-}
-
-bool same_token(std::string_view given, std::string_view expected) {
-  const Digest a = digest(given), b = digest(expected);
-  return CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 std::string random_token() {

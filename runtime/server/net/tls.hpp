@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "runtime/server/net/transport.hpp"
 
@@ -24,10 +23,6 @@ class Carrier {
   struct Context;
   std::unique_ptr<Context> context_;
 };
-
-/// Whether the token is the one expected, in a time that tells nothing of either (their SHA-256 are
-/// compared).
-bool same_token(std::string_view given, std::string_view expected);
 
 /// 16 random bytes that nobody can guess, in hexadecimal.
 std::string random_token();

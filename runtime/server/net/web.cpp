@@ -12,8 +12,6 @@
 #include <string_view>
 #include <utility>
 
-#include "runtime/server/net/tls.hpp"
-
 namespace ecorche::server {
 namespace {
 
@@ -181,13 +179,13 @@ class WebSocketTransport final : public Transport {
   CloseReason farewell_ = CloseReason::normal;
 };
 
-// `Bearer TOKEN`: the scheme's name in any case (RFC 7235).
-bool bears(std::string_view header, const std::string& token) {
+// Of `Bearer TOKEN`, the scheme's name in any case (RFC 7235); empty where it says something else.
+std::string_view borne_token(std::string_view header) {
   constexpr std::string_view scheme = "bearer ";
   if (header.size() < scheme.size() ||
       !beast::iequals({header.data(), scheme.size()}, {scheme.data(), scheme.size()}))
-    return false;
-  return same_token(header.substr(scheme.size()), token);
+    return {};
+  return header.substr(scheme.size());
 }
 
 class Request final : public WebRequest {
@@ -232,7 +230,7 @@ class Request final : public WebRequest {
     const bool health = reads && (target == "/healthz" || target == "/readyz");
     if (!health && !context_.admit(kind(target), peer_))
       co_return co_await answer(http::status::too_many_requests, "try again in a second\n");
-    if (target == "/v1") co_return co_await upgrade();
+    if (is_socket_target(target)) co_return co_await upgrade();
     if (!reads) co_return co_await answer(http::status::method_not_allowed, "GET and HEAD only\n");
     if (target == "/healthz") co_return co_await answer(http::status::ok, "alive\n");
     if (target == "/readyz") {
@@ -241,8 +239,8 @@ class Request final : public WebRequest {
                                 ready ? "ready\n" : "stopping\n");
     }
     if (target == "/metrics") {
-      if (!proven()) co_return co_await deny();
-      if (context_.token.empty() && !names_this_machine(header(http::field::host)))
+      if (!shown_pass()) co_return co_await deny();
+      if (context_.passes->open() && !names_this_machine(header(http::field::host)))
         co_return co_await answer(http::status::forbidden, "without a token, ask by address or localhost\n");
       co_return co_await answer(http::status::ok, context_.metrics());
     }
@@ -299,14 +297,14 @@ class Request final : public WebRequest {
 
   // Who has shown the token is not kept out by those who have none, nor a viewer by who asks for pages.
   WebKind kind(std::string_view target) const {
-    if (!context_.token.empty() && proven()) return WebKind::proven;
-    return target == "/v1" && websocket::is_upgrade(parser_.get()) ? WebKind::handshake : WebKind::page;
+    if (!context_.passes->open() && shown_pass()) return WebKind::proven;
+    return is_socket_target(target) && websocket::is_upgrade(parser_.get()) ? WebKind::handshake
+                                                                            : WebKind::page;
   }
 
-  // Whoever needs no token has it.
-  bool proven() const {
-    if (context_.token.empty()) return true;
-    return bears(header(http::field::authorization), context_.token);
+  // Null for another token than those of the server, or none; whoever needs none has one.
+  std::shared_ptr<const Pass> shown_pass() const {
+    return context_.passes->find(borne_token(header(http::field::authorization)));
   }
 
   net::awaitable<void> deny() {
@@ -330,12 +328,12 @@ class Request final : public WebRequest {
       context_.denied();
       co_return co_await answer(http::status::forbidden, "pages of this origin may not connect\n");
     }
-    if (!header(http::field::authorization).empty() && !proven()) co_return co_await deny();
+    const std::shared_ptr<const Pass> pass = shown_pass();
+    if (!header(http::field::authorization).empty() && !pass) co_return co_await deny();
     if (!http::token_list(request[http::field::sec_websocket_protocol])
              .exists({kSubprotocol.data(), kSubprotocol.size()}))
       co_return co_await answer(http::status::bad_request, "the subprotocol is ecorche.v1\n");
 
-    const bool known = proven();
     socket_ = std::make_unique<Socket>(std::move(*stream_));
     stream_.reset();
     // The owner has the deadlines.
@@ -353,7 +351,7 @@ class Request final : public WebRequest {
     // What the request brought beyond its header would be lost: no client may speak before the answer.
     if (ec || over_ || buffer_.size() > 0) co_return;
     over_ = true;
-    context_.welcome(std::make_unique<WebSocketTransport>(std::move(socket_)), peer_, known);
+    context_.welcome(std::make_unique<WebSocketTransport>(std::move(socket_)), peer_, pass);
   }
 
   net::awaitable<void> answer(http::status status, std::string body) {

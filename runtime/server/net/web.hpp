@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/server/net/passes.hpp"
 #include "runtime/server/net/transport.hpp"
 #include "runtime/server/net/web_files.hpp"
 #include "runtime/server/net/web_host.hpp"
@@ -20,7 +21,7 @@ enum class WebKind : std::uint8_t { page, handshake, proven };
 
 /// What the HTTP port asks the server.
 struct WebContext {
-  std::string token;                       ///< empty: none is asked for
+  std::shared_ptr<const Passes> passes = std::make_shared<const Passes>(std::vector<Pass>());
   std::vector<std::string> origins;        ///< pages of others that may connect, as browsers name them
   bool tls = false;                        ///< it is spoken on this port
   HostList hosts;                          ///< by which browsers may ask, and whose own pages may connect
@@ -32,8 +33,11 @@ struct WebContext {
   std::function<void()> denied;
   /// Whether one more request of this kind and peer may be answered now.
   std::function<bool(WebKind kind, const std::string& peer)> admit;
-  /// A client that speaks WebSocket from here on; `proven`: its request had the token.
-  std::function<void(std::unique_ptr<Transport> transport, std::string peer, bool proven)> welcome;
+  /// A client that speaks WebSocket from here on; `pass`: of the token that its request had; null: it had
+  /// none.
+  std::function<void(std::unique_ptr<Transport> transport, std::string peer,
+                     std::shared_ptr<const Pass> pass)>
+      welcome;
 };
 
 /// One request of one client, answered, and the connection ends; or it becomes a WebSocket, and goes on as

@@ -69,6 +69,12 @@ class HostList {
   std::set<std::string> names_;
 };
 
+/// What is asked for is a WebSocket of the protocol. More may stand behind it, such as the session, by which
+/// a balancer in front chooses a server (docs/how-to/several_servers.md).
+inline bool is_socket_target(std::string_view target) {
+  return target.substr(0, target.find('?')) == "/v1";
+}
+
 /// Whether a page of this origin (`http://localhost:7071`) was asked of the server that `host` names. `tls`:
 /// that speaks TLS itself; else a proxy may have taken it off.
 inline bool same_origin(std::string_view origin, std::string_view host, bool tls) {

@@ -26,19 +26,26 @@ void warm_up(const ServedModel& model) {
   }
 }
 
+// Who shows the one token may do all.
+std::vector<Pass> all_passes(const Options& options, std::vector<Pass> passes) {
+  if (!options.token.empty()) passes.push_back({.name = "token", .digest = digest_of(options.token)});
+  return passes;
+}
+
 }  // namespace
 
 SessionRegistry::SessionRegistry(net::io_context& io, Workers& workers, Options options,
                                  std::vector<NamedModel> models, TestHooks hooks)
     : io_(io),
       options_(std::move(options)),
+      passes_(std::make_shared<Passes>(all_passes(options_, options_.passes))),
       memory_(options_.limits.queued_bytes, options_.limits.kept_bytes),
       hooks_(std::move(hooks)),
       executor_(io, workers),
       quality_turns_(io, TurnQueue::Order::first_come, kQualityPause),
       first_frames_(io, TurnQueue::Order::least_used),
       recordings_(executor_, options_),
-      journal_(options_.limits.log_lines_per_second) {
+      journal_(options_.limits.log_lines_per_second, options_.log) {
   if (models.empty() || models.size() > options_.limits.models) {
     throw Error(ErrorKind::config, "models", std::to_string(models.size()) + " are given",
                 "serve 1 to " + std::to_string(options_.limits.models) + ", or raise --max-models");
@@ -294,6 +301,31 @@ void SessionRegistry::reload(const std::string& name, std::function<void(const S
     reload_all([calls = std::exchange(reload_again_, {})] {
       for (const auto& call : calls) call();
     });
+  });
+}
+
+void SessionRegistry::reload_passes(std::function<void(bool)> done) {
+  if (!options_.read_passes) return done(false);
+  struct Reading {
+    std::vector<Pass> passes;
+    std::string error;
+  };
+  const auto reading = std::make_shared<Reading>();
+  const auto work = [reading, read = options_.read_passes] {
+    try {
+      reading->passes = read();
+    } catch (const std::exception& error) {
+      reading->error = error.what();
+    }
+  };
+  executor_.run(Service::background, work, [this, reading, done = std::move(done)] {
+    if (reading->error.empty()) {
+      spdlog::info("tokens: {} read again", reading->passes.size());
+      passes_->replace(all_passes(options_, std::move(reading->passes)));
+    } else {
+      spdlog::warn("tokens: {}; those from before are still good", reading->error);
+    }
+    done(reading->error.empty());
   });
 }
 

@@ -29,6 +29,7 @@ struct SavedPlace {
   std::weak_ptr<Session> session;
   std::vector<SubscriptionRequest> subscriptions;
   bool controlled = false;
+  bool watches = false;  ///< it wanted no control
   Clock::time_point since = Clock::now();
 };
 
@@ -42,6 +43,11 @@ class SessionRegistry {
 
   const Options& options() const { return options_; }
   const Limits& limits() const { return options_.limits; }
+  Passes& passes() { return *passes_; }
+  std::shared_ptr<const Passes> shared_passes() const { return passes_; }
+  /// Reads the passes again, and calls `done` on the I/O thread; false: they stay as they were, as the log
+  /// says.
+  void reload_passes(std::function<void(bool)> done);
   const std::vector<std::shared_ptr<const ServedModel>>& models() const { return models_; }
 
   /// The session that the request names, made where it is new, for a client of this address. not_found for an
@@ -108,6 +114,7 @@ class SessionRegistry {
 
   net::io_context& io_;
   Options options_;
+  std::shared_ptr<Passes> passes_;
   MemoryBudget memory_;
   TestHooks hooks_;
   std::atomic<bool> leaving_ = false;  ///< nothing more is made before somebody asks

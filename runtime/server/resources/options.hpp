@@ -4,10 +4,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "runtime/server/net/passes.hpp"
+#include "runtime/server/resources/journal.hpp"
 
 namespace ecorche::server {
 
@@ -57,11 +61,18 @@ struct Options {
   std::vector<std::string> origins;     ///< others' pages that may connect, e.g. `https://viewer.example`
   std::vector<std::string> host_names;  ///< by which browsers ask, besides the address of `http`
   std::shared_ptr<const WebFiles> viewer = {};  ///< that `http` shows; null: none
-  std::string certificate, key;         ///< PEM files; both or neither. With them both ports speak TLS only
-  std::string token;                    ///< clients must show it; empty: none is asked for
+  std::string certificate, key;  ///< PEM files; both or neither. With them both ports speak TLS only
+  std::string token;             ///< who shows it may do all; clients must show one, where there is any
+  std::vector<Pass> passes;      ///< and others, each with rights and limits of its own
+  std::function<std::vector<Pass>()> read_passes = {};  ///< reload() has them read again by it; may be empty
   bool insecure = false;                ///< listen beyond loopback although TLS or the token is missing
   std::filesystem::path record_folder;  ///< empty: nothing is recorded
   std::string version;                  ///< of the program, for ServerHello
+  /// stop() lets clients go on for so long, and newcomers in, while /readyz says 503: time for who asks that
+  /// to send newcomers elsewhere. Then clients are told to come back at once, to another server.
+  double drain_seconds = 0;
+  std::string elsewhere;  ///< and to whom: HOST:PORT of frames; empty: to the same address
+  Journal::Write log;     ///< takes the log's lines about clients and sessions; none: spdlog, as text
   Limits limits;
 };
 

@@ -15,7 +15,7 @@ void Control::give(Member& member) {
 
 v1::Role Control::join(Member& member, bool heir, Clock::time_point now) {
   members_.insert(&member);
-  if (!controller_ && (!reserved(now) || (heir && awaits_heir_))) {
+  if (!controller_ && member.seeks_control() && (!reserved(now) || (heir && awaits_heir_))) {
     give(member);
     notify(now, &member);
   }
@@ -24,7 +24,7 @@ v1::Role Control::join(Member& member, bool heir, Clock::time_point now) {
 }
 
 v1::Role Control::rejoin(Member& member, bool control, Clock::time_point now) {
-  if (!control || controller_) return join(member, false, now);
+  if (!control || controller_ || !member.may_control()) return join(member, false, now);
   members_.insert(&member);
   give(member);
   notify(now, &member);

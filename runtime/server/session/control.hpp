@@ -23,7 +23,7 @@ class Control {
   /// `changed` is called after every change of members or control. It throws nothing.
   void on_change(std::function<void()> changed) { changed_ = std::move(changed); }
 
-  /// Gives control to the member where it is free; to an `heir` also where it is reserved for one.
+  /// Gives control to the member where it is free and sought; to an `heir` also where it is reserved for one.
   v1::Role join(Member& member, bool heir, Clock::time_point now);
   /// As join; with `control`, the control that it left with is its again, unless somebody has it.
   v1::Role rejoin(Member& member, bool control, Clock::time_point now);

@@ -45,6 +45,9 @@ class Member {
     static_cast<void>(feature);
     return false;
   }
+  /// Control may be given to it; and it takes what it finds free when it comes.
+  virtual bool may_control() const { return true; }
+  virtual bool seeks_control() const { return true; }
   /// What all hear who hear of its feature.
   virtual void tell(const std::shared_ptr<const wire::EncodedFrame>& news) { static_cast<void>(news); }
   /// Who held control gave it to this one, which has heard of the change.

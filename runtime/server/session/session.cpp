@@ -72,7 +72,7 @@ Session::~Session() {
 }
 
 void Session::log_error(const std::string& what) const {
-  if (journal_) journal_->line(spdlog::level::err, "session " + name_ + ": " + what);
+  if (journal_) journal_->line(spdlog::level::err, {.text = what, .session = name_});
 }
 
 v1::Role Session::join(Member& member, bool heir) {

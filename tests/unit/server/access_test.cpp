@@ -203,10 +203,7 @@ TEST_F(Access, BeyondLoopbackBothAreNeeded) {
   EXPECT_EQ(start(options), ErrorKind::config);
 }
 
-TEST(Token, IsComparedWhole) {
-  EXPECT_TRUE(same_token(kToken, kToken));
-  EXPECT_FALSE(same_token(kToken.substr(0, 5), kToken));
-  EXPECT_FALSE(same_token("", kToken));
+TEST(Token, IsRandom) {
   EXPECT_NE(random_token(), random_token());
   EXPECT_EQ(random_token().size(), 32U);
 }

@@ -45,14 +45,16 @@ struct ClientStage {
 /// One of them.
 class StageClient {
  public:
-  explicit StageClient(ClientStage& stage, bool greets = true)
+  explicit StageClient(ClientStage& stage, bool greets = true, const std::string& token = {})
       : stage_(stage),
-        client_(std::make_shared<Client>("192.0.2.1:1000", false, stage.io.get_executor(), stage.registry)) {
+        client_(
+            std::make_shared<Client>("192.0.2.1:1000", nullptr, stage.io.get_executor(), stage.registry)) {
     if (!greets) return;
     v1::Envelope hello;
     hello.set_request_id(1);
     hello.mutable_client_hello()->set_protocol_min(1);
     hello.mutable_client_hello()->set_protocol_max(1);
+    hello.mutable_client_hello()->set_token(token);
     hello_ = send(std::move(hello)).value_or(v1::Envelope()).server_hello();
   }
   ~StageClient() { close(); }

@@ -94,9 +94,12 @@ TEST(MessageTable, SaysWhatTheProtocolsPageSays) {
   const std::map<int, std::string> names = messages_to_server();
   for (const MessageRow& row : message_table()) {
     std::string needs = row.needs.hello ? "hello" : "nothing: it comes first, and once";
+    if (row.needs.right != Right::watch)
+      needs += std::string(", the right to ") + right_name(row.needs.right);
     if (row.needs.model) needs += ", model";
     if (row.needs.control == Needs::Control::yes) needs += ", control";
-    if (row.needs.control == Needs::Control::where_applied) needs += ", control where `apply_as` is not 0";
+    if (row.needs.control == Needs::Control::where_applied)
+      needs += ", control and the right to pose where `apply_as` is not 0";
     if (row.needs.recording) needs += ", recordings";
     expected += "| `" + names.at(row.message) + "` | `" + row.name + "` | " + needs + " |\n";
   }

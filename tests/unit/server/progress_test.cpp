@@ -318,9 +318,8 @@ TEST(Movement, OfAWebSocketIsItsCarriers) {
   WebContext context;
   context.hosts = HostList(net::ip::make_address("127.0.0.1"), {});
   context.admit = [](auto&&...) { return true; };
-  context.welcome = [&](std::unique_ptr<Transport> welcomed, const std::string&, bool) {
-    transport = std::move(welcomed);
-  };
+  context.welcome = [&](std::unique_ptr<Transport> welcomed, const std::string&,
+                        const std::shared_ptr<const Pass>&) { transport = std::move(welcomed); };
   const auto request = web_request(tcp_transport(std::move(sockets.server)), "test", context);
   request->start();
   net::write(sockets.client, net::buffer(std::string(

@@ -83,15 +83,18 @@ TEST(Shares, EachHasARateOfItsOwn) {
   EXPECT_EQ(rates.known(), 1U) << "who did nothing for long is forgotten";
 }
 
+LogLine about(int connection) {
+  return {.text = "ended", .connection = static_cast<std::uint64_t>(connection), .peer = "10.0.0.1:80"};
+}
+
 TEST(Shares, AFloodOfBadClientsWritesFewLines) {
   std::vector<std::string> lines;
-  Journal journal(2, [&](Journal::Level, const std::string& line) { lines.push_back(line); });
-  for (int i = 0; i < 7000; ++i)
-    journal.line(spdlog::level::info, "10.0.0.1", "#" + std::to_string(i), "ended");
+  Journal journal(2, [&](Journal::Level, const LogLine& line) { lines.push_back(text_of(line)); });
+  for (int i = 0; i < 7000; ++i) journal.line(spdlog::level::info, about(i), "10.0.0.1");
   EXPECT_EQ(lines.size(), 20U);
-  journal.line(spdlog::level::info, "10.0.0.2", "#7001", "ended");
+  journal.line(spdlog::level::info, about(7001), "10.0.0.2");
   ASSERT_EQ(lines.size(), 21U) << "another address has its own";
-  EXPECT_EQ(lines.back(), "#7001: ended");
+  EXPECT_EQ(lines.back(), "#7001 10.0.0.1:80: ended");
   journal.tick(Clock::now());
   EXPECT_EQ(lines.size(), 21U);
   journal.tick(Clock::now() + Journal::report_interval);
@@ -101,8 +104,8 @@ TEST(Shares, AFloodOfBadClientsWritesFewLines) {
   EXPECT_EQ(lines.size(), 22U) << "nothing was left out since";
   // From however many addresses.
   for (int i = 0; i < 7000; ++i)
-    journal.line(spdlog::level::info, "10.0." + std::to_string(i / 250) + "." + std::to_string(i % 250), "#1",
-                 "ended");
+    journal.line(spdlog::level::info, about(1),
+                 "10.0." + std::to_string(i / 250) + "." + std::to_string(i % 250));
   EXPECT_LE(lines.size(), 22U + 200U);
 }
 

@@ -3,6 +3,7 @@
 #include "tests/support/toy_model.hpp"
 #include "tests/unit/server/forwarding_transport.hpp"
 #include "tests/unit/server/test_server.hpp"
+#include "tests/unit/server/web_client.hpp"
 
 namespace ecorche::server {
 namespace {
@@ -35,6 +36,34 @@ TEST(Shutdown, ClientsThatDoNotReadDoNotHoldItUp) {
   server.stop();
   server.join();
   EXPECT_LT(client::Clock::now() - start, std::chrono::seconds(10));
+}
+
+// Who asks /readyz hears first that it stops; clients go on meanwhile, and newcomers come in.
+TEST(Shutdown, BeforeThatClientsAreDrained) {
+  Options options;
+  options.http = Endpoint{};
+  options.drain_seconds = 1;
+  options.elsewhere = "192.0.2.1:7070";
+  TestServer server(options);
+  TestClient poser(server);
+  poser.subscribe_mesh();
+  EXPECT_EQ(WebClient(server.http()).get("/readyz").rfind("HTTP/1.1 200", 0), 0U);
+  const auto begun = client::Clock::now();
+  server.stop();
+  while (WebClient(server.http()).get("/readyz").rfind("HTTP/1.1 503", 0) != 0)
+    ASSERT_LT(client::Clock::now() - begun, std::chrono::seconds(1));
+  poser.send(1, poser.bent(0.2));
+  poser.next_mesh(1);
+  RawClient newcomer(server);
+  newcomer.send_hello();
+  ASSERT_TRUE(newcomer.receive()->envelope.has_server_hello());
+  const auto last = newcomer.receive();
+  ASSERT_TRUE(last);
+  EXPECT_GE(client::Clock::now() - begun, std::chrono::milliseconds(950));
+  EXPECT_EQ(last->envelope.goodbye().status().code(), static_cast<std::uint32_t>(StatusCode::unavailable));
+  EXPECT_EQ(last->envelope.goodbye().elsewhere(), "192.0.2.1:7070");
+  EXPECT_LT(last->envelope.goodbye().retry_seconds(), 0.5);
+  server.join();
 }
 
 TEST(Shutdown, BeforeItRanAndTwice) {

@@ -48,9 +48,10 @@ typedef struct ecorche_client_options {
   const char* name;        /* that the server's log has; NULL: "ecorche_client" */
   const char* token;       /* of the right to connect; NULL: none */
   const char* authorities; /* PEM file of certificates that are trusted; NULL: no TLS */
+  const char* session;     /* to be opened: a balancer of several servers goes by it; NULL: one's own */
 } ecorche_client_options;
 #define ECORCHE_CLIENT_OPTIONS_INIT \
-  { sizeof(ecorche_client_options), 0, 0, 0 }
+  { sizeof(ecorche_client_options), 0, 0, 0, 0 }
 
 /* "127.0.0.1:7070". Waits 5 s at most; `options` may be NULL. UNAVAILABLE where nobody answers there. */
 ECORCHE_API ecorche_code ecorche_client_connect(const char* address, const ecorche_client_options* options,

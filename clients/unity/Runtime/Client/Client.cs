@@ -47,6 +47,7 @@ namespace Ecorche
         private readonly Queue<ClientEvent> _events = new Queue<ClientEvent>();
         private readonly List<MeshStream> _streams = new List<MeshStream>();
         private readonly List<VolumeStream> _volumes = new List<VolumeStream>();
+        private readonly string _session;
         private Line _line;
         private ulong _requests, _sequence;
         private long _received;
@@ -58,6 +59,7 @@ namespace Ecorche
                 throw new EcorcheException(Code.InvalidArgument, "address: '" + address + "' is no HOST:PORT (for example 127.0.0.1:7070)");
             _host = address.Substring(0, colon).Trim('[', ']');
             _options = options ?? new ClientOptions();
+            _session = _options.Session ?? Guid.NewGuid().ToString("N");
         }
 
         /// <summary>"127.0.0.1:7070". Waits as long as the options say.</summary>
@@ -130,6 +132,7 @@ namespace Ecorche
                 hello.Client = _options.Name;
                 hello.Token = System.Text.Encoding.UTF8.GetBytes(_options.Token ?? "");
                 hello.ResumeToken = resumeToken;
+                hello.Session = _session;
                 for (var one = Encoding.F32; one <= Encoding.U16Delta; ++one) hello.Encodings.Append(one);
                 var told = Keep(Call(default), envelope => envelope.HasServerHello);
                 if (told.ServerHello.Protocol != 1)

@@ -10,6 +10,9 @@ namespace Ecorche
         /// <summary>Of the right to connect; null: none.</summary>
         public string Token;
 
+        /// <summary>That will be opened, by which a balancer in front of several servers chooses one; null: this client's own.</summary>
+        public string Session;
+
         /// <summary>By TLS, trusting what this system trusts.</summary>
         public bool Tls;
 

@@ -272,17 +272,18 @@ export class Client extends Emitter<ClientEvents> {
   }
 
   private async dial(): Promise<ServerHello> {
-    const { token, name = "ecorche web", person = "" } = this.options;
+    const { token, name = "ecorche web", person = "", session = "" } = this.options;
     const hello = create(ClientHelloSchema, {
       protocolMin: 1, protocolMax: 1, client: name, name: person,
       features: [Feature.POSE, Feature.CLIP_STATE, Feature.PRESENCE],
       encodings: [Encoding.F32, Encoding.U16, Encoding.U16_DELTA],
       token: new TextEncoder().encode(token ?? ""),
       resumeToken: this.hello?.resumeToken ?? new Uint8Array(),
+      session,
     });
     this.ending = undefined;
     const { envelope, answer } = this.requests.ask({ case: "clientHello", value: hello }, "serverHello");
-    this.post({ kind: "dial", url: this.url, hello: envelope });
+    this.post({ kind: "dial", url: this.url + (session && `?session=${encodeURIComponent(session)}`), hello: envelope });
     return (await answer).value;
   }
 

@@ -35,6 +35,8 @@ export interface ClientOptions {
   name?: string;
   /** What others in the session call who uses this client. */
   person?: string;
+  /** That will be opened, where a balancer stands in front of several servers: it chooses one by it. Goes into the address, too. */
+  session?: string;
   onState?: (change: StateChange) => void;
   /** The bundle of worker.ts, which receives and decodes; false: this thread does. None: as the page was bundled. */
   worker?: string | URL | false;

@@ -107,8 +107,9 @@ export class Live {
   }
 
   async #connect(): Promise<void> {
+    const asked = hashParameters(), session = asked.get("session") ?? SHARED_SESSION;
     const client = await Client.connect(address(), {
-      token: this.#token, name: "ecorche viewer", person: localStorage.getItem("ecorche.name") ?? "",
+      session, token: this.#token, name: "ecorche viewer", person: localStorage.getItem("ecorche.name") ?? "",
       onState: ({ state, reason, retryMs }) => {
         if (state !== "closed" || this.client) this.store.set({ link: { state, reason, mends: state !== "closed", ...(retryMs === undefined ? {} : { retryAt: Date.now() + retryMs }) } });
       },
@@ -122,10 +123,9 @@ export class Live {
     client.on("modelChanged", () => void client.open(client.model?.model, client.model?.session).catch((error: unknown) => {
       this.store.set({ link: { state: "closed", reason: reasonOf(error), mends: false } });
     }));
-    const asked = hashParameters();
     performance.mark("ecorche connected");
     // No name: its first model.
-    const model = await client.open(asked.get("model") ?? "", asked.get("session") ?? SHARED_SESSION);
+    const model = await client.open(asked.get("model") ?? "", session);
     performance.mark("ecorche opened");
     const stream = await client.subscribeMesh(Arrival.firstOf(model));
     this.stream = stream;

@@ -30,6 +30,9 @@ struct Access {
   std::string authorities;   ///< PEM file whose certificates are trusted; empty: no TLS
   std::string token;         ///< of the right to connect
   std::string resume_token;  ///< ServerHello.resume_token of an earlier connection
+  /// The session that will be opened, by which a balancer in front of several servers chooses one; for one of
+  /// one's own something random, the same again for who comes back. Not needed without a balancer.
+  std::string session = {};
 };
 
 /// One connection; for one thread. Frames are acknowledged and pings answered as they are read, so call

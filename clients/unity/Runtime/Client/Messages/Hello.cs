@@ -35,6 +35,7 @@ namespace Ecorche.Wire
         public byte[] Token = System.Array.Empty<byte>();
         public byte[] ResumeToken = System.Array.Empty<byte>();
         public string Name = "";
+        public string Session = "";
 
         public void Clear()
         {
@@ -46,10 +47,12 @@ namespace Ecorche.Wire
             Token = System.Array.Empty<byte>();
             ResumeToken = System.Array.Empty<byte>();
             Name = "";
+            Session = "";
         }
 
         internal void Write(WireWriter to)
         {
+            if (Session.Length > 0) to.String(74, Session);
             if (Name.Length > 0) to.String(66, Name);
             if (ResumeToken.Length > 0) to.Bytes(58, ResumeToken);
             if (Token.Length > 0) to.Bytes(50, Token);
@@ -320,15 +323,18 @@ namespace Ecorche.Wire
     {
         public bool HasStatus; public readonly Status Status = new Status();
         public double RetrySeconds;
+        public string Elsewhere = "";
 
         public void Clear()
         {
             HasStatus = false;
             RetrySeconds = default;
+            Elsewhere = "";
         }
 
         internal void Read(ref WireReader from)
         {
+            var oldElsewhere = Elsewhere;
             Clear();
             for (uint key; (key = from.Key()) != 0;)
             {
@@ -336,6 +342,7 @@ namespace Ecorche.Wire
                 {
                     case 10: { var inner = from.Message(); Status.Read(ref inner); } HasStatus = true; break;
                     case 17: RetrySeconds = from.Double(); break;
+                    case 26: Elsewhere = from.String(oldElsewhere); break;
                     default: from.Skip(key); break;
                 }
             }

@@ -104,6 +104,7 @@ namespace Ecorche.Wire
         public string Session = "";
         public bool WithoutTriangles;
         public bool PackedTriangles;
+        public bool Watch;
 
         public void Clear()
         {
@@ -111,10 +112,12 @@ namespace Ecorche.Wire
             Session = "";
             WithoutTriangles = default;
             PackedTriangles = default;
+            Watch = default;
         }
 
         internal void Write(WireWriter to)
         {
+            if (Watch) to.Bool(40, Watch);
             if (PackedTriangles) to.Bool(32, PackedTriangles);
             if (WithoutTriangles) to.Bool(24, WithoutTriangles);
             if (Session.Length > 0) to.String(18, Session);
