@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/json_log.hpp"
 
+#include <spdlog/details/os.h>
 #include <spdlog/formatter.h>
 #include <spdlog/spdlog.h>
 

@@ -87,11 +87,13 @@ class Client:
         request.list_models.SetInParent()
         return list(self._call(request)[0].model_list.models)
 
-    def open(self, model="", session=""):
-        """Opens a model; the server's first by default, in a session of one's own by default."""
+    def open(self, model="", session="", watch=False):
+        """Opens a model; the server's first by default, in a session of one's own by default. `watch`: only to look; control that is
+        free is left to others."""
         request = envelope_pb2.Envelope()
         request.open_model.model = model
         request.open_model.session = session
+        request.open_model.watch = watch
         answer, payload = self._call(request)
         self.body = Body(answer.model_opened, payload)
         self.model_changed = False

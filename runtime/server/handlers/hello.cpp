@@ -67,7 +67,9 @@ Status check_hello(const v1::ClientHello& hello) {
 Status handle_client_hello(Client& client, const v1::ClientHello& hello, const Request& request) {
   if (Status status = check_hello(hello); !status.ok()) return status;
   SessionRegistry& registry = client.registry();
-  std::shared_ptr<const Pass> pass = client.pass() ? client.pass() : registry.passes().find(hello.token());
+  // The one that a WebSocket's request showed may be another by now.
+  const std::shared_ptr<const Pass> pass =
+      client.pass() ? registry.passes().again(*client.pass()) : registry.passes().find(hello.token());
   if (!pass) {
     registry.metrics().denied();
     return {StatusCode::unauthenticated, "hello: the token is missing or wrong (ask who runs the server)"};

@@ -113,7 +113,8 @@ const MessageRow* find_message(v1::Envelope::MessageCase message) {
 Status check_needs(const Client& client, const v1::Envelope& request) {
   const MessageRow& row = *find_message(request.message_case());
   const Needs& needs = row.needs;
-  if (const Right right = needed_right(needs, request); !client.may(right)) {
+  // Before the hello nobody has shown anything.
+  if (const Right right = needed_right(needs, request); needs.hello && !client.may(right)) {
     return {StatusCode::permission_denied,
             std::string(row.name) + ": the token of this connection may only " +
                 right_name(client.pass()->right) + " (show one that may " + right_name(right) + ")"};

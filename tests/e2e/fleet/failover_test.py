@@ -130,6 +130,29 @@ class Fleet(unittest.TestCase):
                 self.assertLess(time.monotonic(), deadline)
                 time.sleep(0.02)
 
+    def test_who_only_watches_is_back_first_and_leaves_control(self):
+        nodes = self.start()
+
+        def connect(watch):
+            client = Client("127.0.0.1", self.balancer.port, session="ward_3")
+            self.addCleanup(client.close)
+            return client, client.open(session="ward_3", watch=watch)
+
+        poser, body = connect(False)
+        watcher, _ = connect(True)
+        poser.send_pose(body.rest_pose())
+        lost = next(node for node in nodes if node.clients() == 2)
+        lost.stop(signal.SIGKILL)
+        watcher, _ = connect(True)
+        poser, body = connect(False)
+        self.assertFalse(watcher.has_control)
+        self.assertTrue(poser.has_control)
+        watcher.subscribe_mesh()
+        pose = body.rest_pose()
+        pose[1] = (0.9801, 0.1987, 0, 0)
+        poser.send_pose(pose, root_translation=(10, 0, 0))
+        self.assertTrue(any(frame.pose_sequence == 1 for frame in watcher.frames(10)))
+
     def test_pages(self):
         nodes = self.start()
         page = f"http://127.0.0.1:{self.balancer.http_port}"

@@ -79,7 +79,7 @@ export class Client extends Emitter<ClientEvents> {
     if (this.state.state === "closed") return;
     this.redial.stop();
     this.change({ state: "closed", reason });
-    this.tell({ case: "goodbye", value: { $typeName: "ecorche.v1.Goodbye", retrySeconds: 0 } });
+    this.tell({ case: "goodbye", value: { $typeName: "ecorche.v1.Goodbye", retrySeconds: 0, elsewhere: "" } });
     this.post({ kind: "hang up" });
     this.bridge.end();
     this.requests.fail(new ConnectionError(reason));
