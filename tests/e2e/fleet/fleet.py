@@ -89,7 +89,8 @@ class Balancer:
         text = replaced(text, f"bind :7070{tls}", f"bind 127.0.0.1:{self.port}{ours}")
         text = replaced(text, f"bind :443{tls} alpn http/1.1", f"bind 127.0.0.1:{self.http_port}{ours}")
         for node, address in zip(nodes, ("10.0.0.11", "10.0.0.12")):
-            text = replaced(text, f"{address}:7070 id {nodes.index(node) + 1} port 7071", f"127.0.0.1:{node.port} id {nodes.index(node) + 1} port {node.http_port}")
+            row = nodes.index(node) + 1
+            text = replaced(text, f"{address}:7070 id {row} check port 7071", f"127.0.0.1:{node.port} id {row} check port {node.http_port}")
             text = replaced(text, f"{address}:7071", f"127.0.0.1:{node.http_port}")
         self.path = pathlib.Path(self._folder.name) / "haproxy.cfg"
         self.path.write_text(text)
