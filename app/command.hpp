@@ -70,6 +70,7 @@ void declare_deformers(CLI::App& app, Program& program, Run& chosen);
 void declare_path(CLI::App& app, Program& program, Run& chosen);
 void declare_radiograph(CLI::App& app, Program& program, Run& chosen);
 void declare_fem(CLI::App& app, Program& program, Run& chosen);
+void declare_calibrate(CLI::App& app, Program& program, Run& chosen);
 void declare_contact(CLI::App& app, Program& program, Run& chosen);
 void declare_cohort(CLI::App& app, Program& program, Run& chosen);
 void declare_report(CLI::App& app, Program& program, Run& chosen);

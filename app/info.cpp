@@ -7,6 +7,7 @@
 #include "app/certificate_report.hpp"
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
+#include "app/correction_report.hpp"
 #include "app/joint_json.hpp"
 #include "app/pose_report.hpp"
 #include "app/text_line.hpp"
@@ -51,6 +52,8 @@ Json to_json(const std::string& path, const Model& model) {
            {"spheres", Json::array()},
            {"contacts", contacts_json(model)},
            {"skin_caps", caps_json(model)},
+           {"corrections", corrections_json(model)},
+           {"safe_ranges", safe_ranges_json(model)},
            {"provenance", model.provenance}};
   out["identity"] = text::hex(model_file::identity(model));
   for (std::size_t row = 0; row < model.segment_count(); ++row)
@@ -161,6 +164,7 @@ std::string info_text(const Json& info) {
                      at[1].get<double>(), at[2].get<double>());
   }
   if (!info["contacts"].empty()) out += "\n" + printable_lines(contacts_text(info["contacts"]));
+  out += printable_lines(correction_text(info["corrections"], info["safe_ranges"]));
   out += "\ncertificate\n";
   for (const auto& [name, value] : info["certificate"].items()) {
     out += text_line("  %-28s %s", name.c_str(), value.dump().c_str());

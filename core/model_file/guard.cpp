@@ -17,19 +17,20 @@ namespace {
 constexpr hsize_t kMaxMembers = 4096;      // of one group: tissues are tens, segments at most hundreds
 constexpr std::size_t kMaxText = 1 << 20;  // bytes of one text
 constexpr std::array<unsigned char, 8> kMagic{0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
-constexpr std::array<std::string_view, 10> kParts{"skeleton", "weights", "cor",     "tissues",    "volumes",
-                                                  "spheres",  "labels",  "quality", "provenance", "digests"};
+constexpr std::array<std::string_view, 8> kParts{"skeleton", "weights",    "cor",        "labels",
+                                                 "quality",  "safe_range", "provenance", "digests"};
+// Groups of groups, a name each.
+constexpr std::array<std::string_view, 4> kNamedParts{"tissues", "volumes", "spheres", "correction"};
 
 // Whether this version knows the group; datasets in other groups belong to a newer minor version.
 bool known_group(const std::string& path) {
   if (path == "/VTKHDF" || path == "/VTKHDF/CellData" || path == "/VTKHDF/PointData" || path == "/ecorche")
     return true;
-  for (const std::string_view part : kParts) {
-    const std::string group = "/ecorche/" + std::string(part);
-    if (path == group) return true;
-    if (part == "tissues" || part == "volumes" || part == "spheres") {
-      if (path.starts_with(group + "/") && is_identifier(path.substr(group.size() + 1))) return true;
-    }
+  for (const std::string_view part : kParts)
+    if (path == "/ecorche/" + std::string(part)) return true;
+  for (const std::string_view part : kNamedParts) {
+    const std::string group = "/ecorche/" + std::string(part) + "/";
+    if (path.starts_with(group) && is_identifier(path.substr(group.size()))) return true;
   }
   return false;
 }

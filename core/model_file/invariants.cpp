@@ -9,6 +9,7 @@
 #include <span>
 
 #include <ecorche/values/volumetric_skeleton_check.hpp>
+#include "core/model_file/correction_defect.hpp"
 #include "core/model_file/in_turn.hpp"
 #include "core/values/identifier.hpp"
 
@@ -46,6 +47,7 @@ class Checker {
     part([this] { check_names(model_.spheres, "/ecorche/spheres"); });
     for (const VolumetricSkeleton& skeleton : model_.spheres)
       part([this, &skeleton] { check_spheres(skeleton); });
+    part([this] { check_corrections(); });
     run_as_in_turn(parts);
   }
 
@@ -310,6 +312,12 @@ class Checker {
       look(r);
       require_row(is_segment(skeleton.segment[r]), at + "/segment", "names no segment", r);
     }
+  }
+
+  void check_corrections() const {
+    context_.check_stop();
+    if (const auto defect = first_defect_of_corrections(model_))
+      require(false, defect->dataset, defect->what);
   }
 
   const Model& model_;

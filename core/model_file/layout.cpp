@@ -185,6 +185,33 @@ void add_spheres(Layout& out, const VolumetricSkeleton& skeleton, std::size_t in
   out.view<std::int32_t>(at + "segment", skeleton.segment, {rows});
 }
 
+void add_correction(Layout& out, const JointCorrection& correction, const std::string& joint,
+                    std::size_t index) {
+  const std::string at = "/ecorche/correction/" + joint + "/";
+  const auto modes = std::uint64_t{correction.scale.size()}, rows = std::uint64_t{correction.node.size()};
+  out.scalar(at + "index", static_cast<std::int32_t>(index));
+  out.view(at + "turn", elements(correction.turn), {count(correction.turn.rows()), 3});
+  out.view(at + "mix", elements(correction.mix), {count(correction.mix.rows()), modes});
+  out.view<float>(at + "scale", correction.scale, {modes});
+  out.view<std::uint32_t>(at + "node", correction.node, {rows});
+  out.view<std::int16_t>(at + "field", correction.field, {modes, rows, 3});
+}
+
+void add_safe_ranges(Layout& out, const std::vector<SafeRange>& ranges) {
+  if (ranges.empty()) return;
+  const std::string at = "/ecorche/safe_range/";
+  out.copy(at + "joint", column(ranges, [](const SafeRange& r) { return r.joint; }));
+  out.copy(at + "angle", column(ranges, [](const SafeRange& r) { return r.angle; }));
+  out.copy(at + "way", column(ranges, [](const SafeRange& r) { return r.way; }));
+  out.copy(at + "looked", column(ranges, [](const SafeRange& r) { return r.looked; }));
+  out.copy(at + "skinned_inverted", column(ranges, [](const SafeRange& r) { return r.skinned.inverted; }));
+  out.copy(at + "skinned_volume", column(ranges, [](const SafeRange& r) { return r.skinned.volume; }));
+  out.copy(at + "corrected_inverted",
+           column(ranges, [](const SafeRange& r) { return r.corrected.inverted; }));
+  out.copy(at + "corrected_volume", column(ranges, [](const SafeRange& r) { return r.corrected.volume; }));
+  out.copy(at + "bones", column(ranges, [](const SafeRange& r) { return r.bones; }));
+}
+
 void add_provenance(Layout& out, const std::map<std::string, std::string>& provenance) {
   std::vector<std::string> keys, values;
   for (const auto& [key, value] : provenance) {
@@ -222,6 +249,12 @@ Layout lay_out(const Model& model) {
   for (std::size_t i = 0; i < model.tissues.size(); ++i) add_tissue(out, model.tissues[i], i);
   for (std::size_t i = 0; i < model.volumes.size(); ++i) add_volume(out, model.volumes[i], i);
   for (std::size_t i = 0; i < model.spheres.size(); ++i) add_spheres(out, model.spheres[i], i);
+  for (std::size_t i = 0; i < model.corrections.size(); ++i) {
+    const JointCorrection& correction = model.corrections[i];
+    const auto joint = static_cast<std::size_t>(correction.joint);
+    add_correction(out, correction, model.rig.skeleton.segments[joint].joint.name, i);
+  }
+  add_safe_ranges(out, model.safe_ranges);
   for_each_figure(model.certificate, [&](std::string_view name, const auto& value) {
     out.scalar("/ecorche/quality/" + std::string(name), value);
   });

@@ -74,6 +74,7 @@ T* data_or_null(std::vector<T>& rows) {
 
 BodyParts::BodyParts(const Model& model)
     : clusters_(cluster_nodes(model, kinds_of_nodes(model))),
+      corrections_(model, clusters_),
       tissues_(model.tissues.size()),
       origin_(middle_of(floats(model.nodes))),
       reach_(std::max(1.0F, diagonal(model.nodes))) {
@@ -149,6 +150,7 @@ void BodyParts::make_scratch(PosedBody::Scratch& scratch) const {
   scratch.begun.resize(clusters_.slabs());
   scratch.late.reserve(runs_.size());
   scratch.bones.reserve(bones_.size());
+  scratch.modes.assign(corrections_.modes(), 0.0F);
 }
 
 // What is to be done for a frame, as all its threads read it.
@@ -228,6 +230,7 @@ void BodyParts::pose(const Model& model, Skinning skinning, std::span<const std:
                      NodesOf nodes, PosedBody& out) const {
   PosedBody::Scratch& scratch = out.scratch;
   choose(tissues, nodes, scratch);
+  corrections_.weigh(out.pose, scratch.modes);
   const RootMotion root = make_motions(out.segments, origin_, scratch.motions);
   for (std::size_t c = 0; c < 3; ++c) {
     out.box.low[c] = static_cast<float>(static_cast<double>(origin_[c] - reach_) + root.shift[c]);
@@ -238,7 +241,9 @@ void BodyParts::pose(const Model& model, Skinning skinning, std::span<const std:
                          root,
                          {},
                          std::span(scratch.lanes).first(3 * clusters_.node.size()),
-                         nodes == NodesOf::body ? std::span<float>(out.nodes) : std::span<float>()};
+                         nodes == NodesOf::body ? std::span<float>(out.nodes) : std::span<float>(),
+                         corrections_.modes() > 0 ? &corrections_ : nullptr,
+                         scratch.modes};
   const Frame frame{model, job, kernel_of(skinning), out};
 
   // Threads take spans of slabs, then blocks of bones. What reaches from a span into one before it waits

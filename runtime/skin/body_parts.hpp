@@ -8,6 +8,7 @@
 
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/values/model.hpp>
+#include "runtime/skin/corrections.hpp"
 #include "runtime/skin/move_vertices.hpp"
 #include "runtime/skin/node_clusters.hpp"
 
@@ -20,6 +21,7 @@ class BodyParts {
   explicit BodyParts(const Model& model);
 
   std::size_t lane_floats() const { return 3 * clusters_.node.size() + 1; }
+  std::size_t modes() const { return corrections_.modes(); }
   void make_scratch(PosedBody::Scratch& scratch) const;
 
   /// The nodes and tissues of `out.segments`, slab after slab: what hangs on a slab's nodes is moved while
@@ -58,6 +60,7 @@ class BodyParts {
   void move_bone(const Frame& frame, const Block& block) const;
 
   NodeClusters clusters_;
+  Corrections corrections_;
   std::vector<Part> tissues_;
   std::vector<Block> bones_;
   std::vector<Run> runs_;                 // by slab, then tissue

@@ -38,12 +38,23 @@ void check_tissue(const Model& model, const Tissue& tissue) {
   }
 }
 
+void check_correction(const Model& model, const JointCorrection& correction) {
+  const std::size_t modes = correction.scale.size(), rows = correction.node.size();
+  if (!below(&correction.joint, 1, model.segment_count()) ||
+      !below(correction.node.data(), rows, model.node_count()) ||
+      correction.field.size() != 3 * modes * rows || correction.mix.rows() != correction.turn.rows() ||
+      correction.mix.cols() != static_cast<Eigen::Index>(modes)) {
+    unfit(model, "a correction does not fit its nodes and joints");
+  }
+}
+
 void check_model(const Model& model) {
   if (model.segment_count() == 0 || model.node_count() == 0) unfit(model, "it has no segment or no node");
   if (!below(model.tets.data(), static_cast<std::size_t>(model.tets.size()), model.node_count())) {
     unfit(model, "a tet names an absent node");
   }
   for (const Tissue& tissue : model.tissues) check_tissue(model, tissue);
+  for (const JointCorrection& correction : model.corrections) check_correction(model, correction);
   // A rig that cannot be constrained is found here, not in the middle of a session.
   Pose rest = Pose::rest(model.segment_count());
   std::vector<ClampedJoint> clamped;
@@ -116,9 +127,9 @@ struct BodyPoser::Impl {
     bool good =
         frame.segments.size() == model->segment_count() &&
         frame.scratch.motions.size() == model->segment_count() &&
-        frame.scratch.lanes.size() == parts.lane_floats() && frame.nodes.size() == 3 * model->node_count() &&
-        frame.tissues.size() == model->tissues.size() && frame.quantised.size() == model->tissues.size() &&
-        frame.normals.size() == model->tissues.size();
+        frame.scratch.lanes.size() == parts.lane_floats() && frame.scratch.modes.size() == parts.modes() &&
+        frame.nodes.size() == 3 * model->node_count() && frame.tissues.size() == model->tissues.size() &&
+        frame.quantised.size() == model->tissues.size() && frame.normals.size() == model->tissues.size();
     const auto whole_or_none = [](std::size_t found, std::size_t size) {
       return found == 0 || found == size;
     };

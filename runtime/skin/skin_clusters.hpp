@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <ecorche/runtime/segment_motion.hpp>
+#include "runtime/skin/corrections.hpp"
 #include "runtime/skin/node_clusters.hpp"
 
 namespace ecorche::runtime {
@@ -19,6 +20,8 @@ struct SkinClusters {
   std::span<const std::uint32_t> clusters;  ///< which to skin; each below layout.clusters(), not checked here
   std::span<float> posed;                   ///< 3 * 64 * #clusters, LPS mm, a row a lane
   std::span<float> nodes;                   ///< empty, or 3 * #nodes: the same, a row a node of the model
+  const Corrections* corrections = nullptr;  ///< of `layout`; null: there are none
+  std::span<const float> modes = {};         ///< corrections->modes(), of the pose
 
   /// The first reason why a kernel must not be called; empty when it may.
   std::string_view check() const;
@@ -34,7 +37,8 @@ struct SkinClusters {
   void dqs() const;
   /// x' = R (x - p) + sum w_i (R_i p + t_i), with p the node's centre and R the turn of the blended
   /// quaternion sum w_i q_i / |sum w_i q_i| (LeHodgins16; Sujar18 4). Signs and vanished blends as above. A
-  /// node without a centre has itself as p, which is LBS.
+  /// node without a centre has itself as p, which is LBS. Corrections move x in the node's own frame: x' + R
+  /// u, u the sum of the fields; other methods leave them out.
   void cor() const;
 
   // All three: parallel over blocks of clusters in the caller's arena. Clusters do not depend on each other,

@@ -9,10 +9,33 @@
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
+/// The sum of the fields of a cluster's corrections at a vector of its lanes.
+HWY_INLINE V3 correction(const SkinClusters& job, std::size_t cluster, std::size_t lane) {
+  const hn::Rebind<std::int16_t, F> d;
+  const auto load = [&](const std::int16_t* from)
+                        HWY_ATTR { return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(d, from))); };
+  V3 u{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};
+  for (const Corrections::Part& part : job.corrections->of(cluster)) {
+    const std::int16_t* field = job.corrections->field(part) + lane;
+    for (std::size_t m = 0; m < part.modes; ++m, field += 3 * NodeClusters::size) {
+      const float mode = job.modes[part.first + m];
+      if (mode == 0) continue;
+      const V times_mode = all(mode);
+      u.x = hn::MulAdd(times_mode, load(field), u.x);
+      u.y = hn::MulAdd(times_mode, load(field + NodeClusters::size), u.y);
+      u.z = hn::MulAdd(times_mode, load(field + 2 * NodeClusters::size), u.z);
+    }
+  }
+  return u;
+}
+
 void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
   const V3 origin = all3(job.root.origin);
   const SegmentMotion* motions = job.motions.data();
   const float* centres = job.layout.centre.data();
+  // Asked once for a cluster: its vectors follow each other.
+  std::size_t last = ~std::size_t{0};
+  bool moves = false;
   for_clusters(job, begin, end, [&](const Cluster& cluster, std::size_t at, const V3& x) HWY_ATTR {
     const V3 p = load_planar(centres + at, NodeClusters::size);
     const V3 y = minus(p, origin);
@@ -31,7 +54,16 @@ void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
     if (HWY_UNLIKELY(any_vanished(squared))) {
       replace_vanished(motions, cluster, squared, &SegmentMotion::real, q);
     }
-    return plus(times(shift, all(1 / whole)), turn_less_identity(q.w, q.r, minus(x, p)));
+    const std::size_t c = at / (3 * NodeClusters::size);
+    if (job.corrections != nullptr && c != last) {
+      moves = job.corrections->moves(c, job.modes);
+      last = c;
+    }
+    const V3 e = times(shift, all(1 / whole)), arm = minus(x, p);
+    if (HWY_LIKELY(!moves)) return plus(e, turn_less_identity(q.w, q.r, arm));
+    // R (arm + u) - arm = (R - I) (arm + u) + u
+    const V3 u = correction(job, c, at % (3 * NodeClusters::size));
+    return plus(e, plus(turn_less_identity(q.w, q.r, plus(arm, u)), u));
   });
 }
 

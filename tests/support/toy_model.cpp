@@ -274,6 +274,30 @@ void make_spheres(Model& model) {
   model.spheres = {body};
 }
 
+JointCorrection made_up_correction(const Model& model, std::int32_t joint, const JointCorrection::Turns& turn,
+                                   std::size_t modes) {
+  std::vector<std::uint8_t> of_bone(model.node_count(), 0);
+  for (std::size_t t = 0; t < model.tet_count(); ++t)
+    for (int c = 0; c < 4 && model.tet_label[t] != TetMesh::soft; ++c)
+      of_bone[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(t), c))] = 1;
+  JointCorrection out;
+  out.joint = joint;
+  out.turn = turn;
+  std::uint32_t state = static_cast<std::uint32_t>(joint);
+  const auto next = [&state] {
+    return state = 1664525 * state + 1013904223;
+  };  // Numerical Recipes' generator
+  out.mix.resize(turn.rows(), static_cast<Eigen::Index>(modes));
+  for (Eigen::Index i = 0; i < out.mix.size(); ++i)
+    out.mix.data()[i] = static_cast<float>(next() >> 8) / (1 << 23) - 1;
+  for (std::size_t m = 0; m < modes; ++m) out.scale.push_back(2e-4F * static_cast<float>(m + 1));
+  for (std::uint32_t n = static_cast<std::uint32_t>(joint) % 2; n < model.node_count(); n += 2)
+    if (of_bone[n] == 0) out.node.push_back(n);
+  for (std::size_t i = 0; i < 3 * modes * out.node.size(); ++i)
+    out.field.push_back(static_cast<std::int16_t>(next() >> 16));
+  return out;
+}
+
 }  // namespace
 
 Model toy_model() {
@@ -309,6 +333,24 @@ Model fine_toy_model(int times) {
       }
     }
   }
+  return model;
+}
+
+Model corrected_toy_model() {
+  Model model = toy_model();
+  JointCorrection::Turns line(3, 3), around(5, 3);
+  line << 0.8, 0, 0, -0.5, 0, 0, 0.3, 0, 0;
+  around << 0.5, 0, 0, 0, -0.6, 0, 0, 0, 0.4, 0.3, 0.3, 0.2, -0.4, 0.1, -0.2;
+  model.corrections = {made_up_correction(model, 1, line, 3), made_up_correction(model, 2, around, 2)};
+  SafeRange range;
+  range.joint = 1;
+  range.looked = 2.5;
+  range.skinned = {0.75, 1.5};
+  range.corrected = {1.25, SafeRange::none};
+  model.safe_ranges = {range};
+  model.safe_ranges[0].way = -1;
+  model.safe_ranges.push_back(range);
+  model.safe_ranges[1].bones = 2;
   return model;
 }
 

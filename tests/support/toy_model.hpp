@@ -12,6 +12,10 @@ namespace ecorche::test {
 /// about each joint.
 Model toy_model();
 
+/// The same with a correction of its hinge (3 samples, as many modes) and of its ball (5 samples, 2 modes)
+/// that nobody measured, of every second free node each, and a safe range.
+Model corrected_toy_model();
+
 /// The same, its CT sampled so many times as finely along each axis: several bricks from 5 on.
 Model fine_toy_model(int times);
 

@@ -46,6 +46,18 @@ void describe(const ModelVolume& volume, v1::Volume& out) {
   for (const auto& [id, name] : volume.table) (*out.mutable_table())[id] = name;
 }
 
+void describe(const SafeRange& range, v1::SafeRange& out) {
+  out.set_joint(static_cast<std::uint32_t>(range.joint));
+  out.set_angle(static_cast<std::uint32_t>(range.angle));
+  out.set_negative(range.way < 0);
+  out.set_looked(range.looked);
+  out.set_skinned_inverted(range.skinned.inverted);
+  out.set_corrected_inverted(range.corrected.inverted);
+  out.set_skinned_volume(range.skinned.volume);
+  out.set_corrected_volume(range.corrected.volume);
+  out.set_bones(range.bones);
+}
+
 // While it waits for its own loops, the thread must not take up another job: that one could want the same.
 template <class Make>
 void once(std::once_flag& flag, Make&& make) {
@@ -79,6 +91,8 @@ struct ServedModel::Made {
     wire::to_proto(model.rig, *opened.mutable_skeleton());
     for (const Tissue& tissue : model.tissues) describe(tissue, *opened.add_tissues());
     for (const ModelVolume& volume : model.volumes) describe(volume, *opened.add_volumes());
+    opened.set_corrected(!model.corrections.empty());
+    for (const SafeRange& range : model.safe_ranges) describe(range, *opened.add_safe_ranges());
   }
   void lay_out(const Model& model) {
     auto payload = std::make_shared<wire::Payload>();
@@ -165,6 +179,7 @@ void ServedModel::describe_skinning(const std::vector<std::uint32_t>& tissues, s
   skinning_.describe(
       *poser_, [this](std::uint32_t l, std::uint32_t t) { return &level(l, t); }, tissues, detail, out,
       payload);
+  out.set_without_correction(!model().corrections.empty());
 }
 
 const runtime::Probe& ServedModel::probe() const {

@@ -2,6 +2,7 @@
 // Every invariant can be broken, and the message then names the dataset.
 #include "core/model_file/invariants.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 
@@ -135,6 +136,41 @@ const std::vector<Break> kBreaks{
     {"/ecorche/spheres/body/segment", [](Model& m) { m.spheres[1].segment.clear(); }},
     {"/ecorche/spheres/body/segment", [](Model& m) { m.spheres[1].segment[5] = VolumetricSkeleton::none; }},
     {"/ecorche/spheres/body/segment", [](Model& m) { m.spheres[1].segment[5] = 3; }},
+    {"/ecorche/correction", [](Model& m) { std::swap(m.corrections[0], m.corrections[1]); }},
+    {"/ecorche/correction", [](Model& m) { m.corrections[1].joint = 3; }},
+    {"/ecorche/correction", [](Model& m) { m.corrections[0].joint = -1; }},
+    {"/ecorche/correction/middle_joint/turn", [](Model& m) { m.corrections[0].turn.resize(0, 3); }},
+    {"/ecorche/correction/middle_joint/turn", [](Model& m) { m.corrections[0].turn(1, 0) = kNan; }},
+    {"/ecorche/correction/middle_joint/turn", [](Model& m) { m.corrections[0].turn(1, 0) = 4; }},
+    {"/ecorche/correction/middle_joint/turn", [](Model& m) { m.corrections[0].turn.row(1).setZero(); }},
+    {"/ecorche/correction/middle_joint/turn",
+     [](Model& m) { m.corrections[0].turn.row(1) = m.corrections[0].turn.row(0); }},
+    {"/ecorche/correction/middle_joint/turn", [](Model& m) { m.corrections[0].turn(1, 2) = 0.1; }},
+    {"/ecorche/correction/tip_joint/mix", [](Model& m) { m.corrections[1].mix(1, 1) = kNanF; }},
+    {"/ecorche/correction/tip_joint/mix", [](Model& m) { m.corrections[1].mix.resize(4, 2); }},
+    {"/ecorche/correction/tip_joint/mix",
+     [](Model& m) { m.corrections[1].mix.resize(5, 0), m.corrections[1].scale.clear(); }},
+    {"/ecorche/correction/tip_joint/scale", [](Model& m) { m.corrections[1].scale[1] = kNanF; }},
+    {"/ecorche/correction/tip_joint/node", [](Model& m) { m.corrections[1].node.clear(); }},
+    {"/ecorche/correction/tip_joint/node", [](Model& m) { m.corrections[1].node.back() = 1 << 20; }},
+    {"/ecorche/correction/tip_joint/node",
+     [](Model& m) { std::swap(m.corrections[1].node[0], m.corrections[1].node[1]); }},
+    {"/ecorche/correction/tip_joint/node",
+     [](Model& m) {
+       m.corrections[1].node = {static_cast<std::uint32_t>(m.tets(
+           std::find_if(m.tet_label.begin(), m.tet_label.end(), [](auto label) { return label != 0; }) -
+               m.tet_label.begin(),
+           0))};
+     }},
+    {"/ecorche/correction/tip_joint/field", [](Model& m) { m.corrections[1].field.pop_back(); }},
+    {"/ecorche/safe_range/joint", [](Model& m) { m.safe_ranges[1].joint = 3; }},
+    {"/ecorche/safe_range/joint", [](Model& m) { m.safe_ranges[1].way = -1; }},
+    {"/ecorche/safe_range/angle", [](Model& m) { m.safe_ranges[1].angle = 3; }},
+    {"/ecorche/safe_range/way", [](Model& m) { m.safe_ranges[1].way = 0; }},
+    {"/ecorche/safe_range/looked", [](Model& m) { m.safe_ranges[1].looked = kNan; }},
+    {"/ecorche/safe_range/skinned_volume", [](Model& m) { m.safe_ranges[1].skinned.volume = kNan; }},
+    {"/ecorche/safe_range/corrected_inverted", [](Model& m) { m.safe_ranges[1].corrected.inverted = -0.1; }},
+    {"/ecorche/safe_range/bones", [](Model& m) { m.safe_ranges[1].bones = 2.6; }},
 };
 
 TEST(Invariants, HoldForAGoodModel) {

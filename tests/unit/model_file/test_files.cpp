@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <tuple>
 
 #include <ecorche/model_file/model_file.hpp>
 #include "core/model_file/figures.hpp"
@@ -79,6 +80,9 @@ Model full_model() {
   few.parent = {VolumetricSkeleton::none, VolumetricSkeleton::none};
   few.segment = {2, 0};
   model.spheres.insert(model.spheres.begin(), few);
+  const Model corrected = corrected_toy_model();
+  model.corrections = corrected.corrections;
+  model.safe_ranges = corrected.safe_ranges;
   double figure = 1;
   Certificate& c = model.certificate;
   for (double* value :
@@ -217,6 +221,24 @@ void expect_same(const Model& a, const Model& b) {
     EXPECT_EQ(a.spheres[i].deficit, b.spheres[i].deficit);
     EXPECT_EQ(a.spheres[i].parent, b.spheres[i].parent);
     EXPECT_EQ(a.spheres[i].segment, b.spheres[i].segment);
+  }
+  ASSERT_EQ(a.corrections.size(), b.corrections.size());
+  for (std::size_t i = 0; i < a.corrections.size(); ++i) {
+    EXPECT_EQ(a.corrections[i].joint, b.corrections[i].joint);
+    EXPECT_TRUE(same(a.corrections[i].turn, b.corrections[i].turn));
+    EXPECT_TRUE(same(a.corrections[i].mix, b.corrections[i].mix));
+    EXPECT_EQ(a.corrections[i].scale, b.corrections[i].scale);
+    EXPECT_EQ(a.corrections[i].node, b.corrections[i].node);
+    EXPECT_EQ(a.corrections[i].field, b.corrections[i].field);
+  }
+  ASSERT_EQ(a.safe_ranges.size(), b.safe_ranges.size());
+  for (std::size_t i = 0; i < a.safe_ranges.size(); ++i) {
+    const SafeRange &p = a.safe_ranges[i], &q = b.safe_ranges[i];
+    EXPECT_EQ(std::tie(p.joint, p.angle, p.way, p.looked, p.bones),
+              std::tie(q.joint, q.angle, q.way, q.looked, q.bones));
+    EXPECT_EQ(std::tie(p.skinned.inverted, p.skinned.volume), std::tie(q.skinned.inverted, q.skinned.volume));
+    EXPECT_EQ(std::tie(p.corrected.inverted, p.corrected.volume),
+              std::tie(q.corrected.inverted, q.corrected.volume));
   }
   expect_same(a.certificate, b.certificate);
   EXPECT_EQ(a.provenance, b.provenance);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <ecorche/values/case.hpp>
+#include <ecorche/values/correction.hpp>
 #include <ecorche/values/image.hpp>
 #include <ecorche/values/mesh.hpp>
 #include <ecorche/values/skeleton.hpp>
@@ -113,6 +114,9 @@ struct Model {
   /// Bodies as balls, for the deformer that needs no tets; each with its tree, and every voxel hung on a
   /// segment of the rig. Empty unless asked for.
   std::vector<VolumetricSkeleton> spheres;
+  /// Ascending by joint. Empty unless `ecorche calibrate` made them, as are the ranges.
+  std::vector<JointCorrection> corrections;
+  std::vector<SafeRange> safe_ranges;  ///< ascending by joint, then angle, then way
   Certificate certificate;
   std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
 

@@ -71,6 +71,7 @@ struct PosedBody {
     std::vector<std::uint32_t> begun;  // per slab, where its thread had begun
     std::vector<std::uint32_t> late;   // runs of cells that reach across where two threads met
     std::vector<std::uint32_t> bones;  // blocks of bones
+    std::vector<float> modes;          // of the correction, mm a step of its fields
   } scratch;
 };
 

@@ -138,6 +138,8 @@ namespace Ecorche.Wire
         public readonly Repeated<Volume> Volumes = new Repeated<Volume>();
         public bool HasPose; public readonly PoseState Pose = new PoseState();
         public ulong LastSequence;
+        public bool Corrected;
+        public readonly Repeated<SafeRange> SafeRanges = new Repeated<SafeRange>();
 
         public void Clear()
         {
@@ -152,6 +154,8 @@ namespace Ecorche.Wire
             Volumes.Clear();
             HasPose = false;
             LastSequence = default;
+            Corrected = default;
+            SafeRanges.Clear();
         }
 
         internal void Read(ref WireReader from)
@@ -174,6 +178,55 @@ namespace Ecorche.Wire
                     case 74: { var inner = from.Message(); Volumes.Add().Read(ref inner); } break;
                     case 82: { var inner = from.Message(); Pose.Read(ref inner); } HasPose = true; break;
                     case 88: LastSequence = from.UInt64(); break;
+                    case 96: Corrected = from.Bool(); break;
+                    case 106: { var inner = from.Message(); SafeRanges.Add().Read(ref inner); } break;
+                    default: from.Skip(key); break;
+                }
+            }
+        }
+    }
+
+    public sealed class SafeRange
+    {
+        public uint Joint;
+        public uint Angle;
+        public bool Negative;
+        public double Looked;
+        public double SkinnedInverted;
+        public double CorrectedInverted;
+        public double SkinnedVolume;
+        public double CorrectedVolume;
+        public double Bones;
+
+        public void Clear()
+        {
+            Joint = default;
+            Angle = default;
+            Negative = default;
+            Looked = default;
+            SkinnedInverted = default;
+            CorrectedInverted = default;
+            SkinnedVolume = default;
+            CorrectedVolume = default;
+            Bones = default;
+        }
+
+        internal void Read(ref WireReader from)
+        {
+            Clear();
+            for (uint key; (key = from.Key()) != 0;)
+            {
+                switch (key)
+                {
+                    case 8: Joint = from.UInt32(); break;
+                    case 16: Angle = from.UInt32(); break;
+                    case 24: Negative = from.Bool(); break;
+                    case 33: Looked = from.Double(); break;
+                    case 41: SkinnedInverted = from.Double(); break;
+                    case 49: CorrectedInverted = from.Double(); break;
+                    case 57: SkinnedVolume = from.Double(); break;
+                    case 65: CorrectedVolume = from.Double(); break;
+                    case 73: Bones = from.Double(); break;
                     default: from.Skip(key); break;
                 }
             }
@@ -314,45 +367,6 @@ namespace Ecorche.Wire
                     case 24: DrivenAngle = from.UInt32(); HasDrivenAngle = true; break;
                     case 32: SlideAxis = from.UInt32(); HasSlideAxis = true; break;
                     case 41: Ratio = from.Double(); break;
-                    default: from.Skip(key); break;
-                }
-            }
-        }
-    }
-
-    public sealed class AngleAxis
-    {
-        public string Name = "";
-        public uint Axis;
-        public bool Negative;
-        public double Rest;
-        public double Min;
-        public double Max;
-
-        public void Clear()
-        {
-            Name = "";
-            Axis = default;
-            Negative = default;
-            Rest = default;
-            Min = default;
-            Max = default;
-        }
-
-        internal void Read(ref WireReader from)
-        {
-            var oldName = Name;
-            Clear();
-            for (uint key; (key = from.Key()) != 0;)
-            {
-                switch (key)
-                {
-                    case 10: Name = from.String(oldName); break;
-                    case 16: Axis = from.UInt32(); break;
-                    case 24: Negative = from.Bool(); break;
-                    case 33: Rest = from.Double(); break;
-                    case 41: Min = from.Double(); break;
-                    case 49: Max = from.Double(); break;
                     default: from.Skip(key); break;
                 }
             }

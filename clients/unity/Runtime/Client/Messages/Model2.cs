@@ -2,6 +2,45 @@
 // Made by scripts/csharp_messages of proto/ecorche/v1/model.proto, which says what these mean.
 namespace Ecorche.Wire
 {
+    public sealed class AngleAxis
+    {
+        public string Name = "";
+        public uint Axis;
+        public bool Negative;
+        public double Rest;
+        public double Min;
+        public double Max;
+
+        public void Clear()
+        {
+            Name = "";
+            Axis = default;
+            Negative = default;
+            Rest = default;
+            Min = default;
+            Max = default;
+        }
+
+        internal void Read(ref WireReader from)
+        {
+            var oldName = Name;
+            Clear();
+            for (uint key; (key = from.Key()) != 0;)
+            {
+                switch (key)
+                {
+                    case 10: Name = from.String(oldName); break;
+                    case 16: Axis = from.UInt32(); break;
+                    case 24: Negative = from.Bool(); break;
+                    case 33: Rest = from.Double(); break;
+                    case 41: Min = from.Double(); break;
+                    case 49: Max = from.Double(); break;
+                    default: from.Skip(key); break;
+                }
+            }
+        }
+    }
+
     public sealed class Tissue
     {
         public string Name = "";

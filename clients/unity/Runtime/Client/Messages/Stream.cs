@@ -300,6 +300,7 @@ namespace Ecorche.Wire
         public double LargestNormalError;
         public double UsualNormalError;
         public readonly Repeated<string> Measured = new Repeated<string>();
+        public bool WithoutCorrection;
 
         public void Clear()
         {
@@ -309,6 +310,7 @@ namespace Ecorche.Wire
             LargestNormalError = default;
             UsualNormalError = default;
             Measured.Clear();
+            WithoutCorrection = default;
         }
 
         internal void Read(ref WireReader from)
@@ -324,6 +326,7 @@ namespace Ecorche.Wire
                     case 33: LargestNormalError = from.Double(); break;
                     case 41: UsualNormalError = from.Double(); break;
                     case 50: Measured.Append(from.String(Measured.Spare)); break;
+                    case 56: WithoutCorrection = from.Bool(); break;
                     default: from.Skip(key); break;
                 }
             }

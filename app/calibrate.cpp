@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// ecorche calibrate MODEL: joints sampled by finite elements, and what skinning misses kept in the model.
+#include <fmt/format.h>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+
+#include <ecorche/model_file/model_file.hpp>
+#include "app/command.hpp"
+#include "app/correction_report.hpp"
+#include "app/safe_range.hpp"
+#include "app/stage_folder.hpp"
+#include "preprocess/correct/calibrate.hpp"
+
+namespace ecorche::app {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr double kCacheGib = 1000;  // samples are never worth less than the time they took
+
+struct CalibrateSettings {
+  fs::path model, output, cache;
+  correct::CalibrateOptions options;
+  bool ranges = true;
+};
+
+json report_of(const correct::JointReport& joint) {
+  return {{"joint", joint.joint},     {"tets", joint.tets},    {"free_nodes", joint.free_nodes},
+          {"samples", joint.samples}, {"clean", joint.clean},  {"clean_deg", joint.clean_deg},
+          {"nodes", joint.nodes},     {"modes", joint.modes},  {"bytes", joint.bytes},
+          {"mean_mm", joint.mean_mm}, {"max_mm", joint.max_mm}};
+}
+
+std::string text_of(const json& report, const Model& model) {
+  std::string out = "joint, tets, samples clean of asked, to (deg), nodes, modes, KiB, at most (mm)\n";
+  for (const json& row : report["joints"])
+    out +=
+        fmt::format("  {:<24} {:>8} {:>3} of {:<3} {:>5.0f} {:>8} {:>3} {:>8.0f} {:>6.1f}\n",
+                    row["joint"].get<std::string>(), row["tets"].get<int>(), row["clean"].get<int>(),
+                    row["samples"].get<int>(), row["clean_deg"].get<double>(), row["nodes"].get<int>(),
+                    row["modes"].get<int>(), row["bytes"].get<double>() / 1024, row["max_mm"].get<double>());
+  out += correction_text(json::array(), safe_ranges_json(model));
+  return out + fmt::format(
+                   "\nsolved in {:.0f} s, ranges in {:.0f} s. Nearer to finite elements, never nearer to the "
+                   "patient.\n"
+                   "For training and education, not for planning surgery.",
+                   report["seconds"]["samples"].get<double>(), report["seconds"]["ranges"].get<double>());
+}
+
+// Joints without a clean sample keep skinning as it is, which must be said.
+void warn_of(const Program& program, const correct::Calibration& found) {
+  for (const correct::JointReport& joint : found.joints) {
+    if (joint.tets > 0 && joint.clean == 0)
+      program.note("warning: " + joint.joint +
+                   ": no sample by finite elements came out clean, so it stays as skinned (prepare the model "
+                   "with more tets)");
+  }
+}
+
+int run(const Program& program, const CalibrateSettings& s) {
+  using Clock = std::chrono::steady_clock;
+  const auto model = std::make_shared<Model>(model_file::read(s.model, program.context("reading")));
+  model->corrections.clear();
+  model->safe_ranges.clear();
+  std::optional<StageFolder> store;
+  if (!s.cache.empty()) store.emplace(s.cache, kCacheGib);
+  const auto began = Clock::now();
+  correct::Calibration found =
+      correct::calibrate(*model, s.options, store ? &*store : nullptr, program.context("finite elements"));
+  warn_of(program, found);
+  model->corrections = std::move(found.corrections);
+  const auto solved = Clock::now();
+  std::vector<std::size_t> rows;
+  for (const std::string& joint : s.options.joints)
+    rows.push_back(static_cast<std::size_t>(model->rig.skeleton.find_joint(joint)));
+  if (s.ranges) model->safe_ranges = measure_safe_ranges(model, rows, program.context("safe ranges"));
+  const auto measured = Clock::now();
+  model->provenance["correction"] =
+      fmt::format("p1 stable_neo_hookean, Poisson's ratio {:g}, step {:g} deg, from {:g} mm",
+                  s.options.poisson, s.options.step_deg, s.options.least_mm);
+  model_file::write(*model, s.output, program.context("writing"));
+  const auto seconds = [](auto from, auto to) { return std::chrono::duration<double>(to - from).count(); };
+  json report{{"ok", true},
+              {"output", s.output.string()},
+              {"joints", json::array()},
+              {"safe_ranges", safe_ranges_json(*model)},
+              {"seconds", {{"samples", seconds(began, solved)}, {"ranges", seconds(solved, measured)}}},
+              {"purpose", "training and education, not planning of surgery"}};
+  for (const correct::JointReport& joint : found.joints) report["joints"].push_back(report_of(joint));
+  program.result(text_of(report, *model), report);
+  return 0;
+}
+
+}  // namespace
+
+void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
+  const auto s = std::make_shared<CalibrateSettings>();
+  CLI::App* command = app.add_subcommand(
+      "calibrate", "move skinning towards finite elements: joints sampled, the difference kept in the model");
+  command->add_option("MODEL", s->model, "a model that preprocess made")->required();
+  command->add_option("-o,--output", s->output, "the model with its correction, ending in .hdf")->required();
+  command
+      ->add_option("--joints", s->options.joints,
+                   "joints to sample, with commas between; without it all that turn by themselves")
+      ->delimiter(',');
+  command->add_option("--step", s->options.step_deg, "degrees between samples of a hinge, at most")
+      ->check(CLI::Range(2.0, 60.0))
+      ->capture_default_str();
+  command
+      ->add_option("--least", s->options.least_mm,
+                   "mm: where every sample moves a node less, nothing is kept of it")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  command->add_option("--cache", s->cache,
+                      "a folder that keeps each solved sample: resumes an interrupted run");
+  command->add_flag("!--no-ranges", s->ranges, "leave out how far each joint may be turned");
+  command->footer(
+      "Skinning about centres of rotation is corrected, lbs and dqs are not.\n"
+      "Nearer to finite elements, never nearer to the patient: one material, glued to the bones, no "
+      "gravity.");
+  command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a model's correction and its safe ranges are, for `info` and `calibrate`.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include <ecorche/values/model.hpp>
+
+namespace ecorche::app {
+
+/// A row a joint: how many samples, modes and nodes, the largest displacement and the largest turn sampled.
+nlohmann::json corrections_json(const Model& model);
+
+/// A row a joint, angle and way, in degrees, anatomical; null where nothing was met up to `looked_deg`.
+nlohmann::json safe_ranges_json(const Model& model);
+
+/// Both as tables; empty where the model has none.
+std::string correction_text(const nlohmann::json& corrections, const nlohmann::json& ranges);
+
+}  // namespace ecorche::app

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/safe_range.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
+#include "app/bone_overlap.hpp"
+#include "preprocess/correct/samples.hpp"
+#include "preprocess/fem/body.hpp"
+
+namespace ecorche::app {
+namespace {
+
+// Of the preparation; a millimetre where the model does not say.
+double voxel_mm(const Model& model) {
+  const auto found = model.provenance.find("option/voxel_mm");
+  double value = 0;
+  if (found != model.provenance.end())
+    std::from_chars(found->second.data(), found->second.data() + found->second.size(), value);
+  return value > 0 ? value : 1;
+}
+
+// What of a body can go wrong by skinning.
+struct Watched {
+  std::vector<std::int32_t> tets;      // free ones that bones do not squeeze
+  std::vector<std::uint32_t> tissues;  // closed, and hung on tets
+  std::vector<double> volume;          // theirs at rest
+};
+
+Watched watched(const Model& model) {
+  Watched out;
+  const fem::Body body = fem::body_of(model, fem::Element::p1);
+  for (std::size_t t = 0; t < body.tet.size(); ++t)
+    if (body.mesh.squeezed[t] == 0) out.tets.push_back(body.tet[t]);
+  const std::vector<std::uint8_t> closed = runtime::closed_surfaces(model);
+  for (std::size_t t = 0; t < model.tissues.size(); ++t) {
+    const Tissue& tissue = model.tissues[t];
+    if (closed[t] == 0 || tissue.segment != Tissue::by_tets) continue;
+    const double volume =
+        runtime::enclosed_volume({tissue.V.data(), static_cast<std::size_t>(tissue.V.size())}, tissue.F);
+    if (!(std::abs(volume) > 0)) continue;
+    out.tissues.push_back(static_cast<std::uint32_t>(t));
+    out.volume.push_back(volume);
+  }
+  return out;
+}
+
+// One way of skinning.
+class Skinned {
+ public:
+  Skinned(const std::shared_ptr<const Model>& model, const Watched& watched)
+      : poser_(model), watched_(watched), body_(poser_.make_frame()) {}
+
+  // Writes `turn` into what of `ends` fails here first.
+  void look(const Pose& pose, double turn, SafeRange::Ends& ends) {
+    const bool tets = ends.inverted == SafeRange::none, volumes = ends.volume == SafeRange::none;
+    if (!tets && !volumes) return;
+    const std::span<const std::uint32_t> tissues =
+        volumes ? std::span(watched_.tissues) : std::span<const std::uint32_t>();
+    if (!poser_.run(pose, runtime::Skinning::cor, tissues, body_).ok()) return;
+    if (tets && any_inverted()) ends.inverted = turn;
+    if (volumes && any_changed()) ends.volume = turn;
+  }
+
+ private:
+  bool any_inverted() const {
+    const std::vector<float> det = runtime::tet_det_f(poser_.model(), body_.nodes);
+    return std::any_of(watched_.tets.begin(), watched_.tets.end(),
+                       [&](std::int32_t t) { return !(det[static_cast<std::size_t>(t)] > 0); });
+  }
+  bool any_changed() const {
+    for (std::size_t i = 0; i < watched_.tissues.size(); ++i) {
+      const std::uint32_t t = watched_.tissues[i];
+      const double now = runtime::enclosed_volume(body_.tissues[t], poser_.model().tissues[t].F);
+      if (std::abs(now / watched_.volume[i] - 1) > kSafeVolume) return true;
+    }
+    return false;
+  }
+
+  runtime::BodyPoser poser_;
+  const Watched& watched_;
+  runtime::PosedBody body_;
+};
+
+std::shared_ptr<const Model> without_corrections(const Model& model) {
+  auto out = std::make_shared<Model>(model);
+  out->corrections.clear();
+  return out;
+}
+
+bool corrects(const Model& model, std::size_t joint) {
+  return std::any_of(model.corrections.begin(), model.corrections.end(),
+                     [&](const JointCorrection& c) { return static_cast<std::size_t>(c.joint) == joint; });
+}
+
+bool both(const SafeRange::Ends& ends) {
+  return ends.inverted != SafeRange::none && ends.volume != SafeRange::none;
+}
+
+}  // namespace
+
+std::vector<SafeRange> measure_safe_ranges(const std::shared_ptr<const Model>& model,
+                                           const std::vector<std::size_t>& joints, const Context& context) {
+  const Skeleton& skeleton = model->rig.skeleton;
+  const Watched what = watched(*model);
+  Skinned plain(without_corrections(*model), what), corrected(model, what);
+  BoneOverlap bones(*model);
+  const double voxel = voxel_mm(*model);
+  std::vector<SafeRange> out;
+  for (std::size_t j = 0; j < skeleton.segments.size(); ++j) {
+    context.report(static_cast<double>(j) / static_cast<double>(skeleton.segments.size()));
+    const bool asked = joints.empty() || std::find(joints.begin(), joints.end(), j) != joints.end();
+    if (!asked || !correct::turns_by_itself(skeleton, j)) continue;
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (const int way : {-1, 1}) {
+        SafeRange range;
+        range.joint = static_cast<std::int32_t>(j);
+        range.angle = static_cast<std::int32_t>(a);
+        range.way = way;
+        range.looked = correct::reach(skeleton.segments[j].joint, a, way);
+        if (!(range.looked >= kSafeStep)) continue;
+        const bool both_ways = corrects(*model, j);
+        for (double turn = kSafeStep; turn <= range.looked; turn += kSafeStep) {
+          context.check_stop();
+          if (both(range.skinned) && (both(range.corrected) || !both_ways) && range.bones != SafeRange::none)
+            break;
+          const Pose pose =
+              correct::turned(skeleton, j, way * turn * Eigen::Vector3d::Unit(static_cast<Eigen::Index>(a)));
+          plain.look(pose, turn, range.skinned);
+          if (both_ways) corrected.look(pose, turn, range.corrected);
+          if (range.bones == SafeRange::none && bones.meet(kinematics::forward(model->rig, pose), voxel))
+            range.bones = turn;
+        }
+        if (!both_ways) range.corrected = range.skinned;
+        out.push_back(range);
+      }
+    }
+  }
+  context.report(1);
+  return out;
+}
+
+}  // namespace ecorche::app

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/correct/calibrate.hpp"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <mutex>
+#include <numbers>
+
+#include <ecorche/kinematics/forward.hpp>
+#include <ecorche/model_file/model_file.hpp>
+#include "preprocess/cache/kept_stage.hpp"
+#include "preprocess/correct/compress.hpp"
+#include "preprocess/correct/samples.hpp"
+#include "preprocess/correct/solve_sample.hpp"
+
+namespace ecorche::correct {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// One at a time: joints are solved side by side.
+class SharedStore : public preprocess::StageStore {
+ public:
+  explicit SharedStore(preprocess::StageStore& store) : store_(store) {}
+  std::uint64_t program() const override { return store_.program(); }
+  std::optional<std::string> find(std::string_view name) override {
+    const std::lock_guard lock(mutex_);
+    return store_.find(name);
+  }
+  void keep(std::string_view name, std::string_view bytes) override {
+    const std::lock_guard lock(mutex_);
+    store_.keep(name, bytes);
+  }
+
+ private:
+  preprocess::StageStore& store_;
+  std::mutex mutex_;
+};
+
+// The whole of `context`'s progress, from parts that end in any order.
+class Progress {
+ public:
+  Progress(const Context& context, std::size_t all) : context_(context), all_(all) {}
+  void add(std::size_t samples) {
+    const std::lock_guard lock(mutex_);
+    done_ += samples;
+    context_.report(static_cast<double>(done_) / static_cast<double>(std::max<std::size_t>(1, all_)));
+  }
+
+ private:
+  const Context& context_;
+  std::size_t all_, done_ = 0;
+  std::mutex mutex_;
+};
+
+std::vector<std::size_t> joints_of(const Skeleton& skeleton, const std::vector<std::string>& names) {
+  std::vector<std::size_t> out;
+  for (std::size_t j = 0; j < skeleton.segments.size(); ++j) {
+    const std::string& name = skeleton.segments[j].joint.name;
+    const bool asked = names.empty() || std::find(names.begin(), names.end(), name) != names.end();
+    if (asked && turns_by_itself(skeleton, j)) out.push_back(j);
+  }
+  for (const std::string& name : names) {
+    const int row = skeleton.find_joint(name);
+    if (row < 0 || !turns_by_itself(skeleton, static_cast<std::size_t>(row)))
+      throw Error(ErrorKind::usage, "--joints", "'" + name + "' is no joint that turns by itself",
+                  "choose among those that ecorche info names");
+  }
+  return out;
+}
+
+class OneJoint {
+ public:
+  OneJoint(const Model& model, std::size_t joint, const CalibrateOptions& options, std::uint64_t identity)
+      : model_(model), joint_(joint), options_(options), identity_(identity) {
+    samples_ = samples_of(model.rig.skeleton, joint, options.step_deg * kDegree);
+  }
+
+  std::size_t samples() const { return samples_.size(); }
+
+  void solve(const fem::Material& material, SharedStore* store, Progress& progress, const Context& context) {
+    std::vector<std::vector<RigidTransform>> motions;
+    for (const Sample& sample : samples_) motions.push_back(kinematics::forward(model_.rig, sample.pose));
+    report_.joint = joint().name;
+    report_.samples = samples_.size();
+    const Neighbourhood part = neighbourhood(model_, motions, options_.least_share);
+    report_.tets = part.mesh.tets();
+    report_.free_nodes = part.mesh.free_nodes;
+    solved_.resize(samples_.size());
+    if (part.mesh.free_nodes > 0) {
+      SampleSolver solver(model_, part, material);
+      for (std::size_t s = 0; s < samples_.size(); ++s) {
+        solved_[s] = sample(solver, s, store, context);
+        progress.add(1);
+      }
+      keep(part);
+    } else {
+      progress.add(samples_.size());
+    }
+  }
+
+  const JointReport& report() const { return report_; }
+  const JointCorrection& correction() const { return correction_; }
+
+ private:
+  const Joint& joint() const { return model_.rig.skeleton.segments[joint_].joint; }
+
+  SolvedSample sample(SampleSolver& solver, std::size_t s, SharedStore* store, const Context& context) const {
+    const Sample& asked = samples_[s];
+    const SolvedSample* before = asked.from < 0 ? nullptr : &solved_[static_cast<std::size_t>(asked.from)];
+    if (before != nullptr && before->clean == 0) return {};
+    const auto make = [&](const Context& quiet) {
+      return solver.solve(asked.pose, before != nullptr ? before->displacement : std::vector<float>(), quiet);
+    };
+    if (store == nullptr) return make(context);
+    // All that a chain depends on; the places of its samples say the rest.
+    std::vector<double> turns;
+    for (const Sample& other : samples_) turns.insert(turns.end(), other.turn.begin(), other.turn.end());
+    const std::string name =
+        preprocess::cache::key(*store, "sample", identity_, std::uint64_t{joint_}, std::uint64_t{s}, turns,
+                               options_.least_share, options_.poisson);
+    if (auto kept = preprocess::cache::take<SolvedSample>(*store, name, context)) return std::move(*kept);
+    return preprocess::cache::make_and_keep(*store, name, context, make);
+  }
+
+  void keep(const Neighbourhood& part) {
+    std::vector<std::vector<float>> fields;
+    std::vector<Eigen::RowVector3d> turns;
+    for (std::size_t s = 0; s < samples_.size(); ++s) {
+      if (solved_[s].clean == 0) continue;
+      fields.push_back(solved_[s].displacement);
+      turns.push_back(samples_[s].turn);
+      report_.clean_deg = std::max(report_.clean_deg, samples_[s].turn.norm() / kDegree);
+    }
+    report_.clean = fields.size();
+    if (fields.empty()) return;
+    JointCorrection::Turns turn(static_cast<Eigen::Index>(turns.size()), 3);
+    for (std::size_t s = 0; s < turns.size(); ++s) turn.row(static_cast<Eigen::Index>(s)) = turns[s];
+    CompressOptions options;
+    options.least_mm = options_.least_mm;
+    correction_ = compress(static_cast<std::int32_t>(joint_), joint().kind == JointKind::hinge, turn, fields,
+                           part.node, options);
+    report_.nodes = correction_.node.size();
+    report_.modes = correction_.scale.size();
+    report_.bytes =
+        correction_.field.size() * sizeof(std::int16_t) + correction_.node.size() * sizeof(std::uint32_t);
+    measure();
+  }
+
+  void measure() {
+    for (std::size_t s = 0; s < static_cast<std::size_t>(correction_.turn.rows()) && report_.nodes > 0; ++s) {
+      const std::vector<float> field = field_of(correction_, s);
+      double sum = 0, most = 0;
+      for (std::size_t n = 0; n < report_.nodes; ++n) {
+        const auto moved = static_cast<double>(Eigen::Map<const Eigen::Vector3f>(&field[3 * n]).norm());
+        sum += moved;
+        most = std::max(most, moved);
+      }
+      report_.mean_mm = std::max(report_.mean_mm, sum / static_cast<double>(report_.nodes));
+      report_.max_mm = std::max(report_.max_mm, most);
+    }
+  }
+
+  const Model& model_;
+  std::size_t joint_;
+  const CalibrateOptions& options_;
+  std::uint64_t identity_;
+  std::vector<Sample> samples_;
+  std::vector<SolvedSample> solved_;
+  JointReport report_;
+  JointCorrection correction_;
+};
+
+}  // namespace
+
+Calibration calibrate(const Model& model, const CalibrateOptions& options, preprocess::StageStore* store,
+                      const Context& context) {
+  const auto material = fem::make_material("stable_neo_hookean", options.poisson);
+  const std::uint64_t identity = model_file::identity(model);
+  std::optional<SharedStore> shared;
+  if (store != nullptr) shared.emplace(*store);
+  std::vector<OneJoint> joints;
+  std::size_t samples = 0;
+  for (const std::size_t j : joints_of(model.rig.skeleton, options.joints)) {
+    joints.emplace_back(model, j, options, identity);
+    samples += joints.back().samples();
+  }
+  Progress progress(context, samples);
+  const Context quiet = context.quiet();
+  tbb::parallel_for(
+      std::size_t{0}, joints.size(),
+      [&](std::size_t i) {
+        // While one joint waits for its own loops, its thread must not begin another.
+        tbb::this_task_arena::isolate(
+            [&] { joints[i].solve(*material, shared ? &*shared : nullptr, progress, quiet); });
+      },
+      tbb::simple_partitioner());
+  Calibration out;
+  for (const OneJoint& joint : joints) {
+    out.joints.push_back(joint.report());
+    if (!joint.correction().node.empty()) out.corrections.push_back(joint.correction());
+  }
+  return out;
+}
+
+}  // namespace ecorche::correct

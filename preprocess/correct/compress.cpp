@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/correct/compress.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace ecorche::correct {
+namespace {
+
+constexpr float kMost = 32767;
+
+// #samples by 3 * #kept, mm.
+Eigen::MatrixXf rows_of(std::span<const std::vector<float>> fields, const std::vector<std::size_t>& kept) {
+  Eigen::MatrixXf out(static_cast<Eigen::Index>(fields.size()), static_cast<Eigen::Index>(3 * kept.size()));
+  for (std::size_t s = 0; s < fields.size(); ++s)
+    for (std::size_t k = 0; k < kept.size(); ++k)
+      for (std::size_t c = 0; c < 3; ++c)
+        out(static_cast<Eigen::Index>(s), static_cast<Eigen::Index>(3 * k + c)) = fields[s][3 * kept[k] + c];
+  return out;
+}
+
+// Columns: the shares of samples in modes, the weightiest first; of each the largest is positive.
+Eigen::MatrixXd principal(const Eigen::MatrixXf& rows, double left_mm, std::size_t most) {
+  const Eigen::Index samples = rows.rows();
+  Eigen::MatrixXd gram(samples, samples);
+  for (Eigen::Index a = 0; a < samples; ++a)
+    for (Eigen::Index b = 0; b <= a; ++b)
+      gram(a, b) = gram(b, a) = rows.row(a).cast<double>().dot(rows.row(b).cast<double>());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
+  const double enough =
+      left_mm * left_mm * static_cast<double>(samples) * static_cast<double>(rows.cols() / 3);
+  double left = gram.trace();
+  std::vector<Eigen::VectorXd> modes;
+  for (Eigen::Index m = samples - 1; m >= 0 && modes.size() < most && (left > enough || modes.empty()); --m) {
+    Eigen::VectorXd mode = eigen.eigenvectors().col(m);
+    Eigen::Index largest = 0;
+    mode.cwiseAbs().maxCoeff(&largest);
+    if (mode[largest] < 0) mode = -mode;
+    modes.push_back(std::move(mode));
+    left -= eigen.eigenvalues()[m];
+  }
+  Eigen::MatrixXd out(samples, static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t m = 0; m < modes.size(); ++m) out.col(static_cast<Eigen::Index>(m)) = modes[m];
+  return out;
+}
+
+}  // namespace
+
+JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::Turns& turn,
+                         std::span<const std::vector<float>> fields, const std::vector<std::uint32_t>& node,
+                         const CompressOptions& options) {
+  JointCorrection out;
+  out.joint = joint;
+  out.turn = turn;
+  std::vector<std::size_t> kept;
+  for (std::size_t n = 0; n < node.size(); ++n) {
+    const bool counts = std::any_of(fields.begin(), fields.end(), [&](const std::vector<float>& field) {
+      return static_cast<double>(Eigen::Map<const Eigen::Vector3f>(&field[3 * n]).norm()) > options.least_mm;
+    });
+    if (!counts) continue;
+    kept.push_back(n);
+    out.node.push_back(node[n]);
+  }
+  if (kept.empty()) return out;
+  const Eigen::MatrixXf rows = rows_of(fields, kept);
+  const Eigen::MatrixXd mix = hinge ? Eigen::MatrixXd::Identity(rows.rows(), rows.rows())
+                                    : principal(rows, options.least_mm, options.most_modes);
+  out.mix = mix.cast<float>();
+  for (Eigen::Index m = 0; m < mix.cols(); ++m) {
+    const Eigen::RowVectorXf mode = (mix.col(m).transpose() * rows.cast<double>()).cast<float>();
+    const float scale = std::max(mode.cwiseAbs().maxCoeff() / kMost, 1e-12F);
+    out.scale.push_back(scale);
+    for (Eigen::Index i = 0; i < mode.size(); ++i)
+      out.field.push_back(static_cast<std::int16_t>(std::lround(std::clamp(mode[i] / scale, -kMost, kMost))));
+  }
+  return out;
+}
+
+std::vector<float> field_of(const JointCorrection& correction, std::size_t s) {
+  const std::size_t numbers = 3 * correction.node.size();
+  std::vector<float> out(numbers, 0.0F);
+  for (std::size_t m = 0; m < correction.scale.size(); ++m) {
+    const float share =
+        correction.mix(static_cast<Eigen::Index>(s), static_cast<Eigen::Index>(m)) * correction.scale[m];
+    for (std::size_t i = 0; i < numbers; ++i)
+      out[i] += share * static_cast<float>(correction.field[numbers * m + i]);
+  }
+  return out;
+}
+
+}  // namespace ecorche::correct

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fields of samples as a model keeps them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <ecorche/values/correction.hpp>
+
+namespace ecorche::correct {
+
+struct CompressOptions {
+  double least_mm = 0.05;       ///< nodes that no sample moves farther are left out
+  std::size_t most_modes = 10;  ///< of a joint that is not a hinge
+};
+
+/// `fields`: a sample each, 3 * #node, mm; `turn`: theirs. A hinge keeps its samples as they are, since a
+/// pose takes two of them. Others keep principal modes (Kry02): as few as leave less than least_mm, root mean
+/// square over nodes and samples, but no more than most_modes. Each mode in 16 bits of its own largest
+/// number. Without a node that counts, `node` is empty. Deterministic.
+JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::Turns& turn,
+                         std::span<const std::vector<float>> fields, const std::vector<std::uint32_t>& node,
+                         const CompressOptions& options);
+
+/// What the joint is moved by at sample s: 3 * correction.node, mm.
+std::vector<float> field_of(const JointCorrection& correction, std::size_t s);
+
+}  // namespace ecorche::correct

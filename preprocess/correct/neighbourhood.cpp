@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/correct/neighbourhood.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+namespace ecorche::correct {
+namespace {
+
+constexpr double kSameTurn = 1e-9, kSameShift = 1e-6;  // of two segments that move as one; mm
+constexpr std::int32_t kNone = -1;
+
+bool alike(const RigidTransform& a, const RigidTransform& b) {
+  return std::abs(std::abs(a.q.dot(b.q)) - 1) < kSameTurn && (a.t - b.t).norm() < kSameShift;
+}
+
+// By segment: which of the rigid halves it belongs to, named by their first segment.
+std::vector<std::size_t> halves_of(std::span<const std::vector<RigidTransform>> poses, std::size_t segments) {
+  std::vector<std::size_t> half(segments);
+  for (std::size_t s = 0; s < segments; ++s) {
+    std::size_t first = 0;
+    const auto together = [&](std::size_t other) {
+      return std::all_of(poses.begin(), poses.end(),
+                         [&](const auto& pose) { return alike(pose[s], pose[other]); });
+    };
+    while (first < s && !together(first)) ++first;
+    half[s] = first;
+  }
+  return half;
+}
+
+// By node: the segment whose bone's tets have it.
+std::vector<std::int32_t> bone_of_nodes(const Model& model) {
+  std::vector<std::int32_t> out(model.node_count(), kNone);
+  for (std::size_t t = 0; t < model.tet_count(); ++t) {
+    if (model.tet_label[t] == TetMesh::soft) continue;
+    for (int c = 0; c < 4; ++c)
+      out[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(t), c))] =
+          model.bone_segment[model.tet_label[t] - 1U];
+  }
+  return out;
+}
+
+// What of a node's weight lies outside the half that has most of it.
+double divided(const Model& model, std::size_t node, const std::vector<std::size_t>& half,
+               std::vector<double>& of_half) {
+  std::fill(of_half.begin(), of_half.end(), 0.0);
+  double sum = 0;
+  for (auto e = model.weights.offsets[node]; e < model.weights.offsets[node + 1]; ++e) {
+    of_half[half[model.weights.segment[e]]] += static_cast<double>(model.weights.weight[e]);
+    sum += static_cast<double>(model.weights.weight[e]);
+  }
+  return 1 - *std::max_element(of_half.begin(), of_half.end()) / sum;
+}
+
+// Tets of parts that three held nodes or more place. `T`: rows of the model's nodes.
+std::vector<std::int32_t> placed(const Model& model, const std::vector<std::int32_t>& tets,
+                                 const std::vector<std::uint8_t>& is_free) {
+  std::vector<std::int32_t> up(model.node_count());
+  std::iota(up.begin(), up.end(), 0);
+  const auto at = [](std::int32_t row) { return static_cast<std::size_t>(row); };
+  const auto root = [&](std::int32_t n) {
+    while (up[at(n)] != n) n = up[at(n)] = up[at(up[at(n)])];
+    return n;
+  };
+  for (const std::int32_t t : tets) {
+    for (int c = 1; c < 4; ++c) {
+      const std::int32_t a = root(model.tets(t, 0)), b = root(model.tets(t, c));
+      up[at(std::max(a, b))] = std::min(a, b);
+    }
+  }
+  std::vector<std::uint8_t> seen(model.node_count(), 0);
+  std::vector<std::size_t> anchors(model.node_count(), 0);
+  for (const std::int32_t t : tets) {
+    for (int c = 0; c < 4; ++c) {
+      const std::int32_t n = model.tets(t, c);
+      if (is_free[at(n)] == 0 && std::exchange(seen[at(n)], 1) == 0) ++anchors[at(root(n))];
+    }
+  }
+  std::vector<std::int32_t> out;
+  for (const std::int32_t t : tets)
+    if (anchors[at(root(model.tets(t, 0)))] >= 3) out.push_back(t);
+  return out;
+}
+
+}  // namespace
+
+Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<RigidTransform>> poses,
+                            double least_share) {
+  const std::vector<std::size_t> half = halves_of(poses, model.segment_count());
+  const std::vector<std::int32_t> bone = bone_of_nodes(model);
+  std::vector<std::uint8_t> is_free(model.node_count(), 0);
+  std::vector<double> of_half(model.segment_count());
+  for (std::size_t n = 0; n < is_free.size(); ++n)
+    is_free[n] = bone[n] == kNone && divided(model, n, half, of_half) > least_share ? 1 : 0;
+
+  std::vector<std::int32_t> tets;
+  for (std::size_t t = 0; t < model.tet_count(); ++t) {
+    const auto row = static_cast<Eigen::Index>(t);
+    bool any = false;
+    for (int c = 0; c < 4; ++c) any = any || is_free[static_cast<std::size_t>(model.tets(row, c))] != 0;
+    if (any && model.tet_label[t] == TetMesh::soft) tets.push_back(static_cast<std::int32_t>(t));
+  }
+  tets = placed(model, tets, is_free);
+
+  Neighbourhood out;
+  std::vector<std::int32_t> local(model.node_count(), kNone);
+  for (const std::int32_t t : tets)
+    for (int c = 0; c < 4; ++c) local[static_cast<std::size_t>(model.tets(t, c))] = 0;
+  for (std::size_t n = 0; n < local.size(); ++n) {
+    if (local[n] == kNone) continue;
+    local[n] = static_cast<std::int32_t>(out.node.size());
+    out.node.push_back(static_cast<std::uint32_t>(n));
+  }
+  Points V(static_cast<Eigen::Index>(out.node.size()), 3);
+  std::vector<std::uint8_t> held(out.node.size());
+  for (std::size_t i = 0; i < out.node.size(); ++i) {
+    V.row(static_cast<Eigen::Index>(i)) =
+        model.nodes.row(static_cast<Eigen::Index>(out.node[i])).cast<double>();
+    held[i] = is_free[out.node[i]] != 0 ? 0 : 1;
+  }
+  Tets T(static_cast<Eigen::Index>(tets.size()), 4);
+  std::vector<std::uint8_t> squeezed;
+  for (std::size_t t = 0; t < tets.size(); ++t) {
+    std::size_t one = std::numeric_limits<std::size_t>::max();
+    bool two = false;
+    for (int c = 0; c < 4; ++c) {
+      const auto node = static_cast<std::size_t>(model.tets(tets[t], c));
+      T(static_cast<Eigen::Index>(t), c) = local[node];
+      if (bone[node] == kNone) continue;
+      const std::size_t of = half[static_cast<std::size_t>(bone[node])];
+      two = two || (one != std::numeric_limits<std::size_t>::max() && one != of);
+      one = of;
+    }
+    squeezed.push_back(two ? 1 : 0);
+  }
+  out.mesh = fem::make_mesh(fem::Element::p1, V, T, held, {});
+  out.mesh.squeezed = std::move(squeezed);
+  return out;
+}
+
+}  // namespace ecorche::correct

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finite elements about one joint, and how far they are from skinning.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <ecorche/values/context.hpp>
+#include <ecorche/values/model.hpp>
+#include <ecorche/values/pose.hpp>
+#include "preprocess/correct/neighbourhood.hpp"
+#include "preprocess/fem/assembly.hpp"
+#include "preprocess/fem/material.hpp"
+#include "preprocess/fem/newton.hpp"
+
+namespace ecorche::correct {
+
+struct SolvedSample {
+  std::uint8_t clean = 0;           ///< converged, and nothing inverted
+  std::uint64_t inverted_tets = 0;  ///< squeezed ones apart (fem::Total)
+  std::int32_t iterations = 0;
+  /// 3 * #node, mm, each in the frame that skinning turns with its node; zero for held ones. Empty where it
+  /// is not clean.
+  std::vector<float> displacement;
+};
+
+template <class A, class T>
+requires std::same_as<std::remove_const_t<T>, SolvedSample>
+void fields(A& archive, T& sample) {
+  archive(sample.clean, sample.inverted_tets, sample.iterations, sample.displacement);
+}
+
+/// Samples of one joint after each other: the factor of one preconditions the next.
+class SampleSolver {
+ public:
+  /// `model` and `part` must outlive it.
+  SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material);
+
+  /// `start`: displacements to begin from, as in SolvedSample, or empty: from skinning. Where that does not
+  /// end clean, from rest along the joint's way (fem::follow).
+  SolvedSample solve(const Pose& pose, const std::vector<float>& start, const Context& context);
+
+ private:
+  struct Skinned {
+    Points at;
+    std::vector<Eigen::Quaterniond> turn;
+  };
+  Skinned skin(const Pose& pose) const;
+
+  const Model& model_;
+  const Neighbourhood& part_;
+  const fem::Material& material_;
+  fem::Assembly assembly_;
+  std::unique_ptr<solve::SpdSolver> solver_;
+  fem::StepSolver steps_;
+};
+
+}  // namespace ecorche::correct

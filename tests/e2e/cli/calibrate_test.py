@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`ecorche calibrate` through the command: nearer to finite elements between samples, rest and bones as before, the same bytes when resumed."""
+import json
+import pathlib
+import shutil
+import tempfile
+import unittest
+
+from posed_files import CASE, run
+
+HEAD = "ecorche_pose: 1\nskeleton: phantom\n"
+
+
+class Calibrate(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.model, cls.calibrated = cls.folder / "coarse.hdf", cls.folder / "calibrated.hdf"
+        done = run("preprocess", CASE, "-o", cls.model, "--mesher", "lattice", "--max-tets", 40000)
+        assert done.returncode == 0, done.stderr
+        cls.cache = cls.folder / "samples"
+        done = run("--json", "calibrate", cls.model, "-o", cls.calibrated, "--joints", "elbow_right", "--cache", cls.cache, "--step", 30)
+        assert done.returncode == 0, done.stderr
+        cls.made = json.loads(done.stdout)
+
+    def pose(self, model, name, joints, *words):
+        file, out = self.folder / f"{name}.yaml", self.folder / f"{model.stem}_{name}_{len(words)}"
+        file.write_text(HEAD + joints)
+        done = run(*(words or ("pose",)), model, "-o", out, "--pose", file, "--tissues", "skin,humerus_right,radius_right")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return out
+
+    def test_a_pose_between_samples_is_nearer_to_finite_elements(self):
+        joints = "joints: {elbow_right: {flexion_deg: 40}}\n"
+        to_cor = [json.loads((self.pose(model, "forty", joints, "fem", "--one-start") / "fem.json").read_text())["to_cor"]
+                  for model in (self.model, self.calibrated)]
+        self.assertGreater(to_cor[0]["mean_mm"], 0.5)
+        self.assertLess(to_cor[1]["mean_mm"], 0.3 * to_cor[0]["mean_mm"])
+
+    def test_bones_and_rest_are_as_before(self):
+        bent = [self.pose(model, "bent", "joints: {elbow_right: {flexion_deg: 50}}\n") for model in (self.model, self.calibrated)]
+        for name, same in (("skin", False), ("humerus_right", True), ("radius_right", True)):
+            self.assertEqual((bent[0] / f"{name}.stl").read_bytes() == (bent[1] / f"{name}.stl").read_bytes(), same, name)
+        for name, joints in (("rest", "joints: {}\n"), ("other", "joints: {elbow_left: {flexion_deg: 50}}\n")):
+            posed = [self.pose(model, name, joints) for model in (self.model, self.calibrated)]
+            self.assertEqual((posed[0] / "skin.stl").read_bytes(), (posed[1] / "skin.stl").read_bytes(), name)
+
+    def test_info_and_verify_know_it(self):
+        info = json.loads(run("--json", "info", self.calibrated).stdout)
+        (correction,) = info["corrections"]
+        self.assertEqual(correction["joint"], "elbow_right")
+        self.assertEqual(correction["nodes"], self.made["joints"][0]["nodes"])
+        self.assertGreater(correction["largest_mm"], 1)
+        self.assertEqual(info["safe_ranges"], self.made["safe_ranges"])
+        flexion = next(row for row in info["safe_ranges"] if row["angle"] == "flexion" and row["way"] == 1)
+        skinned, corrected = flexion["skinned_deg"]["inverted"], flexion["corrected_deg"]["inverted"]
+        self.assertIsNotNone(skinned)
+        self.assertTrue(corrected is None or corrected >= skinned, flexion)
+        self.assertRegex(run("info", self.calibrated).stdout, r"elbow_right +flexion ")
+        self.assertEqual(run("verify", self.calibrated).returncode, 0)
+        self.assertEqual(json.loads(run("--json", "info", self.model).stdout)["corrections"], [])
+
+    def test_samples_are_kept_and_give_the_same_bytes(self):
+        kept = sorted(self.cache.glob("sample-*.stage"))
+        self.assertEqual(len(kept), self.made["joints"][0]["samples"])
+        for lost in kept[::2]:
+            lost.unlink()
+        again = self.folder / "again.hdf"
+        done = run("--threads", 1, "calibrate", self.model, "-o", again, "--joints", "elbow_right", "--cache", self.cache, "--step", 30)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(again.read_bytes(), self.calibrated.read_bytes())
+
+    def test_what_is_no_joint_is_refused(self):
+        done = run("calibrate", self.model, "-o", self.folder / "none.hdf", "--joints", "elbow_rigth")
+        self.assertEqual(done.returncode, 64)
+        self.assertIn("error: --joints: 'elbow_rigth' is no joint that turns by itself (choose among those that ecorche info names)", done.stderr)
+        self.assertFalse((self.folder / "none.hdf").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
