@@ -9,8 +9,8 @@
 namespace ecorche::runtime {
 namespace {
 
-// A joint of more samples is not made; poses are weighed without allocating.
-constexpr std::size_t kMostSamples = 256;
+// Poses are weighed without allocating.
+constexpr std::size_t kMostSamples = SampleShares::most_samples;
 
 Eigen::RowVector3d rotation_vector(const Eigen::Quaterniond& turn) {
   const double sine = turn.vec().norm();
@@ -28,9 +28,6 @@ double multiquadric(const Eigen::RowVector3d& a, const Eigen::RowVector3d& b) {
 SampleShares::SampleShares(const JointCorrection& correction, JointKind kind)
     : turn_(correction.turn), line_(kind == JointKind::hinge) {
   const Eigen::Index count = turn_.rows();
-  if (count == 0 || samples() > kMostSamples)
-    throw Error(ErrorKind::data, "correction", "has no samples, or more than 256",
-                "calibrate the model again");
   if (line_) {
     along_ = turn_.row(0).normalized();
     knot_.emplace_back(0, samples());

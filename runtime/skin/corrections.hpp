@@ -20,6 +20,8 @@ namespace ecorche::runtime {
 /// among them; beyond the box about the samples, as at its border. Exactly zero at rest.
 class SampleShares {
  public:
+  static constexpr std::size_t most_samples = 256;
+  /// Of 1 to most_samples samples.
   SampleShares(const JointCorrection& correction, JointKind kind);
 
   /// #samples, of a unit quaternion of the joint.

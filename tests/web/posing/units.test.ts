@@ -32,6 +32,17 @@ const SKELETON = {
 };
 const rig: Rig = rigOf(SKELETON);
 
+test("a ring shows where the body stays one: up to the first thing that goes wrong, or as far as was looked", () => {
+  const range = { joint: 2, angle: 0, negative: false, looked: 2.4, correctedInverted: 1.4, correctedVolume: Infinity, bones: 1.9 };
+  const safe = rigOf(SKELETON, [range, { ...range, negative: true, looked: 0.1, correctedInverted: Infinity, bones: Infinity },
+                                { ...range, joint: 1, angle: 2 }]);
+  const [hip, knee] = safe.segments.slice(1);
+  assert.deepEqual(knee!.joint.sequence[0]!.safe, { from: -0.1, to: 1.4 });
+  assert.deepEqual(hip!.joint.sequence[2]!.safe, { from: 0, to: 1.4 });
+  assert.equal(hip!.joint.sequence[0]!.safe, null);
+  assert.equal(rig.segments[2]!.joint.sequence[0]!.safe, null);
+});
+
 function poser(controls = true) {
   const sent: ReturnType<typeof wireOf>[] = [], said: string[] = [], history = new History();
   const made = new Poser(history, { setPose: (pose) => sent.push(pose) }, (text) => said.push(text));

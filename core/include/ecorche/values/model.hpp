@@ -114,11 +114,11 @@ struct Model {
   /// Bodies as balls, for the deformer that needs no tets; each with its tree, and every voxel hung on a
   /// segment of the rig. Empty unless asked for.
   std::vector<VolumetricSkeleton> spheres;
+  Certificate certificate;
+  std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
   /// Ascending by joint. Empty unless `ecorche calibrate` made them, as are the ranges.
   std::vector<JointCorrection> corrections;
   std::vector<SafeRange> safe_ranges;  ///< ascending by joint, then angle, then way
-  Certificate certificate;
-  std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
 
   /// Nodes of the tets.
   std::size_t node_count() const { return static_cast<std::size_t>(nodes.rows()); }

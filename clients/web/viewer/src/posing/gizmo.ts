@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rings of a joint as they are drawn: a ring an angle, the arc that its limits leave, how far it has turned, and a handle.
+// The rings of a joint as they are drawn: a ring an angle, the arc that its limits leave, within it a thinner one where the body stays one,
+// how far it has turned, and a handle.
 
 import * as THREE from "three";
 import { directionAt, type Ring } from "./ring.js";
@@ -50,6 +51,8 @@ function ink(shared: Shared, opacity: number): THREE.ShaderMaterial {
 }
 
 const SECTOR_STEPS = 360;
+/** Of the arc within a ring that shows its safe range, over the ring's. */
+const SAFE_RADIUS = 0.92;
 
 /** One ring; its geometry is of radius 1 about z, from x on. */
 class RingDrawing {
@@ -61,6 +64,7 @@ class RingDrawing {
   #handle: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>;
   #rim: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>;
   #stops: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>[] = [];
+  #safe: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial> | null = null;
 
   constructor(ring: Ring, shared: Shared) {
     const span = Math.min(ring.to - ring.from, 2 * Math.PI);
@@ -76,6 +80,9 @@ class RingDrawing {
     this.#whole = mesh(new THREE.TorusGeometry(1, 0.008, 6, 128), 0.35, 1);
     this.#edge = mesh(new THREE.TorusGeometry(1, 0.036, 8, 128, span), 0.6, 2);
     this.#arc = mesh(new THREE.TorusGeometry(1, 0.022, 8, 128, span), 1, 3);
+    if (ring.safe) {
+      this.#safe = mesh(new THREE.TorusGeometry(SAFE_RADIUS, 0.012, 6, 96, Math.min(ring.safe.to - ring.safe.from, 2 * Math.PI)), 0.9, 3);
+    }
     if (ring.limited) this.#stops = [0, 1].map(() => mesh(new THREE.BoxGeometry(0.16, 0.035, 0.035), 1, 4));
     this.#rim = mesh(new THREE.SphereGeometry(0.1, 24, 16), 1, 5);
     this.#handle = mesh(new THREE.SphereGeometry(0.075, 24, 16), 1, 6);
@@ -93,6 +100,10 @@ class RingDrawing {
     set(this.#whole, at(from, ring.center, radius));
     set(this.#edge, at(from, ring.center, radius));
     set(this.#arc, at(from, ring.center, radius));
+    if (this.#safe && ring.safe) {
+      set(this.#safe, at(directionAt(ring, ring.safe.from), ring.center, radius));
+      this.#safe.material.uniforms["color"]!.value = look.color;
+    }
     const low = Math.min(ring.rest, ring.value), turned = Math.abs(ring.value - ring.rest);
     set(this.#sector, at(directionAt(ring, low), ring.center, radius));
     this.#sector.geometry.setDrawRange(0, 3 * Math.min(SECTOR_STEPS, Math.round((turned / (2 * Math.PI)) * SECTOR_STEPS)));

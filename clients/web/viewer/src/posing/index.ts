@@ -99,7 +99,7 @@ function listen(client: Client, poser: Poser, clips: Clips): void {
 function opened(poser: Poser, model: ModelOpened, again: boolean): void {
   if (!model.skeleton) return;
   const before = again ? poser.state.asked : null;
-  const rig = rigOf(model.skeleton);
+  const rig = rigOf(model.skeleton, model.safeRanges);
   const controls = model.role === Role.CONTROLLER;
   // Older servers do not tell: then a session shows the scan, as a new one does.
   const shown = model.pose ?? { rotation: [] };

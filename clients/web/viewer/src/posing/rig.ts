@@ -16,6 +16,8 @@ export interface AngleAxis {
   readonly rest: number;
   readonly min: number;
   readonly max: number;
+  /** Where the body stays one, the other angles at rest: measured by `ecorche calibrate`; null where nobody did. */
+  readonly safe: { readonly from: number; readonly to: number } | null;
 }
 
 /** An angle or a slide that the server sets after another joint's angle, counted from rest. */
@@ -59,6 +61,17 @@ interface WireVector {
   readonly z: number;
 }
 
+/** What is read of the message `ecorche.v1.SafeRange`: turns from rest, infinite where nothing was met. */
+export interface WireSafeRange {
+  readonly joint: number;
+  readonly angle: number;
+  readonly negative: boolean;
+  readonly looked: number;
+  readonly correctedInverted: number;
+  readonly correctedVolume: number;
+  readonly bones: number;
+}
+
 type Drives = { case: "drivenAngle" | "slideAxis"; value: number } | { case: undefined; value?: undefined };
 
 /** What is read of the message `ecorche.v1.Skeleton`; servers older than `coupled` leave it out. */
@@ -85,8 +98,18 @@ const KINDS: readonly (JointKind | null)[] = [null, "ball", "hinge", "universal"
 
 const vector = (v?: WireVector): Vec3 => (v ? [v.x, v.y, v.z] : [0, 0, 0]);
 
+// The nearest of what goes wrong; as far as was looked where nothing does. A way that was not looked at leaves no room.
+function safeOf(ranges: readonly WireSafeRange[], joint: number, angle: number, rest: number): AngleAxis["safe"] {
+  const mine = ranges.filter((r) => r.joint === joint && r.angle === angle);
+  if (mine.length === 0) return null;
+  const far = (negative: boolean) =>
+    Math.max(0, ...mine.filter((r) => r.negative === negative)
+      .map((r) => Math.min(r.looked, r.correctedInverted, r.correctedVolume, r.bones)));
+  return { from: rest - far(true), to: rest + far(false) };
+}
+
 /** Throws where the skeleton is none: it decides what is sent for a patient. */
-export function rigOf(skeleton: WireSkeleton): Rig {
+export function rigOf(skeleton: WireSkeleton, safeRanges: readonly WireSafeRange[] = []): Rig {
   const segments = skeleton.segments.map((segment, row): Segment => {
     const joint = segment.joint;
     const kind = joint && KINDS[joint.kind];
@@ -106,8 +129,9 @@ export function rigOf(skeleton: WireSkeleton): Rig {
         kind,
         center: vector(joint.center),
         axes: [vector(joint.axisX), vector(joint.axisY), vector(joint.axisZ)],
-        sequence: joint.sequence.map((a) => ({
+        sequence: joint.sequence.map((a, i) => ({
           name: a.name, axis: a.axis, sign: a.negative ? -1 : 1, rest: a.rest, min: a.min, max: a.max,
+          safe: safeOf(safeRanges, row, i, a.rest),
         })),
         coupled: (joint.coupled ?? []).map((c) => ({
           joint: c.joint, angle: c.angle, ratio: c.ratio,

@@ -19,6 +19,8 @@ export interface Ring {
   readonly from: number;
   readonly to: number;
   readonly limited: boolean;
+  /** The part of it in which the body stays one; null where nobody measured. */
+  readonly safe: { readonly from: number; readonly to: number } | null;
   readonly center: Vec3;
   /** The angle grows as the segment turns about this, by the right hand. */
   readonly axis: Vec3;
@@ -55,6 +57,7 @@ export function ringsOf(rig: Rig, row: number, placed: PlacedJoint, limb: Vec3, 
       from: Number.isFinite(low) ? low : value - Math.PI,
       to: Number.isFinite(high) ? high : value + Math.PI,
       limited: Number.isFinite(low) && Number.isFinite(high),
+      safe: range.safe,
       handle: handleOf(rig, row, placed, limb, parent, angle),
     };
   });
