@@ -59,7 +59,8 @@ def curves(kit):
                         f"The built-in patient, {number(thing)} voxels; one curve; of which objects theirs are is not stated in what we hold."))
     tree = thinner(kit, 0.48, "--tree")[1]
     share = 100 * tree["skeletal"] / thing
-    rows.append(Row("4: skeletal voxels of the body", "42 298, 0.33 % of the object; 33 630 refilled; of what 9666, 3980, 1017 and 231 are is not stated in what we hold",
+    rows.append(Row("4: skeletal voxels of the body",
+                    "42 298, 0.33 % of the object; 33 630 refilled; of what 9666, 3980, 1017 and 231 are is not stated in what we hold",
                     f"{tree['skeletal']} at TP 0.48, {share:.2f} %", command, "bench/volumetric/run --data DIR sets ours at equal shares beside each of them."))
     rows.append(Row("3.3: edges of the tree", "about 20 000", f"{tree['tree']['edges']} in {tree['tree']['components']} pieces, alpha {tree['tree']['alpha']:g}",
                     "ecorche thin IMAGE --tree -o SKELETON.vtp", "Fewer voxels, so fewer edges; the paper's alpha is 0.7 to 0.95."))
