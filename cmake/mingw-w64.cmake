@@ -9,7 +9,7 @@ set(CMAKE_RC_COMPILER x86_64-w64-mingw32-windres)
 set(CMAKE_AR x86_64-w64-mingw32-gcc-ar-posix)
 set(CMAKE_RANLIB x86_64-w64-mingw32-gcc-ranlib-posix)
 
-set(_libraries ${CMAKE_CURRENT_LIST_DIR}/../build/libraries-windows)
+get_filename_component(_libraries ${CMAKE_CURRENT_LIST_DIR}/../build/libraries-windows ABSOLUTE)
 set(CMAKE_FIND_ROOT_PATH ${_libraries} /usr/x86_64-w64-mingw32)
 set(CMAKE_PREFIX_PATH ${_libraries})
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

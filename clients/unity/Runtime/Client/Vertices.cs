@@ -56,7 +56,26 @@ namespace Ecorche
                 }
                 return;
             }
-            for (float* end = to + 4 * count; to < end; ++first, ++second, ++third, ++normals, to += 4)
+            for (float* end = to + 4 * (count & ~3); to < end; first += 4, second += 4, third += 4, normals += 4, to += 16)
+            {
+                to[0] = (float)(o0 + s0 * first[0]);
+                to[1] = (float)(o1 + s1 * second[0]);
+                to[2] = (float)(o2 + s2 * third[0]);
+                *(uint*)(to + 3) = table[normals[0]];
+                to[4] = (float)(o0 + s0 * first[1]);
+                to[5] = (float)(o1 + s1 * second[1]);
+                to[6] = (float)(o2 + s2 * third[1]);
+                *(uint*)(to + 7) = table[normals[1]];
+                to[8] = (float)(o0 + s0 * first[2]);
+                to[9] = (float)(o1 + s1 * second[2]);
+                to[10] = (float)(o2 + s2 * third[2]);
+                *(uint*)(to + 11) = table[normals[2]];
+                to[12] = (float)(o0 + s0 * first[3]);
+                to[13] = (float)(o1 + s1 * second[3]);
+                to[14] = (float)(o2 + s2 * third[3]);
+                *(uint*)(to + 15) = table[normals[3]];
+            }
+            for (float* end = to + 4 * (count & 3); to < end; ++first, ++second, ++third, ++normals, to += 4)
             {
                 to[0] = (float)(o0 + s0 * *first);
                 to[1] = (float)(o1 + s1 * *second);

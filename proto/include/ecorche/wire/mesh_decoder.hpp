@@ -24,6 +24,7 @@ struct DecodedTissue {
   std::vector<float> positions;             ///< 3 per vertex, mm, LPS
   std::vector<float> normals;               ///< 3 per vertex, unit or zero; empty where there are no numbers
 
+  /// How many there are.
   std::size_t vertices() const { return (numbers.empty() ? positions.size() : numbers.size()) / 3; }
 };
 
