@@ -43,7 +43,7 @@ void to_oct16(std::span<const std::int16_t> unit, std::span<std::int8_t> out) {
 std::array<float, 3> from_oct16(std::int8_t u, std::int8_t v) {
   if (u == kNone && v == kNone) return {0, 0, 0};
   // In 127ths, whole numbers: kernels::to_normals() has the same bits on any processor.
-  int x = u, y = v;
+  int x = +u, y = +v;
   const int z = kOne - std::abs(x) - std::abs(y);
   if (z < 0) {
     const int folded = x < 0 ? std::abs(y) - kOne : kOne - std::abs(y);
