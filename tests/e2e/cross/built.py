@@ -14,7 +14,7 @@ def build(source, libraries, preset):
     """Fetches or builds what is linked (scripts/LIBRARIES), then the preset; returns its folder."""
     run(source / "scripts" / libraries)
     run("cmake", "--preset", preset, "-Wno-dev", cwd=source)
-    run("cmake", "--build", "--preset", preset, "-j", os.environ.get("JOBS", "2"), cwd=source)
+    run("cmake", "--build", "--preset", preset, "-j", os.environ.get("JOBS", os.cpu_count()), cwd=source)
     return source / "build" / preset
 
 

@@ -87,7 +87,7 @@ namespace Ecorche
                 ulong mask = (wanted & (0xFFFFu >> under)) * Each;
                 if (under + width <= 16)
                 {
-                    // Written out, here and below: a loop would take a third longer, and no compiler of C# unrolls it.
+                    // Written out, here and below: Mono leaves loops as they are, and counting to eight costs as much as this does.
                     left[0] = (word[0] >> under) & mask;
                     left[1] = (word[1] >> under) & mask;
                     left[2] = (word[2] >> under) & mask;
