@@ -78,7 +78,7 @@ class Fleet(unittest.TestCase):
         self.assertLess(report["longest_back"], 2)
 
     def test_both_are_restarted(self):
-        nodes = self.start("--drain-seconds", "0.8")
+        nodes = self.start("--drain-seconds", "1")
         posers = Posers(self.balancer.port, 9)
         for node in nodes:
             stopping = threading.Thread(target=node.stop, args=(signal.SIGTERM,))
