@@ -9,6 +9,7 @@ import os
 import pathlib
 import re
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
@@ -42,12 +43,16 @@ def expressions():
 
 
 def metrics_page():
-    """Of a server that has posed."""
+    """Of a server that has posed, and one of whose limits was hit."""
     with Server(MODEL, options=("--http", "127.0.0.1:0")) as server, Client("127.0.0.1", server.port) as client:
         body = client.open()
         client.subscribe_mesh()
         client.send_pose(body.rest_pose())
         next(frame for frame in client.frames(seconds=20) if frame.pose_sequence == 1)
+        with socket.create_connection(("127.0.0.1", server.port), 5) as no_client:
+            no_client.sendall(b"\xff" * 64)
+            while no_client.recv(4096):
+                pass
         with urllib.request.urlopen(f"http://127.0.0.1:{server.http_port}/metrics") as answer:
             return answer.read().decode()
 
