@@ -78,8 +78,8 @@ int run(const Program& program, const CalibrateSettings& s) {
   if (s.ranges) model->safe_ranges = measure_safe_ranges(model, rows, program.context("safe ranges"));
   const auto measured = Clock::now();
   model->provenance["correction"] =
-      fmt::format("p1 stable_neo_hookean, Poisson's ratio {:g}, step {:g} deg, from {:g} mm",
-                  s.options.poisson, s.options.step_deg, s.options.least_mm);
+      fmt::format("p1 stable_neo_hookean, Poisson's ratio {:g}, step {:g} deg, from {:g} mm, folds {:g}",
+                  s.options.poisson, s.options.step_deg, s.options.least_mm, s.options.folds);
   model_file::write(*model, s.output, program.context("writing"));
   const auto seconds = [](auto from, auto to) { return std::chrono::duration<double>(to - from).count(); };
   json report{{"ok", true},
@@ -112,6 +112,12 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
       ->add_option("--least", s->options.least_mm,
                    "mm: where every sample moves a node less, nothing is kept of it")
       ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  command
+      ->add_option("--folds", s->options.folds,
+                   "share of the tets about a joint that a sample may leave inside out, where skinning leaves more: "
+                   "reaches farther, with a fold here and there")
+      ->check(CLI::Range(0.0, 0.01))
       ->capture_default_str();
   command->add_option("--cache", s->cache,
                       "a folder that keeps each solved sample: resumes an interrupted run");

@@ -18,6 +18,7 @@
 namespace ecorche::correct {
 namespace {
 
+constexpr int kHalvings = 2;  // of the last step of a hinge's way; of others' one
 constexpr double kDegree = std::numbers::pi / 180;
 
 // One at a time: joints are solved side by side.
@@ -90,11 +91,13 @@ class OneJoint {
     report_.free_nodes = part.mesh.free_nodes;
     solved_.resize(samples_.size());
     if (part.mesh.free_nodes > 0) {
-      SampleSolver solver(model_, part, material);
-      for (std::size_t s = 0; s < samples_.size(); ++s) {
+      SampleSolver solver(model_, part, material, options_.folds);
+      for (std::size_t s = 0; s < report_.samples; ++s) {
         solved_[s] = sample(solver, s, store, context);
         progress.add(1);
       }
+      for (std::size_t s = 0; s < report_.samples; ++s) come_nearer(solver, s, store, context);
+      report_.samples = samples_.size();
       keep(part);
     } else {
       progress.add(samples_.size());
@@ -120,9 +123,27 @@ class OneJoint {
     for (const Sample& other : samples_) turns.insert(turns.end(), other.turn.begin(), other.turn.end());
     const std::string name =
         preprocess::cache::key(*store, "sample", identity_, std::uint64_t{joint_}, std::uint64_t{s}, turns,
-                               options_.least_share, options_.poisson);
+                               options_.least_share, options_.poisson, options_.folds);
     if (auto kept = preprocess::cache::take<SolvedSample>(*store, name, context)) return std::move(*kept);
     return preprocess::cache::make_and_keep(*store, name, context, make);
+  }
+
+  // Where a way ends: halfway between its last clean sample and the first that is not, and halfway again.
+  void come_nearer(SampleSolver& solver, std::size_t s, SharedStore* store, const Context& context) {
+    int last = samples_[s].from;
+    if (solved_[s].clean != 0 || (last >= 0 && solved_[static_cast<std::size_t>(last)].clean == 0)) return;
+    Eigen::Vector3d far = samples_[s].from_rest;
+    for (int halving = 0; halving < (joint().kind == JointKind::hinge ? kHalvings : 1); ++halving) {
+      const Eigen::Vector3d near =
+          last < 0 ? Eigen::Vector3d::Zero() : samples_[static_cast<std::size_t>(last)].from_rest;
+      samples_.push_back(sample_at(model_.rig.skeleton, joint_, (near + far) / 2, last));
+      solved_.push_back(sample(solver, samples_.size() - 1, store, context));
+      if (solved_.back().clean == 0) {
+        far = samples_.back().from_rest;
+      } else {
+        last = static_cast<int>(samples_.size()) - 1;
+      }
+    }
   }
 
   void keep(const Neighbourhood& part) {

@@ -40,8 +40,7 @@ class Chains {
   void add(const Eigen::Vector3d& whole, int steps) {
     int from = -1;
     for (int i = 1; i <= steps; ++i) {
-      Sample sample{turned(skeleton_, joint_, whole * i / steps), {}, from};
-      sample.turn = rotation_vector(sample.pose.rotation[joint_]);
+      Sample sample = sample_at(skeleton_, joint_, whole * i / steps, from);
       if (!is_new(sample.turn)) continue;
       from = static_cast<int>(samples_.size());
       samples_.push_back(std::move(sample));
@@ -83,6 +82,12 @@ Pose turned(const Skeleton& skeleton, std::size_t joint, const Eigen::Vector3d& 
   std::vector<ClampedJoint> clamped;
   kinematics::constrain(skeleton, pose, clamped);
   return pose;
+}
+
+Sample sample_at(const Skeleton& skeleton, std::size_t joint, const Eigen::Vector3d& from_rest, int from) {
+  Sample out{from_rest, turned(skeleton, joint, from_rest), {}, from};
+  out.turn = rotation_vector(out.pose.rotation[joint]);
+  return out;
 }
 
 Eigen::RowVector3d rotation_vector(const Eigen::Quaterniond& turn) {

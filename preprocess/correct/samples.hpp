@@ -11,6 +11,7 @@
 namespace ecorche::correct {
 
 struct Sample {
+  Eigen::Vector3d from_rest;  ///< radians, along the joint's sequence
   Pose pose;                ///< constrained: what follows the joint follows it here too
   Eigen::RowVector3d turn;  ///< rotation vector of the joint
   int from = -1;            ///< the sample nearer to rest on the same way, whose displacement is the start
@@ -26,6 +27,7 @@ bool turns_by_itself(const Skeleton& skeleton, std::size_t joint);
 double reach(const Joint& joint, std::size_t angle, int way);
 /// The joint alone turned so far from rest, along its sequence; constrained.
 Pose turned(const Skeleton& skeleton, std::size_t joint, const Eigen::Vector3d& from_rest);
+Sample sample_at(const Skeleton& skeleton, std::size_t joint, const Eigen::Vector3d& from_rest, int from);
 /// Of a unit quaternion, at most half a turn.
 Eigen::RowVector3d rotation_vector(const Eigen::Quaterniond& turn);
 

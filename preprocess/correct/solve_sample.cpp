@@ -12,16 +12,14 @@ namespace {
 
 constexpr double kToleranceMm = 1e-3;  // a fiftieth of what is kept at all
 
-bool clean(const fem::NewtonResult& newton) {
-  return newton.converged && newton.total.inverted_tets == 0;
-}
-
 }  // namespace
 
-SampleSolver::SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material)
+SampleSolver::SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material,
+                           double folds)
     : model_(model),
       part_(part),
       material_(material),
+      most_folds_(static_cast<std::size_t>(folds * static_cast<double>(part.mesh.tets()))),
       assembly_(part.mesh),
       solver_(weights::make_solver(weights::solver_for(static_cast<std::int64_t>(3 * part.mesh.free_nodes)))),
       steps_(assembly_, *solver_) {}
@@ -41,6 +39,11 @@ SolvedSample SampleSolver::solve(const Pose& pose, const std::vector<float>& sta
   const fem::Mesh& mesh = part_.mesh;
   const Skinned skinned = skin(pose);
   const auto is_free = [&](std::size_t i) { return mesh.free[i] >= 0; };
+  const std::size_t by_skinning = assembly_.total(material_, skinned.at).inverted_tets;
+  const auto clean = [&](const fem::NewtonResult& newton) {
+    const std::size_t folds = newton.total.inverted_tets;
+    return newton.converged && (folds == 0 || (folds <= most_folds_ && folds < by_skinning));
+  };
   Points x = skinned.at;
   for (std::size_t i = 0; i < part_.node.size() && !start.empty(); ++i) {
     if (!is_free(i)) continue;

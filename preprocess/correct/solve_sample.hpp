@@ -16,7 +16,7 @@
 namespace ecorche::correct {
 
 struct SolvedSample {
-  std::uint8_t clean = 0;           ///< converged, and nothing inverted
+  std::uint8_t clean = 0;           ///< converged, and no more is inverted than is allowed
   std::uint64_t inverted_tets = 0;  ///< squeezed ones apart (fem::Total)
   std::int32_t iterations = 0;
   /// 3 * #node, mm, each in the frame that skinning turns with its node; zero for held ones. Empty where it
@@ -33,8 +33,9 @@ void fields(A& archive, T& sample) {
 /// Samples of one joint after each other: the factor of one preconditions the next.
 class SampleSolver {
  public:
-  /// `model` and `part` must outlive it.
-  SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material);
+  /// `model`, `part` and `material` must outlive it. `folds`: the share of the part's tets that a clean sample
+  /// may leave inside out, as long as skinning leaves more.
+  SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material, double folds);
 
   /// `start`: displacements to begin from, as in SolvedSample, or empty: from skinning. Where that does not
   /// end clean, from rest along the joint's way (fem::follow).
@@ -50,6 +51,7 @@ class SampleSolver {
   const Model& model_;
   const Neighbourhood& part_;
   const fem::Material& material_;
+  std::size_t most_folds_;
   fem::Assembly assembly_;
   std::unique_ptr<solve::SpdSolver> solver_;
   fem::StepSolver steps_;
