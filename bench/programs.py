@@ -74,6 +74,14 @@ def spheres_model():
     return model
 
 
+def standard_model(tets):
+    """Of the standard phantom, at most so many tets."""
+    model = MADE / f"standard_{tets}.hdf"
+    if not model.exists():
+        ecorche("preprocess", phantom("standard"), "-o", model, "--mesher", "lattice", "--max-tets", tets)
+    return model
+
+
 def example_model(body, data, tets=300_000):
     """The model of examples/BODY, whose files lie in the folder `data`."""
     model = MADE / "examples" / f"{body}_{tets}.hdf"

@@ -93,21 +93,19 @@ Total Assembly::total(const Material& material, const Points& x) const {
   out.inverted.resize(mesh_.tets());
   const std::size_t parts = (mesh_.tets() + kAtOnce - 1) / kAtOnce;
   std::vector<double> energy(parts, 0), volume(parts, 0);
+  std::vector<std::size_t> crushed(parts, 0);
   tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
     for (std::size_t t = part * kAtOnce; t < std::min((part + 1) * kAtOnce, mesh_.tets()); ++t) {
       const TetEnergy of = tet_energy(mesh_, material, t, x);
       energy[part] += of.energy;
       volume[part] += of.mean_j * mesh_.rest[t].volume;
       out.inverted[t] = of.least_j > 0 ? 0 : 1;
+      crushed[part] += of.least_j < elastic::StableNeoHookean::kCrushed ? 1 : 0;
     }
   });
   out.energy = std::accumulate(energy.begin(), energy.end(), 0.0);
   out.volume = std::accumulate(volume.begin(), volume.end(), 0.0);
-  for (std::size_t t = 0; t < mesh_.squeezed.size(); ++t) {
-    if (mesh_.squeezed[t] == 0 || out.inverted[t] == 0) continue;
-    out.inverted[t] = 0;
-    ++out.squeezed_tets;
-  }
+  out.crushed_tets = std::accumulate(crushed.begin(), crushed.end(), std::size_t{0});
   out.inverted_tets = static_cast<std::size_t>(std::count(out.inverted.begin(), out.inverted.end(), 1));
   return out;
 }

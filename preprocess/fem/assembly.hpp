@@ -17,9 +17,9 @@ namespace ecorche::fem {
 struct Total {
   double energy = 0;
   double volume = 0;                   ///< posed, mm^3
-  std::vector<std::uint8_t> inverted;  ///< #tets; squeezed ones (Mesh::squeezed) are not among them
+  std::vector<std::uint8_t> inverted;  ///< #tets
   std::size_t inverted_tets = 0;
-  std::size_t squeezed_tets = 0;  ///< squeezed ones that are inverted
+  std::size_t crushed_tets = 0;  ///< of less than elastic::StableNeoHookean::kCrushed of their volume
 };
 
 /// Where the entries of the Hessian stand, and which tets may be added at once: those of one colour share no

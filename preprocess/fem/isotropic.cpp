@@ -30,7 +30,10 @@ Matrix3d stress(const Principal& at, const Stretched& density) {
 Matrix9d hessian(const Principal& at, const Stretched& density, bool filtered) {
   const auto lifted = [filtered](double value) { return filtered ? std::max(value, 0.0) : value; };
   Matrix3d scaling = density.curvature;
-  if (filtered) {
+  // Most are positive definite, which their minors tell sooner than their eigenvalues.
+  const bool definite =
+      scaling(0, 0) > 0 && scaling.topLeftCorner<2, 2>().determinant() > 0 && scaling.determinant() > 0;
+  if (filtered && !definite) {
     const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(scaling);
     if (eigen.eigenvalues()[0] < 0)
       scaling = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *

@@ -5,6 +5,7 @@
 #include <string>
 
 #include <ecorche/values/error.hpp>
+#include "preprocess/fem/isotropic.hpp"
 
 namespace ecorche::fem {
 namespace {
@@ -17,34 +18,32 @@ Vector3d cofactors(const Vector3d& s) {
   return {s[1] * s[2], s[2] * s[0], s[0] * s[1]};
 }
 
-/// Smith18: mu/2 (I - 3) - mu/2 log((I + 1) / 4) + lambda/2 (J - alpha)^2 with I = |F|^2 and alpha = 1 + 3/4
-/// mu/lambda, less its value at rest. Of its lambda, Lame's own is left to bulk(); expanded about J = 1 the
-/// rest is -3/4 mu (J - 1) + 5/6 mu_Lame / 2 (J - 1)^2, and at rest at() alone is mu_Lame |strain|^2.
 class StableNeoHookean final : public Material {
  public:
-  explicit StableNeoHookean(const Lame& given)
-      : mu_(4.0 / 3.0 * given.mu), own_(5.0 / 6.0 * given.mu), bulk_(given.lambda) {}
+  explicit StableNeoHookean(const Lame& given) : of_(given) {}
   std::string_view name() const override { return "stable_neo_hookean"; }
-  double bulk() const override { return bulk_; }
+  double bulk() const override { return of_.bulk(); }
 
   Stretched at(const Vector3d& s) const override {
     const double i = s.squaredNorm(), j = s.prod();
     // |F|^2 - 3 without the rounding of a sum near 3.
     const double over = (s.array() - 1).square().sum() + 2 * (s.array() - 1).sum();
-    const double pull = mu_ * i / (i + 1);
+    const double pull = of_.pull(i);
     Stretched out;
-    out.energy =
-        mu_ / 2 * (over - std::log1p(over / 4)) - 0.75 * mu_ * (j - 1) + own_ / 2 * (j - 1) * (j - 1);
+    out.energy = of_.density(over, j);
     out.stress = pull * s;
-    out.curvature = pull * Matrix3d::Identity() + 2 * mu_ / ((i + 1) * (i + 1)) * s * s.transpose();
+    out.curvature = pull * Matrix3d::Identity() + of_.pull_slope(i) * s * s.transpose();
     out.twist.setConstant(pull);
     out.flip.setConstant(pull);
-    add_volume(s, own_ * (j - 1) - 0.75 * mu_, own_, out);
+    add_volume(s, of_.pressure(j), of_.stiffness(j), out);
     return out;
+  }
+  double energy(const Matrix3d& F) const override {
+    return of_.density(F.squaredNorm() - 3, F.determinant());
   }
 
  private:
-  double mu_, own_, bulk_;
+  elastic::StableNeoHookean of_;
 };
 
 /// mu |S - I|^2 + lambda/2 tr(S - I)^2 with F = R S. Its volume term is no function of J, so bulk() is 0.
@@ -82,7 +81,11 @@ Lame lame(double poisson) {
     throw Error(ErrorKind::usage, "--poisson", std::to_string(poisson) + " is not within 0 and 0.5",
                 "flesh is nearly incompressible: 0.45 to 0.499");
   }
-  return {1 / (2 * (1 + poisson)), poisson / ((1 + poisson) * (1 - 2 * poisson))};
+  return elastic::lame(poisson);
+}
+
+double Material::energy(const Matrix3d& F) const {
+  return at(principal(F).s).energy;
 }
 
 void add_volume(const Vector3d& s, double pressure, double modulus, Stretched& out) {

@@ -8,13 +8,11 @@
 #include <string_view>
 #include <vector>
 
+#include "core/elastic/stable_neo_hookean.hpp"
+
 namespace ecorche::fem {
 
-/// Lame's constants, in units of Young's modulus: it only scales the energy where all that moves a body is
-/// prescribed, so it is 1 here.
-struct Lame {
-  double mu = 0, lambda = 0;
-};
+using elastic::Lame;
 /// `poisson` in [0, 0.5). Throws Error{usage} elsewhere.
 Lame lame(double poisson);
 
@@ -37,13 +35,15 @@ class Material {
   virtual std::string_view name() const = 0;
   virtual double bulk() const = 0;
   virtual Stretched at(const Eigen::Vector3d& s) const = 0;
+  /// at(s).energy of the stretches of F, without them where the material can.
+  virtual double energy(const Eigen::Matrix3d& F) const;
 };
 
 /// Adds pressure (J - 1) + modulus / 2 (J - J_0)^2 at J_0 = J (so its first derivative is the pressure's
 /// alone).
 void add_volume(const Eigen::Vector3d& s, double pressure, double modulus, Stretched& out);
 
-/// `stable_neo_hookean` (Smith18 eq. 14, with Lame's constants as of its section 3.4), or `corotational`:
+/// `stable_neo_hookean` (elastic::StableNeoHookean), or `corotational`:
 /// Sujar18's and Mueller04's co-rotational linear material with exact rotations, which softens under
 /// compression and does not resist inversion: past 90 degrees its iterations find no end.
 std::unique_ptr<Material> make_material(std::string_view name, double poisson);

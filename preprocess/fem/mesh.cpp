@@ -46,17 +46,14 @@ std::array<std::int32_t, 2> edge(std::int32_t a, std::int32_t b) {
 }
 
 RestTet rest_tet(const Points& V, const Tets& T, Eigen::Index t) {
-  Eigen::Matrix3d edges;
-  for (int c = 0; c < 3; ++c) edges.col(c) = (V.row(T(t, c + 1)) - V.row(T(t, 0))).transpose();
-  RestTet out;
-  out.volume = edges.determinant() / 6;
+  Eigen::Matrix<double, 4, 3> corner;
+  for (int c = 0; c < 4; ++c) corner.row(c) = V.row(T(t, c));
+  const RestTet out = elastic::rest_tet(corner);
   if (!(out.volume > 0)) {
     throw Error(ErrorKind::data, "fem",
                 "tet " + std::to_string(t) + " has the volume " + std::to_string(out.volume) + " mm^3",
                 "prepare the model again: every tet must have a positive volume");
   }
-  out.gradient.bottomRows<3>() = edges.inverse();
-  out.gradient.row(0) = -out.gradient.bottomRows<3>().colwise().sum();
   return out;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <ecorche/values/mesh.hpp>
+#include "core/elastic/rest_tet.hpp"
 
 namespace ecorche::fem {
 
@@ -21,11 +22,7 @@ enum class Element : std::uint8_t {
 std::string_view element_name(Element element);
 Element element_from_name(std::string_view name);
 
-/// Of one tet at rest.
-struct RestTet {
-  Eigen::Matrix<double, 4, 3> gradient;  ///< of the barycentric coordinates, 1/mm
-  double volume = 0;                     ///< mm^3
-};
+using elastic::RestTet;
 
 /// Shape functions of an element at its points of integration, which all weigh the same.
 struct Rule {
@@ -48,10 +45,6 @@ struct Mesh {
   std::size_t free_nodes = 0;
   /// Middles of edges: the rows of their two ends. Row r of X stands at r - (#X - #middle).
   std::vector<std::array<std::int32_t, 2>> middle;
-
-  /// #tets or none: 1 where bones of two segments hold corners. What they squeeze between them no flesh can
-  /// keep from being turned inside out, so that is counted apart.
-  std::vector<std::uint8_t> squeezed;
 
   std::size_t tets() const { return rest.size(); }
   const Rule& rule() const { return rule_of(element); }

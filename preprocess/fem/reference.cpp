@@ -35,6 +35,12 @@ double largest_distance(const Mesh& mesh, const Points& a, const Points& b) {
   return out;
 }
 
+std::size_t inverted(const Points& x, const Tets& T, const std::vector<std::int32_t>& rows) {
+  return static_cast<std::size_t>(std::count_if(rows.begin(), rows.end(), [&](std::int32_t t) {
+    return !(tet_det(x.row(T(t, 0)), x.row(T(t, 1)), x.row(T(t, 2)), x.row(T(t, 3))) > 0);
+  }));
+}
+
 Distances distances(const Mesh& mesh, const Points& skinned, const Points& x) {
   std::vector<double> all;
   for (Eigen::Index n = 0; n < skinned.rows(); ++n) {
@@ -123,6 +129,7 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
   out.free_nodes = body->mesh.free_nodes;
   out.soft_tets = body->soft_tets;
   out.on_bones = body->on_bones;
+  out.between = body->between.size();
   out.floating = body->floating;
   out.rest_mm3 = body->rest_mm3;
   out.posed_mm3 = out.newton.total.volume;
@@ -133,6 +140,7 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
     const auto row = static_cast<Eigen::Index>(n);
     if (out.solved[n] == 0) out.nodes.row(row) = start.row(row);
   }
+  out.squeezed = inverted(out.nodes, model.tets, body->between);
   out.to_skinned = distances(body->mesh, start, out.nodes);
   out.contact = self_contact(model.nodes.cast<double>(), out.nodes, model.tets);
   context.report(1);

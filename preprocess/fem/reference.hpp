@@ -39,14 +39,15 @@ struct Reference {
       solved;        ///< #nodes: 1 where `nodes` is finite elements', 0 where it is skinning's
   std::string from;  ///< the start whose solution this is: `skinned` or `rest`
   std::size_t tets = 0, free_nodes = 0;
-  std::size_t soft_tets = 0, on_bones = 0, floating = 0;  ///< see Body
-  double rest_mm3 = 0, posed_mm3 = 0;                     ///< of the tets solved for
-  NewtonResult newton;                                    ///< of this solution
-  bool skinned_good = false, rest_good = false;           ///< converged, and nothing inverted
-  double reached = 0;                                     ///< of the way from rest, 1 is the pose
-  int steps = 0, refused = 0;                             ///< of that way
-  bool compared = false;                                  ///< both starts converged
-  double between_starts_mm = 0;                           ///< largest distance of a node
+  std::size_t soft_tets = 0, on_bones = 0, between = 0, floating = 0;  ///< see Body
+  std::size_t squeezed = 0;                      ///< of those between bones: posed inside out
+  double rest_mm3 = 0, posed_mm3 = 0;            ///< of the tets solved for
+  NewtonResult newton;                           ///< of this solution
+  bool skinned_good = false, rest_good = false;  ///< converged, and nothing inverted
+  double reached = 0;                            ///< of the way from rest, 1 is the pose
+  int steps = 0, refused = 0;                    ///< of that way
+  bool compared = false;                         ///< both starts converged
+  double between_starts_mm = 0;                  ///< largest distance of a node
   SelfContact contact;
   Distances to_skinned;
   double seconds_build = 0, seconds_skinned = 0, seconds_rest = 0;

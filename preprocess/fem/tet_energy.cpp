@@ -57,7 +57,7 @@ TetEnergy tet_energy(const Mesh& mesh, const Material& material, std::size_t t, 
   const bool mean = mesh.element == Element::p2p0;
   for (std::size_t p = 0; p < static_cast<std::size_t>(posed.points); ++p) {
     const double change = (mean ? posed.mean_j : posed.J[p]) - 1;
-    out.energy += weight * (material.at(principal(posed.F[p]).s).energy + bulk * change * change);
+    out.energy += weight * (material.energy(posed.F[p]) + bulk * change * change);
     out.least_j = std::min(out.least_j, posed.J[p]);
   }
   return out;

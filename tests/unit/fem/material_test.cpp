@@ -48,7 +48,7 @@ Matrix3d turn(std::mt19937& random) {
       .toRotationMatrix();
 }
 
-/// Random gradients, det F > 0: mildly and badly deformed, with two equal stretches, and none.
+/// Random gradients, det F > 0: mildly and badly deformed, also crushed, with two equal stretches, and none.
 std::vector<Matrix3d> gradients() {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> stretch(0.4, 1.8);
@@ -59,6 +59,8 @@ std::vector<Matrix3d> gradients() {
     if (n % 10 == 0) s[2] = s[0];
     out.push_back(turn(random) * s.asDiagonal() * turn(random));
   }
+  for (const double third : {0.4, 0.2, 0.05})  // J of 0.3 lies between the first two
+    out.push_back(turn(random) * Vector3d(1.1, 0.8, third).asDiagonal() * turn(random));
   return out;
 }
 
@@ -88,6 +90,7 @@ TEST(Material, StressIsTheEnergysDerivative) {
       const auto energy = [&](const Vector9d& at) {
         return density_at(*material, principal(Eigen::Map<const Matrix3d>(at.data())).s).energy;
       };
+      EXPECT_NEAR(material->energy(F), material->at(principal(F).s).energy, 1e-14 * (1 + F.squaredNorm()));
       for (Eigen::Index i = 0; i < 9; ++i)
         EXPECT_NEAR((energy(f + h * Vector9d::Unit(i)) - energy(f - h * Vector9d::Unit(i))) / (2 * h), P[i],
                     1e-8 * (1 + P.norm()));
@@ -111,6 +114,23 @@ TEST(Material, HessianIsTheStresssDerivative) {
       EXPECT_LT((H - D).norm(), 1e-7 * (1 + H.norm()));
     }
   }
+}
+
+/// The wall before flat tets: nothing of it above kCrushed, two continuous derivatives, and a price for J = 0
+/// that is many times Smith18's.
+TEST(Material, HasAWallBeforeFlatTets) {
+  constexpr double kEdge = elastic::StableNeoHookean::kCrushed, kMu = 4.0 / 3.0, kOwn = 5.0 / 6.0;
+  const Lame constants = lame(kPoisson);
+  const elastic::StableNeoHookean material(constants);
+  const auto smith = [&](double over, double j) {
+    return constants.mu *
+           (kMu / 2 * (over - std::log1p(over / 4)) - 0.75 * kMu * (j - 1) + kOwn / 2 * (j - 1) * (j - 1));
+  };
+  for (const double j : {kEdge, 0.5, 1.0, 1.7}) EXPECT_NEAR(material.density(0.4, j), smith(0.4, j), 1e-14);
+  EXPECT_GT(material.density(0.4, 0) - smith(0.4, 0), 1);
+  EXPECT_NEAR(material.pressure(kEdge - 1e-9), material.pressure(kEdge), 1e-8);
+  EXPECT_NEAR(material.stiffness(kEdge - 1e-9), material.stiffness(kEdge), 1e-6);
+  EXPECT_LT(material.pressure(0), material.pressure(kEdge) - 10);
 }
 
 TEST(Material, FilteredHessianIsTheDenselyProjectedOne) {

@@ -2,57 +2,18 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <numbers>
 #include <set>
 
-#include <ecorche/kinematics/forward.hpp>
 #include <ecorche/values/error.hpp>
 #include "preprocess/fem/reference.hpp"
-#include "tests/support/toy_model.hpp"
+#include "tests/unit/fem/boned_beam.hpp"
 #include "tests/unit/weights/box_mesh.hpp"
 
 namespace ecorche::fem {
 namespace {
 
-/// The toy beam with a bone along its corner in each segment, 30 mm apart at the joints.
-Model boned() {
-  Model model = test::toy_model();
-  std::vector<std::int32_t> order;
-  std::vector<std::uint16_t> label(model.tet_count(), TetMesh::soft);
-  for (std::size_t t = 0; t < model.tet_count(); ++t) {
-    Eigen::RowVector3f middle = Eigen::RowVector3f::Zero();
-    for (int c = 0; c < 4; ++c) middle += model.nodes.row(model.tets(static_cast<Eigen::Index>(t), c)) / 4;
-    if (middle.x() > 0 || middle.y() > 0) continue;
-    const float z = middle.z();
-    label[t] = z < 83 ? 1 : z > 117 && z < 183 ? 2 : z > 217 ? 3 : TetMesh::soft;
-  }
-  model.tet_label = label;
-  model.bone_segment = {0, 1, 2};
-  return model;
-}
-
-Pose bent(const Model& model, double degrees) {
-  Pose pose = Pose::rest(model.segment_count());
-  pose.rotation[1] = Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitX());
-  return pose;
-}
-
-/// LBS, as it is written.
-std::vector<float> skinned(const Model& model, const Pose& pose) {
-  const auto segments = kinematics::forward(model.rig, pose);
-  std::vector<float> out;
-  for (std::size_t n = 0; n < model.node_count(); ++n) {
-    const Eigen::Vector3d X = model.nodes.row(static_cast<Eigen::Index>(n)).cast<double>();
-    Eigen::Vector3d x = Eigen::Vector3d::Zero();
-    for (auto e = model.weights.offsets[n]; e < model.weights.offsets[n + 1]; ++e)
-      x += static_cast<double>(model.weights.weight[e]) * (segments[model.weights.segment[e]] * X);
-    for (Eigen::Index c = 0; c < 3; ++c) out.push_back(static_cast<float>(x[c]));
-  }
-  return out;
-}
-
 TEST(Body, HoldsBonesAndLeavesOutWhatNothingShapes) {
-  Model model = boned();
+  Model model = boned(14);  // less than two tets: some have corners on both
   // A tet of its own, far off; and one that hangs on two nodes of a bone, a hinge: its part is the whole
   // flesh.
   const Eigen::Index n = model.nodes.rows(), t = model.tets.rows();
@@ -69,6 +30,7 @@ TEST(Body, HoldsBonesAndLeavesOutWhatNothingShapes) {
   for (const Element element : {Element::p1, Element::p2p0}) {
     const Body body = body_of(model, element);
     std::size_t bone = 0, on_bones = 0, soft = 0;
+    std::vector<std::int32_t> between;
     std::vector<std::int32_t> segment(static_cast<std::size_t>(n + 6), -1);
     for (std::size_t i = 0; i < model.tet_count(); ++i)
       for (int c = 0; c < 4 && model.tet_label[i] != TetMesh::soft; ++c)
@@ -79,23 +41,28 @@ TEST(Body, HoldsBonesAndLeavesOutWhatNothingShapes) {
       for (int c = 0; c < 4; ++c)
         held += segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))] >= 0 ? 1 : 0;
       ++(model.tet_label[i] != TetMesh::soft ? bone : soft);
-      if (model.tet_label[i] == TetMesh::soft && held == 4) ++on_bones;
+      if (model.tet_label[i] != TetMesh::soft) continue;
+      std::set<std::int32_t> of;
+      for (int c = 0; c < 4; ++c)
+        of.insert(segment[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(i), c))]);
+      of.erase(-1);
+      if (held == 4) {
+        ++on_bones;
+      } else if (of.size() > 1) {
+        between.push_back(static_cast<std::int32_t>(i));
+      }
     }
     EXPECT_GT(bone, 50U);
     EXPECT_EQ(body.soft_tets, soft);
     EXPECT_EQ(body.on_bones, on_bones);
+    EXPECT_EQ(body.between, between);
+    EXPECT_GT(between.size(), 0U);
     EXPECT_EQ(body.floating, 2U);
-    EXPECT_EQ(body.mesh.tets(), soft - on_bones - 2);
+    EXPECT_EQ(body.mesh.tets(), soft - on_bones - between.size() - 2);
     EXPECT_TRUE(std::equal(segment.begin(), segment.end(), body.segment.begin()));
     for (std::size_t i = 0; i < body.segment.size(); ++i)
       EXPECT_TRUE(body.segment[i] < 0 || body.mesh.free[i] < 0);
     EXPECT_LT(body.mesh.free[static_cast<std::size_t>(n)], 0);
-    for (std::size_t i = 0; i < body.tet.size(); ++i) {
-      std::set<std::int32_t> of;
-      for (int c = 0; c < 4; ++c) of.insert(segment[static_cast<std::size_t>(model.tets(body.tet[i], c))]);
-      of.erase(-1);
-      EXPECT_EQ(body.mesh.squeezed[i], of.size() > 1 ? 1 : 0);
-    }
   }
 }
 
@@ -165,18 +132,20 @@ TEST(Reference, RefusesABodyWithoutBones) {
   }
 }
 
-TEST(Assembly, CountsSqueezedTetsApart) {
+TEST(Assembly, CountsWhatIsInvertedAndCrushed) {
   Mesh mesh =
       make_mesh(Element::p1, test::box_mesh({1, 1, 1}, 10).V, test::box_mesh({1, 1, 1}, 10).T, {}, {});
-  Points x = mesh.X;
-  x.col(0) *= -1;  // all inside out
   const auto material = make_material("stable_neo_hookean", 0.45);
-  EXPECT_EQ(Assembly(mesh).total(*material, x).inverted_tets, 6U);
-  mesh.squeezed = {0, 1, 0, 0, 1, 0};
-  const Total total = Assembly(mesh).total(*material, x);
-  EXPECT_EQ(total.inverted_tets, 4U);
-  EXPECT_EQ(total.squeezed_tets, 2U);
-  EXPECT_EQ(total.inverted, (std::vector<std::uint8_t>{1, 0, 1, 1, 0, 1}));
+  const auto total = [&](double times) {
+    Points x = mesh.X;
+    x.col(0) *= times;
+    return Assembly(mesh).total(*material, x);
+  };
+  EXPECT_EQ(total(0.31).crushed_tets, 0U);
+  EXPECT_EQ(total(0.29).crushed_tets, 6U);
+  EXPECT_EQ(total(0.29).inverted_tets, 0U);
+  EXPECT_EQ(total(-1).inverted_tets, 6U);
+  EXPECT_EQ(total(-1).inverted, std::vector<std::uint8_t>(6, 1));
 }
 
 /// A node of the surface in a tet that is not its own, asked of all pairs.

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/elastic/flesh.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace ecorche::elastic {
+namespace {
+
+std::size_t at(std::int32_t row) {
+  return static_cast<std::size_t>(row);
+}
+
+/// The part of each node that these rows of T tie together: its lowest node.
+std::vector<std::int32_t> parts(std::size_t nodes, const Tets& T, const std::vector<std::int32_t>& rows) {
+  std::vector<std::int32_t> up(nodes);
+  std::iota(up.begin(), up.end(), 0);
+  const auto root = [&](std::int32_t n) {
+    while (up[at(n)] != n) n = up[at(n)] = up[at(up[at(n)])];
+    return n;
+  };
+  for (const std::int32_t t : rows) {
+    for (int c = 1; c < 4; ++c) {
+      const std::int32_t a = root(T(t, 0)), b = root(T(t, c));
+      up[at(std::max(a, b))] = std::min(a, b);
+    }
+  }
+  for (std::size_t n = 0; n < nodes; ++n) up[n] = root(static_cast<std::int32_t>(n));
+  return up;
+}
+
+}  // namespace
+
+Flesh flesh_of(const Model& model) {
+  Flesh out;
+  const std::size_t nodes = model.node_count();
+  out.segment.assign(nodes, -1);
+  for (std::size_t t = 0; t < model.tet_count(); ++t) {
+    if (model.tet_label[t] == TetMesh::soft) continue;
+    for (int c = 0; c < 4; ++c)
+      out.segment[at(model.tets(static_cast<Eigen::Index>(t), c))] =
+          model.bone_segment[model.tet_label[t] - 1U];
+  }
+  const auto is_held = [&](std::int32_t node) { return out.segment[at(node)] >= 0; };
+  const auto holds_two = [&](const auto& tet) {
+    std::int32_t one = -1;
+    for (const std::int32_t node : tet) {
+      const std::int32_t s = out.segment[at(node)];
+      if (s >= 0 && one >= 0 && s != one) return true;
+      if (s >= 0) one = s;
+    }
+    return false;
+  };
+  std::vector<std::int32_t> soft;
+  for (std::size_t t = 0; t < model.tet_count(); ++t) {
+    if (model.tet_label[t] != TetMesh::soft) continue;
+    ++out.soft_tets;
+    const auto tet = model.tets.row(static_cast<Eigen::Index>(t));
+    if (std::all_of(tet.begin(), tet.end(), is_held)) {
+      ++out.on_bones;
+    } else if (holds_two(tet)) {
+      out.between.push_back(static_cast<std::int32_t>(t));
+    } else {
+      soft.push_back(static_cast<std::int32_t>(t));
+    }
+  }
+  // Parts meet in held nodes too: two that do hang on the same bone.
+  const std::vector<std::int32_t> part = parts(nodes, model.tets, soft);
+  std::vector<std::uint8_t> touched(nodes, 0);
+  std::vector<std::size_t> anchors(nodes, 0);
+  for (const std::int32_t t : soft)
+    for (int c = 0; c < 4; ++c) touched[at(model.tets(t, c))] = 1;
+  for (std::size_t n = 0; n < nodes; ++n)
+    if (touched[n] != 0 && out.segment[n] >= 0) ++anchors[at(part[n])];
+  for (const std::int32_t t : soft) {
+    if (anchors[at(part[at(model.tets(t, 0))])] >= 3) {
+      out.tet.push_back(t);
+    } else {
+      ++out.floating;
+    }
+  }
+  return out;
+}
+
+}  // namespace ecorche::elastic
