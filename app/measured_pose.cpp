@@ -56,6 +56,17 @@ nlohmann::json MeasuredPose::unfold(const Context& context) {
           {"largest_move_mm", done.largest_move_mm}};
 }
 
+nlohmann::json MeasuredPose::settle(const runtime::FleshSettler& settler, const Context& context) {
+  runtime::Settled done;
+  change([&](runtime::PosedBody& body) { done = settler.run(body, {}, context); });
+  return {{"steps", done.steps},
+          {"came_to_rest", done.came_to_rest},
+          {"energy_before_mm3", done.energy_before},
+          {"energy_after_mm3", done.energy_after},
+          {"moved_nodes", done.moved_nodes},
+          {"largest_move_mm", done.largest_move_mm}};
+}
+
 void MeasuredPose::replace(const std::vector<float>& nodes, const std::vector<std::uint8_t>& moved) {
   change([&](runtime::PosedBody& body) {
     for (std::size_t n = 0; n < moved.size(); ++n)

@@ -8,6 +8,7 @@
 
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/values/context.hpp>
+#include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::app {
 
@@ -22,6 +23,9 @@ class MeasuredPose {
   Status run(const Pose& pose, runtime::Skinning skinning);
   /// Unfolds both alike; what that did, as `unfolded` of quality.json.
   nlohmann::json unfold(const Context& context);
+
+  /// Settles both alike; what that did, as `settled` of quality.json.
+  nlohmann::json settle(const runtime::FleshSettler& settler, const Context& context);
 
   /// Puts nodes of the still body where `nodes` (3 * #nodes) has them, those with `moved`, and in both all
   /// that hangs on them.

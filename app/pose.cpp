@@ -24,6 +24,7 @@
 #include "app/posed_dicom.hpp"
 #include "app/posed_folder.hpp"
 #include "app/posed_tets.hpp"
+#include "app/relax_pose.hpp"
 #include "app/tet_regions.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/values/text.hpp"
@@ -219,7 +220,7 @@ class FrameWriter {
 io::DicomFacts facts_of(io::DicomFacts facts, const PoseSettings& settings, const Frame& frame,
                         const Rig& rig) {
   facts.pose = io::pose_to_yaml(frame.pose, rig) + settings.skinning + settings.deformer +
-               (settings.unfold ? "unfolded" : "");
+               (settings.unfold ? "unfolded" : "") + (settings.settle ? "settled" : "");
   facts.words = frame.name.empty() ? fs::path(settings.frames.pose).stem().string() : frame.name;
   return facts;
 }
@@ -246,6 +247,7 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
   const runtime::Skinning skinning =
       runtime::skinning_from_name(settings.by_fem() ? "cor" : settings.skinning);
   MeasuredPose posed(poser);
+  PoseRelaxer relaxer(settings, *model);
   io::DicomFacts dicom;
   if (settings.writes_dicom())
     dicom = dicom_facts(program, settings.dicom, "ECORCHE-" + text::hex(identity),
@@ -260,15 +262,13 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
     // Quality looks at every tissue, whichever are written.
     const Status status = posed.run(frame.pose, skinning);
     if (!status.ok()) throw Error(ErrorKind::data, "pose " + frame.name, status.message, "mend the motion");
-    const json unfolded = settings.unfold ? posed.unfold(context) : json();
-    const json fem = settings.by_fem() ? pose_by_fem(settings.fem, posed, context) : json();
+    const json relaxed = relaxer.run(posed, context);
     const runtime::PosedBody& body = posed.body();
     const std::vector<float> det_f = runtime::tet_det_f(*model, posed.still().nodes);
     json quality =
         quality_json(*model, body, runtime::measure(*model, posed.still(), poser.all_tissues(), {}, closed),
-                     det_f, {skinning, settings.unfold, settings.by_fem()});
-    if (settings.by_fem()) add_fem(fem, quality);
-    if (settings.unfold) quality["unfolded"] = unfolded;
+                     det_f, {skinning, settings.unfold || settings.settle, settings.by_fem()});
+    add_relaxed(relaxed, quality);
     if (!frame.missed.empty()) {
       quality["verdict"] = "warn";
       quality["warnings"].insert(quality["warnings"].begin(), frame.missed.begin(), frame.missed.end());
@@ -284,7 +284,8 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
     if (settings.writes_dicom()) writer.use_dicom(program, facts_of(dicom, settings, frame, model->rig));
     json written = writer.write(quality);
     if (settings.as_case) written.push_back((folder / "case.yaml").string());
-    const PosedAs as{identity, settings.skinning, settings.deformer, settings.unfold, plan.field};
+    const PosedAs as{identity,        settings.skinning, settings.deformer,
+                     settings.unfold, settings.settle,   plan.field};
     for (const std::string& added : target.finish(*model, body, frame.pose, as, context))
       written.push_back((folder / added).string());
     result["frames"].push_back({{"name", frame.name},
@@ -349,9 +350,7 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
                    "how volumes follow: tets, or spheres (the model's volumetric skeleton, refilled)")
       ->check(CLI::IsMember({"tets", "spheres"}))
       ->capture_default_str();
-  command->add_flag("--unfold", s->unfold,
-                    "relax around inverted tets, as far as no tissue loses volume for it; those squeezed by "
-                    "bones remain");
+  add_relaxing(*command, *s);
   add_bridge_option(*command, s->bridge);
   command->add_option("--tissues", s->tissues, "tissues to write: all, none, or names with commas between")
       ->delimiter(',');

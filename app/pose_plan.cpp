@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "app/relax_pose.hpp"
 #include "app/unknown_name.hpp"
 #include "app/usage_error.hpp"
 
@@ -38,12 +39,7 @@ void check_settings(const PoseSettings& settings) {
   check_dicom_options(settings.dicom, settings.writes_dicom(), "add --volume-format dicom");
   if (!settings.bridge && settings.deformer != "spheres")
     usage_error("--no-bridge", "tets open no gaps", "add --deformer spheres");
-  if (settings.by_fem()) {
-    if (settings.deformer != "tets")
-      usage_error("--skinning fem", "finite elements are tets", "leave out --deformer");
-    if (settings.unfold) usage_error("--skinning fem", "it refuses folds by itself", "leave out --unfold");
-    check_fem(settings.fem);
-  }
+  check_relaxing(settings);
   if (settings.as_case) {
     if (settings.chooses())
       usage_error("--as-case", "a case is whole", "leave out --tissues, --volumes, --tets and --field");

@@ -29,7 +29,8 @@ struct PoseSettings {
   std::string sampling = "trilinear";
   std::string grid = "posed";
   std::string deformer = "tets";
-  bool tets = false, field = false, as_case = false, bridge = true, unfold = false;
+  bool tets = false, field = false, as_case = false, bridge = true;
+  bool unfold = false, settle = false;
   std::vector<std::string> tet_formats{"vtu"};
   DicomSettings dicom;
 

@@ -9,6 +9,7 @@
 #include <ecorche/runtime/skin_caps.hpp>
 #include "app/fem_pose.hpp"
 #include "app/inverted_tets.hpp"
+#include "app/relax_pose.hpp"
 #include "runtime/quality/bone_tets.hpp"
 #include "runtime/quality/tissue_limits.hpp"
 
@@ -129,6 +130,7 @@ std::string line_of(const json& frame) {
       100 * quality["unsigned_volume_change"].get<double>(), quality["bone_rigidity_mm"].get<double>(),
       frame["files"].size());
   if (quality.contains("fem")) out += fem_line(quality["fem"]);
+  out += settled_line(quality);
   const json& warnings = quality["warnings"];
   for (std::size_t w = 0; w < std::min(kMostWarnings, warnings.size()); ++w) out += warning_line(warnings[w]);
   if (warnings.size() > kMostWarnings)

@@ -149,7 +149,7 @@ std::vector<std::string> PosedFolder::finish(const Model& model, const runtime::
   const fs::path& stage = staged_.stage();
   std::vector<std::string> added{std::string(kPoseFile)};
   files::write_text(stage / kPoseFile, io::pose_to_yaml(asked, model.rig));
-  PosedManifest manifest{model.name, as.identity, as.skinning, as.deformer, as.unfolded, {}, {}};
+  PosedManifest manifest{model.name, as.identity, as.skinning, as.deformer, as.unfolded, as.settled, {}, {}};
   const Naming naming(model, as.field);
   std::set<std::string> written;
   for (const fs::path& file : files::files_within(stage)) {

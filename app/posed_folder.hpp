@@ -18,7 +18,8 @@ namespace ecorche::app {
 struct PosedAs {
   std::uint64_t identity = 0;  ///< of the model
   std::string skinning, deformer;
-  bool unfolded = false, field = false;  ///< whether the displacement field was written
+  bool unfolded = false, settled = false;
+  bool field = false;  ///< whether the displacement field was written
 };
 
 class PosedFolder {

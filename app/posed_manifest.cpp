@@ -78,6 +78,7 @@ PosedManifest manifest_from(const json& from) {
   out.skinning = from.at("skinning");
   out.deformer = from.at("deformer");
   out.unfolded = from.at("unfolded");
+  out.settled = from.value("settled", false);
   for (const json& surface : from.at("surfaces")) out.surfaces.push_back(surface_from(surface));
   for (const json& file : from.at("files")) out.files.push_back(file_from(file));
   return out;
@@ -106,14 +107,15 @@ std::string to_json(const PosedManifest& manifest) {
     if (!file.of.empty()) files.back()["of"] = file.of;
     for (const auto& [value, name] : file.labels) files.back()["labels"][std::to_string(value)] = name;
   }
-  const json out{{"ecorche_posed", 1},
-                 {"model", {{"name", manifest.model}, {"identity", text::hex(manifest.identity)}}},
-                 {"pose", kPoseFile},
-                 {"skinning", manifest.skinning},
-                 {"deformer", manifest.deformer},
-                 {"unfolded", manifest.unfolded},
-                 {"surfaces", std::move(surfaces)},
-                 {"files", std::move(files)}};
+  json out{{"ecorche_posed", 1},
+           {"model", {{"name", manifest.model}, {"identity", text::hex(manifest.identity)}}},
+           {"pose", kPoseFile},
+           {"skinning", manifest.skinning},
+           {"deformer", manifest.deformer},
+           {"unfolded", manifest.unfolded},
+           {"surfaces", std::move(surfaces)},
+           {"files", std::move(files)}};
+  if (manifest.settled) out["settled"] = true;
   return out.dump(2) + "\n";
 }
 

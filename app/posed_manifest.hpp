@@ -45,7 +45,7 @@ struct PosedManifest {
   std::string model;
   std::uint64_t identity = 0;  ///< model_file::identity
   std::string skinning, deformer;
-  bool unfolded = false;
+  bool unfolded = false, settled = false;
   std::vector<PosedSurface> surfaces;  ///< in the order of kScanSurfaces
   std::vector<PosedFile> files;        ///< all but the manifest, sorted by name
 

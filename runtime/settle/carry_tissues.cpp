@@ -8,7 +8,7 @@ namespace ecorche::runtime {
 void carry_tissues(const Model& model, const std::vector<std::uint8_t>& moved, PosedBody& body) {
   for (std::size_t i = 0; i < model.tissues.size(); ++i) {
     const Tissue& tissue = model.tissues[i];
-    if (tissue.segment != Tissue::by_tets) continue;
+    if (tissue.segment != Tissue::by_tets || body.tissues[i].empty()) continue;
     for (std::size_t v = 0; v < tissue.tet.size(); ++v) {
       const auto tet = model.tets.row(tissue.tet[v]);
       if (!std::any_of(tet.begin(), tet.end(),

@@ -10,7 +10,8 @@
 
 namespace ecorche::runtime {
 
-/// Vertices that hang on tets with a moved node, `moved` #nodes, again where their tets are. Bones stay.
+/// Vertices that hang on tets with a moved node, `moved` #nodes, again where their tets are. Bones stay, and
+/// so do tissues of which `body` has no positions.
 void carry_tissues(const Model& model, const std::vector<std::uint8_t>& moved, PosedBody& body);
 
 }  // namespace ecorche::runtime

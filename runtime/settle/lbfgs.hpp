@@ -10,30 +10,32 @@
 
 namespace ecorche::runtime {
 
-/// Makes `f(x, gradient)` smaller from x on, in at most `steps` steps; returns how many were made. The first
-/// step, and each after the memory was of no use, moves no entry by more than `first_step`.
-template <class F>
-int lbfgs(const F& f, Eigen::VectorXd& x, int steps, double first_step) {
+/// A step and what it did to the gradient; rho = 1 / (s . y).
+struct LbfgsPair {
+  Eigen::VectorXd s, y;
+  double rho;
+};
+
+/// Makes `f(x, gradient)` smaller from x on, in at most `steps` steps; returns how many were made.
+/// `initial(direction, newest)` multiplies by a first estimate of the inverse Hessian, for which it may look
+/// at the newest pair; null at first, and after the memory was of no use. Ends after a step s that is
+/// `enough(s)`.
+template <class F, class Initial, class Enough>
+int lbfgs(const F& f, const Initial& initial, const Enough& enough, Eigen::VectorXd& x, int steps) {
   constexpr std::size_t kMemory = 8;
   constexpr double kArmijo = 1e-4;
-  struct Pair {
-    Eigen::VectorXd s, y;
-    double rho;
-  };
-  std::deque<Pair> pairs;
+  std::deque<LbfgsPair> pairs;
   Eigen::VectorXd gradient(x.size()), next_gradient(x.size()), direction, next;
   double value = f(x, gradient);
   for (int step = 0; step < steps; ++step) {
-    const double steepest = gradient.lpNorm<Eigen::Infinity>();
-    if (steepest == 0) return step;
+    if (gradient.lpNorm<Eigen::Infinity>() == 0) return step;
     direction = -gradient;
     std::vector<double> alpha(pairs.size());
     for (std::size_t i = pairs.size(); i-- > 0;) {
       alpha[i] = pairs[i].rho * pairs[i].s.dot(direction);
       direction -= alpha[i] * pairs[i].y;
     }
-    direction *=
-        pairs.empty() ? first_step / steepest : 1 / (pairs.back().rho * pairs.back().y.squaredNorm());
+    initial(direction, pairs.empty() ? nullptr : &pairs.back());
     for (std::size_t i = 0; i < pairs.size(); ++i)
       direction += (alpha[i] - pairs[i].rho * pairs[i].y.dot(direction)) * pairs[i].s;
     const double slope = direction.dot(gradient);
@@ -49,17 +51,29 @@ int lbfgs(const F& f, Eigen::VectorXd& x, int steps, double first_step) {
       pairs.clear();  // once more along the gradient
       continue;
     }
-    Pair pair{next - x, next_gradient - gradient, 0};
+    LbfgsPair pair{next - x, next_gradient - gradient, 0};
     const double curvature = pair.s.dot(pair.y);
     x.swap(next);
     gradient.swap(next_gradient);
     value = next_value;
+    if (enough(pair.s)) return step + 1;
     if (curvature <= 1e-12 * pair.s.norm() * pair.y.norm()) continue;
     pair.rho = 1 / curvature;
     pairs.push_back(std::move(pair));
     if (pairs.size() > kMemory) pairs.pop_front();
   }
   return steps;
+}
+
+/// The same by the gradient alone: a step without memory moves no entry by more than `first_step`.
+template <class F>
+int lbfgs(const F& f, Eigen::VectorXd& x, int steps, double first_step) {
+  const auto initial = [first_step](Eigen::VectorXd& direction, const LbfgsPair* newest) {
+    direction *= newest == nullptr ? first_step / direction.lpNorm<Eigen::Infinity>()
+                                   : 1 / (newest->rho * newest->y.squaredNorm());
+  };
+  return lbfgs(
+      f, initial, [](const Eigen::VectorXd&) { return false; }, x, steps);
 }
 
 }  // namespace ecorche::runtime

@@ -112,6 +112,7 @@ void Client::on_closed() {
   closed_ = true;
   seat_.reset();
   if (pending_.radiograph) pending_.radiograph->request_stop();
+  if (pending_.settle) pending_.settle->request_stop();
   output_.wake().cancel();
   leave_place();
   try {

@@ -111,7 +111,7 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   struct Pending {
     std::size_t subscriptions = 0;
     int ik = 0, probes = 0, fields = 0;
-    std::optional<std::stop_source> radiograph;  ///< of the one that is being made
+    std::optional<std::stop_source> radiograph, settle;  ///< of the one that is being made
   };
   Pending& pending() { return pending_; }
 

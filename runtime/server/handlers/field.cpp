@@ -2,7 +2,6 @@
 // Numbers at the vertices of tissues in the present pose.
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +9,7 @@
 #include <ecorche/runtime/vertex_fields.hpp>
 #include "proto/arrays.hpp"
 #include "runtime/server/handlers/handlers.hpp"
+#include "runtime/server/handlers/tissue_rows.hpp"
 #include "runtime/server/resources/guarded.hpp"
 #include "runtime/server/session/quality_job.hpp"
 
@@ -37,20 +37,7 @@ Status read_request(const v1::SampleField& sample, const Model& model, FieldRequ
                                               " (count from 0, as the skeleton does)"};
   }
   out.segment = static_cast<int>(sample.segment());
-  for (const std::string& name : sample.tissues()) {
-    const auto found = std::find_if(model.tissues.begin(), model.tissues.end(),
-                                    [&](const Tissue& tissue) { return tissue.name == name; });
-    if (found == model.tissues.end())
-      return {StatusCode::not_found, "field: no tissue '" + name + "' (ModelOpened.tissues has the names)"};
-    out.tissues.push_back(static_cast<std::uint32_t>(found - model.tissues.begin()));
-  }
-  if (sample.tissues().empty()) {
-    out.tissues.resize(model.tissues.size());
-    std::iota(out.tissues.begin(), out.tissues.end(), 0U);
-  }
-  std::sort(out.tissues.begin(), out.tissues.end());
-  out.tissues.erase(std::unique(out.tissues.begin(), out.tissues.end()), out.tissues.end());
-  return {};
+  return tissue_rows("field", sample.tissues(), model, out.tissues);
 }
 
 Status find_values(const ServedModel& served, FieldRequest& field) {

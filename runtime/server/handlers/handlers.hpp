@@ -45,6 +45,9 @@ Status handle_render_radiograph(Client& client, const v1::RenderRadiograph& rend
 // field.cpp
 Status handle_sample_field(Client& client, const v1::SampleField& sample, const Request& request);
 
+// settle.cpp
+Status handle_settle_flesh(Client& client, const v1::SettleFlesh& settle_flesh, const Request& request);
+
 // ik.cpp
 Status handle_solve_ik(Client& client, const v1::SolveIk& solve, const Request& request);
 

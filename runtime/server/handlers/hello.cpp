@@ -15,12 +15,12 @@ namespace {
 // The protocol of proto/ecorche/v1.
 constexpr std::uint32_t kProtocol = 1;
 constexpr std::size_t kMaxPing = 64;  // bytes
-constexpr std::array kFeatures{v1::FEATURE_VOLUMES,  v1::FEATURE_QUALITY,     v1::FEATURE_CONTROL,
-                               v1::FEATURE_RESUME,   v1::FEATURE_CLIPS,       v1::FEATURE_INVERSE_KINEMATICS,
-                               v1::FEATURE_RELOAD,   v1::FEATURE_THRESHOLDS,  v1::FEATURE_SPHERES,
-                               v1::FEATURE_PROBE,    v1::FEATURE_POSE,        v1::FEATURE_CLIP_STATE,
-                               v1::FEATURE_PRESENCE, v1::FEATURE_SKINNING,    v1::FEATURE_RADIOGRAPH,
-                               v1::FEATURE_FIELDS,   v1::FEATURE_HANG_SPHERES};
+constexpr std::array kFeatures{v1::FEATURE_VOLUMES,  v1::FEATURE_QUALITY,      v1::FEATURE_CONTROL,
+                               v1::FEATURE_RESUME,   v1::FEATURE_CLIPS,        v1::FEATURE_INVERSE_KINEMATICS,
+                               v1::FEATURE_RELOAD,   v1::FEATURE_THRESHOLDS,   v1::FEATURE_SPHERES,
+                               v1::FEATURE_PROBE,    v1::FEATURE_POSE,         v1::FEATURE_CLIP_STATE,
+                               v1::FEATURE_PRESENCE, v1::FEATURE_SKINNING,     v1::FEATURE_RADIOGRAPH,
+                               v1::FEATURE_FIELDS,   v1::FEATURE_HANG_SPHERES, v1::FEATURE_SETTLE};
 
 void describe(const Limits& limits, v1::Limits& out) {
   out.set_hello_bytes(limits.hello_bytes);

@@ -60,6 +60,7 @@ constexpr std::array kMessages{
     MessageRow{E::kRenderRadiograph, "radiograph", kModel, kStatus,
                call<&E::render_radiograph, handle_render_radiograph>},
     MessageRow{E::kSampleField, "field", kModel, kStatus, call<&E::sample_field, handle_sample_field>},
+    MessageRow{E::kSettleFlesh, "settle", kModel, kStatus, call<&E::settle_flesh, handle_settle_flesh>},
     MessageRow{E::kGetSpheres, "spheres", kModel, kStatus, call<&E::get_spheres, handle_get_spheres>},
     MessageRow{E::kHangSpheres, "spheres", kControl, kStatus, call<&E::hang_spheres, handle_hang_spheres>},
     MessageRow{E::kPing, "ping", kHello, kStatus, call<&E::ping, handle_ping>},

@@ -151,6 +151,12 @@ const runtime::VolumePoser& ServedModel::volumes() const {
   return *volumes_;
 }
 
+const runtime::FleshSettler& ServedModel::settler() const {
+  once(settler_made_,
+       [this] { settler_ = std::make_unique<const runtime::FleshSettler>(model(), Context{}); });
+  return *settler_;
+}
+
 bool ServedModel::has_levels(const std::vector<std::uint32_t>& tissues) const {
   return std::all_of(tissues.begin(), tissues.end(),
                      [this](std::uint32_t t) { return levels_[t].made.load(); });

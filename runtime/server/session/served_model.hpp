@@ -21,6 +21,7 @@
 #include "runtime/server/session/packed_triangles.hpp"
 #include "runtime/server/session/rest_pose.hpp"
 #include "runtime/server/session/skinning_data.hpp"
+#include "runtime/settle/settle_flesh.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::server {
@@ -57,6 +58,8 @@ struct ServedModel {
   const runtime::QualityMeter& meter() const;
   const runtime::VolumePoser& volumes() const;
   const runtime::Probe& probe() const;
+  /// Factors, which takes seconds; throws Error{data} where no soft tet hangs on a bone.
+  const runtime::FleshSettler& settler() const;
   /// What a client skins these tissues by at this level of detail. Appends to `payload`.
   void describe_skinning(const std::vector<std::uint32_t>& tissues, std::uint32_t level,
                          v1::SkinningData& out, wire::Payload& payload) const;
@@ -109,6 +112,8 @@ struct ServedModel {
   mutable SkinningTables skinning_;
   mutable std::once_flag probe_made_;
   mutable std::unique_ptr<const runtime::Probe> probe_;
+  mutable std::once_flag settler_made_;
+  mutable std::unique_ptr<const runtime::FleshSettler> settler_;
 };
 
 }  // namespace ecorche::server

@@ -42,7 +42,9 @@ class Fem(unittest.TestCase):
         self.assertLess(fem["two_starts"]["distance_mm"], 0.1)
         self.assertLess(fem["residual"], 1e-3)
         self.assertLess(abs(fem["volume_change"]), 0.01)
-        self.assertEqual(fem["tets"] + fem["left_out"]["on_bones"] + fem["left_out"]["floating"], fem["left_out"]["of_soft_tets"])
+        left_out = fem["left_out"]
+        self.assertEqual(fem["tets"] + left_out["on_bones"] + left_out["between_bones"] + left_out["floating"], left_out["of_soft_tets"])
+        self.assertGreater(left_out["between_bones"], 0)
         self.assertGreater(fem["to_cor"]["max_mm"], fem["to_cor"]["p95_mm"])
         self.assertRegex(done.stdout, r"  finite elements: pass, p1 at 0\.45, \d+ tets, \d+ iterations, ")
         # The surfaces are those of the solution: as far from skinning's as it says, and bones where they were.
@@ -60,6 +62,49 @@ class Fem(unittest.TestCase):
         self.assertEqual((fem / "skin.stl").read_bytes(), (pose_fem / "skin.stl").read_bytes())
         self.assertIn('"skinning": "fem"', (pose_fem / "posed.json").read_text())
 
+    def test_a_knee_is_free_of_inversions(self):
+        """Bones that pass one another turn tets between them inside out; flesh beside those is not dragged along."""
+        out, _ = self.solve("knee", "joints: {knee_right: {flexion_deg: 60}}\n", "--one-start")
+        fem = json.loads((out / "fem.json").read_text())
+        self.assertTrue(fem["converged"])
+        self.assertEqual(fem["inverted_tets"], 0)
+
+    def test_a_settled_body_is_near_to_it_and_measured_as_such(self):
+        pose = "root: {translation_mm: [300, 20, -10], rotation: [0.9, 0.1, 0.3, 0.3]}\njoints: {elbow_right: {flexion_deg: 45}, knee_right: {flexion_deg: 40}}\n"
+        fem, _ = self.solve("settle_fem", pose, "--one-start")
+        skinned, _ = self.solve("settle_cor", pose, command=("pose",))
+        settled, done = self.solve("settled", pose, "--settle", "--tets", command=("pose",))
+        self.assertRegex(done.stdout, r"  settled: \d+ steps, energy \d+ to \d+ mm\^3, nodes moved by up to \d+\.\d mm\n")
+        apart = {name: np.linalg.norm(corners(folder / "skin.stl") - corners(fem / "skin.stl"), axis=-1)
+                 for name, folder in (("skinned", skinned), ("settled", settled))}
+        self.assertGreater(apart["skinned"].max(), 2)
+        self.assertLess(np.sqrt((apart["settled"] ** 2).mean()), 0.1 * np.sqrt((apart["skinned"] ** 2).mean()))
+        for bone in ("humerus_right", "femur_right"):
+            self.assertEqual((settled / f"{bone}.stl").read_bytes(), (skinned / f"{bone}.stl").read_bytes())
+        quality = json.loads((settled / "quality.json").read_text())
+        self.assertLess(quality["settled"]["energy_after_mm3"], 0.8 * quality["settled"]["energy_before_mm3"])
+        self.assertGreater(quality["settled"]["largest_move_mm"], 2)
+        self.assertTrue(json.loads((settled / "posed.json").read_text())["settled"])
+        # What was measured is what was written.
+        skin = corners(settled / "skin.stl")
+        volume = np.einsum("ij,ij->i", skin[:, 0] - skin[0, 0], np.cross(skin[:, 1] - skin[0, 0], skin[:, 2] - skin[0, 0])).sum() / 6
+        row = next(tissue for tissue in quality["tissues"] if tissue["name"] == "skin")
+        self.assertLess(abs(volume / row["posed_mm3"] - 1), 1e-4)
+        before = json.loads((skinned / "quality.json").read_text())
+        self.assertLess(quality["inverted_tets"], before["inverted_tets"])
+        self.assertNotIn("settled", before)
+
+    def test_volumes_are_of_the_settled_body(self):
+        file = self.folder / "bent.yaml"
+        file.write_text(HEAD + "joints: {elbow_right: {flexion_deg: 60}}\n")
+        made = {}
+        for words in ((), ("--settle",)):
+            out = self.folder / f"volumes{len(words)}"
+            done = run("pose", self.model, "-o", out, "--pose", file, "--volumes", "labels", "--grid", "rest", *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            made[len(words)] = (out / "labels.nrrd").read_bytes()
+        self.assertNotEqual(made[0], made[1])
+
     def test_beyond_its_range_it_warns(self):
         out, done = self.solve("deep", "joints: {knee_right: {flexion_deg: 110}}\n", "--one-start")
         fem = json.loads((out / "fem.json").read_text())
@@ -74,6 +119,12 @@ class Fem(unittest.TestCase):
                       "(use --element p1 or p2, or --material stable_neo_hookean)", done.stderr)
         _, done = self.solve("none", "", "--skinning", "fem", "--unfold", command=("pose",), code=64)
         self.assertIn("error: --skinning fem: it refuses folds by itself (leave out --unfold)", done.stderr)
+        _, done = self.solve("none", "", "--skinning", "fem", "--settle", command=("pose",), code=64)
+        self.assertIn("error: --skinning fem: it is settled to the end (leave out --settle)", done.stderr)
+        _, done = self.solve("none", "", "--settle", "--unfold", command=("pose",), code=64)
+        self.assertIn("error: --settle: it presses folds out by itself (leave out --unfold)", done.stderr)
+        _, done = self.solve("none", "", "--settle", "--deformer", "spheres", command=("pose",), code=64)
+        self.assertIn("error: --settle: it moves tets (leave out --deformer)", done.stderr)
         _, done = self.solve("none", "", "--skinning", "fem", "--deformer", "spheres", command=("pose",), code=64)
         self.assertIn("error: --skinning fem: finite elements are tets (leave out --deformer)", done.stderr)
 

@@ -23,6 +23,7 @@ namespace Ecorche.Wire
         Radiograph = 35,
         Fields = 36,
         HangSpheres = 39,
+        Settle = 44,
     }
 
     public sealed class ClientHello
