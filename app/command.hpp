@@ -74,5 +74,6 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen);
 void declare_contact(CLI::App& app, Program& program, Run& chosen);
 void declare_cohort(CLI::App& app, Program& program, Run& chosen);
 void declare_report(CLI::App& app, Program& program, Run& chosen);
+void declare_igtl(CLI::App& app, Program& program, Run& chosen);
 
 }  // namespace ecorche::app

@@ -44,6 +44,7 @@ const std::vector<std::pair<std::string, std::string>> kMoreExamples{
     {"serve", "ecorche serve patient.hdf --http 127.0.0.1:8080"},
     {"cohort", "ecorche cohort bids results participant group --participant-label 01 02"},
     {"report", "ecorche report group results"},
+    {"igtl", "ecorche igtl patient.hdf --goal Stylus=hand_right"},
     {"stream", "ecorche stream 127.0.0.1:7070 --motion patient/motion/walk.bvh"},
 };
 

@@ -22,12 +22,13 @@
 namespace ecorche::app {
 namespace {
 
-constexpr Declare kCommands[] = {
-    declare_phantom, declare_new,      declare_check, declare_repair,     declare_preprocess, declare_info,
-    declare_verify,  declare_export,   declare_pose,  declare_motion,     declare_unpose,     declare_probe,
-    declare_thin,    declare_refill,   declare_tears, declare_deformers,  declare_path,       declare_contact,
-    declare_serve,   declare_stream,   declare_rig,   declare_radiograph, declare_cohort,     declare_report,
-    declare_fem,     declare_calibrate};
+constexpr Declare kCommands[] = {declare_phantom,    declare_new,        declare_check,  declare_repair,
+                                 declare_preprocess, declare_info,       declare_verify, declare_export,
+                                 declare_pose,       declare_motion,     declare_unpose, declare_probe,
+                                 declare_thin,       declare_refill,     declare_tears,  declare_deformers,
+                                 declare_path,       declare_contact,    declare_serve,  declare_stream,
+                                 declare_rig,        declare_radiograph, declare_cohort, declare_report,
+                                 declare_fem,        declare_calibrate,  declare_igtl};
 
 int run_command(int argc, char** argv) {
   Program program;
