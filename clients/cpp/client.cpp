@@ -13,6 +13,11 @@ constexpr wire::FrameLimits kLimits{.envelope_bytes = 16U << 20, .payload_bytes 
 // Of a large payload, before it is read on: a tenth of a millisecond's copying.
 constexpr std::size_t kEnough = 256U << 10;
 
+constexpr std::uint32_t kProtocol = 1;
+
+// For the connection, and then for the server's hello.
+constexpr std::chrono::seconds kGreeting{5};
+
 constexpr auto kHighestCode = static_cast<std::uint32_t>(StatusCode::unauthenticated);
 
 ErrorKind kind_of(std::uint32_t code) {
@@ -40,11 +45,11 @@ ServerError::ServerError(const std::string& where, const v1::Status& status)
       code_(status.code() <= kHighestCode ? static_cast<StatusCode>(status.code()) : StatusCode::unknown) {}
 
 Client::Client(const wire::Address& address, const std::string& name, const Access& access)
-    : socket_(address, Clock::now() + std::chrono::seconds(5), access.authorities), reader_(kLimits) {
+    : socket_(address, Clock::now() + kGreeting, access.authorities), reader_(kLimits) {
   v1::Envelope envelope;
   v1::ClientHello& hello = *envelope.mutable_client_hello();
-  hello.set_protocol_min(1);
-  hello.set_protocol_max(1);
+  hello.set_protocol_min(kProtocol);
+  hello.set_protocol_max(kProtocol);
   hello.set_client(name.substr(0, 64));
   // MeshDecoder reads them all.
   for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
@@ -52,19 +57,26 @@ Client::Client(const wire::Address& address, const std::string& name, const Acce
   hello.set_token(access.token);
   hello.set_resume_token(access.resume_token);
   hello.set_session(access.session);
-  wire::Frame answer = call(std::move(envelope));
+  wire::Frame answer = call(std::move(envelope), nullptr, kGreeting);
   if (!answer.envelope.has_server_hello()) {
     throw Error(ErrorKind::protocol, "hello", "the server answered with something else",
                 "check that it is ecorche serve");
   }
   hello_ = std::move(*answer.envelope.mutable_server_hello());
+  if (hello_.protocol() != kProtocol) {
+    throw Error(ErrorKind::protocol, "hello",
+                "the server speaks protocol " + std::to_string(hello_.protocol()) + ", this client " +
+                    std::to_string(kProtocol),
+                "use a client of the server's version");
+  }
 }
 
-wire::Frame Client::call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload) {
+wire::Frame Client::call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload,
+                         std::chrono::seconds within) {
   const std::uint64_t id = ++last_request_;
   request.set_request_id(id);
   send(request, payload);
-  const auto until = Clock::now() + patience;
+  const auto until = Clock::now() + within;
   while (auto frame = read_frame(until)) {
     if (frame->envelope.request_id() != id) {
       waiting_.push_back(std::move(*frame));
@@ -74,7 +86,7 @@ wire::Frame Client::call(v1::Envelope request, const std::shared_ptr<const wire:
       throw ServerError("server", frame->envelope.status());
     return std::move(*frame);
   }
-  throw Error(ErrorKind::temporary, "server", "no answer within " + std::to_string(patience.count()) + " s",
+  throw Error(ErrorKind::temporary, "server", "no answer within " + std::to_string(within.count()) + " s",
               "try again");
 }
 

@@ -41,6 +41,10 @@ void Socket::write(std::span<const std::byte> bytes, Clock::time_point until) {
   tls_->write(bytes, [&](std::span<const std::byte> part) { write_plain(part, until); });
 }
 
+std::intptr_t Socket::handle() const {
+  return plain_->handle();
+}
+
 std::size_t Socket::read_plain(std::span<std::byte> out, Clock::time_point until, std::size_t enough) {
   std::error_code error;
   const std::size_t read = plain_->read(out, until, enough < kMany ? 1 : enough, error);

@@ -71,6 +71,8 @@ class Client:
         hello.client_hello.encodings.extend(ENCODINGS.values())
         hello.client_hello.features.extend([hello_pb2.FEATURE_PRESENCE, hello_pb2.FEATURE_CLIP_STATE])
         self.server = self._call(hello)[0].server_hello
+        if self.server.protocol != 1:
+            raise ConnectionError(f"the server speaks protocol {self.server.protocol}, this client 1")
 
     def __enter__(self):
         return self

@@ -32,6 +32,8 @@ class TcpClient {
   /// end. Where nothing is there it sleeps until `enough` bytes have come, or `until`.
   std::size_t read(std::span<std::byte> out, Clock::time_point until, std::size_t enough,
                    std::error_code& error);
+  /// For who waits for several at once. -1 where there is none.
+  std::intptr_t handle() const { return socket_; }
   /// Whether a read has met the end of what the peer sends.
   bool ended() const { return ended_; }
   /// Writes all, or as much as the peer takes until `until`; the number of bytes.

@@ -207,6 +207,10 @@ ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche
   });
 }
 
+intptr_t ecorche_client_descriptor(const ecorche_client* client) {
+  return client == nullptr ? -1 : client->connection->handle();
+}
+
 ecorche_code ecorche_client_quality(const ecorche_client* client, ecorche_quality* out, uint64_t* sequence) {
   return c::with_client(client, true, [&] {
     if (!client->quality)

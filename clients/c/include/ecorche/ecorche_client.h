@@ -53,7 +53,8 @@ typedef struct ecorche_client_options {
 #define ECORCHE_CLIENT_OPTIONS_INIT \
   { sizeof(ecorche_client_options), 0, 0, 0, 0 }
 
-/* "127.0.0.1:7070". Waits 5 s at most; `options` may be NULL. UNAVAILABLE where nobody answers there. */
+/* "127.0.0.1:7070". Waits 5 s at most for the connection, and 5 s for the server to
+ * greet; `options` may be NULL. UNAVAILABLE where nobody answers there. */
 ECORCHE_API ecorche_code ecorche_client_connect(const char* address, const ecorche_client_options* options,
                                                 ecorche_client** out);
 ECORCHE_API void ecorche_client_close(ecorche_client* client);
@@ -148,6 +149,12 @@ typedef struct ecorche_event {
 
 /* The next thing that came. Waits `seconds` for one; 0: never, for a game's loop. */
 ECORCHE_API ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche_event* out);
+
+/* The connection's socket, for a loop of events that waits for many: when it can be read, call
+ * ecorche_client_poll with 0 until nothing more comes; call it so, too, after every function that waits for an
+ * answer, since what came with the answer waits in the client. Another one after ecorche_client_resume. Not to
+ * be read, written or closed. -1 for none. */
+ECORCHE_API intptr_t ecorche_client_descriptor(const ecorche_client* client);
 
 /* Of the last frame: 3 * vertex_count, LPS mm; NULL before the first, or for a tissue that was not asked for.
  * Pointers into a frame are good until the next poll. Floats are made at the first of these calls, so who

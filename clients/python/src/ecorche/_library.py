@@ -3,7 +3,7 @@
 import ctypes
 import functools
 import os
-from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_size_t, c_uint, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_size_t, c_ssize_t, c_uint, c_uint32, c_uint64, c_void_p
 from typing import Any
 
 ABI_VERSION = 0
@@ -179,6 +179,7 @@ _CLIENT_OTHER = [
     (c_char_p, "clip", c_void_p, c_uint32, POINTER(c_double)),
     (POINTER(c_float), "positions", c_void_p, c_uint32),
     (POINTER(c_float), "normals", c_void_p, c_uint32),
+    (c_ssize_t, "descriptor", c_void_p),
 ]
 
 

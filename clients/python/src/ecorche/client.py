@@ -44,6 +44,7 @@ class Client(Anatomy):
             raise InvalidArgument(f"encoding: {encoding} is none of {', '.join(ENCODINGS)}")
         self._library = client_library()
         self._handle = ctypes.c_void_p()
+        self.model_changed = False  # the server has read the model anew: this session stays as it is; connect again for the new one
         text = lambda value: None if value is None else os.fsencode(value)  # noqa: E731
         options = ClientOptions(name=b"python", token=text(token), authorities=text(authorities))
         self._call("connect", address.encode(), ctypes.byref(options), ctypes.byref(self._handle))
@@ -217,7 +218,11 @@ class Client(Anatomy):
         self._call("poll", self._handle, seconds, ctypes.byref(event))
         if event.code != 0:
             raise self._library.error(event.code)
+        self.model_changed |= event.kind == MODEL_CHANGED
         return event
+
+    def _descriptor(self) -> int:
+        return self._library.ask("descriptor", self._handle)
 
     def _vectors(self, what: str, tissue: Union[str, int]) -> npt.NDArray[np.float32]:
         found = self.tissue(tissue)

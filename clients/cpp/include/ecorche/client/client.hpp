@@ -53,7 +53,7 @@ class Client {
   /// How long the server may take for an answer.
   static constexpr std::chrono::seconds patience{30};
 
-  /// Connects and exchanges the hellos.
+  /// Connects and exchanges the hellos; each takes 5 s at most.
   Client(const wire::Address& address, const std::string& name, const Access& access = {});
 
   /// What the server said of itself.
@@ -61,7 +61,8 @@ class Client {
 
   /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
   /// answer is a Status that is not OK.
-  wire::Frame call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload = nullptr);
+  wire::Frame call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload = nullptr,
+                   std::chrono::seconds within = patience);
 
   /// Sends what has no direct answer: poses.
   void send(const v1::Envelope& envelope, const std::shared_ptr<const wire::Payload>& payload = nullptr);
@@ -84,6 +85,9 @@ class Client {
 
   /// A frame that was read to its end: its memory serves a later payload.
   void reuse(wire::Frame spent) { reader_.reuse(std::move(spent.payload)); }
+
+  /// The system's handle of the socket: readable when receive() may have something.
+  std::intptr_t handle() const { return socket_.handle(); }
 
   /// All read so far, framing included.
   std::uint64_t bytes_received() const { return bytes_received_; }

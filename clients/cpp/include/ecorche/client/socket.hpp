@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -35,6 +36,8 @@ class Socket {
   std::size_t read(std::span<std::byte> out, Clock::time_point until, std::size_t enough = 1);
   /// Writes all. Throws Error{temporary} when the peer hung up, or did not take it until `until`.
   void write(std::span<const std::byte> bytes, Clock::time_point until);
+  /// The system's handle, for who waits for several at once.
+  std::intptr_t handle() const;
 
  private:
   std::size_t read_plain(std::span<std::byte> out, Clock::time_point until, std::size_t enough = 1);
