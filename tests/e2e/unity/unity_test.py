@@ -22,6 +22,7 @@ sys.path.insert(0, str(SOURCE / "tests" / "e2e" / "stream"))
 
 from ecorche_client import Client  # noqa: E402
 from ecorche_frames import aligned, array  # noqa: E402
+from hostile import HostileServers  # noqa: E402
 from relay import Relay  # noqa: E402
 from serving import ECORCHE, Server  # noqa: E402
 from ecorche.v1 import stream_pb2  # noqa: E402
@@ -286,24 +287,16 @@ class Unity(unittest.TestCase):
                 plain = check("refused", where, "--token", TOKEN, "--timeout", 3, fails=True)
                 self.assertIn("error", plain)
 
-    def test_another_version(self):
-        import socket
-        import threading
-        from ecorche.v1 import envelope_pb2
-        from ecorche_frames import encode
-        with socket.create_server(("127.0.0.1", 0)) as listener:
-            def newer():
-                with listener.accept()[0] as connection:
-                    connection.recv(4096)
-                    answer = envelope_pb2.Envelope(request_id=1)
-                    answer.server_hello.protocol = 2
-                    connection.sendall(encode(answer))
-                    connection.recv(1)
-            thread = threading.Thread(target=newer)
-            thread.start()
-            out = check("refused", "127.0.0.1:%d" % listener.getsockname()[1], fails=True)
-            thread.join()
-        self.assertEqual(out, "error FailedPrecondition the server speaks protocol 2, this client 1\n")
+    def test_servers_that_are_none_of_ours(self):
+        with HostileServers(self.server.port) as hostile, tempfile.TemporaryDirectory() as folder:
+            self.assertEqual(check("refused", hostile.address("other_version"), fails=True),
+                             "error FailedPrecondition the server speaks protocol 99, this client 1\n")
+            for name, error in (("silent", "DeadlineExceeded"), ("hangs_up", "Unavailable"), ("noise", ""), ("huge", "")):
+                with self.subTest(name):
+                    self.assertRegex(check("refused", hostile.address(name), "--timeout", 2, fails=True), f"^error {error}")
+            for name, error in (("half_a_frame", "Unavailable"), ("lying_frame", "")):
+                with self.subTest(name):
+                    self.assertRegex(check("live", hostile.address(name), folder, "U16Delta", fails=True), f"^error {error}")
 
     def test_five_steps(self):
         out = subprocess.run(["mono", SAMPLE, self.server.address], capture_output=True, text=True, check=True, timeout=60).stdout

@@ -186,3 +186,19 @@ test("a client that is sent nonsense says so and dials again", async (t) => {
     client.close();
   }
 });
+
+test("a server of another protocol is told apart, and not asked again", async (t) => {
+  const server = new WebSocketServer({ port: 0, host: "127.0.0.1" });
+  await new Promise((resolve) => server.once("listening", resolve));
+  t.after(() => { for (const socket of server.clients) socket.terminate(); server.close(); });
+  let dialled = 0;
+  server.on("connection", (socket) => {
+    ++dialled;
+    socket.once("message", () => socket.send(encodeFrame(toBinary(EnvelopeSchema, create(EnvelopeSchema, {
+      requestId: 2n, message: { case: "serverHello", value: { protocol: 99 } } })))));
+  });
+  await assert.rejects(within(20, Client.connect(`ws://127.0.0.1:${(server.address() as AddressInfo).port}/v1`), "connecting"),
+    (error: ConnectionError) => error instanceof ConnectionError && error.message === "the server speaks protocol 99, this client 1");
+  await new Promise((resolve) => setTimeout(resolve, 300));
+  assert.equal(dialled, 1);
+});

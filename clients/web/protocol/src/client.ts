@@ -11,7 +11,7 @@ import { makeBridge, type Bridge } from "./bridge.js";
 import type { FrameNote, Post, ToClient, ToLink } from "./channel.js";
 import type { ClientEvents, ClientOptions, IkTargetInit } from "./client_events.js";
 import { Emitter } from "./emitter.js";
-import { Code, ConnectionError, report, ServerError } from "./errors.js";
+import { Code, ConnectionError, ofKnownProtocol, report, ServerError } from "./errors.js";
 import { Encoding, type PoseState } from "./gen/ecorche/v1/common_pb.js";
 import type { ClipSummary, ControlGranted, IkSolved } from "./gen/ecorche/v1/command_pb.js";
 import { AskControlSchema, GiveControlSchema, PlayClipSchema, SolveIkSchema, SteerClipSchema } from "./gen/ecorche/v1/command_pb.js";
@@ -284,7 +284,7 @@ export class Client extends Emitter<ClientEvents> {
     this.ending = undefined;
     const { envelope, answer } = this.requests.ask({ case: "clientHello", value: hello }, "serverHello");
     this.post({ kind: "dial", url: this.url + (session && `?session=${encodeURIComponent(session)}`), hello: envelope });
-    return (await answer).value;
+    return ofKnownProtocol((await answer).value);
   }
 
   private hear(message: ToClient): void {

@@ -31,6 +31,12 @@ export class ConnectionError extends Error {
   override name = "ConnectionError";
 }
 
+/** A server's hello, where it speaks what this client does; else throws ConnectionError. */
+export function ofKnownProtocol<Hello extends { protocol: number }>(hello: Hello): Hello {
+  if (hello.protocol !== 1) throw new ConnectionError(`the server speaks protocol ${hello.protocol}, this client 1`);
+  return hello;
+}
+
 /** As an uncaught error, which the handlers of a page and of a test see. */
 export function report(error: unknown): void {
   queueMicrotask(() => {
