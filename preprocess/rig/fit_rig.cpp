@@ -8,9 +8,11 @@
 
 #include <ecorche/kinematics/angles.hpp>
 #include "core/values/degrees.hpp"
+#include "preprocess/rig/body_frame.hpp"
 #include "preprocess/rig/bridged_joints.hpp"
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
+#include "preprocess/rig/lone_side.hpp"
 #include "preprocess/rig/mirrored_joints.hpp"
 #include "preprocess/rig/parted_bones.hpp"
 #include "preprocess/rig/plausible.hpp"
@@ -166,17 +168,18 @@ Context advising(const Context& outer) {
   return context;
 }
 
-}  // namespace
-
-Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* evidence) {
-  const Context context = advising(outer);
+// The joints of a body that lies straight along LPS, or as its scan has it.
+Rig fit_straight(const Case& patient, const Context& context, std::vector<JointEvidence>* evidence) {
   Rig rig;
   const Skeleton asked = patient.generic ? generic_tree(patient, context) : present_part(patient, context);
   rig.skeleton = asked;
   JointSources sources(patient, asked);
   take_other_sides(asked, sources, context);
   keep_rest_possible(asked, sources, context);
-  if (!patient.generic) keep_bridged_near(patient, asked, sources);
+  if (!patient.generic) {
+    keep_bridged_near(patient, asked, sources);
+    keep_lone_in_middle(asked, sources, context);
+  }
   for (std::size_t row = 0; row < asked.segments.size(); ++row) {
     context.check_stop();
     fit_joint(patient, sources, row, rig, context);
@@ -196,8 +199,40 @@ Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* e
       measure_rest(parent, joint, rig.fits[row], context);
     }
   }
+  return rig;
+}
+
+// Back into the scan; what was given stays to the last digit.
+void turn_back(const Skeleton& asked, const Eigen::Matrix3d& frame, Rig& rig,
+               std::vector<JointEvidence>* evidence) {
+  for (Segment& segment : rig.skeleton.segments) {
+    const Joint& was = asked.segments[static_cast<std::size_t>(asked.find_joint(segment.joint.name))].joint;
+    const bool given = !was.how && was.rule == CenterRule::given;
+    segment.joint.center = given ? was.center : Eigen::Vector3d(frame * segment.joint.center);
+    segment.joint.axes = given ? was.axes : Eigen::Matrix3d(frame * segment.joint.axes);
+  }
+  if (evidence == nullptr) return;
+  for (JointEvidence& one : *evidence) {
+    one.at = frame * one.at;
+    one.axis = frame * one.axis;
+    for (Eigen::Vector3d& vertex : one.vertices) vertex = frame * vertex;
+  }
+}
+
+}  // namespace
+
+Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* evidence) {
+  const Context context = advising(outer);
+  const Eigen::Matrix3d frame = body_frame(patient);
+  Rig rig;
+  if (frame.isIdentity(0)) {
+    rig = fit_straight(patient, context, evidence);
+  } else {
+    rig = fit_straight(turned(patient, frame.transpose()), context, evidence);
+    turn_back(patient.skeleton, frame, rig, evidence);
+  }
   // Its poses and clips are those of the same joints.
-  if (is_parted(asked)) rig.skeleton.name = whole_of_parted;
+  if (is_parted(patient.skeleton)) rig.skeleton.name = whole_of_parted;
   return rig;
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include <ecorche/kinematics/angles.hpp>
 #include "core/values/degrees.hpp"
@@ -16,12 +18,21 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kApart = 10, kTurned = 10;  // mm, degrees: what bench/rig_damage calls bad
-constexpr double kCut = 0.9;                 // of the other's length: sides differ by a few hundredths
+constexpr double kApart = 10, kTurned = 10;      // mm, degrees: what bench/rig_damage calls bad
+constexpr double kCut = 0.9;                     // of the other's length: sides differ by a few hundredths
+constexpr double kAsLong = 0.95;                 // of the other's extent: no need to lay them onto each other
+constexpr double kSurer = 2, kLeastShown = 0.2;  // so many times as sure as the other, and so sure, will do
 constexpr double kMirrored = 0.4, kTurnedBack = 0.3, kAssumed = 0.1;
 
 std::string degrees(double radians) {
   return std::to_string(std::lround(radians * degrees_per_radian));
+}
+
+// Whether a direction leads from a point to another, or is one that first tries that.
+bool leads_along(const DirectionSource& source) {
+  if (source.kind == DirectionSource::Kind::first_good)
+    return !source.choices.empty() && leads_along(source.choices.front());
+  return source.kind == DirectionSource::Kind::towards;
 }
 
 // One side's joint as the bones show it.
@@ -38,13 +49,21 @@ class Pairs {
       : skeleton_(skeleton), sources_(sources), context_(context) {}
 
   void run() {
+    std::vector<std::pair<std::size_t, std::size_t>> both;
     for (std::size_t row = 0; row < skeleton_.segments.size(); ++row) {
       const Joint& left = skeleton_.segments[row].joint;
       if (!left.name.ends_with("_left") || !left.how) continue;
       const int other = skeleton_.find_joint(other_side(left.name));
       if (other < 0 || !skeleton_.segments[static_cast<std::size_t>(other)].joint.how) continue;
+      both.emplace_back(row, static_cast<std::size_t>(other));
+    }
+    for (const auto& [left, right] : both) {
       context_.check_stop();
-      compare(shown(row), shown(static_cast<std::size_t>(other)));
+      compare(shown(left), shown(right));
+    }
+    for (const auto& [left, right] : both) {
+      context_.check_stop();
+      compare_along(left, right);
     }
   }
 
@@ -58,11 +77,13 @@ class Pairs {
     const FoundPoint& found = sources_.center(row);
     out.center = found.at;
     out.confidence = found.fit.confidence;
-    if (joint(row).kind == JointKind::hinge && !joint(row).sequence.empty()) {
-      const int axis = joint(row).sequence[0].axis;
-      const auto along = sources_.shown_axis(row, axis);
-      out.axis = along ? along->along : sources_.axes(row).first.col(axis);
-      if (along) out.confidence = std::min(out.confidence, along->confidence);
+    if (joint(row).sequence.empty()) return out;
+    const int axis = joint(row).sequence[0].axis;
+    if (const auto along = sources_.shown_axis(row, axis)) {
+      out.axis = along->along;
+      out.confidence = std::min(out.confidence, along->confidence);
+    } else if (joint(row).kind == JointKind::hinge) {
+      out.axis = sources_.axes(row).first.col(axis);
     }
     return out;
   }
@@ -79,6 +100,45 @@ class Pairs {
     return V.rows() == 0 ? 0 : (V.colwise().maxCoeff() - V.colwise().minCoeff()).norm();
   }
 
+  double away(const Vector3d& point, const std::string& segment) {
+    const Points& V = sources_.bones(segment).V;
+    return std::sqrt((V.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff());
+  }
+
+  // The bones of both sides, the shorter ones laid onto the image of the longer; nothing where they are alike
+  // in length: none is cut.
+  struct Cut {
+    std::string longer, shorter;
+    Laid lies;
+  };
+  std::optional<Cut> cut(const std::string& left, const std::string& right) {
+    const double a = length(left), b = length(right);
+    if (!(a > 0 && b > 0) || std::min(a, b) > kAsLong * std::max(a, b)) return std::nullopt;
+    const auto& [longer, shorter] = a >= b ? std::pair(left, right) : std::pair(right, left);
+    const auto& lies = laid(longer, shorter);
+    if (!lies || lies->share >= kCut) return std::nullopt;
+    return Cut{longer, shorter, *lies};
+  }
+
+  // Whether the bones of this side, the joint's own or its parent's, end before the joint, as those of the
+  // other show it.
+  bool ends_before(const Shown& it, const Shown& other) {
+    const auto& all = skeleton_.segments;
+    const auto parent = [&](const Shown& one) { return all[one.row].parent; };
+    std::vector<std::pair<std::string, std::string>> both{{all[it.row].name, all[other.row].name}};
+    if (parent(it) >= 0 && parent(other) >= 0)
+      both.emplace_back(all[static_cast<std::size_t>(parent(it))].name,
+                        all[static_cast<std::size_t>(parent(other))].name);
+    for (const auto& [here, there] : both) {
+      if (other_side(here) != there) continue;
+      const auto by = cut(here, there);
+      if (by && by->shorter == here &&
+          away(by->lies.map * other.center, here) > away(other.center, there) + kApart)
+        return true;
+    }
+    return false;
+  }
+
   void compare(const Shown& left, const Shown& right) {
     if (left.bones.empty() || other_side(left.bones) != right.bones) return;
     const double a = length(left.bones), b = length(right.bones);
@@ -87,11 +147,16 @@ class Pairs {
     const Shown& shorter = a >= b ? right : left;
     const auto& lies = laid(longer.bones, shorter.bones);
     if (!lies) return;
-    const bool cut = lies->share < kCut;
-    const bool shorter_is_worse = cut || shorter.confidence <= longer.confidence;
+    const bool is_cut = lies->share < kCut;
+    const bool left_ends = ends_before(left, right), right_ends = !left_ends && ends_before(right, left);
+    const bool ends = left_ends || right_ends;
+    const bool shorter_is_worse =
+        ends ? left_ends == (&shorter == &left) : is_cut || shorter.confidence <= longer.confidence;
     const Shown& worse = shorter_is_worse ? shorter : longer;
     const Shown& better = shorter_is_worse ? longer : shorter;
-    if (better.confidence < JointSources::least_confidence) return;
+    const bool surer = better.confidence >= kSurer * worse.confidence;
+    const double enough = surer ? kLeastShown : JointSources::least_confidence;
+    if (ends ? better.confidence <= 0 : better.confidence < enough) return;
     const Eigen::Affine3d map = shorter_is_worse ? lies->map : Eigen::Affine3d(lies->map.inverse());
     const Vector3d to = map * better.center;
     // Axes point to the left on both sides: mirrored, and turned round.
@@ -99,7 +164,7 @@ class Pairs {
     Vector3d off = worse.center - to;
     double turned = 0;
     if (!axis.isZero()) {
-      off -= axis * axis.dot(off);
+      if (joint(worse.row).kind == JointKind::hinge) off -= axis * axis.dot(off);
       turned = std::acos(std::min(1.0, std::abs(axis.dot(worse.axis)))) * degrees_per_radian;
     }
     const bool missing = worse.confidence <= 0;
@@ -114,11 +179,37 @@ class Pairs {
     line << "joint " << joint(worse.row).name << ": its bones show it " << std::lround(off.norm()) << " mm";
     if (!axis.isZero()) line << " and " << std::lround(turned) << " degrees";
     line << " off the mirror image of " << joint(better.row).name;
-    if (cut) line << ", on a bone with " << std::lround(100 * lies->share) << " % of the other's length";
+    if (is_cut && shorter_is_worse)
+      line << ", on a bone with " << std::lround(100 * lies->share) << " % of the other's length";
     line << ": it is taken from there, with confidence " << std::lround(100 * known) << " %";
     context_.warn(line.str());
     sources_.settle(worse.row, found);
     if (!axis.isZero()) sources_.settle_axis(worse.row, joint(worse.row).sequence[0].axis, {axis, known});
+  }
+
+  // The long axis of a segment whose bones are cut leads to where they end, not to the next joint.
+  void compare_along(std::size_t left, std::size_t right) {
+    const auto by = cut(skeleton_.segments[left].name, skeleton_.segments[right].name);
+    if (!by) return;
+    const auto [worse, better] =
+        by->shorter == skeleton_.segments[left].name ? std::pair(left, right) : std::pair(right, left);
+    for (const auto& [axis, source] : joint(worse).how->axes) {
+      if (!leads_along(source)) continue;
+      const auto [frame, confidence] = sources_.axes(better);
+      const Vector3d to = by->lies.map.linear() * frame.col(axis);
+      const Vector3d is = sources_.axes(worse).first.col(axis);
+      const double turned = std::acos(std::clamp(to.dot(is), -1.0, 1.0)) * degrees_per_radian;
+      if (turned <= kTurned || confidence < kLeastShown) continue;
+      const double known = std::min(kMirrored, confidence);
+      std::ostringstream line;
+      line << "joint " << joint(worse).name << ": its long axis leads " << std::lround(turned)
+           << " degrees off the mirror image of that of " << joint(better).name << ", on a bone with "
+           << std::lround(100 * by->lies.share)
+           << " % of the other's length: it is taken from there, with confidence " << std::lround(100 * known)
+           << " %";
+      context_.warn(line.str());
+      sources_.settle_axis(worse, axis, {to, known});
+    }
   }
 
   const Skeleton& skeleton_;

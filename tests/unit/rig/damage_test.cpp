@@ -3,81 +3,25 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
-#include <set>
 
-#include "io/case/case_rules.hpp"
-#include "io/case/skeleton_file.hpp"
-#include "phantom/body.hpp"
 #include "phantom/bones.hpp"
-#include "phantom/isosurface.hpp"
-#include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/other_side.hpp"
-#include "tests/unit/rig/balls.hpp"
+#include "tests/unit/rig/human_bodies.hpp"
 
 namespace ecorche::rig {
 namespace {
 
 using Eigen::Vector3d;
+using test::Found;
+using test::found;
+using test::mirrored;
 
-SurfaceMesh mirrored(SurfaceMesh mesh) {
-  mesh.V.col(0) = -mesh.V.col(0);
-  mesh.F.col(1).swap(mesh.F.col(2));
-  return mesh;
-}
-
-/// Pelvis, thighs, shanks and feet of both sides; the right ones are the left ones' mirror images.
+/// Pelvis, thighs, shanks and feet of both sides.
 const std::vector<CaseBone>& legs() {
-  static const std::vector<CaseBone> made = [] {
-    const std::set<std::string> below{"thigh_left", "shank_left", "foot_left"};
-    std::vector<CaseBone> bones;
-    for (const phantom::Part& part : phantom::make_bones(phantom::make_landmarks(3))) {
-      if (part.mirror_of >= 0 || (part.segment != "pelvis" && !below.contains(part.segment))) continue;
-      bones.push_back({part.name, part.segment, phantom::isosurface(part.shape, 4, {})});
-      if (part.segment == "pelvis") continue;
-      bones.push_back({other_side(part.name), other_side(part.segment), mirrored(bones.back().surface)});
-      if (bones.back().name.empty()) bones.back().name = part.name + "_right";
-    }
-    // A pelvis that is given by its left half only is made whole.
-    for (std::size_t b = 0, count = bones.size(); b < count; ++b) {
-      if (bones[b].segment != "pelvis" || bones[b].surface.V.col(0).minCoeff() < -30) continue;
-      bones.push_back({bones[b].name + "_mirrored", "pelvis", mirrored(bones[b].surface)});
-    }
-    return bones;
-  }();
+  static const std::vector<CaseBone> made =
+      test::phantom_bones({"pelvis", "thigh_left", "shank_left", "foot_left"}, 4);
   return made;
-}
-
-struct Found {
-  Rig rig;
-  std::vector<std::string> warnings;
-  std::size_t row(const std::string& joint) const {
-    return static_cast<std::size_t>(rig.skeleton.find_joint(joint));
-  }
-  const Joint& joint(const std::string& name) const { return rig.skeleton.segments[row(name)].joint; }
-  double confidence(const std::string& name) const { return rig.fits[row(name)].confidence; }
-  bool said(const std::string& joint, const std::string& what) const {
-    return std::any_of(warnings.begin(), warnings.end(), [&](const std::string& line) {
-      return line.starts_with("joint " + joint + ": ") && line.find(what) != std::string::npos;
-    });
-  }
-};
-
-Found found(const std::vector<CaseBone>& bones) {
-  io::PlacedSkeleton human = io::parse_skeleton(
-      io::yaml::Value::parse(io::skeleton_template("human").value(), "human.yaml"), io::Frame{});
-  Case patient;
-  patient.name = "legs";
-  patient.skeleton = human.skeleton;
-  patient.bones = bones;
-  io::place_regions({}, human.regions, patient);
-  Found out;
-  Context context;
-  context.log = [&](LogLevel level, std::string_view line) {
-    if (level == LogLevel::warning) out.warnings.emplace_back(line);
-  };
-  out.rig = fit(patient, context);
-  return out;
 }
 
 const Found& whole() {
@@ -139,6 +83,45 @@ TEST(Damage, a_femur_without_its_condyles_does_not_kick_sideways) {
   EXPECT_LT(
       degrees_apart(now.joint("knee_right").axes.col(0), tilt * whole().joint("knee_right").axes.col(0)), 12);
   EXPECT_LT(now.confidence("knee_right"), JointSources::least_confidence);
+}
+
+TEST(Damage, a_root_with_one_hip_stays_in_the_middle) {
+  std::vector<CaseBone> bones;
+  for (const CaseBone& bone : legs()) {
+    if (bone.segment == "pelvis" || bone.segment.ends_with("_left")) bones.push_back(bone);
+  }
+  const Found now = found(bones);
+  EXPECT_LT((now.joint("pelvis").center - whole().joint("pelvis").center).norm(), 2);
+  EXPECT_LT(now.confidence("pelvis"), JointSources::least_confidence);
+  EXPECT_TRUE(now.said("pelvis", "hip_right has no bone: its centre lies beside hip_left"));
+}
+
+TEST(Damage, a_shank_that_ends_early_has_its_ankle_and_its_long_axis_from_the_other) {
+  const double top = whole().joint("knee_right").center.z(), ankle = whole().joint("ankle_right").center.z();
+  const Found now =
+      found(cut("shank_right", [&](const Vector3d& p) { return p.z() > ankle + 0.7 * (top - ankle); }));
+  expect_near(now, "ankle_right", 5, 10);
+  expect_near(now, "knee_right", 5, 10);
+  EXPECT_LT(now.confidence("ankle_right"), JointSources::least_confidence);
+  EXPECT_TRUE(now.said("ankle_right", "off the mirror image of ankle_left"));
+}
+
+TEST(Damage, a_mirrored_body_has_mirrored_joints) {
+  std::vector<CaseBone> bones = cut(
+      "thigh_left", [&](const Vector3d& p) { return p.z() > whole().joint("knee_left").center.z() + 60; });
+  const Found one = found(bones);
+  for (CaseBone& bone : bones) {
+    bone.surface = mirrored(bone.surface);
+    const std::string other = other_side(bone.segment);
+    if (!other.empty()) bone.segment = other;
+  }
+  const Found other = found(bones);
+  for (const Segment& segment : one.rig.skeleton.segments) {
+    const std::string twin = other_side(segment.joint.name);
+    const Joint& is = other.joint(twin.empty() ? segment.joint.name : twin);
+    const Vector3d at = Vector3d(-1, 1, 1).cwiseProduct(segment.joint.center);
+    EXPECT_LT((is.center - at).norm(), 0.1) << segment.joint.name;
+  }
 }
 
 TEST(Damage, both_femurs_cut_by_the_field_of_view_rest_as_bodies_do) {

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/rig/body_frame.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "preprocess/rig/parted_bones.hpp"
+
+namespace ecorche::rig {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Middles of the bones' surfaces beside that of the pelvis, mm, in a body that stands straight: the means of
+// BodyParts3D and ICRP's woman, which are 1 and 2 degrees off them.
+struct Middle {
+  std::string_view segment;
+  Vector3d at;
+};
+const std::array<Middle, 4>& upright() {
+  static const std::array<Middle, 4> middles{{{"pelvis", {0, 0, 0}},
+                                              {"thorax", {0, 4, 345}},
+                                              {"girdle_left", {100, 27, 453}},
+                                              {"girdle_right", {-100, 27, 453}}}};
+  return middles;
+}
+
+constexpr double kUnlike = 0.15;  // of the root of the mean square of all from their middle
+constexpr double kLeastMm = 1;    // four that lie in one place show nothing
+
+bool says_the_body(const Skeleton& skeleton) {
+  return skeleton.name == "human" || is_parted(skeleton);
+}
+
+// By area: a mesh that is finer on one side does not draw it there.
+std::optional<Vector3d> middle_of(const Case& patient, std::string_view segment) {
+  Vector3d sum = Vector3d::Zero();
+  double area = 0;
+  for (const CaseBone& bone : patient.bones) {
+    if (bone.segment != segment) continue;
+    const SurfaceMesh& mesh = bone.surface;
+    for (Eigen::Index f = 0; f < mesh.F.rows(); ++f) {
+      const Vector3d a = mesh.V.row(mesh.F(f, 0)), b = mesh.V.row(mesh.F(f, 1)), c = mesh.V.row(mesh.F(f, 2));
+      const double twice = (b - a).cross(c - a).norm();
+      sum += twice * (a + b + c) / 3;
+      area += twice;
+    }
+  }
+  if (!(area > 0)) return std::nullopt;
+  return Vector3d(sum / area);
+}
+
+void turn_points(PointSource& source, const Matrix3d& turn) {
+  source.point = turn * source.point;
+  for (PointSource& part : source.parts) turn_points(part, turn);
+}
+
+void turn_points(DirectionSource& source, const Matrix3d& turn) {
+  turn_points(source.from, turn);
+  turn_points(source.to, turn);
+  for (DirectionSource& choice : source.choices) turn_points(choice, turn);
+}
+
+void turn_joint(Joint& joint, const Matrix3d& turn) {
+  joint.center = turn * joint.center;
+  // Left, back and up of a joint with a rule that says no axes are the body's.
+  const bool of_body = joint.how && (!joint.how->axes.empty() || joint.axes.isIdentity(0));
+  if (!of_body) joint.axes = turn * joint.axes;
+  if (!joint.how) return;
+  auto how = std::make_shared<JointRule>(*joint.how);
+  turn_points(how->center, turn);
+  for (auto& [axis, source] : how->axes) turn_points(source, turn);
+  joint.how = how;
+}
+
+}  // namespace
+
+Matrix3d body_frame(const Case& patient) {
+  if (patient.generic || !says_the_body(patient.skeleton)) return Matrix3d::Identity();
+  // A region that stands in the scan's coordinates was marked by somebody who says its axes, too.
+  for (const Region& region : patient.regions) {
+    if (!region.boxes.empty() && !region.of_bones && region.near.empty()) return Matrix3d::Identity();
+  }
+  constexpr int count = std::tuple_size_v<std::array<Middle, 4>>;
+  Eigen::Matrix<double, 3, count> straight, here;
+  for (int m = 0; m < count; ++m) {
+    const Middle& middle = upright()[static_cast<std::size_t>(m)];
+    const std::optional<Vector3d> at = middle_of(patient, middle.segment);
+    if (!at) return Matrix3d::Identity();
+    straight.col(m) = middle.at;
+    here.col(m) = *at;
+  }
+  straight.colwise() -= straight.rowwise().mean().eval();
+  here.colwise() -= here.rowwise().mean().eval();
+  const double size = here.norm();
+  if (!(size > kLeastMm)) return Matrix3d::Identity();
+  straight *= size / straight.norm();
+  const Eigen::JacobiSVD<Matrix3d> svd(here * straight.transpose(),
+                                       Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Matrix3d sign = Matrix3d::Identity();
+  sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Matrix3d frame = svd.matrixU() * sign * svd.matrixV().transpose();
+  return (here - frame * straight).norm() > kUnlike * size ? Matrix3d::Identity() : frame;
+}
+
+Case turned(const Case& patient, const Matrix3d& turn) {
+  Case out;
+  out.name = patient.name;
+  out.generic = patient.generic;
+  out.skeleton = patient.skeleton;
+  for (Segment& segment : out.skeleton.segments) turn_joint(segment.joint, turn);
+  out.regions = patient.regions;
+  for (Region& region : out.regions) region.points = region.points * turn.transpose();
+  for (const CaseBone& bone : patient.bones) {
+    out.bones.push_back({bone.name, bone.segment, bone.surface});
+    out.bones.back().surface.V = bone.surface.V * turn.transpose();
+  }
+  return out;
+}
+
+}  // namespace ecorche::rig
