@@ -39,8 +39,8 @@ double in_cache(std::size_t count, const std::function<void(std::size_t)>& work)
         }
       },
       tbb::simple_partitioner());
-  const double all = std::accumulate(ms.begin(), ms.end(), 0.0) * static_cast<double>(count) /
-                     static_cast<double>(pieces);
+  const double all =
+      std::accumulate(ms.begin(), ms.end(), 0.0) * static_cast<double>(count) / static_cast<double>(pieces);
   return all / tbb::this_task_arena::max_concurrency();
 }
 
@@ -72,11 +72,12 @@ double arithmetic_of_nodes(const runtime::BodyParts& parts, runtime::Skinning sk
   const runtime::NodeClusters& clusters = parts.clusters();
   std::vector<std::uint32_t> needed(pieces_of(clusters.needed, runtime::NodeClusters::size));
   std::iota(needed.begin(), needed.end(), 0U);
-  const runtime::SkinClusters job{
-      clusters, frame.scratch.motions,
-      root,     needed,
-      std::span(frame.scratch.lanes).first(3 * clusters.node.size()),
-      {}};
+  const runtime::SkinClusters job{clusters,
+                                  frame.scratch.motions,
+                                  root,
+                                  needed,
+                                  std::span(frame.scratch.lanes).first(3 * clusters.node.size()),
+                                  {}};
   const auto kernel = kernel_of(skinning);
   return in_cache(pieces_of(needed.size(), kClusters), [&](std::size_t p) {
     kernel(job, kClusters * p, std::min(needed.size(), kClusters * (p + 1)));

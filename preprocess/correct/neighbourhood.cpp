@@ -2,8 +2,10 @@
 #include "preprocess/correct/neighbourhood.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
+#include <utility>
+
+#include "core/elastic/flesh.hpp"
 
 namespace ecorche::correct {
 namespace {
@@ -28,18 +30,6 @@ std::vector<std::size_t> halves_of(std::span<const std::vector<RigidTransform>> 
     half[s] = first;
   }
   return half;
-}
-
-// By node: the segment whose bone's tets have it.
-std::vector<std::int32_t> bone_of_nodes(const Model& model) {
-  std::vector<std::int32_t> out(model.node_count(), kNone);
-  for (std::size_t t = 0; t < model.tet_count(); ++t) {
-    if (model.tet_label[t] == TetMesh::soft) continue;
-    for (int c = 0; c < 4; ++c)
-      out[static_cast<std::size_t>(model.tets(static_cast<Eigen::Index>(t), c))] =
-          model.bone_segment[model.tet_label[t] - 1U];
-  }
-  return out;
 }
 
 // What of a node's weight lies outside the half that has most of it.
@@ -89,18 +79,18 @@ std::vector<std::int32_t> placed(const Model& model, const std::vector<std::int3
 Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<RigidTransform>> poses,
                             double least_share) {
   const std::vector<std::size_t> half = halves_of(poses, model.segment_count());
-  const std::vector<std::int32_t> bone = bone_of_nodes(model);
+  const elastic::Flesh flesh = elastic::flesh_of(model);
   std::vector<std::uint8_t> is_free(model.node_count(), 0);
   std::vector<double> of_half(model.segment_count());
   for (std::size_t n = 0; n < is_free.size(); ++n)
-    is_free[n] = bone[n] == kNone && divided(model, n, half, of_half) > least_share ? 1 : 0;
+    is_free[n] = flesh.segment[n] < 0 && divided(model, n, half, of_half) > least_share ? 1 : 0;
 
   std::vector<std::int32_t> tets;
-  for (std::size_t t = 0; t < model.tet_count(); ++t) {
-    const auto row = static_cast<Eigen::Index>(t);
-    bool any = false;
-    for (int c = 0; c < 4; ++c) any = any || is_free[static_cast<std::size_t>(model.tets(row, c))] != 0;
-    if (any && model.tet_label[t] == TetMesh::soft) tets.push_back(static_cast<std::int32_t>(t));
+  for (const std::int32_t t : flesh.tet) {
+    const auto tet = model.tets.row(t);
+    if (std::any_of(tet.begin(), tet.end(),
+                    [&](std::int32_t n) { return is_free[static_cast<std::size_t>(n)] != 0; }))
+      tets.push_back(t);
   }
   tets = placed(model, tets, is_free);
 
@@ -121,22 +111,11 @@ Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<Rigi
     held[i] = is_free[out.node[i]] != 0 ? 0 : 1;
   }
   Tets T(static_cast<Eigen::Index>(tets.size()), 4);
-  std::vector<std::uint8_t> squeezed;
   for (std::size_t t = 0; t < tets.size(); ++t) {
-    std::size_t one = std::numeric_limits<std::size_t>::max();
-    bool two = false;
-    for (int c = 0; c < 4; ++c) {
-      const auto node = static_cast<std::size_t>(model.tets(tets[t], c));
-      T(static_cast<Eigen::Index>(t), c) = local[node];
-      if (bone[node] == kNone) continue;
-      const std::size_t of = half[static_cast<std::size_t>(bone[node])];
-      two = two || (one != std::numeric_limits<std::size_t>::max() && one != of);
-      one = of;
-    }
-    squeezed.push_back(two ? 1 : 0);
+    for (int c = 0; c < 4; ++c)
+      T(static_cast<Eigen::Index>(t), c) = local[static_cast<std::size_t>(model.tets(tets[t], c))];
   }
   out.mesh = fem::make_mesh(fem::Element::p1, V, T, held, {});
-  out.mesh.squeezed = std::move(squeezed);
   return out;
 }
 

@@ -20,8 +20,8 @@ struct Neighbourhood {
 /// The soft tets about nodes that do not move rigidly with one half of the body in some of `poses` (motions
 /// of all segments): nodes whose weights divide, beyond `least_share`, between segments that move
 /// differently. These are free; the other corners of their tets are the border, where skinning is as good as
-/// rigid. Tets whose part hangs on fewer than three held nodes are left out, which nothing places. May be
-/// empty.
+/// rigid. Left out are tets that elastic::flesh_of leaves out, and those whose part hangs on fewer than three
+/// held nodes, which nothing places. May be empty.
 Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<RigidTransform>> poses,
                             double least_share);
 
