@@ -33,6 +33,7 @@ const std::vector<std::pair<std::string, std::string>> kExamples{
     {"tears", "ecorche tears patient.hdf --motion patient/motion/walk.bvh --frames 0:30:10"},
     {"radiograph",
      "ecorche radiograph patient.hdf -o knee.png --view lateral_left --target knee_left --size 300,300"},
+    {"calibrate", "ecorche calibrate patient.hdf -o calibrated.hdf --joints elbow_right --step 30"},
     {"fem", "ecorche fem patient.hdf -o anatomical --pose lib:anatomical --tissues skin"},
     {"contact", "ecorche contact patient.hdf patient.hdf --other-pose lib:sitting"},
 };

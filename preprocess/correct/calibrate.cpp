@@ -85,19 +85,18 @@ class OneJoint {
     std::vector<std::vector<RigidTransform>> motions;
     for (const Sample& sample : samples_) motions.push_back(kinematics::forward(model_.rig, sample.pose));
     report_.joint = joint().name;
-    report_.samples = samples_.size();
     const Neighbourhood part = neighbourhood(model_, motions, options_.least_share);
     report_.tets = part.mesh.tets();
     report_.free_nodes = part.mesh.free_nodes;
     solved_.resize(samples_.size());
     if (part.mesh.free_nodes > 0) {
       SampleSolver solver(model_, part, material, options_.folds);
-      for (std::size_t s = 0; s < report_.samples; ++s) {
+      const std::size_t stated = samples_.size();
+      for (std::size_t s = 0; s < stated; ++s) {
         solved_[s] = sample(solver, s, store, context);
         progress.add(1);
       }
-      for (std::size_t s = 0; s < report_.samples; ++s) come_nearer(solver, s, store, context);
-      report_.samples = samples_.size();
+      for (std::size_t s = 0; s < stated; ++s) come_nearer(solver, s, store, context);
       keep(part);
     } else {
       progress.add(samples_.size());
@@ -156,6 +155,8 @@ class OneJoint {
       report_.clean_deg = std::max(report_.clean_deg, samples_[s].turn.norm() / kDegree);
     }
     report_.clean = fields.size();
+    report_.samples = static_cast<std::size_t>(std::count_if(
+        solved_.begin(), solved_.end(), [](const SolvedSample& solved) { return solved.iterations > 0; }));
     if (fields.empty()) return;
     JointCorrection::Turns turn(static_cast<Eigen::Index>(turns.size()), 3);
     for (std::size_t s = 0; s < turns.size(); ++s) turn.row(static_cast<Eigen::Index>(s)) = turns[s];

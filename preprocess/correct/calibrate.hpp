@@ -17,17 +17,17 @@ struct CalibrateOptions {
   double step_deg = 15;             ///< between samples of a hinge, at most
   double least_mm = 0.05;           ///< smaller displacements are not kept
   double least_share = 1e-3;        ///< of weights: see neighbourhood
-  /// Of the tets about a joint: so many may be inside out in a sample, if skinning turns more. None by default:
-  /// about a fold the solution is not what flesh would do.
+  /// Of the tets about a joint: so many may be inside out in a sample, if skinning turns more. None by
+  /// default: about a fold the solution is not what flesh would do.
   double folds = 0;
-  double poisson = 0.45;            ///< linear tets lock beyond
+  double poisson = 0.45;  ///< linear tets lock beyond
 };
 
 /// Of one joint.
 struct JointReport {
   std::string joint;
   std::size_t tets = 0, free_nodes = 0;         ///< of its neighbourhood
-  std::size_t samples = 0, clean = 0;           ///< asked, and kept
+  std::size_t samples = 0, clean = 0;           ///< solved, and kept
   double clean_deg = 0;                         ///< the largest turn of a sample that is kept
   std::size_t nodes = 0, modes = 0, bytes = 0;  ///< of the correction
   double mean_mm = 0, max_mm = 0;               ///< of it, over its nodes, at the sample that moves most
@@ -40,8 +40,8 @@ struct Calibration {
 
 /// Samples of all joints that turn by themselves, several joints at a time; `store` keeps each solved one, so
 /// that an interrupted run goes on where it ended. Of a chain of samples those behind the first that is not
-/// clean are not asked for; between it and the one before, one or two more are. Same result for any number of threads, and whatever the store held. Throws
-/// Error{usage} for a name that is no joint that turns.
+/// clean are not asked for; between it and the one before, one or two more are. Same result for any number of
+/// threads, and whatever the store held. Throws Error{usage} for a name that is no joint that turns.
 Calibration calibrate(const Model& model, const CalibrateOptions& options, preprocess::StageStore* store,
                       const Context& context);
 

@@ -12,9 +12,9 @@ namespace ecorche::correct {
 
 struct Sample {
   Eigen::Vector3d from_rest;  ///< radians, along the joint's sequence
-  Pose pose;                ///< constrained: what follows the joint follows it here too
-  Eigen::RowVector3d turn;  ///< rotation vector of the joint
-  int from = -1;            ///< the sample nearer to rest on the same way, whose displacement is the start
+  Pose pose;                  ///< constrained: what follows the joint follows it here too
+  Eigen::RowVector3d turn;    ///< rotation vector of the joint
+  int from = -1;              ///< the sample nearer to rest on the same way, whose displacement is the start
 };
 
 /// Angles of a joint are looked at to here where they have no limit, and no farther where it lies beyond.

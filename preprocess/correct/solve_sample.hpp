@@ -33,8 +33,8 @@ void fields(A& archive, T& sample) {
 /// Samples of one joint after each other: the factor of one preconditions the next.
 class SampleSolver {
  public:
-  /// `model`, `part` and `material` must outlive it. `folds`: the share of the part's tets that a clean sample
-  /// may leave inside out, as long as skinning leaves more.
+  /// `model`, `part` and `material` must outlive it. `folds`: the share of the part's tets that a clean
+  /// sample may leave inside out, as long as skinning leaves more.
   SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material, double folds);
 
   /// `start`: displacements to begin from, as in SolvedSample, or empty: from skinning. Where that does not

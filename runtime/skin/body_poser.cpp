@@ -42,8 +42,7 @@ void check_correction(const Model& model, const JointCorrection& correction) {
   const std::size_t modes = correction.scale.size(), rows = correction.node.size();
   const auto samples = static_cast<std::size_t>(correction.turn.rows());
   if (!below(&correction.joint, 1, model.segment_count()) || samples == 0 ||
-      samples > SampleShares::most_samples ||
-      !below(correction.node.data(), rows, model.node_count()) ||
+      samples > SampleShares::most_samples || !below(correction.node.data(), rows, model.node_count()) ||
       correction.field.size() != 3 * modes * rows || correction.mix.rows() != correction.turn.rows() ||
       correction.mix.cols() != static_cast<Eigen::Index>(modes)) {
     unfit(model, "a correction does not fit its nodes and joints");

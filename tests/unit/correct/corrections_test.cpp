@@ -123,8 +123,8 @@ TEST(Corrections, ThatDoNotFitAreRefused) {
        {+[](JointCorrection& c) { c.joint = 3; }, +[](JointCorrection& c) { c.field.pop_back(); },
         +[](JointCorrection& c) { c.node.back() = 1'000'000; },
         +[](JointCorrection& c) { c.turn.resize(0, 3), c.mix.resize(0, 3); },
-                           +[](JointCorrection& c) { c.turn.setOnes(257, 3), c.mix.setOnes(257, 3); },
-                           +[](JointCorrection& c) { c.mix.resize(1, 1); }}) {
+        +[](JointCorrection& c) { c.turn.setOnes(257, 3), c.mix.setOnes(257, 3); },
+        +[](JointCorrection& c) { c.mix.resize(1, 1); }}) {
     const auto model = corrected_toy();
     harm(model->corrections[0]);
     try {
