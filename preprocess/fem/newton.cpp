@@ -83,7 +83,8 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
       Points next = moved(mesh, x, d, times);
       Total there = total(next);
       const bool lower = there.energy <= out.total.energy + kArmijo * times * falls + rounding;
-      if (!lower || (halving < kWhole && inverts(out.total, there))) continue;
+      const bool folds = out.total.inverted_tets == 0 && there.inverted_tets > 0;
+      if (!lower || (halving < kWhole && folds)) continue;
       x = std::move(next);
       out.total = std::move(there);
       taken = true;

@@ -56,9 +56,10 @@ class StepSolver {
 };
 
 /// Moves the free nodes of `x` (held ones stand where they are wanted). A step is halved until the energy
-/// falls by a part of what was foreseen (Armijo's 1e-4) and no tet that is not inverted becomes so; where
-/// that would leave less than an eighth of the step, the energy alone decides, since a material that has a
-/// price for inversion finds the way back out of it. Whoever calls looks at what is inverted in the end.
+/// falls by a part of what was foreseen (Armijo's 1e-4) and, where no tet is inverted, none becomes so; where
+/// that would leave less than an eighth of the step, or in a body with folds, the energy alone decides: a
+/// material that has a price for inversion finds the way out of it, and sooner where other tets may give way
+/// meanwhile. Whoever calls looks at what is inverted in the end.
 NewtonResult minimise(const Assembly& assembly, const Material& material, StepSolver& steps,
                       const NewtonOptions& options, Points& x, const Context& context);
 
