@@ -58,7 +58,12 @@ def sweep(kit):
     step = small_or(kit, 90, 30)
     rows = programs.ecorche("tears", kit.model(), "--sweep", "--step", step)["sweep"]
     first = lambda key: [row[key] for row in rows if row[key]]  # noqa: E731
-    told = lambda angles: f"{statistics.median(angles):.0f} degrees in the median, {len(angles)} of {len(rows)} ways tear" if angles else "none tears"  # noqa: E731
+
+    def told(angles):
+        if not angles:
+            return f"none of {len(rows)} ways tears up to 180 degrees"
+        return f"{len(angles)} of {len(rows)} ways tear, in the median of these at {statistics.median(angles):.0f} degrees; the others hold to 180"
+
     command = f"ecorche tears MODEL --sweep --step {step}"
     return Found([Row("7: where a joint breaks, turned alone", "about 90 degrees; whether bulged is not stated in what we hold", told(first("breaks_at_deg")),
                       command,

@@ -38,7 +38,7 @@ def thinned(points, most=MOST):
 
 
 def some_vertices(path):
-    return thinned(vertices(read(path)), 500)
+    return thinned(vertices(read(path)), 100)
 
 
 def distances(points, surface):

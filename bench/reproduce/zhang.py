@@ -97,7 +97,7 @@ def real(kit):
         made = programs.MADE / "bodies" / f"{body}.hdf"  # bench/bodies' own, where they were made
         model = made if made.exists() else programs.example_model(body, kit.data)
         stated = sorted((programs.ROOT / "examples" / body / "poses").glob("*.yaml"))
-        rows += shape_rows(kit, body, model, stated[:1] if kit.small else stated)
+        rows += shape_rows(kit, body, model, stated[:small_or(kit, 1, 2)])
     return Found(rows)
 
 
