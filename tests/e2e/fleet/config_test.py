@@ -91,6 +91,17 @@ class Config(Folder):
         with Server("--config", config) as server, Client("127.0.0.1", server.port) as client:
             self.assertEqual(client.server.limits.connections, 7)
 
+    def test_the_kernel_may_merge_pages(self):
+        if tuple(map(int, os.uname().release.split(".")[:2])) < (6, 4):
+            code, _, said = self.checked(f"models: [{MODEL}]\nmerge_pages: true\n")
+            self.assertEqual(code, 77, said)
+            return
+        with Server(MODEL, options=("--merge-pages",)) as merged, Server(MODEL) as alone:
+            for server, word in ((merged, "yes"), (alone, "no")):
+                told = pathlib.Path(f"/proc/{server.process.pid}/ksm_stat").read_text()
+                if "ksm_merge_any" in told:  # younger kernels say it
+                    self.assertIn(f"ksm_merge_any: {word}", told)
+
     def test_every_option_may_stand_there(self):
         """The keys are the options: each that --help names, but for those about the command line and the file itself."""
         text = subprocess.run([ECORCHE, "serve", "--help"], capture_output=True, text=True, check=True).stdout
