@@ -43,6 +43,7 @@ class Client:
         self.model_changed = False  # ModelChanged came: open() again for the new one
         self.members, self.clip = None, None  # the newest v1.Members and v1.ClipState
         self.has_control = False  # as the server last said
+        self.elsewhere = ""       # HOST:PORT of another server, where this one sent its clients to when it said goodbye
         self.bytes_received = 0
         self._requests = 0
         self._sequence = 0
@@ -347,6 +348,7 @@ class Client:
             self.has_control = True
             self._sequence = envelope.control_granted.last_sequence
         elif kind == "goodbye":
+            self.elsewhere = envelope.goodbye.elsewhere
             raise ServerError(envelope.goodbye.status)
         elif kind == "status" and envelope.request_id == 0:
             raise ServerError(envelope.status)

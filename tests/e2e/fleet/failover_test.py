@@ -7,10 +7,12 @@ usage: failover_test.py SOURCE [CLIENTS]; the environment is that of the fixture
 import json
 import os
 import pathlib
+import re
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import unittest
@@ -18,14 +20,16 @@ import urllib.error
 import urllib.request
 
 import h5py
-from ecorche_client import Client
-from fleet import Balancer, Node, haproxy
+from ecorche_client import Client, ServerError
+from fleet import Balancer, Node, haproxy, make_certificate
 
 SOURCE = pathlib.Path(sys.argv[1])
-# Many, which a small machine poses as often as it can (the newest win), for the slow tests; else few, and no restart.
+# Many, which a small machine poses as often as it can (the newest win), with the slow tests; else few, without those.
 MANY = len(sys.argv) > 2
 CLIENTS = int(sys.argv[2]) if MANY else 6
-MODEL, POSERS = os.environ["ECORCHE_BAR_MODEL"], os.environ["ECORCHE_POSERS"]
+ECORCHE, MODEL, POSERS = os.environ["ECORCHE_BIN"], os.environ["ECORCHE_BAR_MODEL"], os.environ["ECORCHE_POSERS"]
+
+slow = unittest.skipUnless(MANY, "slow")
 
 
 def smallest_tissue(model):
@@ -49,12 +53,12 @@ class Posers:
 
 
 class Fleet(unittest.TestCase):
-    def start(self, *options):
+    def start(self, *options, **balancer):
         self.nodes = [Node(name, MODEL, "--max-sessions", "256", *options) for name in "ab"]
         for node in self.nodes:
             self.addCleanup(node.close)
             node.start()
-        self.balancer = Balancer(SOURCE, self.nodes)
+        self.balancer = Balancer(SOURCE, self.nodes, **balancer)
         self.addCleanup(self.balancer.close)
         time.sleep(0.6)  # until both are known to be up
         return self.nodes
@@ -78,7 +82,7 @@ class Fleet(unittest.TestCase):
         self.assertEqual(report["breaks"], before[0], "who was on the other did not notice")
         self.assertLess(report["longest_back"], 2)
 
-    @unittest.skipUnless(MANY, "slow")
+    @slow
     def test_both_are_restarted(self):
         nodes = self.start("--drain-seconds", "1")
         posers = Posers(self.balancer.port, 9)
@@ -96,6 +100,7 @@ class Fleet(unittest.TestCase):
         self.assertGreaterEqual(report["goodbyes"], report["clients"], "each was sent away at least once")
         self.assertLess(report["longest_gap"], 1)
 
+    @slow
     def test_a_session_is_on_one_server_also_where_it_moved(self):
         nodes = self.start()
         names = [f"ward_{i}" for i in range(8)]
@@ -159,6 +164,46 @@ class Fleet(unittest.TestCase):
         poser.send_pose(pose, root_translation=(10, 0, 0))
         self.assertTrue(any(frame.pose_sequence == 1 for frame in watcher.frames(10)))
 
+    def stream(self, address, session, certificate):
+        done = subprocess.run([ECORCHE, "--json", "stream", address, "--session", session, "--seconds", "0.5", "--model", MODEL, "--tls-ca", certificate],
+                              capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["mismatches"], 0)
+
+    @slow
+    def test_tls_ends_at_the_edge(self):
+        with tempfile.TemporaryDirectory() as folder:
+            certificate, _, both = make_certificate(folder)
+            self.start(certificate=both)
+            self.stream(f"127.0.0.1:{self.balancer.port}", "ward_3", certificate)
+
+    @slow
+    def test_tls_goes_through(self):
+        with tempfile.TemporaryDirectory() as folder:
+            certificate, key, _ = make_certificate(folder)
+            nodes = self.start("--tls-certificate", str(certificate), "--tls-key", str(key), through=True)
+            for session in ("ward_3", "ward_4"):  # of one name, so of one server
+                self.stream(f"localhost:{self.balancer.port}", session, certificate)
+            sent = [float(re.search(r"^ecorche_frames_sent_total (\d+)", node.ask("/metrics")[1], re.M)[1]) for node in nodes]
+            self.assertEqual(min(sent), 0, sent)
+            self.assertGreater(max(sent), 10, sent)
+
+    def test_without_a_balancer_clients_are_told_where_to_go(self):
+        b = Node("b", MODEL)
+        a = Node("a", MODEL, "--elsewhere", f"127.0.0.1:{b.port}")
+        for node in (a, b):
+            self.addCleanup(node.close)
+            node.start()
+        with Client("127.0.0.1", a.port) as client:
+            client.open(session="ward_3")
+            a.process.send_signal(signal.SIGTERM)
+            with self.assertRaises(ServerError):
+                list(client.frames(10))
+            host, port = client.elsewhere.split(":")
+        with Client(host, int(port)) as client:
+            client.open(session="ward_3")
+            self.assertTrue(client.has_control)
+
     def test_pages(self):
         nodes = self.start()
         page = f"http://127.0.0.1:{self.balancer.http_port}"
@@ -178,6 +223,4 @@ class Fleet(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    if MANY:
-        unittest.main(argv=[sys.argv[0], "Fleet.test_one_of_two_is_killed", "Fleet.test_both_are_restarted"])
     unittest.main(argv=sys.argv[:1])

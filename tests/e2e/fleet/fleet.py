@@ -5,6 +5,7 @@ import pathlib
 import re
 import shutil
 import socket
+import ssl
 import subprocess
 import tempfile
 import time
@@ -31,11 +32,21 @@ def replaced(text, what, by):
     return text.replace(what, by)
 
 
+def make_certificate(folder):
+    """A PEM file of a certificate for this machine, and one of it with its key, as HAProxy reads them."""
+    certificate, key, both = (pathlib.Path(folder) / name for name in ("certificate.pem", "key.pem", "both.pem"))
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost", "-addext",
+                    "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", key, "-out", certificate], check=True, capture_output=True)
+    both.write_text(certificate.read_text() + key.read_text())
+    return certificate, key, both
+
+
 class Node:
     """One server of the fleet, on the same ports however often it is started."""
 
     def __init__(self, name, model, *options):
         self.name, self.model, self.options = name, model, options
+        self.tls = "--tls-key" in options
         self.port, self.http_port = free_ports(2)
         self.process, self.log = None, tempfile.TemporaryFile("w+")
 
@@ -53,8 +64,9 @@ class Node:
         """Status and text of a page; status 0 where nobody answers."""
         try:
             with socket.create_connection(("127.0.0.1", self.http_port), 5) as port:
-                port.sendall(f"GET {target} HTTP/1.0\r\n\r\n".encode())
-                answer = b"".join(iter(lambda: port.recv(65536), b"")).decode()
+                with ssl._create_unverified_context().wrap_socket(port) if self.tls else port as line:
+                    line.sendall(f"GET {target} HTTP/1.0\r\n\r\n".encode())
+                    answer = b"".join(iter(lambda: line.recv(65536), b"")).decode()
         except OSError:
             return 0, ""
         return int(answer.split()[1]) if answer else 0, answer
@@ -77,10 +89,20 @@ class Node:
         self.log.close()
 
 
-class Balancer:
-    """HAProxy in front of two nodes: deploy/haproxy.cfg, without TLS or with this certificate."""
+def let_through(text):
+    accept, balance, stick = (line for line in text.splitlines() if line.startswith(("    tcp-request content accept", "    balance hash req.payload", "    stick on req.payload")))
+    for old, new in ((accept, "    tcp-request content accept if { req.ssl_hello_type 1 }"), (balance, "    balance hash req.ssl_sni"),
+                     (stick, "    stick on req.ssl_sni table sessions")):
+        text = replaced(text, old, new)
+    text = "\n".join(line for line in text.splitlines() if "set-var(sess" not in line) + "\n"
+    return re.sub(r"(server \w .* check port \d+)", r"\1 check-ssl verify none", text)
 
-    def __init__(self, source, nodes, certificate=None):
+
+class Balancer:
+    """HAProxy in front of two nodes: deploy/haproxy.cfg, without TLS or with this certificate. `through`: it lets TLS through, as
+    docs/how-to/several_servers.md says."""
+
+    def __init__(self, source, nodes, certificate=None, through=False):
         self._folder = tempfile.TemporaryDirectory()
         self.port, self.http_port = free_ports(2)
         text = (pathlib.Path(source) / "deploy" / "haproxy.cfg").read_text()
@@ -92,6 +114,8 @@ class Balancer:
             row = nodes.index(node) + 1
             text = replaced(text, f"{address}:7070 id {row} check port 7071", f"127.0.0.1:{node.port} id {row} check port {node.http_port}")
             text = replaced(text, f"{address}:7071", f"127.0.0.1:{node.http_port}")
+        if through:
+            text = let_through(text)
         self.path = pathlib.Path(self._folder.name) / "haproxy.cfg"
         self.path.write_text(text)
         self.log = open(self.path.with_suffix(".log"), "w+")

@@ -39,8 +39,8 @@ namespace Ecorche
     /// </remarks>
     public sealed partial class Client : IDisposable
     {
-        private readonly string _host;
-        private readonly int _port;
+        private string _host;
+        private int _port;
         private readonly ClientOptions _options;
         private readonly Envelope _in = new Envelope(), _out = new Envelope(), _reply = new Envelope();
         private readonly WireWriter _writer = new WireWriter();
@@ -54,12 +54,18 @@ namespace Ecorche
 
         private Client(string address, ClientOptions options)
         {
-            int colon = address.LastIndexOf(':');
-            if (colon <= 0 || !int.TryParse(address.Substring(colon + 1), out _port) || _port < 1 || _port > 65535)
-                throw new EcorcheException(Code.InvalidArgument, "address: '" + address + "' is no HOST:PORT (for example 127.0.0.1:7070)");
-            _host = address.Substring(0, colon).Trim('[', ']');
+            SetAddress(address);
             _options = options ?? new ClientOptions();
             _session = _options.Session ?? Guid.NewGuid().ToString("N");
+        }
+
+        private void SetAddress(string address)
+        {
+            int colon = address.LastIndexOf(':');
+            if (colon <= 0 || !int.TryParse(address.Substring(colon + 1), out int port) || port < 1 || port > 65535)
+                throw new EcorcheException(Code.InvalidArgument, "address: '" + address + "' is no HOST:PORT (for example 127.0.0.1:7070)");
+            _host = address.Substring(0, colon).Trim('[', ']');
+            _port = port;
         }
 
         /// <summary>"127.0.0.1:7070". Waits as long as the options say.</summary>
@@ -232,7 +238,12 @@ namespace Ecorche
                 TakeControl(true, false);
             }
             else if (_in.HasModelChanged) _events.Enqueue(new ClientEvent { Kind = EventKind.ModelChanged });
-            else if (_in.HasGoodbye) throw Refused(_in.Goodbye.Status);
+            else if (_in.HasGoodbye)
+            {
+                // Resume then goes to the other server.
+                if (_in.Goodbye.Elsewhere.Length > 0) SetAddress(_in.Goodbye.Elsewhere);
+                throw Refused(_in.Goodbye.Status);
+            }
             else if (_in.HasStatus && _in.RequestId == 0) throw Refused(_in.Status);
         }
 
