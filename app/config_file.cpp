@@ -71,6 +71,7 @@ void take_config(CLI::App& command, const std::string& path) {
   const Value file = Value::read(path);
   const auto keys = keys_of(command);
   std::vector<std::string_view> known;
+  known.reserve(keys.size());
   for (const auto& [key, option] : keys) known.emplace_back(key);
   file.allow(known);
 

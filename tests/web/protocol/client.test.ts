@@ -61,3 +61,19 @@ test("a refusal is an error with the server's line", async (t) => {
   const client = await connected(t);
   await assert.rejects(client.open("nobody"), (error: ServerError) => error instanceof ServerError && error.code === 5 && /no model of that name/.test(error.message));
 });
+
+test("the session stands in the address, where a balancer looks for it", async (t) => {
+  const asked: string[] = [];
+  const Real = globalThis.WebSocket;
+  globalThis.WebSocket = class extends Real {
+    constructor(url: string | URL, protocols?: string | string[]) {
+      asked.push(String(url));
+      super(url, protocols);
+    }
+  };
+  t.after(() => { globalThis.WebSocket = Real; });
+  const client = await within(20, Client.connect(server.url, { session: "ward_3", worker: false }), "connecting");
+  t.after(() => client.close());
+  assert.deepEqual(asked, [`${server.url}?session=ward_3`]);
+  assert.equal((await client.open("", "ward_3")).session, "ward_3");
+});
