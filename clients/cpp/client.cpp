@@ -154,6 +154,7 @@ void Client::attend(const v1::Envelope& envelope) {
     answer.mutable_pong()->set_data(envelope.ping().data());
     send(answer);
   } else if (envelope.has_goodbye()) {
+    elsewhere_ = envelope.goodbye().elsewhere();
     throw ServerError("server", envelope.goodbye().status());
   } else if (envelope.has_status() && envelope.request_id() == 0) {
     throw ServerError("server", envelope.status());

@@ -48,6 +48,8 @@ ecorche_code ecorche_client_resume(ecorche_client* client) {
   return c::with_client(client, true, [&] {
     client::Access access = client->access;
     access.resume_token = client->connection->server().resume_token();
+    const std::string& elsewhere = client->connection->elsewhere();
+    if (!elsewhere.empty()) client->address = wire::parse_address(elsewhere);
     client->connection = std::make_unique<client::Client>(client->address, client->name, access);
     if (!c::take_place(*client) && !c::open_again(*client))
       return c::fail(ECORCHE_FAILED_PRECONDITION,

@@ -63,6 +63,9 @@ TEST(Shutdown, BeforeThatClientsAreDrained) {
   EXPECT_EQ(last->envelope.goodbye().status().code(), static_cast<std::uint32_t>(StatusCode::unavailable));
   EXPECT_EQ(last->envelope.goodbye().elsewhere(), "192.0.2.1:7070");
   EXPECT_LT(last->envelope.goodbye().retry_seconds(), 0.5);
+  EXPECT_EQ(poser.client().elsewhere(), "");
+  EXPECT_THROW(poser.next([](const v1::Envelope&) { return false; }), client::ServerError);
+  EXPECT_EQ(poser.client().elsewhere(), "192.0.2.1:7070");
   server.join();
 }
 

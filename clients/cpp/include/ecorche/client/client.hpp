@@ -59,6 +59,9 @@ class Client {
   /// What the server said of itself.
   const v1::ServerHello& server() const { return hello_; }
 
+  /// HOST:PORT of another server, where this one sent its clients to when it said goodbye; else empty.
+  const std::string& elsewhere() const { return elsewhere_; }
+
   /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
   /// answer is a Status that is not OK.
   wire::Frame call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload = nullptr,
@@ -104,6 +107,7 @@ class Client {
   std::string head_;      ///< of what is sent
   wire::Frame in_place_;  ///< what receive_in_place() shows, but for an envelope in `incoming_`
   v1::ServerHello hello_;
+  std::string elsewhere_;
   std::uint64_t last_request_ = 0;
   std::uint64_t bytes_received_ = 0;
 };
