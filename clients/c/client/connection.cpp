@@ -30,15 +30,6 @@ void check_triangles(const OpenedBody& body) {
   }
 }
 
-// For one's own session behind a balancer: the same for as long as the client lives.
-std::string random_key() {
-  std::random_device random;
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string key;
-  while (key.size() < 32) key += digits[random() & 15U];
-  return key;
-}
-
 // The session may have been posed before: whoever controls it goes on from there.
 void take_pose(const v1::PoseState& state, OpenedBody& body) {
   v1::PoseUpdate update;
@@ -50,6 +41,14 @@ void take_pose(const v1::PoseState& state, OpenedBody& body) {
 }
 
 }  // namespace
+
+std::string random_key() {
+  std::random_device random;
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string key;
+  while (key.size() < 32) key += digits[random() & 15U];
+  return key;
+}
 
 std::unique_ptr<OpenedBody> read_opened(wire::Frame frame) {
   if (!frame.envelope.has_model_opened()) throw lie("answered OpenModel with something else");
@@ -94,7 +93,7 @@ ecorche_code ecorche_client_connect(const char* address, const ecorche_client_op
     client::Access access;
     access.authorities = text(chosen.authorities, "");
     access.token = text(chosen.token, "");
-    access.session = chosen.session == nullptr ? random_key() : chosen.session;
+    access.session = chosen.session == nullptr ? c::random_key() : chosen.session;
     auto made = std::make_unique<ecorche_client>(
         ecorche_client{wire::parse_address(address), text(chosen.name, "ecorche_client"), access, nullptr});
     made->connection = std::make_unique<client::Client>(made->address, made->name, access);

@@ -77,6 +77,9 @@ ecorche_code with_client(const ecorche_client* client, bool opened, const Work& 
   return guarded_call(work);
 }
 
+/// A name for a session of one's own, by which a balancer finds its server again.
+std::string random_key();
+
 /// What `opened` is, made ready. Throws Error{protocol} where its parts do not fit together.
 std::unique_ptr<OpenedBody> read_opened(wire::Frame opened);
 
