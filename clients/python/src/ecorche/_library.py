@@ -127,7 +127,8 @@ _POSING_OTHER = [
 
 
 class ClientOptions(Sized):
-    _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("token", c_char_p), ("authorities", c_char_p)]
+    _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("token", c_char_p), ("authorities", c_char_p),
+                ("session", c_char_p)]
 
 
 class StreamOptions(Sized):

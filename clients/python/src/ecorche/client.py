@@ -46,7 +46,7 @@ class Client(Anatomy):
         self._handle = ctypes.c_void_p()
         self.model_changed = False  # the server has read the model anew: this session stays as it is; connect again for the new one
         text = lambda value: None if value is None else os.fsencode(value)  # noqa: E731
-        options = ClientOptions(name=b"python", token=text(token), authorities=text(authorities))
+        options = ClientOptions(name=b"python", token=text(token), authorities=text(authorities), session=text(session))
         self._call("connect", address.encode(), ctypes.byref(options), ctypes.byref(self._handle))
         try:
             self._call("open", self._handle, text(model), text(session))

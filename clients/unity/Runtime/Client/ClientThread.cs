@@ -38,6 +38,7 @@ namespace Ecorche
         {
             (_address, _model, _session) = (address, model, session);
             _options = options ?? new ClientOptions();
+            if (session.Length > 0) _options.Session = _options.Session ?? session;
             _stream = stream ?? new StreamOptions();
             _thread = new Thread(Run) { IsBackground = true, Name = "ecorche client" };
             _thread.Start();

@@ -28,6 +28,7 @@ bool FEcorcheStream::Connect(const std::string& Address, const std::string& Sess
   Options.name = "ecorche unreal";
   Options.token = OrNull(Token);
   Options.authorities = OrNull(Authorities);
+  Options.session = OrNull(Session);
   if (ecorche_client_connect(Address.c_str(), &Options, &Client) != ECORCHE_OK) return Fail();
   if (ecorche_client_open(Client, nullptr, OrNull(Session)) != ECORCHE_OK ||
       ecorche_client_subscribe(Client, nullptr) != ECORCHE_OK || !ReadTissues()) {
