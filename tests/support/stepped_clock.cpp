@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands before a program (LD_PRELOAD) whose wall clock is to be stepped while it runs: by as many seconds as the
-// file says that STEPPED_CLOCK names, eight bytes that are looked at each time. The steady clock goes on as it
-// is, as on a machine whose date is set. (libfaketime moves both.)
+// Stands before a program (LD_PRELOAD) whose wall clock is to be stepped while it runs: by as many seconds as
+// the file says that STEPPED_CLOCK names, eight bytes that are looked at each time. The steady clock goes on
+// as it is, as on a machine whose date is set. (libfaketime moves both.)
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>
