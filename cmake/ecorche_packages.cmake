@@ -65,7 +65,9 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/clients/c)
 
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "ecorche-doc, paraview")
+# Steps of cohorts are written in it; what runs them is asked for where somebody has a cohort.
+set(CPACK_DEBIAN_COMMAND_PACKAGE_DEPENDS "python3:any")
+set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "ecorche-doc, paraview, snakemake")
 set(CPACK_COMPONENT_COMMAND_DESCRIPTION "pose a patient's whole anatomy
 Prepares a body once, from skin and bones or from a scan, and then poses all
 that is inside (muscles, organs, vessels, the scan itself) into files, or by
