@@ -16,7 +16,7 @@
 namespace ecorche::correct {
 
 struct SolvedSample {
-  std::uint8_t clean = 0;           ///< converged, and no more is inverted than is allowed
+  std::uint8_t clean = 0;  ///< converged, and no more is inverted than is allowed
   std::uint64_t inverted_tets = 0;
   std::int32_t iterations = 0;
   /// 3 * #node, mm, each in the frame that skinning turns with its node; zero for held ones. Empty where it
