@@ -83,8 +83,8 @@ TEST(SettleTest, ASettledBodyIsThatMadeOffline) {
   const wire::Frame one = client.client().call(settle_request({name, name}));
   ASSERT_EQ(one.envelope.settled().parts_size(), 1);
   EXPECT_EQ(one.envelope.settled().parts(0).tissue(), 0U);
-  EXPECT_EQ(one.payload.size(),
-            wire::Payload::size_type{12} * static_cast<std::size_t>(model->tissues[0].V.rows()));
+  EXPECT_EQ(one.envelope.settled().parts(0).positions().count(),
+            static_cast<std::uint64_t>(model->tissues[0].V.rows()));
 }
 
 TEST(SettleTest, IsRefusedByName) {
@@ -92,8 +92,10 @@ TEST(SettleTest, IsRefusedByName) {
   TestClient client(boned);
   EXPECT_NE(refusal_to_settle(client.client(), settle_request({"nose"})).find("settle: no tissue 'nose'"),
             std::string::npos);
-  const TestServer soft;
-  TestClient other(soft);
+  Model soft = fem::boned();
+  soft.tet_label.assign(soft.tet_count(), TetMesh::soft);
+  const TestServer without(Limits{}, soft);
+  TestClient other(without);
   EXPECT_NE(refusal_to_settle(other.client(), settle_request()).find("no soft tet hangs on a bone"),
             std::string::npos);
 }
