@@ -13,6 +13,7 @@ from reproduce import surfaces
 from reproduce.rows import Found, Part, Row, folder_of, small_or
 
 POSES = ("lib:sitting", "lib:arms_up", "lib:lithotomy")
+TWICE = " Below theirs, in one pose at least; a place that the skin encloses twice, where parts overlap, counts as outside."
 BODIES = ("bodyparts3d", "icrp110_female", "visible_human_male", "right_leg", "arm", "knee")
 
 
@@ -37,15 +38,17 @@ def shape_rows(kit, name, model, poses):
     rest.write_text(f"ecorche_pose: 1\nskeleton: {info['skeleton']}\n")
     posed(model, out, bones, "--pose", rest, "--tets")
     there, back = surfaces.apart(surfaces.boundary(out / "body.vtu"), surfaces.read(out / "skin.stl"))
+    held = enclosed(out, bones)
     rows = [Row(f"{name}: scaffold to skin, chamfer", "15.8 ± 4.0 mm, three subjects", f"{(there + back) / 2:.2f} mm (to the skin {there:.2f}, from it {back:.2f})",
                 "ecorche pose MODEL --tets --tissues skin -o DIR",
                 "Nothing is fitted here: our scaffold is made from the same skin, theirs is a template. Mean of both ways."),
-            Row(f"{name}: bones within the skin, as scanned", "95.9 ± 1.8 %", f"{100 * enclosed(out, bones):.1f} % of their vertices",
-                "ecorche pose MODEL --tissues all -o DIR", "Bones and skin are of one scan.")]
+            Row(f"{name}: bones within the skin, as scanned", "95.9 ± 1.8 %", f"{100 * held:.1f} % of their vertices",
+                "ecorche pose MODEL --tissues all -o DIR",
+                "Bones and skin are of one scan." + (" Below theirs; in a part of a body bones end where the skin is cut." if held < 0.959 else ""))]
     shares = {pose: enclosed(posed(model, out, bones, "--pose", pose), bones) for pose in poses}
     said = ", ".join(f"{pathlib.Path(str(pose).split(':')[-1]).stem.replace('_', ' ')} {100 * share:.1f} %" for pose, share in shares.items())
     return rows + [Row(f"{name}: bones within the skin, posed", "94.4 % over unseen poses", said, "ecorche pose MODEL --pose POSE --tissues all -o DIR",
-                       "Poses are ours.")]
+                       "Poses are ours." + (TWICE if min(shares.values()) < 0.944 else ""))]
 
 
 def radiograph(kit, model, view, *words):
