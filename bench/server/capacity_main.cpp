@@ -82,11 +82,13 @@ int cores_here() {
 Measured measure(const Settings& settings, const Load& load) {
   const auto n = static_cast<std::size_t>(load.processes);
   std::vector<std::unique_ptr<Part>> parts;
+  parts.reserve(n);
   for (std::size_t p = 0; p < n; ++p)
     parts.push_back(std::make_unique<Part>(settings, (load.posers + n - 1 - p) / n,
                                            p == 0 ? load.watchers : 0, cores_here()));
   const auto run_all = [&](double seconds) {
     std::vector<std::thread> threads;
+    threads.reserve(parts.size());
     for (const auto& part : parts) threads.emplace_back([&part, seconds] { part->crowd->run(seconds); });
     for (std::thread& thread : threads) thread.join();
   };
@@ -122,6 +124,7 @@ Measured measure(const Settings& settings, const Load& load) {
   out.server_ms = 1e3 * server / frames;
   out.clients_ms = 1e3 * (cpu_seconds() - clients) / frames;
   out.kilobytes = static_cast<double>(all.bytes) / 1e3 / frames;
+  out.work.reserve(all.posed_ms.size());
   for (std::size_t i = 0; i < all.posed_ms.size(); ++i)
     out.work.push_back(all.posed_ms[i] + all.encoded_ms[i]);
   return out;

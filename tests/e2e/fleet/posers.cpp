@@ -233,6 +233,8 @@ int run(int argc, char** argv) {
   std::atomic<int> ready = 0;
   std::vector<std::unique_ptr<Poser>> posers;
   std::vector<std::thread> threads;
+  posers.reserve(static_cast<std::size_t>(count));
+  threads.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     posers.push_back(std::make_unique<Poser>(task, "fleet_" + std::to_string(i), ready));
     threads.emplace_back([&poser = *posers.back()] { poser.run(); });
