@@ -79,12 +79,12 @@ class SceneBody:
 
     def step(self) -> None:
         """What a timer does: frames in, bones out; and where others pose, bones in."""
+        turned = self.follow_bones()
         came, others = self.source.take()
         if came:
             self.show()
-        if others:
+        if others and not turned:
             self.follow_source()
-        self.follow_bones()
 
     def hold_limits(self) -> None:
         """Bones that were turned further than their joints can go back to where the body is."""

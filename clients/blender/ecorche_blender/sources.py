@@ -57,11 +57,12 @@ class Served:
                  authorities: Optional[str] = None) -> None:
         self._client = self.anatomy = ecorche.connect(address, model, session, token=token, authorities=authorities)
         self._own: set[int] = set()  # poses of ours that no frame has shown yet
+        self._seen = 0  # the newest pose that was shown
         self.clips = self._client.clips
         # The scanned body, which frames show like any other: motions() are from there. Who looks on cannot ask for it.
         self._rest: Optional[list[np.ndarray]] = None
         if self._client.controls:
-            self._client.show(self._client.reset().send())
+            self._seen = self._client.show(self._client.reset().send()).sequence
             self._rest = [self._client.positions(tissue.row) for tissue in self.anatomy.tissues]
         else:
             next(self._client.frames(10), None)
@@ -77,14 +78,16 @@ class Served:
             self._client.set_rotation(segment, turn)
         sent = self._client.set_root(root).send()
         if wait:
-            self._client.show(sent)
+            self._seen = self._client.show(sent).sequence
         else:
             self._own.add(sent)
 
     def take(self) -> tuple[bool, bool]:
         shown = [frame.sequence for frame in self._client.frames()]
-        others = bool(shown) and shown[-1] not in self._own
-        self._own = {sequence for sequence in self._own if not shown or sequence > shown[-1]}
+        newest = max(shown, default=0)  # a pose may be shown again
+        others = newest > self._seen and newest not in self._own
+        self._seen = max(newest, self._seen)
+        self._own = {sequence for sequence in self._own if sequence > self._seen}
         return bool(shown), others
 
     def play(self, clip: Optional[str]) -> None:

@@ -127,7 +127,7 @@ def served(address):
     # Bones to server, and so to others.
     with ecorche.connect(address, session="ward") as other:
         part = armature.pose.bones["forearm_left"]
-        bend(armature, "forearm_left", (math.cos(0.4), math.sin(0.4), 0, 0))
+        bend(armature, "forearm_left", flexed(ecorche.Model(os.environ["ECORCHE_MODEL"]), 60))
         until(body, lambda: np.abs(vertices("skin") - rest).max() > 0.05)
         turned = part.rotation_quaternion.copy()
         until(body, lambda: any(True for _ in other.frames()))
