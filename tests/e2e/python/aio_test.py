@@ -122,11 +122,26 @@ class Aio(unittest.IsolatedAsyncioTestCase):
 
     async def test_frames_that_come_with_an_answer_are_not_waited_for(self):
         async with ecorche.aio.connect(self.server.address) as client:
-            for _ in range(5):
-                sent = await client.send()
-                shown = asyncio.create_task(client.show(sent))
-                await asyncio.gather(client.models(), client.models())
+            with ecorche.connect(self.server.address, session=client.session) as other:
+                await client.release()
+                other.claim()
+                async for _ in client.frames(0.5):
+                    pass
+                poll, sent = client._waiting._poll, []
+
+                def nothing_yet(seconds):
+                    """Just after a look that found nothing a frame comes, and is read with the answer of who waits behind."""
+                    event = poll(seconds)
+                    if event.kind == 0 and not sent:
+                        sent.append(other.send())
+                        time.sleep(0.5)
+                    return event
+
+                client._waiting._poll = nothing_yet
+                first, shown, last = (asyncio.create_task(work) for work in (client.models(), client.show(1, 20), client.models()))
                 await asyncio.wait_for(shown, 5)
+                await asyncio.gather(first, last)
+                self.assertEqual(len(sent), 1)
 
     async def test_a_task_that_is_cancelled_leaves_the_client_whole(self):
         async with ecorche.aio.connect(self.server.address) as client:
