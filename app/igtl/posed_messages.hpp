@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -23,7 +24,9 @@ namespace ecorche::app::igtl {
 struct Key {
   int rank = 0;
   std::string type, device;
-  auto operator<=>(const Key&) const = default;
+  bool operator<(const Key& other) const {
+    return std::tie(rank, type, device) < std::tie(other.rank, other.type, other.device);
+  }
 };
 using Messages = std::map<Key, SharedBytes>;
 
