@@ -105,7 +105,7 @@ endfunction()
 # Bodies of tests/fixtures reach a test by environment, so that the same executable runs by hand on any other body.
 function(ecorche_test_properties name)
   cmake_parse_arguments(A "" "TIMEOUT" "LABELS;FIXTURES" ${ARGN})
-  if(ECORCHE_SANITIZE)
+  if(ECORCHE_SANITIZE OR CMAKE_CROSSCOMPILING)
     math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}")
