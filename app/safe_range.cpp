@@ -9,8 +9,8 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include "app/bone_overlap.hpp"
+#include "core/elastic/flesh.hpp"
 #include "preprocess/correct/samples.hpp"
-#include "preprocess/fem/body.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -33,9 +33,7 @@ struct Watched {
 
 Watched watched(const Model& model) {
   Watched out;
-  const fem::Body body = fem::body_of(model, fem::Element::p1);
-  for (std::size_t t = 0; t < body.tet.size(); ++t)
-    if (body.mesh.squeezed[t] == 0) out.tets.push_back(body.tet[t]);
+  out.tets = elastic::flesh_of(model).tet;
   const std::vector<std::uint8_t> closed = runtime::closed_surfaces(model);
   for (std::size_t t = 0; t < model.tissues.size(); ++t) {
     const Tissue& tissue = model.tissues[t];

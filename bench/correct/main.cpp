@@ -17,7 +17,7 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include "bench/table.hpp"
-#include "preprocess/fem/body.hpp"
+#include "core/elastic/flesh.hpp"
 #include "preprocess/fem/reference.hpp"
 
 namespace ecorche::bench {
@@ -102,10 +102,8 @@ struct FreeTets {
 };
 
 FreeTets free_tets(const Model& model) {
-  const fem::Body body = fem::body_of(model, fem::Element::p1);
   FreeTets out;
-  for (std::size_t t = 0; t < body.tet.size(); ++t)
-    if (body.mesh.squeezed[t] == 0) out.tets.push_back(body.tet[t]);
+  out.tets = elastic::flesh_of(model).tet;
   return out;
 }
 
