@@ -36,7 +36,7 @@ std::vector<std::string> PosedMessages::fitting(std::vector<std::string> names) 
   return out;
 }
 
-PosedMessages::PosedMessages(std::shared_ptr<const Model> model, Choice choice)
+PosedMessages::PosedMessages(const std::shared_ptr<const Model>& model, Choice choice)
     : choice_(std::move(choice)),
       poser_(model),
       volume_poser_(model),

@@ -39,7 +39,7 @@ struct Choice {
 
 class PosedMessages {
  public:
-  PosedMessages(std::shared_ptr<const Model> model, Choice choice);
+  PosedMessages(const std::shared_ptr<const Model>& model, Choice choice);
 
   /// A TRANSFORM for each segment (its motion from the scan), the TDATA `joints` (where each joint's centre
   /// is, turned as its segment), a POLYDATA for each tissue. Images stay as they are, and are out of date.
