@@ -126,7 +126,8 @@ net::awaitable<void> read_messages(std::unique_ptr<Transport> transport) {
 
 WebContext web_context(net::io_context& io) {
   WebContext context;
-  context.token = "secret";
+  context.passes =
+      std::make_shared<const Passes>(std::vector<Pass>{{.name = "one", .digest = digest_of("secret")}});
   context.origins = {"http://other.example"};
   context.hosts = HostList(net::ip::make_address("127.0.0.1"), {"served.example"});
   context.messages_per_second = 1e9;
@@ -134,7 +135,8 @@ WebContext web_context(net::io_context& io) {
   context.metrics = [] { return std::string("metric 1\n"); };
   context.denied = [] {};
   context.admit = [](WebKind, const std::string&) { return true; };
-  context.welcome = [&io](std::unique_ptr<Transport> transport, const std::string&, bool) {
+  context.welcome = [&io](std::unique_ptr<Transport> transport, const std::string&,
+                          const std::shared_ptr<const Pass>&) {
     net::co_spawn(io, read_messages(std::move(transport)), net::detached);
   };
   return context;
@@ -149,7 +151,7 @@ void requests(Bytes bytes) {
   const auto first = std::to_integer<unsigned>(bytes[0]);
   bytes = bytes.subspan(1);
   const auto client =
-      std::make_shared<Client>("192.0.2.1:1000", false, stage.io.get_executor(), stage.registry);
+      std::make_shared<Client>("192.0.2.1:1000", nullptr, stage.io.get_executor(), stage.registry);
   const auto send = [&](v1::Envelope request, wire::Payload payload = {}) {
     if (client->over() || client->aborted() != nullptr) return;
     // Nobody guesses a digest: 0 stands for the right one.

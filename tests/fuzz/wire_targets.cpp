@@ -10,7 +10,6 @@
 #include <ecorche/wire/mesh_decoder.hpp>
 #include <ecorche/wire/volume_decoder.hpp>
 #include "proto/arrays.hpp"
-#include "proto/oct16.hpp"
 #include "proto/recording.hpp"
 #include "tests/fuzz/peak_bytes.hpp"
 #include "tests/fuzz/targets.hpp"
@@ -126,7 +125,6 @@ void each_frame(Bytes bytes, Look&& look) {
 }  // namespace
 
 void meshes(Bytes bytes) {
-  wire::oct16_table();  // made once, and no input's fault
   must_stay_small(bytes, kLimits.envelope_bytes + kLimits.payload_bytes, [&] {
     wire::MeshDecoder decoder;
     std::vector<wire::DecodedTissue> tissues;

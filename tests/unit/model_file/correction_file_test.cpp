@@ -2,7 +2,7 @@
 // Corrections and safe ranges that somebody spoilt on purpose.
 #include <tuple>
 
-#include "tests/unit/model_file/forge.hpp"
+#include "tests/unit/model_file/hostile.hpp"
 
 namespace ecorche::test {
 namespace {
