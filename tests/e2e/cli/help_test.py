@@ -51,7 +51,7 @@ class Help(unittest.TestCase):
         shutil.copytree(CASE, self.folder / "patient")
         shutil.copy(MODEL, self.folder / "patient.hdf")
         lines = [re.search(r"(?m)^Example: ecorche (.*)$", run(name, "--help").stdout).group(1) for name in subcommands()]
-        later = ("phantom", "new", "preprocess", "probe", "serve", "stream", "unpose", "refill", "path", "deformers", "tears", "contact", "cohort", "report")
+        later = ("phantom", "new", "preprocess", "probe", "serve", "stream", "unpose", "refill", "path", "deformers", "tears", "contact", "cohort", "report", "calibrate", "igtl")
         chosen = [line for line in lines if line.split()[0] not in later]
         chosen += [line for line in lines if line.split()[0] in ("unpose", "refill", "path")]
         self.assertGreater(len(chosen), 10)
