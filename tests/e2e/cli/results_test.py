@@ -99,7 +99,7 @@ class Results(unittest.TestCase):
 class EveryBench(unittest.TestCase):
     def test_has_a_page_and_stands_in_the_list(self):
         listed = subprocess.run([BENCH / "all_results", "--list", "--data", "/data"], check=True, capture_output=True, text=True, timeout=60).stdout
-        entries = sorted(path.parent.name for path in BENCH.glob("*/run"))
+        entries = sorted(str(path.parent.relative_to(BENCH)) for path in BENCH.glob("**/run"))
         self.assertEqual(sorted(line.split()[0] for line in listed.splitlines()), entries)
         for name in entries:
             self.assertIn("sys.exit(results.run(main))", (BENCH / name / "run").read_text(), name)
