@@ -66,7 +66,7 @@ def page(entry, words, start, about, printed):
     took = datetime.datetime.now().astimezone() - start
     head = {"command": f"`{command}`", "date": f"{start:%Y-%m-%d %H:%M %Z}, {took.total_seconds() / 60:.1f} minutes", "commit": commit(), **machine()}
     rows = "".join(f"| {name} | {value} |\n" for name, value in head.items())
-    bench = entry.parent.name if entry.name == "run" else entry.name
+    bench = str(entry.parent.relative_to(ROOT / "bench")) if entry.name == "run" else entry.name
     return f"<!-- SPDX-License-Identifier: Apache-2.0 -->\n# Results of bench/{bench}\n\n{(about or '').strip()}\n\n| | |\n|---|---|\n{rows}\n{printed.strip()}\n"
 
 
