@@ -15,7 +15,9 @@ namespace ecorche {
 /// sample s, node[n] is moved by sum over modes m of mix(s, m) scale[m] field[m][n], in the frame that
 /// skinning turns with the node. At rest every field is zero.
 struct JointCorrection {
+  /// A rotation vector a row.
   using Turns = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  /// A sample a row, a mode a column.
   using Mix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   std::int32_t joint = 0;  ///< row of the skeleton
@@ -32,6 +34,7 @@ struct JointCorrection {
 /// Radians, positive; infinite where nothing was met up to `looked`.
 struct SafeRange {
   static constexpr double none = std::numeric_limits<double>::infinity();
+  /// Where each of these was met first.
   struct Ends {
     double inverted = none;  ///< the first free tet is turned inside out
     double volume = none;    ///< a tissue's volume has changed by a tenth
