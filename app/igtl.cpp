@@ -32,8 +32,7 @@ server::tcp::endpoint endpoint_of(const IgtlSettings& settings) {
   const wire::Address address = wire::parse_address(settings.listen);
   server::Options anywhere;
   anywhere.insecure = true;
-  const server::tcp::endpoint out =
-      server::endpoint_of({.host = address.host, .port = address.port}, anywhere);
+  server::tcp::endpoint out = server::endpoint_of({.host = address.host, .port = address.port}, anywhere);
   if (!out.address().is_loopback() && !settings.insecure) {
     throw Error(ErrorKind::refused, address.host,
                 "is reachable by others, and OpenIGTLink knows neither passwords nor encryption",
@@ -103,7 +102,7 @@ void report(const Program& program, const std::string& where, std::uint16_t port
                      " surfaces, " + std::to_string(choice.volumes.size()) + " images\n";
   for (const auto& [name, fitting] : body.shortened()) {
     names[name] = fitting;
-    text += name + " is sent as " + fitting + "\n";
+    text.append(name).append(" is sent as ").append(fitting).append("\n");
   }
   program.result(text, {{"address", where},
                         {"port", port},

@@ -122,8 +122,10 @@ std::vector<SafeRange> measure_safe_ranges(const std::shared_ptr<const Model>& m
         range.looked = correct::reach(skeleton.segments[j].joint, a, way);
         if (!(range.looked >= kSafeStep)) continue;
         const bool both_ways = corrects(*model, j);
-        for (double turn = kSafeStep; turn <= range.looked; turn += kSafeStep) {
+        const int steps = static_cast<int>(std::floor(range.looked / kSafeStep));
+        for (int n = 1; n <= steps; ++n) {
           context.check_stop();
+          const double turn = n * kSafeStep;
           if (both(range.skinned) && (both(range.corrected) || !both_ways) && range.bones != SafeRange::none)
             break;
           const Pose pose =

@@ -25,6 +25,7 @@ void use_big_heap() {
   constexpr std::uintptr_t kPage = std::uintptr_t{1} << 21;
   const auto end = reinterpret_cast<std::uintptr_t>(sbrk(0));
   const std::uintptr_t begin = (end - std::uintptr_t{kAhead} + kPage) / kPage * kPage;
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): a page's place is reckoned
   if (some != nullptr) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 #endif
 }

@@ -35,6 +35,7 @@ int exit_code(ErrorKind kind) noexcept {
 
 // Foreign messages (HDF5, YAML, the file system) may hold line breaks, and names of a damaged file any bytes;
 // an error is one line, and text: it goes into JSON, and on the wire.
+// NOLINTNEXTLINE(performance-unnecessary-value-param): whoever throws hands over what was made for it
 Error::Error(ErrorKind kind, std::string where, std::string what, std::string mend)
     : kind_(kind),
       where_(text::one_line(where)),
