@@ -28,8 +28,8 @@ Eigen::MatrixXd principal(const Eigen::MatrixXf& rows, double left_mm, std::size
     for (Eigen::Index b = 0; b <= a; ++b)
       gram(a, b) = gram(b, a) = rows.row(a).cast<double>().dot(rows.row(b).cast<double>());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
-  const double enough =
-      left_mm * left_mm * static_cast<double>(samples) * static_cast<double>(rows.cols() / 3);
+  const Eigen::Index nodes = rows.cols() / 3;
+  const double enough = left_mm * left_mm * static_cast<double>(samples) * static_cast<double>(nodes);
   double left = gram.trace();
   std::vector<Eigen::VectorXd> modes;
   for (Eigen::Index m = samples - 1; m >= 0 && modes.size() < most && (left > enough || modes.empty()); --m) {

@@ -48,7 +48,7 @@ std::array<std::int32_t, 2> edge(std::int32_t a, std::int32_t b) {
 RestTet rest_tet(const Points& V, const Tets& T, Eigen::Index t) {
   Eigen::Matrix<double, 4, 3> corner;
   for (int c = 0; c < 4; ++c) corner.row(c) = V.row(T(t, c));
-  const RestTet out = elastic::rest_tet(corner);
+  RestTet out = elastic::rest_tet(corner);
   if (!(out.volume > 0)) {
     throw Error(ErrorKind::data, "fem",
                 "tet " + std::to_string(t) + " has the volume " + std::to_string(out.volume) + " mm^3",
