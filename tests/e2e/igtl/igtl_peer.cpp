@@ -66,7 +66,7 @@ Pointer body(igtl::MessageHeader::Pointer header, Pointer message) {
   return message;
 }
 
-json surface(igtl::PolyDataMessage::Pointer message) {
+json surface(const igtl::PolyDataMessage::Pointer& message) {
   std::vector<float> points, normals;
   std::vector<std::uint32_t> triangles;
   for (int i = 0; i < message->GetPoints()->GetNumberOfPoints(); ++i) {
@@ -96,7 +96,7 @@ json surface(igtl::PolyDataMessage::Pointer message) {
           {"kind", attribute->GetType()}};
 }
 
-json image(igtl::ImageMessage::Pointer message) {
+json image(const igtl::ImageMessage::Pointer& message) {
   int size[3];
   message->GetDimensions(size);
   igtl::Matrix4x4 matrix;
@@ -114,7 +114,7 @@ json image(igtl::ImageMessage::Pointer message) {
           {"coordinates", message->GetCoordinateSystem()}};
 }
 
-json told(igtl::MessageHeader::Pointer header) {
+json told(const igtl::MessageHeader::Pointer& header) {
   const std::string type = header->GetDeviceType();
   json out{{"type", type}, {"device", header->GetDeviceName()}};
   if (type == "TRANSFORM") {
@@ -238,7 +238,7 @@ void obey(std::istream& words) {
 
 }  // namespace
 
-int main(int, char** argv) {
+int main(int, char** argv) try {
   folder = argv[2];
   socket_of_server = igtl::ClientSocket::New();
   if (socket_of_server->ConnectToServer("127.0.0.1", std::atoi(argv[1])) != 0) return 2;
@@ -249,4 +249,7 @@ int main(int, char** argv) {
   }
   socket_of_server->CloseSocket();
   return 0;
+} catch (const std::exception& error) {
+  std::cerr << error.what() << "\n";
+  return 70;
 }
