@@ -15,6 +15,7 @@
 
 // HDF5 1.10 itself loses a block whenever H5Gopen or H5Dopen refuses a damaged header; a C program of those
 // calls alone shows the same.
+// NOLINTNEXTLINE(bugprone-reserved-identifier): its name is the sanitizer's
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() {
   return "leak:libhdf5_serial";
