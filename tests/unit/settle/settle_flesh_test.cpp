@@ -183,7 +183,7 @@ TEST(SettleFlesh, RefusesABodyWithoutFleshOrBones) {
     Model model = boned();
     model.tet_label.assign(model.tet_count(), label);
     try {
-      FleshSettler(model, {});
+      const FleshSettler settler(model, {});
       FAIL() << "settles what nothing holds, or nothing at all";
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::data);
