@@ -32,6 +32,22 @@ std::vector<std::int32_t> parts(std::size_t nodes, const Tets& T, const std::vec
 
 }  // namespace
 
+std::vector<std::int32_t> anchored(std::size_t nodes, const Tets& T, const std::vector<std::int32_t>& rows,
+                                   const std::function<bool(std::int32_t)>& is_held) {
+  // Parts meet in held nodes too: two that do hang on the same bone.
+  const std::vector<std::int32_t> part = parts(nodes, T, rows);
+  std::vector<std::uint8_t> touched(nodes, 0);
+  std::vector<std::size_t> anchors(nodes, 0);
+  for (const std::int32_t t : rows)
+    for (int c = 0; c < 4; ++c) touched[at(T(t, c))] = 1;
+  for (std::size_t n = 0; n < nodes; ++n)
+    if (touched[n] != 0 && is_held(static_cast<std::int32_t>(n))) ++anchors[at(part[n])];
+  std::vector<std::int32_t> out;
+  for (const std::int32_t t : rows)
+    if (anchors[at(part[at(T(t, 0))])] >= 3) out.push_back(t);
+  return out;
+}
+
 Flesh flesh_of(const Model& model) {
   Flesh out;
   const std::size_t nodes = model.node_count();
@@ -65,21 +81,8 @@ Flesh flesh_of(const Model& model) {
       soft.push_back(static_cast<std::int32_t>(t));
     }
   }
-  // Parts meet in held nodes too: two that do hang on the same bone.
-  const std::vector<std::int32_t> part = parts(nodes, model.tets, soft);
-  std::vector<std::uint8_t> touched(nodes, 0);
-  std::vector<std::size_t> anchors(nodes, 0);
-  for (const std::int32_t t : soft)
-    for (int c = 0; c < 4; ++c) touched[at(model.tets(t, c))] = 1;
-  for (std::size_t n = 0; n < nodes; ++n)
-    if (touched[n] != 0 && out.segment[n] >= 0) ++anchors[at(part[n])];
-  for (const std::int32_t t : soft) {
-    if (anchors[at(part[at(model.tets(t, 0))])] >= 3) {
-      out.tet.push_back(t);
-    } else {
-      ++out.floating;
-    }
-  }
+  out.tet = anchored(nodes, model.tets, soft, is_held);
+  out.floating = soft.size() - out.tet.size();
   return out;
 }
 

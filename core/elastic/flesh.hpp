@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <ecorche/values/model.hpp>
@@ -24,5 +25,9 @@ struct Flesh {
 /// the mesh that hang on fewer than three held nodes, which nothing places. Nodes of no tet stay where
 /// skinning puts them.
 Flesh flesh_of(const Model& model);
+
+/// Of these rows of T those whose part of the mesh hangs on three held nodes or more, in their order.
+std::vector<std::int32_t> anchored(std::size_t nodes, const Tets& T, const std::vector<std::int32_t>& rows,
+                                   const std::function<bool(std::int32_t)>& is_held);
 
 }  // namespace ecorche::elastic

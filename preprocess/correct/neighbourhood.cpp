@@ -2,8 +2,6 @@
 #include "preprocess/correct/neighbourhood.hpp"
 
 #include <algorithm>
-#include <numeric>
-#include <utility>
 
 #include "core/elastic/flesh.hpp"
 
@@ -44,36 +42,6 @@ double divided(const Model& model, std::size_t node, const std::vector<std::size
   return 1 - *std::max_element(of_half.begin(), of_half.end()) / sum;
 }
 
-// Tets of parts that three held nodes or more place. `T`: rows of the model's nodes.
-std::vector<std::int32_t> placed(const Model& model, const std::vector<std::int32_t>& tets,
-                                 const std::vector<std::uint8_t>& is_free) {
-  std::vector<std::int32_t> up(model.node_count());
-  std::iota(up.begin(), up.end(), 0);
-  const auto at = [](std::int32_t row) { return static_cast<std::size_t>(row); };
-  const auto root = [&](std::int32_t n) {
-    while (up[at(n)] != n) n = up[at(n)] = up[at(up[at(n)])];
-    return n;
-  };
-  for (const std::int32_t t : tets) {
-    for (int c = 1; c < 4; ++c) {
-      const std::int32_t a = root(model.tets(t, 0)), b = root(model.tets(t, c));
-      up[at(std::max(a, b))] = std::min(a, b);
-    }
-  }
-  std::vector<std::uint8_t> seen(model.node_count(), 0);
-  std::vector<std::size_t> anchors(model.node_count(), 0);
-  for (const std::int32_t t : tets) {
-    for (int c = 0; c < 4; ++c) {
-      const std::int32_t n = model.tets(t, c);
-      if (is_free[at(n)] == 0 && std::exchange(seen[at(n)], 1) == 0) ++anchors[at(root(n))];
-    }
-  }
-  std::vector<std::int32_t> out;
-  for (const std::int32_t t : tets)
-    if (anchors[at(root(model.tets(t, 0)))] >= 3) out.push_back(t);
-  return out;
-}
-
 }  // namespace
 
 Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<RigidTransform>> poses,
@@ -92,7 +60,8 @@ Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<Rigi
                     [&](std::int32_t n) { return is_free[static_cast<std::size_t>(n)] != 0; }))
       tets.push_back(t);
   }
-  tets = placed(model, tets, is_free);
+  tets = elastic::anchored(model.node_count(), model.tets, tets,
+                           [&](std::int32_t n) { return is_free[static_cast<std::size_t>(n)] == 0; });
 
   Neighbourhood out;
   std::vector<std::int32_t> local(model.node_count(), kNone);
