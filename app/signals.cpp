@@ -10,42 +10,52 @@
 namespace ecorche::app {
 namespace {
 
-std::mutex guard;
-std::function<void()> hangup_call;
+// What the listening thread touches. It outlives main, so this is never destroyed: a signal that came while
+// the process was leaving would meet it gone.
+struct Listener {
+  std::stop_source source;
+  std::mutex guard;
+  std::function<void()> hangup_call;
+};
 
-void listen(std::stop_source& source) {
+Listener& listener() {
+  static Listener& only = *new Listener;
+  return only;
+}
+
+void listen() {
+  Listener& self = listener();
   platform::Signal which{};
   bool again = false;
   while (platform::wait_for_signal(which)) {
     if (which == platform::Signal::hangup) {
-      const std::lock_guard lock(guard);
-      if (hangup_call) hangup_call();
+      const std::lock_guard lock(self.guard);
+      if (self.hangup_call) self.hangup_call();
       continue;
     }
     if (std::exchange(again, true)) platform::end_process(130);
-    source.request_stop();
+    self.source.request_stop();
   }
 }
 
 }  // namespace
 
 std::stop_token stop_on_signals() {
-  static std::stop_source source;
-  if (!platform::catch_stops()) return source.get_token();  // signals then end the process at once
-  // Lives as long as the process: nothing waits for it.
-  std::thread([] { listen(source); }).detach();
-  return source.get_token();
+  const std::stop_token stop = listener().source.get_token();
+  if (!platform::catch_stops()) return stop;  // signals then end the process at once
+  std::thread(listen).detach();               // lives as long as the process: nothing waits for it
+  return stop;
 }
 
 OnHangup::OnHangup(std::function<void()> call) {
-  const std::lock_guard lock(guard);
-  hangup_call = std::move(call);
+  const std::lock_guard lock(listener().guard);
+  listener().hangup_call = std::move(call);
   platform::catch_hangups();
 }
 
 OnHangup::~OnHangup() {
-  const std::lock_guard lock(guard);
-  hangup_call = nullptr;
+  const std::lock_guard lock(listener().guard);
+  listener().hangup_call = nullptr;
 }
 
 }  // namespace ecorche::app
