@@ -17,7 +17,7 @@ internal static partial class Check
     {
         ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
         ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["cut"] = Cut, ["native"] = NativeChecks.Run,
-        ["bench"] = Bench,
+        ["bench"] = Bench, ["zstd"] = ZstdChecks.Run,
     };
 
     private static int Main(string[] words)
@@ -208,12 +208,13 @@ internal static partial class Check
         }
     }
 
+    /// <summary>volume ADDRESS [compressed]: bends an elbow, and prints what the volume is then.</summary>
     private static void ShowVolume(string[] words)
     {
         using (var client = Client.Connect(words[0]))
         {
             var body = client.Open();
-            var volume = client.SubscribeVolume(body.Volumes[0].Name, changedBricks: true);
+            var volume = client.SubscribeVolume(body.Volumes[0].Name, changedBricks: true, compressed: words.Length > 1);
             var pose = client.NewPose();
             for (int i = 0; i < 6; ++i)
             {

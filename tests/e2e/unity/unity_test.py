@@ -20,6 +20,7 @@ SOURCE, LIBRARIES = (pathlib.Path(word) for word in sys.argv[1:3])
 MODEL, OTHER_MODEL = os.environ["ECORCHE_MODEL"], os.environ["ECORCHE_MODELS"].split(":")[-1]
 sys.path.insert(0, str(SOURCE / "tests" / "e2e" / "stream"))
 
+import zstd_frames  # noqa: E402
 from ecorche_client import Client  # noqa: E402
 from ecorche_frames import aligned, array  # noqa: E402
 from hostile import HostileServers  # noqa: E402
@@ -174,6 +175,7 @@ class Unity(unittest.TestCase):
 
     def test_volumes_with_changed_bricks(self):
         out = check("volume", self.server.address).splitlines()
+        self.assertEqual(check("volume", self.server.address, "compressed").splitlines(), out)
         with Client("127.0.0.1", self.server.port) as client:
             body = client.open()
             client.subscribe_volume(body.message.volumes[0].name)
@@ -191,6 +193,42 @@ class Unity(unittest.TestCase):
                 told.append(f"{i} {i_size} {j} {k} {hashlib.sha256(np.ascontiguousarray(frame.voxels).tobytes()).hexdigest()}")
         self.assertEqual([line.removesuffix(" by bricks") for line in out], told)
         self.assertIn(" by bricks", "".join(out))
+
+    def unpacked(self, *pairs):
+        """Lines of the program of (size, frame)."""
+        with tempfile.TemporaryDirectory() as folder:
+            zstd_frames.write(pathlib.Path(folder) / "frames", pairs)
+            return check("zstd", pathlib.Path(folder) / "frames").splitlines()
+
+    def test_zstd_as_its_library(self):
+        names, contents, frames = zip(*zstd_frames.frames())
+        told = self.unpacked(*((len(data), frame) for data, frame in zip(contents, frames)))
+        for name, data, line in zip(names, contents, told, strict=True):
+            self.assertEqual(line, hashlib.sha256(data).hexdigest(), name)
+
+    def test_zstd_that_was_tampered_with(self):
+        large = ("words at level 3", "ct at level 9", "wide at level 1")
+        pairs = [(len(data), changed) for seed, (name, data, frame) in enumerate(zstd_frames.frames()) if 0 < len(data) < 20_000 or name in large
+                 for changed in zstd_frames.tampered(frame, 60, seed)]
+        expected = [zstd_frames.decompress(frame, size) for size, frame in pairs]
+        refused = stricter = 0
+        for (size, frame), bytes_, line in zip(pairs, expected, self.unpacked(*pairs), strict=True):
+            if bytes_ is None:
+                self.assertRegex(line, "^refused the server's message is damaged: ", frame[:200].hex())
+                refused += 1
+            elif line.endswith("a zstd frame with a block that is none"):
+                stricter += 1  # RFC 8878, 4.2.2: streams of literals end with their last bit, which the library does not always look at
+            else:
+                self.assertEqual(line, hashlib.sha256(bytes_).hexdigest(), frame[:200].hex())
+        print(f"{len(pairs)} frames, of which {refused} are none, and {stricter} the library reads, too")
+        self.assertGreater(refused, len(pairs) / 2)
+        self.assertLess(stricter, (len(pairs) - refused) / 5)
+
+    def test_zstd_that_amplifies(self):
+        told = self.unpacked((1 << 17, zstd_frames.bomb(1 << 17)), ((1 << 17) + 1, zstd_frames.bomb((1 << 17) + 1)), (2 ** 31 - 1, zstd_frames.bomb(2 ** 31 - 1)))
+        self.assertEqual(told[0], hashlib.sha256(bytes([7]) * (1 << 17)).hexdigest())
+        self.assertTrue(told[1].endswith("a zstd frame of 14 bytes cannot hold 131073"), told[1])
+        self.assertTrue(told[2].endswith("a zstd frame of 14 bytes cannot hold 2147483647"), told[2])
 
     def test_envelopes_that_are_cut(self):
         self.assertEqual(check("cut"), "cut 73 times\n")

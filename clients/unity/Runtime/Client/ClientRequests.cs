@@ -127,10 +127,12 @@ namespace Ecorche
             _line.Release(Call(default));
         }
 
-        /// <summary>Frames of a posed volume, whole or a `region` of the posed space (LPS mm). `changedBricks`: less on the way, all voxels here.</summary>
-        public VolumeStream SubscribeVolume(string name, bool nearest = false, bool changedBricks = false, double[] region = null, double maxRate = 0)
+        /// <summary>Frames of a posed volume, whole or a `region` of the posed space (LPS mm). `changedBricks`: less on the way, all voxels here;
+        /// `compressed`: by zstd, for lines that are slower than its decoder.</summary>
+        public VolumeStream SubscribeVolume(string name, bool nearest = false, bool changedBricks = false, double[] region = null, double maxRate = 0,
+            bool compressed = false)
         {
-            var stream = new VolumeStream(Opened(), name, nearest, changedBricks, region, maxRate);
+            var stream = new VolumeStream(Opened(), name, nearest, changedBricks, region, maxRate, compressed);
             Subscribe(stream);
             _volumes.Add(stream);
             return stream;
@@ -147,6 +149,7 @@ namespace Ecorche
             subscribe.Volume.Volume = stream.Name;
             subscribe.Volume.Nearest = stream.Nearest;
             subscribe.Volume.ChangedBricks = stream.ChangedBricks;
+            subscribe.Volume.Compressed = stream.Compressed;
             subscribe.Volume.HasRegion = SetBox(subscribe.Volume.Region, stream.Region);
             var came = Call(default);
             using (new Returned(_line, came)) stream.Begin(_in.Subscribed.Subscription);

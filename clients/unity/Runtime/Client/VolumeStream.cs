@@ -5,22 +5,24 @@ using Ecorche.Wire;
 
 namespace Ecorche
 {
-    /// <summary>Frames of a posed volume, uncompressed: zstd is for slow lines, and the client has no decoder of it.</summary>
+    /// <summary>Frames of a posed volume.</summary>
     public sealed class VolumeStream
     {
         private const int Brick = 32;
         private readonly int _bytesPerVoxel;
         private readonly Volume _volume;
-        private byte[] _key = System.Array.Empty<byte>(), _voxels = System.Array.Empty<byte>();
+        private readonly ZstdDecoder _zstd;
+        private byte[] _key = System.Array.Empty<byte>(), _voxels = System.Array.Empty<byte>(), _content = System.Array.Empty<byte>();
         private ulong _keyframe;
         private bool _hasKey;
 
-        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate)
+        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate, bool compressed)
         {
             (Name, Nearest, ChangedBricks, Region, MaxRate) = (name, nearest, changedBricks, region, maxRate);
             for (int v = 0; v < body.Volumes.Count; ++v)
                 if (body.Volumes[v].Name == name) _volume = body.Volumes[v];
             if (_volume == null) throw new EcorcheException(Code.NotFound, name + ": the model has no such volume");
+            if (compressed) _zstd = new ZstdDecoder();
             _bytesPerVoxel = (int)_volume.Components * FrameBytes.BytesOf(_volume.Type);
         }
 
@@ -47,6 +49,7 @@ namespace Ecorche
 
         internal bool Nearest { get; }
         internal bool ChangedBricks { get; }
+        internal bool Compressed => _zstd != null;
         internal double[] Region { get; }
         internal double MaxRate { get; }
 
@@ -60,12 +63,12 @@ namespace Ecorche
         internal Code Decode(VolumeFrame told, FrameBytes from)
         {
             if (told.HasStatus && told.Status.Code != 0) return (Code)told.Status.Code;
-            if (told.HasContent || !told.HasGrid) throw EcorcheException.Damaged("a volume that was not asked for so");
-            var rows = Bytes(told.Voxels, from);
+            if (told.HasContent != Compressed || !told.HasGrid) throw EcorcheException.Damaged("a volume that was not asked for so");
             long voxels = (long)told.Grid.SizeI * told.Grid.SizeJ * told.Grid.SizeK;
             if (told.Grid.SizeI > 65536 || told.Grid.SizeJ > 65536 || told.Grid.SizeK > 65536 || voxels * _bytesPerVoxel > int.MaxValue)
                 throw EcorcheException.Damaged("a volume of " + voxels + " voxels");
             int size = (int)voxels * _bytesPerVoxel;
+            var rows = Compressed ? Content(told, from, size) : Bytes(told.Voxels, from);
             if (!told.HasBricks)
             {
                 if (rows.Length != size) throw EcorcheException.Damaged("a volume of " + rows.Length + " bytes of " + size);
@@ -99,6 +102,17 @@ namespace Ecorche
                 case 4: return MemoryMarshal.AsBytes(from.Rows<uint>(array, _volume.Type, components));
                 default: return MemoryMarshal.AsBytes(from.Rows<ulong>(array, _volume.Type, components));
             }
+        }
+
+        /// <summary>What the zstd frame holds: at most all voxels.</summary>
+        private ReadOnlySpan<byte> Content(VolumeFrame told, FrameBytes from, int most)
+        {
+            var packed = from.Rows<byte>(told.Voxels, ScalarType.U8, 1);
+            if (told.Content.Type != _volume.Type || told.Content.Components != _volume.Components || told.Content.Count > (ulong)(most / _bytesPerVoxel))
+                throw EcorcheException.Damaged("a volume of " + told.Content.Count + " voxels of type " + told.Content.Type + " in " + most + " bytes");
+            int size = (int)told.Content.Count * _bytesPerVoxel;
+            _zstd.Decode(packed, size, ref _content);
+            return _content.AsSpan(0, size);
         }
 
         private void SetGrid(VolumeFrame told)
