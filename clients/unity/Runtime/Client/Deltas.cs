@@ -63,11 +63,13 @@ namespace Ecorche
         {
             int shift = digits + 2;
             ulong add = (ushort)(0x8000 - (centre << shift)) * Both;
-            for (int q = 0; q < quads; ++q)
+            for (ulong* end = key + quads; key < end; key += 2, x += 2)
             {
-                ulong four = key[q];
-                x[q] = (((four & Low) << shift) + add) & Low;
-                x[Quads + q] = ((((four >> 16) & Low) << shift) + add) & Low;
+                ulong a = key[0], b = key[1];
+                x[0] = (((a & Low) << shift) + add) & Low;
+                x[1] = (((b & Low) << shift) + add) & Low;
+                x[Quads] = ((((a >> 16) & Low) << shift) + add) & Low;
+                x[Quads + 1] = ((((b >> 16) & Low) << shift) + add) & Low;
             }
         }
 
@@ -132,16 +134,21 @@ namespace Ecorche
             ulong c0 = Beside(row[0], (half + 0x8000) << 15), c1 = Beside(row[1], 0), c2 = Beside(row[2], 0);
             int shift = 15 + digits;
             ulong kept = (0xFFFFu >> digits) * Both, add = (ushort)(origin - (0x8000 >> digits)) * Both;
-            ulong* y = x + 2 * Quads;
-            ulong* z = y + 2 * Quads;
-            for (int q = 0; q < quads; ++q)
+            // Two at once, at distances that are known: Mono computes each address that is not, and fetches every constant anew in a round.
+            for (ulong* end = numbers + quads; numbers < end; numbers += 2, x += 2)
             {
-                ulong left = numbers[q];
-                ulong even = ((m0 * x[q] + c0) & Whole) + ((m1 * y[q] + c1) & Whole) + ((m2 * z[q] + c2) & Whole);
-                ulong odd = ((m0 * x[Quads + q] + c0) & Whole) + ((m1 * y[Quads + q] + c1) & Whole) + ((m2 * z[Quads + q] + c2) & Whole);
+                ulong left = numbers[0];
+                ulong even = ((m0 * x[0] + c0) & Whole) + ((m1 * x[2 * Quads] + c1) & Whole) + ((m2 * x[4 * Quads] + c2) & Whole);
+                ulong odd = ((m0 * x[Quads] + c0) & Whole) + ((m1 * x[3 * Quads] + c1) & Whole) + ((m2 * x[5 * Quads] + c2) & Whole);
                 even = ((even >> shift) & kept) + add + (left & Low);
                 odd = ((odd >> shift) & kept) + add + ((left >> 16) & Low);
-                numbers[q] = (even & Low) | ((odd & Low) << 16);
+                numbers[0] = (even & Low) | ((odd & Low) << 16);
+                left = numbers[1];
+                even = ((m0 * x[1] + c0) & Whole) + ((m1 * x[2 * Quads + 1] + c1) & Whole) + ((m2 * x[4 * Quads + 1] + c2) & Whole);
+                odd = ((m0 * x[Quads + 1] + c0) & Whole) + ((m1 * x[3 * Quads + 1] + c1) & Whole) + ((m2 * x[5 * Quads + 1] + c2) & Whole);
+                even = ((even >> shift) & kept) + add + (left & Low);
+                odd = ((odd >> shift) & kept) + add + ((left >> 16) & Low);
+                numbers[1] = (even & Low) | ((odd & Low) << 16);
             }
         }
 
