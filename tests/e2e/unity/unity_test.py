@@ -8,6 +8,7 @@ import hashlib
 import os
 import pathlib
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -255,6 +256,20 @@ class Unity(unittest.TestCase):
                         served.with_suffix(".new").rename(served)
                         other.reload("body")
                 self.comes_back_by_resume(server, replace, "back anew\n")
+
+    def test_a_server_that_stops_sends_its_clients_elsewhere(self):
+        with Server(MODEL) as other, Server(MODEL, options=["--elsewhere", other.address]) as server, \
+                subprocess.Popen(command("resume", server.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:
+            self.assertEqual(client.stdout.readline(), "shown 1\n")
+            server.process.send_signal(signal.SIGTERM)
+            client.stdin.write("\n")
+            client.stdin.flush()
+            self.assertRegex(client.stdout.readline(), "^lost .*stop")
+            client.stdin.write("\n")
+            client.stdin.flush()
+            self.assertEqual(client.stdout.readline(), "back anew\n")
+            client.stdin.close()
+            self.assertEqual(client.wait(30), 0)
 
     def comes_back_by_resume(self, server, meanwhile, told):
         with Relay(server.port) as relay, subprocess.Popen(command("resume", relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,

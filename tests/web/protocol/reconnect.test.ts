@@ -7,8 +7,9 @@ import net from "node:net";
 import os from "node:os";
 import path from "node:path";
 import { test } from "node:test";
+import { create } from "@bufbuild/protobuf";
 import { retryDelay } from "../../../clients/web/protocol/src/backoff.js";
-import { Client, ConnectionError, Encoding, Role, ServerError, type BodyFrame, type ConnectionState, type MeshStream } from "../../../clients/web/protocol/src/index.js";
+import { Client, ConnectionError, Encoding, ReloadModelSchema, Role, ServerError, type BodyFrame, type ConnectionState, type MeshStream } from "../../../clients/web/protocol/src/index.js";
 import { bendingPose } from "../support/poses.js";
 import { Server, within } from "../support/server.js";
 
@@ -94,6 +95,43 @@ test("a new server on the same port: the same model, session, streams and pose",
   assert.equal(client.hello.resumed, undefined);
   assert.equal(client.model!.session, "healing");
   assert.deepEqual(found.vertices, expected.vertices);
+});
+
+test("a model that is replaced while it is open: told, and shown until it is opened anew", async (t) => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), "ecorche-replaced-")), file = path.join(folder, "body.hdf");
+  t.after(() => fs.rmSync(folder, { recursive: true }));
+  const [first, second] = [process.env["ECORCHE_MODEL"]!, process.env["ECORCHE_MODELS"]!.split(":").at(-1)!];
+  fs.copyFileSync(first, file);
+  const server = await Server.start([], { model: file });
+  t.after(() => server.stop());
+  const client = await within(20, Client.connect(server.url), "connecting");
+  t.after(() => client.close());
+  const model = await client.open("", "kept"), before = (await client.listModels())[0]!.identity;
+  const stream = await client.subscribeMesh({ encoding: Encoding.U16_DELTA });
+
+  const changed = within(60, new Promise<{ identity: bigint }>((resolve) => { client.on("modelChanged", resolve); }), "modelChanged");
+  fs.copyFileSync(second, `${file}.new`);
+  fs.renameSync(`${file}.new`, file);
+  await client.ask({ case: "reloadModel", value: create(ReloadModelSchema, { model: model.model }) }, "status");
+  const { identity } = await changed;
+  assert.notEqual(identity, before);
+  assert.equal((await client.listModels())[0]!.identity, identity);
+  // The session goes on with what it has.
+  const bend = async () => {
+    const bent = frameOf(stream, ({ poseSequence }) => poseSequence === 1n);
+    client.setPose(bendingPose(model, 0.4));
+    return bent;
+  };
+  const old = await bend();
+  assert.equal(client.model, model);
+
+  // Nobody joins it any more: by the same name there is a new one, which shows the scan.
+  const anew = frameOf(stream, ({ poseSequence }) => poseSequence === 0n);
+  assert.equal((await client.open("", "kept")).lastSequence, 0n);
+  await anew;
+  const bent = await bend();
+  assert.equal(bent.vertices.length, old.vertices.length);
+  assert.notDeepEqual(bent.vertices, old.vertices, "other tets");
 });
 
 test("who may not come in is told once, and does not try again", async (t) => {
