@@ -64,34 +64,41 @@ ecorche_code check_out(std::size_t vertices, ecorche_space space, VerticesOut& o
 inline constexpr std::size_t batch_vertices = 256;
 using Batch = std::array<float, 3 * batch_vertices>;
 
-/// Of `count` vectors the axes, `stride` bytes from one to the next. `make(first, count, batch)`: where the
-/// floats of so many of them are, perhaps made in `batch`.
-template <class Make>
-void place_all(std::size_t count, const Make& make, const Axes& axes, float* out, std::size_t stride) {
-  auto* to = reinterpret_cast<char*>(out);
-  Batch batch;
+/// Vectors into the axes of a space, `stride` bytes from one to the next.
+inline void place(const float* from, std::size_t count, const Axes& axes, char* to, std::size_t stride) {
   const auto [x, y, z] = axes.from;
   const auto [by_x, by_y, by_z] = axes.by;
-  for (std::size_t first = 0; first < count; first += batch_vertices) {
-    const std::size_t some = std::min(batch_vertices, count - first);
-    const float* from = make(first, some, batch);
-    for (std::size_t i = 0; i < some; ++i, from += 3, to += stride) {
-      const std::array<float, 3> q{by_x * from[x], by_y * from[y], by_z * from[z]};
-      std::memcpy(to, q.data(), vector_bytes);
-    }
+  for (std::size_t i = 0; i < count; ++i, from += 3, to += stride) {
+    // Each by itself: twelve bytes at once would be put together in memory first, and waited for.
+    const float a = by_x * from[x], b = by_y * from[y], c = by_z * from[z];
+    std::memcpy(to, &a, sizeof a);
+    std::memcpy(to + sizeof a, &b, sizeof b);
+    std::memcpy(to + 2 * sizeof a, &c, sizeof c);
   }
 }
 
-/// As ecorche_body_copy, of vertices that place_all() is told of. The vectors that `normals` makes have the
-/// length 1 / `unit`.
+/// As ecorche_body_copy. `positions(first, count, batch)`, and `normals` likewise: where the floats of so
+/// many vertices are, perhaps made in `batch`; normals have the length 1 / `unit`.
 template <class Positions, class Normals>
 ecorche_code copy_vertices(std::size_t vertices, const Positions& positions, const Normals& normals,
                            double unit, ecorche_space space, VerticesOut out) {
   if (const ecorche_code wrong = check_out(vertices, space, out); wrong != ECORCHE_OK) return wrong;
   const Space& to = *find_space(space);
-  if (out.positions != nullptr)
-    place_all(vertices, positions, to.axes(to.scale), out.positions, out.position_stride);
-  if (out.normals != nullptr) place_all(vertices, normals, to.axes(unit), out.normals, out.normal_stride);
+  const Axes points = to.axes(to.scale), directions = to.axes(unit);
+  auto* const at = reinterpret_cast<char*>(out.positions);
+  auto* const along = reinterpret_cast<char*>(out.normals);
+  Batch batch;
+  // Both of a vertex in turn, which mostly lie in one line of the cache: else all of them came and went
+  // twice.
+  for (std::size_t first = 0; first < vertices; first += batch_vertices) {
+    const std::size_t some = std::min(batch_vertices, vertices - first);
+    if (at != nullptr)
+      place(positions(first, some, batch), some, points, at + first * out.position_stride,
+            out.position_stride);
+    if (along != nullptr)
+      place(normals(first, some, batch), some, directions, along + first * out.normal_stride,
+            out.normal_stride);
+  }
   return ECORCHE_OK;
 }
 

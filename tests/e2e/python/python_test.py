@@ -191,6 +191,11 @@ class Clients(unittest.TestCase):
                 turned = (client.normals("skin") * here.normals("skin")).sum(axis=1) / 32767
                 self.assertGreater(turned.min(), np.cos(np.radians(2)))
                 np.testing.assert_allclose(client.copy("skin", "gltf"), client.positions("skin")[:, [0, 2, 1]] * [1e-3, 1e-3, -1e-3], atol=1e-5)
+                # Into a caller's own vertices, of which some bytes are not the library's.
+                both = np.full((len(client.positions("skin")), 7), 9, np.float32)
+                client._call("copy", client._handle, 0, ecorche.body.SPACES["gltf"], both.ctypes.data, 28, both.ctypes.data + 12, 28, len(both))
+                np.testing.assert_array_equal(both[:, :3], client.copy("skin", "gltf"))
+                np.testing.assert_array_equal(both[:, 3:], np.c_[client.normals("skin")[:, [0, 2]], -client.normals("skin")[:, 1], np.full(len(both), 9, "f4")])
                 self.assertGreater(client.bytes_received, 10000)
 
     def test_quality_and_points(self):
