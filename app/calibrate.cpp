@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <chrono>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 
 #include <ecorche/model_file/model_file.hpp>
@@ -11,6 +12,7 @@
 #include "app/safe_range.hpp"
 #include "app/stage_folder.hpp"
 #include "preprocess/correct/calibrate.hpp"
+#include "preprocess/correct/transfer.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -21,16 +23,25 @@ using nlohmann::json;
 constexpr double kCacheGib = 1000;  // samples are never worth less than the time they took
 
 struct CalibrateSettings {
-  fs::path model, output, cache;
+  fs::path model, output, cache, from;
   correct::CalibrateOptions options;
   bool ranges = true;
 };
 
 json report_of(const correct::JointReport& joint) {
-  return {{"joint", joint.joint},     {"tets", joint.tets},    {"free_nodes", joint.free_nodes},
-          {"samples", joint.samples}, {"clean", joint.clean},  {"clean_deg", joint.clean_deg},
-          {"nodes", joint.nodes},     {"modes", joint.modes},  {"bytes", joint.bytes},
-          {"mean_mm", joint.mean_mm}, {"max_mm", joint.max_mm}};
+  json tried = json::array();
+  for (const correct::SampleReport& sample : joint.tried) {
+    const Eigen::Vector3d turn = sample.from_rest * 180 / std::numbers::pi;
+    tried.push_back({{"from_rest_deg", {turn[0], turn[1], turn[2]}},
+                     {"clean", sample.clean},
+                     {"inverted", sample.inverted},
+                     {"inverted_skinned", sample.by_skinning},
+                     {"iterations", sample.iterations}});
+  }
+  return {{"joint", joint.joint},     {"tets", joint.tets},     {"free_nodes", joint.free_nodes},
+          {"samples", joint.samples}, {"clean", joint.clean},   {"clean_deg", joint.clean_deg},
+          {"nodes", joint.nodes},     {"modes", joint.modes},   {"bytes", joint.bytes},
+          {"mean_mm", joint.mean_mm}, {"max_mm", joint.max_mm}, {"tried", tried}};
 }
 
 std::string text_of(const json& report, const Model& model) {
@@ -59,6 +70,26 @@ void warn_of(const Program& program, const correct::Calibration& found) {
   }
 }
 
+struct Made {
+  correct::Calibration calibration;
+  std::string how;
+};
+
+Made make(const Program& program, const CalibrateSettings& s, const Model& model,
+          preprocess::StageStore* store) {
+  if (s.from.empty())
+    return {
+        correct::calibrate(model, s.options, store, program.context("finite elements")),
+        fmt::format("p1 stable_neo_hookean, Poisson's ratio {:g}, step {:g} deg, from {:g} mm, folds {:g}",
+                    s.options.poisson, s.options.step_deg, s.options.least_mm, s.options.folds)};
+  const Model coarse = model_file::read(s.from, program.context("reading"));
+  const auto how = coarse.provenance.find("correction");
+  return {
+      correct::transfer(coarse, model, s.options.joints, s.options.least_mm, program.context("taking over")),
+      fmt::format("{}, of {} tets", how == coarse.provenance.end() ? "unknown" : how->second,
+                  coarse.tet_count())};
+}
+
 int run(const Program& program, const CalibrateSettings& s) {
   using Clock = std::chrono::steady_clock;
   const auto model = std::make_shared<Model>(model_file::read(s.model, program.context("reading")));
@@ -67,19 +98,19 @@ int run(const Program& program, const CalibrateSettings& s) {
   std::optional<StageFolder> store;
   if (!s.cache.empty()) store.emplace(s.cache, kCacheGib);
   const auto began = Clock::now();
-  correct::Calibration found =
-      correct::calibrate(*model, s.options, store ? &*store : nullptr, program.context("finite elements"));
+  Made made = make(program, s, *model, store ? &*store : nullptr);
+  correct::Calibration& found = made.calibration;
   warn_of(program, found);
   model->corrections = std::move(found.corrections);
   const auto solved = Clock::now();
   std::vector<std::size_t> rows;
   for (const std::string& joint : s.options.joints)
     rows.push_back(static_cast<std::size_t>(model->rig.skeleton.find_joint(joint)));
-  if (s.ranges) model->safe_ranges = measure_safe_ranges(model, rows, program.context("safe ranges"));
+  if (s.ranges)
+    model->safe_ranges =
+        measure_safe_ranges(model, rows, store ? &*store : nullptr, program.context("safe ranges"));
   const auto measured = Clock::now();
-  model->provenance["correction"] =
-      fmt::format("p1 stable_neo_hookean, Poisson's ratio {:g}, step {:g} deg, from {:g} mm, folds {:g}",
-                  s.options.poisson, s.options.step_deg, s.options.least_mm, s.options.folds);
+  model->provenance["correction"] = made.how;
   model_file::write(*model, s.output, program.context("writing"));
   const auto seconds = [](auto from, auto to) { return std::chrono::duration<double>(to - from).count(); };
   json report{{"ok", true},
@@ -122,6 +153,12 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
       ->capture_default_str();
   command->add_option("--cache", s->cache,
                       "a folder that keeps each solved sample: resumes an interrupted run");
+  command
+      ->add_option(
+          "--from", s->from,
+          "a calibrated model of the same case with fewer tets: its correction is taken over, nothing "
+          "is solved")
+      ->excludes("--step", "--folds");
   command->add_flag("!--no-ranges", s->ranges, "leave out how far each joint may be turned");
   command->footer(
       "Skinning about centres of rotation is corrected, lbs and dqs are not.\n"

@@ -6,10 +6,12 @@
 #include <cmath>
 
 #include <ecorche/kinematics/forward.hpp>
+#include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include "app/bone_overlap.hpp"
 #include "core/elastic/flesh.hpp"
+#include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/correct/samples.hpp"
 
 namespace ecorche::app {
@@ -99,46 +101,90 @@ bool both(const SafeRange::Ends& ends) {
   return ends.inverted != SafeRange::none && ends.volume != SafeRange::none;
 }
 
+// All that it takes to look at a joint; made when the first is.
+class Looking {
+ public:
+  explicit Looking(const std::shared_ptr<const Model>& model)
+      : model_(*model),
+        what_(watched(*model)),
+        plain_(without_corrections(*model), what_),
+        corrected_(model, what_),
+        bones_(*model),
+        voxel_(voxel_mm(*model)) {}
+
+  std::vector<SafeRange> of(std::size_t joint, const Context& context) {
+    std::vector<SafeRange> out;
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (const int way : {-1, 1}) {
+        SafeRange range;
+        range.joint = static_cast<std::int32_t>(joint);
+        range.angle = static_cast<std::int32_t>(a);
+        range.way = way;
+        range.looked = correct::reach(model_.rig.skeleton.segments[joint].joint, a, way);
+        if (!(range.looked >= kSafeStep)) continue;
+        look(range, context);
+        out.push_back(range);
+      }
+    }
+    return out;
+  }
+
+ private:
+  void look(SafeRange& range, const Context& context) {
+    const auto joint = static_cast<std::size_t>(range.joint);
+    const bool both_ways = corrects(model_, joint);
+    const int steps = static_cast<int>(std::floor(range.looked / kSafeStep));
+    for (int n = 1; n <= steps; ++n) {
+      context.check_stop();
+      const double turn = n * kSafeStep;
+      if (both(range.skinned) && (both(range.corrected) || !both_ways) && range.bones != SafeRange::none)
+        break;
+      const Pose pose =
+          correct::turned(model_.rig.skeleton, joint, range.way * turn * Eigen::Vector3d::Unit(range.angle));
+      plain_.look(pose, turn, range.skinned);
+      if (both_ways) corrected_.look(pose, turn, range.corrected);
+      if (range.bones == SafeRange::none && bones_.meet(kinematics::forward(model_.rig, pose), voxel_))
+        range.bones = turn;
+    }
+    if (!both_ways) range.corrected = range.skinned;
+  }
+
+  const Model& model_;
+  Watched what_;
+  Skinned plain_, corrected_;
+  BoneOverlap bones_;
+  double voxel_;
+};
+
 }  // namespace
 
 std::vector<SafeRange> measure_safe_ranges(const std::shared_ptr<const Model>& model,
-                                           const std::vector<std::size_t>& joints, const Context& context) {
+                                           const std::vector<std::size_t>& joints,
+                                           preprocess::StageStore* store, const Context& context) {
   const Skeleton& skeleton = model->rig.skeleton;
-  const Watched what = watched(*model);
-  Skinned plain(without_corrections(*model), what), corrected(model, what);
-  BoneOverlap bones(*model);
-  const double voxel = voxel_mm(*model);
+  const std::uint64_t identity = store != nullptr ? model_file::identity(*model) : 0;
+  const double voxel = voxel_mm(*model);  // in no model's identity
+  std::unique_ptr<Looking> looking;
   std::vector<SafeRange> out;
   for (std::size_t j = 0; j < skeleton.segments.size(); ++j) {
     context.report(static_cast<double>(j) / static_cast<double>(skeleton.segments.size()));
     const bool asked = joints.empty() || std::find(joints.begin(), joints.end(), j) != joints.end();
     if (!asked || !correct::turns_by_itself(skeleton, j)) continue;
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (const int way : {-1, 1}) {
-        SafeRange range;
-        range.joint = static_cast<std::int32_t>(j);
-        range.angle = static_cast<std::int32_t>(a);
-        range.way = way;
-        range.looked = correct::reach(skeleton.segments[j].joint, a, way);
-        if (!(range.looked >= kSafeStep)) continue;
-        const bool both_ways = corrects(*model, j);
-        const int steps = static_cast<int>(std::floor(range.looked / kSafeStep));
-        for (int n = 1; n <= steps; ++n) {
-          context.check_stop();
-          const double turn = n * kSafeStep;
-          if (both(range.skinned) && (both(range.corrected) || !both_ways) && range.bones != SafeRange::none)
-            break;
-          const Pose pose =
-              correct::turned(skeleton, j, way * turn * Eigen::Vector3d::Unit(static_cast<Eigen::Index>(a)));
-          plain.look(pose, turn, range.skinned);
-          if (both_ways) corrected.look(pose, turn, range.corrected);
-          if (range.bones == SafeRange::none && bones.meet(kinematics::forward(model->rig, pose), voxel))
-            range.bones = turn;
-        }
-        if (!both_ways) range.corrected = range.skinned;
-        out.push_back(range);
-      }
+    const auto look = [&](const Context& inner) {
+      if (!looking) looking = std::make_unique<Looking>(model);
+      return looking->of(j, inner);
+    };
+    std::vector<SafeRange> of_joint;
+    if (store == nullptr) {
+      of_joint = look(context);
+    } else {
+      namespace cache = preprocess::cache;
+      const std::string name =
+          cache::key(*store, "range", identity, std::uint64_t{j}, voxel, kSafeStep, kSafeVolume);
+      auto kept = cache::take<std::vector<SafeRange>>(*store, name, context);
+      of_joint = kept ? std::move(*kept) : cache::make_and_keep(*store, name, context, look);
     }
+    out.insert(out.end(), of_joint.begin(), of_joint.end());
   }
   context.report(1);
   return out;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include <ecorche/preprocess/stage_store.hpp>
 #include <ecorche/values/context.hpp>
 #include <ecorche/values/model.hpp>
 
@@ -18,8 +19,9 @@ inline constexpr double kSafeVolume = 0.10;
 
 /// Every angle of every joint that turns by itself, both ways, the others at rest, with `model`'s corrections
 /// and without; only the joints in `joints` (rows), all where it is empty. Bones overlap where they do by a
-/// voxel of the preparation.
+/// voxel of the preparation. `store`, which may be null, keeps each joint's.
 std::vector<SafeRange> measure_safe_ranges(const std::shared_ptr<const Model>& model,
-                                           const std::vector<std::size_t>& joints, const Context& context);
+                                           const std::vector<std::size_t>& joints,
+                                           preprocess::StageStore* store, const Context& context);
 
 }  // namespace ecorche::app

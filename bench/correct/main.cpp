@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // How near a calibrated model comes to finite elements at poses that were never sampled, and what a frame of
-// it costs: bench_correct MODEL.hdf [--two-starts] [--only POSE]... A pose whose joints the model lacks is
-// left out.
+// it costs: bench_correct MODEL.hdf [--two-starts] [--cost] [--only POSE]... A pose whose joints the model
+// lacks is left out. --cost: only what it costs.
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -140,19 +141,22 @@ std::vector<float> nodes_of(const BodyPoser& poser, const Pose& pose, Pose* done
   return body.nodes;
 }
 
-// Median ms of a frame with all tissues, of poses one after the other.
-double frame_ms(const BodyPoser& poser, const std::vector<Pose>& poses) {
-  PosedBody body = poser.make_frame();
-  std::vector<double> all;
+// Median ms of a frame with all tissues, of poses one after the other: of either body, turn about.
+std::array<double, 2> frame_ms(const std::array<const BodyPoser*, 2>& posers,
+                               const std::vector<Pose>& poses) {
+  std::array<std::vector<double>, 2> all;
+  std::array<PosedBody, 2> body{posers[0]->make_frame(), posers[1]->make_frame()};
   for (int f = 0; f < 120; ++f) {
-    const auto begin = std::chrono::steady_clock::now();
-    (void)poser.run(poses[static_cast<std::size_t>(f) % poses.size()], Skinning::cor, poser.all_tissues(),
-                    body);
-    all.push_back(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto begin = std::chrono::steady_clock::now();
+      (void)posers[i]->run(poses[static_cast<std::size_t>(f) % poses.size()], Skinning::cor,
+                           posers[i]->all_tissues(), body[i]);
+      all[i].push_back(
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    }
   }
-  std::sort(all.begin(), all.end());
-  return all[all.size() / 2];
+  for (std::vector<double>& ms : all) std::sort(ms.begin(), ms.end());
+  return {all[0][all[0].size() / 2], all[1][all[1].size() / 2]};
 }
 
 std::string percent(double share) {
@@ -161,9 +165,8 @@ std::string percent(double share) {
   return out;
 }
 
-void measure(const std::shared_ptr<const Model>& model, const std::vector<std::string>& only,
-             bool two_starts) {
-  const BodyPoser corrected(model), plain(without_corrections(*model));
+void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, const BodyPoser& corrected,
+             const std::vector<std::string>& only, bool two_starts) {
   const FreeTets free = free_tets(*model);
   const std::vector<float> rest(model->nodes.data(), model->nodes.data() + model->nodes.size());
   const double volume = free.volume(*model, rest);
@@ -180,11 +183,9 @@ void measure(const std::shared_ptr<const Model>& model, const std::vector<std::s
                      {"volume %, cor"},
                      {"corrected"},
                      {"fem"}});
-  std::vector<Pose> poses;
   for (const Stated& stated : kPoses) {
     Pose pose;
     if (!pose_of(model->rig.skeleton, stated, pose)) continue;
-    poses.push_back(pose);
     if (!only.empty() && std::find(only.begin(), only.end(), stated.name) == only.end()) continue;
     Pose done;
     const std::vector<float> before = nodes_of(plain, pose, &done), after = nodes_of(corrected, pose);
@@ -210,13 +211,30 @@ void measure(const std::shared_ptr<const Model>& model, const std::vector<std::s
                percent(free.volume(*model, after) / volume - 1),
                percent(free.volume(*model, fem) / volume - 1)});
   }
+}
+
+double mebibytes(const Model& model) {
+  std::size_t bytes = 0;
+  for (const JointCorrection& c : model.corrections)
+    bytes += c.field.size() * sizeof(std::int16_t) + c.node.size() * sizeof(std::uint32_t);
+  return static_cast<double>(bytes) / (1U << 20U);
+}
+
+void price(const Model& model, const BodyPoser& plain, const BodyPoser& corrected) {
+  std::vector<Pose> poses;
+  for (const Stated& stated : kPoses) {
+    Pose pose;
+    if (pose_of(model.rig.skeleton, stated, pose)) poses.push_back(pose);
+  }
+  print_notes({std::to_string(model.node_count() / 1000) + " k nodes: corrections of " +
+               std::to_string(model.corrections.size()) + " joints take " + fixed(mebibytes(model), 1) +
+               " MiB"});
   for (const int threads : {1, 2}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
     tbb::task_arena(threads).execute([&] {
-      const double without = frame_ms(plain, poses), with = frame_ms(corrected, poses);
-      print_notes({std::to_string(model->node_count() / 1000) + " k nodes, " + std::to_string(threads) +
-                   " threads: a frame with all tissues takes " + fixed(without, 2) +
+      const auto [without, with] = frame_ms({&plain, &corrected}, poses);
+      print_notes({std::to_string(threads) + " threads: a frame with all tissues takes " + fixed(without, 2) +
                    " ms by centres of rotation, " + fixed(with, 2) + " ms corrected"});
     });
   }
@@ -227,12 +245,14 @@ void measure(const std::shared_ptr<const Model>& model, const std::vector<std::s
 
 int main(int argc, char** argv) {
   std::vector<std::string> only;
-  bool two_starts = false;
+  bool two_starts = false, cost = false;
   const char* path = nullptr;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--two-starts") {
       two_starts = true;
+    } else if (word == "--cost") {
+      cost = true;
     } else if (word == "--only" && i + 1 < argc) {
       only.emplace_back(argv[++i]);
     } else {
@@ -240,13 +260,16 @@ int main(int argc, char** argv) {
     }
   }
   if (path == nullptr) {
-    std::fprintf(
-        stderr, "error: bench_correct: no model (bench_correct MODEL.hdf [--two-starts] [--only POSE]...)\n");
+    std::fprintf(stderr,
+                 "error: bench_correct: no model (bench_correct MODEL.hdf [--two-starts] [--cost] [--only "
+                 "POSE]...)\n");
     return 64;
   }
   try {
     const auto model = std::make_shared<ecorche::Model>(ecorche::model_file::read(path, {}));
-    ecorche::bench::measure(model, only, two_starts);
+    const ecorche::runtime::BodyPoser corrected(model), plain(ecorche::bench::without_corrections(*model));
+    if (!cost) ecorche::bench::compare(model, plain, corrected, only, two_starts);
+    ecorche::bench::price(*model, plain, corrected);
   } catch (const ecorche::Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return ecorche::exit_code(error.kind());

@@ -5,6 +5,8 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <functional>
+#include <memory>
 #include <mutex>
 #include <numbers>
 
@@ -72,6 +74,20 @@ std::vector<std::size_t> joints_of(const Skeleton& skeleton, const std::vector<s
   return out;
 }
 
+// Made when it is first asked for.
+class LazySolver {
+ public:
+  explicit LazySolver(std::function<SampleSolver()> make) : make_(std::move(make)) {}
+  SampleSolver& get() {
+    if (!made_) made_ = std::make_unique<SampleSolver>(make_());
+    return *made_;
+  }
+
+ private:
+  std::function<SampleSolver()> make_;
+  std::unique_ptr<SampleSolver> made_;
+};
+
 class OneJoint {
  public:
   OneJoint(const Model& model, std::size_t joint, const CalibrateOptions& options, std::uint64_t identity)
@@ -81,16 +97,18 @@ class OneJoint {
 
   std::size_t samples() const { return samples_.size(); }
 
-  void solve(const fem::Material& material, SharedStore* store, Progress& progress, const Context& context) {
+  void solve(const fem::Material& material, const elastic::Flesh& flesh, SharedStore* store,
+             Progress& progress, const Context& context) {
     std::vector<std::vector<RigidTransform>> motions;
     for (const Sample& sample : samples_) motions.push_back(kinematics::forward(model_.rig, sample.pose));
     report_.joint = joint().name;
-    const Neighbourhood part = neighbourhood(model_, motions, options_.least_share);
+    const Neighbourhood part = neighbourhood(model_, flesh, motions, options_.least_share);
     report_.tets = part.mesh.tets();
     report_.free_nodes = part.mesh.free_nodes;
     solved_.resize(samples_.size());
     if (part.mesh.free_nodes > 0) {
-      SampleSolver solver(model_, part, material, options_.folds);
+      // What is kept needs none.
+      LazySolver solver([&] { return SampleSolver(model_, part, material, options_.folds); });
       const std::size_t stated = samples_.size();
       for (std::size_t s = 0; s < stated; ++s) {
         solved_[s] = sample(solver, s, store, context);
@@ -109,12 +127,14 @@ class OneJoint {
  private:
   const Joint& joint() const { return model_.rig.skeleton.segments[joint_].joint; }
 
-  SolvedSample sample(SampleSolver& solver, std::size_t s, SharedStore* store, const Context& context) const {
+  SolvedSample sample(LazySolver& solver, std::size_t s, SharedStore* store, const Context& context) const {
     const Sample& asked = samples_[s];
     const SolvedSample* before = asked.from < 0 ? nullptr : &solved_[static_cast<std::size_t>(asked.from)];
     if (before != nullptr && before->clean == 0) return {};
     const auto make = [&](const Context& quiet) {
-      return solver.solve(asked.pose, before != nullptr ? before->displacement : std::vector<float>(), quiet);
+      if (before == nullptr) return solver.get().solve(asked.pose, nullptr, quiet);
+      const Nearer nearer{samples_[static_cast<std::size_t>(asked.from)].pose, before->displacement};
+      return solver.get().solve(asked.pose, &nearer, quiet);
     };
     if (store == nullptr) return make(context);
     // All that a chain depends on; the places of its samples say the rest.
@@ -128,7 +148,7 @@ class OneJoint {
   }
 
   // Where a way ends: halfway between its last clean sample and the first that is not, and halfway again.
-  void come_nearer(SampleSolver& solver, std::size_t s, SharedStore* store, const Context& context) {
+  void come_nearer(LazySolver& solver, std::size_t s, SharedStore* store, const Context& context) {
     int last = samples_[s].from;
     if (solved_[s].clean != 0 || (last >= 0 && solved_[static_cast<std::size_t>(last)].clean == 0)) return;
     Eigen::Vector3d far = samples_[s].from_rest;
@@ -149,14 +169,16 @@ class OneJoint {
     std::vector<std::vector<float>> fields;
     std::vector<Eigen::RowVector3d> turns;
     for (std::size_t s = 0; s < samples_.size(); ++s) {
-      if (solved_[s].clean == 0) continue;
-      fields.push_back(solved_[s].displacement);
+      const SolvedSample& solved = solved_[s];
+      if (solved.iterations > 0)
+        report_.tried.push_back({samples_[s].from_rest, solved.clean != 0, solved.inverted_tets,
+                                 solved.by_skinning, solved.iterations});
+      if (solved.clean == 0) continue;
+      fields.push_back(solved.displacement);
       turns.push_back(samples_[s].turn);
-      report_.clean_deg = std::max(report_.clean_deg, samples_[s].turn.norm() / kDegree);
     }
     report_.clean = fields.size();
-    report_.samples = static_cast<std::size_t>(std::count_if(
-        solved_.begin(), solved_.end(), [](const SolvedSample& solved) { return solved.iterations > 0; }));
+    report_.samples = report_.tried.size();
     if (fields.empty()) return;
     JointCorrection::Turns turn(static_cast<Eigen::Index>(turns.size()), 3);
     for (std::size_t s = 0; s < turns.size(); ++s) turn.row(static_cast<Eigen::Index>(s)) = turns[s];
@@ -164,25 +186,7 @@ class OneJoint {
     options.least_mm = options_.least_mm;
     correction_ = compress(static_cast<std::int32_t>(joint_), joint().kind == JointKind::hinge, turn, fields,
                            part.node, options);
-    report_.nodes = correction_.node.size();
-    report_.modes = correction_.scale.size();
-    report_.bytes =
-        correction_.field.size() * sizeof(std::int16_t) + correction_.node.size() * sizeof(std::uint32_t);
-    measure();
-  }
-
-  void measure() {
-    for (std::size_t s = 0; s < static_cast<std::size_t>(correction_.turn.rows()) && report_.nodes > 0; ++s) {
-      const std::vector<float> field = field_of(correction_, s);
-      double sum = 0, most = 0;
-      for (std::size_t n = 0; n < report_.nodes; ++n) {
-        const auto moved = static_cast<double>(Eigen::Map<const Eigen::Vector3f>(&field[3 * n]).norm());
-        sum += moved;
-        most = std::max(most, moved);
-      }
-      report_.mean_mm = std::max(report_.mean_mm, sum / static_cast<double>(report_.nodes));
-      report_.max_mm = std::max(report_.max_mm, most);
-    }
+    report_on(correction_, report_);
   }
 
   const Model& model_;
@@ -197,6 +201,25 @@ class OneJoint {
 
 }  // namespace
 
+void report_on(const JointCorrection& correction, JointReport& report) {
+  report.nodes = correction.node.size();
+  report.modes = correction.scale.size();
+  report.bytes =
+      correction.field.size() * sizeof(std::int16_t) + correction.node.size() * sizeof(std::uint32_t);
+  report.clean_deg = correction.turn.rowwise().norm().maxCoeff() / kDegree;
+  for (std::size_t s = 0; s < static_cast<std::size_t>(correction.turn.rows()) && report.nodes > 0; ++s) {
+    const std::vector<float> field = field_of(correction, s);
+    double sum = 0, most = 0;
+    for (std::size_t n = 0; n < report.nodes; ++n) {
+      const auto moved = static_cast<double>(Eigen::Map<const Eigen::Vector3f>(&field[3 * n]).norm());
+      sum += moved;
+      most = std::max(most, moved);
+    }
+    report.mean_mm = std::max(report.mean_mm, sum / static_cast<double>(report.nodes));
+    report.max_mm = std::max(report.max_mm, most);
+  }
+}
+
 Calibration calibrate(const Model& model, const CalibrateOptions& options, preprocess::StageStore* store,
                       const Context& context) {
   const auto material = fem::make_material("stable_neo_hookean", options.poisson);
@@ -209,6 +232,7 @@ Calibration calibrate(const Model& model, const CalibrateOptions& options, prepr
     joints.emplace_back(model, j, options, identity);
     samples += joints.back().samples();
   }
+  const elastic::Flesh flesh = elastic::flesh_of(model);
   Progress progress(context, samples);
   const Context quiet = context.quiet();
   tbb::parallel_for(
@@ -216,7 +240,7 @@ Calibration calibrate(const Model& model, const CalibrateOptions& options, prepr
       [&](std::size_t i) {
         // While one joint waits for its own loops, its thread must not begin another.
         tbb::this_task_arena::isolate(
-            [&] { joints[i].solve(*material, shared ? &*shared : nullptr, progress, quiet); });
+            [&] { joints[i].solve(*material, flesh, shared ? &*shared : nullptr, progress, quiet); });
       },
       tbb::simple_partitioner());
   Calibration out;

@@ -2,6 +2,7 @@
 // What finite elements make of each joint alone, kept as fields that are added to skinning.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -23,15 +24,27 @@ struct CalibrateOptions {
   double poisson = 0.45;  ///< linear tets lock beyond
 };
 
+/// Of one sample that was solved.
+struct SampleReport {
+  Eigen::Vector3d from_rest;  ///< radians, along the joint's sequence
+  bool clean = false;
+  std::size_t inverted = 0, by_skinning = 0;  ///< tets of the neighbourhood
+  int iterations = 0;
+};
+
 /// Of one joint.
 struct JointReport {
   std::string joint;
-  std::size_t tets = 0, free_nodes = 0;         ///< of its neighbourhood
-  std::size_t samples = 0, clean = 0;           ///< solved, and kept
-  double clean_deg = 0;                         ///< the largest turn of a sample that is kept
+  std::size_t tets = 0, free_nodes = 0;  ///< of its neighbourhood
+  std::size_t samples = 0, clean = 0;    ///< solved, and kept
+  double clean_deg = 0;                  ///< the largest turn of a sample that is kept
+  std::vector<SampleReport> tried;
   std::size_t nodes = 0, modes = 0, bytes = 0;  ///< of the correction
   double mean_mm = 0, max_mm = 0;               ///< of it, over its nodes, at the sample that moves most
 };
+
+/// Fills in what a correction says itself: from clean_deg on, but for `tried`.
+void report_on(const JointCorrection& correction, JointReport& report);
 
 struct Calibration {
   std::vector<JointCorrection> corrections;  ///< joints without any are left out

@@ -9,10 +9,11 @@ namespace ecorche::correct {
 namespace {
 
 constexpr float kMost = 32767;
+using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // #samples by 3 * #kept, mm.
-Eigen::MatrixXf rows_of(std::span<const std::vector<float>> fields, const std::vector<std::size_t>& kept) {
-  Eigen::MatrixXf out(static_cast<Eigen::Index>(fields.size()), static_cast<Eigen::Index>(3 * kept.size()));
+Rows rows_of(std::span<const std::vector<float>> fields, const std::vector<std::size_t>& kept) {
+  Rows out(static_cast<Eigen::Index>(fields.size()), static_cast<Eigen::Index>(3 * kept.size()));
   for (std::size_t s = 0; s < fields.size(); ++s)
     for (std::size_t k = 0; k < kept.size(); ++k)
       for (std::size_t c = 0; c < 3; ++c)
@@ -21,7 +22,7 @@ Eigen::MatrixXf rows_of(std::span<const std::vector<float>> fields, const std::v
 }
 
 // Columns: the shares of samples in modes, the weightiest first; of each the largest is positive.
-Eigen::MatrixXd principal(const Eigen::MatrixXf& rows, double left_mm, std::size_t most) {
+Eigen::MatrixXd principal(const Rows& rows, double left_mm, std::size_t most) {
   const Eigen::Index samples = rows.rows();
   Eigen::MatrixXd gram(samples, samples);
   for (Eigen::Index a = 0; a < samples; ++a)
@@ -63,7 +64,7 @@ JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::
     out.node.push_back(node[n]);
   }
   if (kept.empty()) return out;
-  const Eigen::MatrixXf rows = rows_of(fields, kept);
+  const Rows rows = rows_of(fields, kept);
   const Eigen::MatrixXd mix = hinge ? Eigen::MatrixXd::Identity(rows.rows(), rows.rows())
                                     : principal(rows, options.least_mm, options.most_modes);
   out.mix = mix.cast<float>();

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "core/elastic/flesh.hpp"
-
 namespace ecorche::correct {
 namespace {
 
@@ -44,10 +42,9 @@ double divided(const Model& model, std::size_t node, const std::vector<std::size
 
 }  // namespace
 
-Neighbourhood neighbourhood(const Model& model, std::span<const std::vector<RigidTransform>> poses,
-                            double least_share) {
+Neighbourhood neighbourhood(const Model& model, const elastic::Flesh& flesh,
+                            std::span<const std::vector<RigidTransform>> poses, double least_share) {
   const std::vector<std::size_t> half = halves_of(poses, model.segment_count());
-  const elastic::Flesh flesh = elastic::flesh_of(model);
   std::vector<std::uint8_t> is_free(model.node_count(), 0);
   std::vector<double> of_half(model.segment_count());
   for (std::size_t n = 0; n < is_free.size(); ++n)

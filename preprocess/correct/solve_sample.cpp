@@ -4,13 +4,13 @@
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/kinematics/interpolate.hpp>
 #include "preprocess/correct/skinned_node.hpp"
-#include "preprocess/fem/follow.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::correct {
 namespace {
 
 constexpr double kToleranceMm = 1e-3;  // a fiftieth of what is kept at all
+constexpr double kHalf = 0.5;          // of the way from a sample to the next, which is short
 
 }  // namespace
 
@@ -21,8 +21,8 @@ SampleSolver::SampleSolver(const Model& model, const Neighbourhood& part, const 
       material_(material),
       most_folds_(static_cast<std::size_t>(folds * static_cast<double>(part.mesh.tets()))),
       assembly_(part.mesh),
-      solver_(weights::make_solver(weights::solver_for(static_cast<std::int64_t>(3 * part.mesh.free_nodes)))),
-      steps_(assembly_, *solver_) {}
+      solver_(
+          weights::make_solver(weights::solver_for(static_cast<std::int64_t>(3 * part.mesh.free_nodes)))) {}
 
 SampleSolver::Skinned SampleSolver::skin(const Pose& pose) const {
   const std::vector<RigidTransform> segments = kinematics::forward(model_.rig, pose);
@@ -35,46 +35,61 @@ SampleSolver::Skinned SampleSolver::skin(const Pose& pose) const {
   return out;
 }
 
-SolvedSample SampleSolver::solve(const Pose& pose, const std::vector<float>& start, const Context& context) {
-  const fem::Mesh& mesh = part_.mesh;
-  const Skinned skinned = skin(pose);
-  const auto is_free = [&](std::size_t i) { return mesh.free[i] >= 0; };
-  const std::size_t by_skinning = assembly_.total(material_, skinned.at).inverted_tets;
-  const auto clean = [&](const fem::NewtonResult& newton) {
-    const std::size_t folds = newton.total.inverted_tets;
-    return newton.converged && (folds == 0 || (folds <= most_folds_ && folds < by_skinning));
-  };
+Points SampleSolver::displaced(const Skinned& skinned, const std::vector<float>& displacement) const {
   Points x = skinned.at;
-  for (std::size_t i = 0; i < part_.node.size() && !start.empty(); ++i) {
-    if (!is_free(i)) continue;
-    const Eigen::Vector3d u = Eigen::Map<const Eigen::Vector3f>(&start[3 * i]).cast<double>();
+  for (std::size_t i = 0; i < part_.node.size() && !displacement.empty(); ++i) {
+    if (part_.mesh.free[i] < 0) continue;
+    const Eigen::Vector3d u = Eigen::Map<const Eigen::Vector3f>(&displacement[3 * i]).cast<double>();
     x.row(static_cast<Eigen::Index>(i)) += (skinned.turn[i] * u).transpose();
   }
+  return x;
+}
+
+fem::FollowResult SampleSolver::follow(fem::StepSolver& steps, const fem::NewtonOptions& newton,
+                                       const Nearer& from, const Pose& pose, Points& x,
+                                       const Context& context) const {
+  fem::FollowOptions way;
+  way.last = newton;
+  if (!from.displacement.empty()) way.first_step = kHalf;
+  x = displaced(skin(from.pose), from.displacement);
+  const auto held_at = [&](double t, Points& to) {
+    const Points at = skin(t < 1 ? kinematics::between(from.pose, pose, t) : pose).at;
+    for (std::size_t i = 0; i < part_.node.size(); ++i)
+      if (part_.mesh.free[i] < 0) to.row(static_cast<Eigen::Index>(i)) = at.row(static_cast<Eigen::Index>(i));
+  };
+  return fem::follow(assembly_, material_, steps, held_at, way, x, context.quiet());
+}
+
+SolvedSample SampleSolver::solve(const Pose& pose, const Nearer* nearer, const Context& context) {
+  const std::vector<float> none;
+  const Pose rest = Pose::rest(pose.rotation.size());
+  const Nearer from = nearer != nullptr ? *nearer : Nearer{rest, none};
+  const Skinned skinned = skin(pose);
+  const std::size_t by_skinning = assembly_.total(material_, skinned.at).inverted_tets;
+  fem::StepSolver steps(assembly_, *solver_);
   fem::NewtonOptions newton;
   newton.tolerance_mm = kToleranceMm;
-  fem::NewtonResult found = fem::minimise(assembly_, material_, steps_, newton, x, context);
+  Points x = displaced(skinned, from.displacement);
+  fem::NewtonResult found = fem::minimise(assembly_, material_, steps, newton, x, context);
   SolvedSample out;
   out.iterations = found.iterations;
-  if (!clean(found)) {
-    const Pose rest = Pose::rest(pose.rotation.size());
-    fem::FollowOptions way;
-    way.last = newton;
-    Points followed = mesh.X;
-    const auto held_at = [&](double t, Points& to) {
-      const Points at = t < 1 ? skin(kinematics::between(rest, pose, t)).at : skinned.at;
-      for (std::size_t i = 0; i < part_.node.size(); ++i)
-        if (!is_free(i)) to.row(static_cast<Eigen::Index>(i)) = at.row(static_cast<Eigen::Index>(i));
-    };
-    found = fem::follow(assembly_, material_, steps_, held_at, way, followed, context.quiet()).newton;
-    out.iterations += found.iterations;
-    x = std::move(followed);
+  if (!found.converged || found.total.inverted_tets > 0) {
+    Points followed;
+    fem::NewtonResult other = follow(steps, newton, from, pose, followed, context).newton;
+    out.iterations += other.iterations;
+    if (other.converged && (!found.converged || other.total.inverted_tets < found.total.inverted_tets)) {
+      found = std::move(other);
+      x = std::move(followed);
+    }
   }
   out.inverted_tets = found.total.inverted_tets;
-  out.clean = clean(found) ? 1 : 0;
+  out.by_skinning = by_skinning;
+  const bool few = out.inverted_tets <= most_folds_ && out.inverted_tets < by_skinning;
+  out.clean = found.converged && (out.inverted_tets == 0 || few) ? 1 : 0;
   if (out.clean == 0) return out;
   out.displacement.assign(3 * part_.node.size(), 0.0F);
   for (std::size_t i = 0; i < part_.node.size(); ++i) {
-    if (!is_free(i)) continue;
+    if (part_.mesh.free[i] < 0) continue;
     const auto row = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d u = skinned.turn[i].conjugate() * (x.row(row) - skinned.at.row(row)).transpose();
     Eigen::Map<Eigen::Vector3f>(&out.displacement[3 * i]) = u.cast<float>();

@@ -10,14 +10,15 @@
 #include <ecorche/values/pose.hpp>
 #include "preprocess/correct/neighbourhood.hpp"
 #include "preprocess/fem/assembly.hpp"
+#include "preprocess/fem/follow.hpp"
 #include "preprocess/fem/material.hpp"
 #include "preprocess/fem/newton.hpp"
 
 namespace ecorche::correct {
 
 struct SolvedSample {
-  std::uint8_t clean = 0;  ///< converged, and no more is inverted than is allowed
-  std::uint64_t inverted_tets = 0;
+  std::uint8_t clean = 0;                            ///< converged, and no more is inverted than is allowed
+  std::uint64_t inverted_tets = 0, by_skinning = 0;  ///< of the joint's neighbourhood
   std::int32_t iterations = 0;
   /// 3 * #node, mm, each in the frame that skinning turns with its node; zero for held ones. Empty where it
   /// is not clean.
@@ -27,19 +28,25 @@ struct SolvedSample {
 template <class A, class T>
 requires std::same_as<std::remove_const_t<T>, SolvedSample>
 void fields(A& archive, T& sample) {
-  archive(sample.clean, sample.inverted_tets, sample.iterations, sample.displacement);
+  archive(sample.clean, sample.inverted_tets, sample.by_skinning, sample.iterations, sample.displacement);
 }
 
-/// Samples of one joint after each other: the factor of one preconditions the next.
+/// A solved sample from which another begins.
+struct Nearer {
+  const Pose& pose;
+  const std::vector<float>& displacement;
+};
+
+/// Samples of one joint. Each is solved alone: the same bits whatever was solved before it.
 class SampleSolver {
  public:
   /// `model`, `part` and `material` must outlive it. `folds`: the share of the part's tets that a clean
   /// sample may leave inside out, as long as skinning leaves more.
   SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material, double folds);
 
-  /// `start`: displacements to begin from, as in SolvedSample, or empty: from skinning. Where that does not
-  /// end clean, from rest along the joint's way (fem::follow).
-  SolvedSample solve(const Pose& pose, const std::vector<float>& start, const Context& context);
+  /// From skinning, displaced as in `nearer`, which may be null. Where that does not end without folds, the
+  /// flesh follows the joint (fem::follow) from there, or from rest; the better of both counts.
+  SolvedSample solve(const Pose& pose, const Nearer* nearer, const Context& context);
 
  private:
   struct Skinned {
@@ -47,6 +54,9 @@ class SampleSolver {
     std::vector<Eigen::Quaterniond> turn;
   };
   Skinned skin(const Pose& pose) const;
+  Points displaced(const Skinned& skinned, const std::vector<float>& displacement) const;
+  fem::FollowResult follow(fem::StepSolver& steps, const fem::NewtonOptions& newton, const Nearer& from,
+                           const Pose& pose, Points& x, const Context& context) const;
 
   const Model& model_;
   const Neighbourhood& part_;
@@ -54,7 +64,6 @@ class SampleSolver {
   std::size_t most_folds_;
   fem::Assembly assembly_;
   std::unique_ptr<solve::SpdSolver> solver_;
-  fem::StepSolver steps_;
 };
 
 }  // namespace ecorche::correct

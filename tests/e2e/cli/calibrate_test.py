@@ -72,6 +72,36 @@ class Calibrate(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(again.read_bytes(), self.calibrated.read_bytes())
 
+    def test_a_full_cache_solves_and_measures_nothing_again(self):
+        again = self.folder / "cached.hdf"
+        done = run("--json", "calibrate", self.model, "-o", again, "--joints", "elbow_right", "--cache", self.cache, "--step", 30)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(again.read_bytes(), self.calibrated.read_bytes())
+        seconds, was = json.loads(done.stdout)["seconds"], self.made["seconds"]
+        self.assertLess(seconds["samples"], was["samples"] / 3)
+        self.assertLess(seconds["ranges"], was["ranges"] / 3)
+
+    def test_each_sample_says_what_became_of_it(self):
+        (joint,) = self.made["joints"]
+        self.assertEqual(len(joint["tried"]), joint["samples"])
+        self.assertEqual(sum(sample["clean"] for sample in joint["tried"]), joint["clean"])
+        for sample in joint["tried"]:
+            self.assertGreater(sample["iterations"], 0)
+            self.assertTrue(not sample["clean"] or sample["inverted"] == 0 or sample["inverted"] < sample["inverted_skinned"], sample)
+
+    def test_a_finer_model_takes_it_over(self):
+        fine, out = self.folder / "fine.hdf", self.folder / "fine_calibrated.hdf"
+        self.assertEqual(run("preprocess", CASE, "-o", fine, "--mesher", "lattice", "--max-tets", 60000).returncode, 0)
+        done = run("--json", "calibrate", fine, "-o", out, "--from", self.calibrated, "--no-ranges")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        (joint,) = json.loads(done.stdout)["joints"]
+        self.assertEqual((joint["joint"], joint["samples"]), ("elbow_right", self.made["joints"][0]["clean"]))
+        self.assertGreater(joint["nodes"], self.made["joints"][0]["nodes"])
+        self.assertEqual(run("verify", out).returncode, 0)
+        joints = "joints: {elbow_right: {flexion_deg: 40}}\n"
+        to_cor = [json.loads((self.pose(model, "forty", joints, "fem", "--one-start") / "fem.json").read_text())["to_cor"] for model in (fine, out)]
+        self.assertLess(to_cor[1]["mean_mm"], 0.5 * to_cor[0]["mean_mm"])
+
     def test_what_is_no_joint_is_refused(self):
         done = run("calibrate", self.model, "-o", self.folder / "none.hdf", "--joints", "elbow_rigth")
         self.assertEqual(done.returncode, 64)
