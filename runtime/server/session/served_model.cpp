@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <ecorche/model_file/model_file.hpp>
+#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/wire/convert.hpp>
 #include "proto/arrays.hpp"
 
@@ -34,6 +35,22 @@ void describe(const Tissue& tissue, v1::Tissue& out) {
   out.set_group(std::string(group_name(tissue.group)));
   out.set_segment(tissue.segment);
   out.set_vertices(static_cast<std::uint64_t>(tissue.V.rows()));
+}
+
+// A bit a vertex of the skin; empty where the scan's border does not cut it.
+std::string cap_vertices(const Model& model) {
+  const std::vector<runtime::SkinCap> caps = runtime::skin_caps(model);
+  if (caps.empty() || model.tissues.empty()) return {};
+  const Tissue& skin = model.tissues.front();
+  std::string bits((static_cast<std::size_t>(skin.V.rows()) + 7) / 8, '\0');
+  const std::vector<std::uint8_t> faces = runtime::cap_faces(skin, caps);
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    for (int c = 0; faces[f] != 0 && c < 3; ++c) {
+      const auto v = static_cast<std::size_t>(skin.F(static_cast<Eigen::Index>(f), c));
+      bits[v / 8] = static_cast<char>(static_cast<unsigned char>(bits[v / 8]) | 1U << v % 8);
+    }
+  }
+  return bits;
 }
 
 void describe(const ModelVolume& volume, v1::Volume& out) {
@@ -90,6 +107,8 @@ struct ServedModel::Made {
     opened.set_topology_digest(model_file::topology_digest(model));
     wire::to_proto(model.rig, *opened.mutable_skeleton());
     for (const Tissue& tissue : model.tissues) describe(tissue, *opened.add_tissues());
+    if (std::string caps = cap_vertices(model); !caps.empty())
+      opened.mutable_tissues(0)->set_cap_vertices(std::move(caps));
     for (const ModelVolume& volume : model.volumes) describe(volume, *opened.add_volumes());
     opened.set_corrected(!model.corrections.empty());
     for (const SafeRange& range : model.safe_ranges) describe(range, *opened.add_safe_ranges());

@@ -2,7 +2,7 @@
 // What the viewer knows without a picture: layers and their undo, names, colours, the scale of distances, the scanned body of a level.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { restNumbers } from "../../../clients/web/viewer/src/rest.js";
+import { capsOf, restNumbers } from "../../../clients/web/viewer/src/rest.js";
 import { farthestFromRest, niceRange } from "../../../clients/web/viewer/src/scene/distance.js";
 import { lookOf } from "../../../clients/web/viewer/src/scene/palette.js";
 import { firstState, type AppState } from "../../../clients/web/viewer/src/state/app_state.js";
@@ -100,4 +100,14 @@ test("the scanned body comes in the order of a coarser level", () => {
   const coarse = { level: 1, vertexCount: 2, indices: new Uint32Array(), ranges: [{ tissue: 2, firstVertex: 0, vertexCount: 2, firstIndex: 0, indexCount: 0, rows: new Uint32Array([0, 2]) }] };
   assert.deepEqual([...restNumbers(whole, coarse)], [4, 5, 6, 7, 12, 13, 14, 15]);
   assert.throws(() => restNumbers(whole, { ...coarse, ranges: [{ ...coarse.ranges[0], tissue: 1 }] }), /missing in the scanned body/);
+});
+
+test("caps come in the order of a level, and a model that nothing cuts has none", () => {
+  const ranges = [{ tissue: 0, firstVertex: 0, vertexCount: 3, firstIndex: 0, indexCount: 0, rows: new Uint32Array([1, 9, 10]) },
+    { tissue: 1, firstVertex: 3, vertexCount: 2, firstIndex: 0, indexCount: 0 }];
+  const layout = { level: 1, vertexCount: 5, indices: new Uint32Array(), ranges };
+  const whole = (...bits: number[]) => ({ capVertices: new Uint8Array(bits) });
+  assert.deepEqual([...capsOf([whole(0b10, 0b100), whole()], layout)!], [255, 0, 255, 0, 0]);
+  assert.deepEqual([...capsOf([whole(0b10), whole()], layout)!], [255, 0, 0, 0, 0], "a server may leave out the last bytes");
+  assert.equal(capsOf([whole(), whole()], layout), null);
 });

@@ -40,7 +40,7 @@ export class App {
   /** The client of the protocol, and what it opened. */
   readonly live: Live;
   /** Of the pointer, for the name beside it: `inside` the picture, not over a panel. */
-  readonly pointer = new Store<{ x: number; y: number; scalar: number; inside: boolean }>({ x: 0, y: 0, scalar: 0, inside: false });
+  readonly pointer = new Store<{ x: number; y: number; scalar: number; cap: boolean; inside: boolean }>({ x: 0, y: 0, scalar: 0, cap: false, inside: false });
   /** What say() said last. */
   readonly said = new Store<{ text: string; count: number }>({ text: "", count: 0 });
   /** More parts of the help; each is asked when it opens. */
@@ -128,7 +128,7 @@ export class App {
       if (!this.#hoverAt) return;
       const { x, y } = this.#hoverAt;
       const picked = this.#hoverAt.pick();
-      this.pointer.set({ x, y, scalar: picked?.scalar ?? 0, inside: true });
+      this.pointer.set({ x, y, scalar: picked?.scalar ?? 0, cap: picked?.cap ?? false, inside: true });
       this.store.set({ hovered: picked?.row ?? null });
     });
   }

@@ -3,7 +3,7 @@
 import { Client, Code, ConnectionError, Role, ServerError, type BodyFrame, type MeshLayout, type MeshStream, type ModelOpened } from "../../protocol/src/index.js";
 import { Arrival } from "./arrival.js";
 import { hashParameters, takeToken } from "./hash.js";
-import { restNumbers } from "./rest.js";
+import { capsOf, restNumbers } from "./rest.js";
 import type { Body, Positions } from "./scene/body.js";
 import type { AppState, Model } from "./state/app_state.js";
 import type { History } from "./state/history.js";
@@ -139,6 +139,7 @@ export class Live {
       name: opened.model, session: opened.session, controls: opened.role === Role.CONTROLLER,
       tissues: opened.tissues.map((tissue, row) => ({
         row, name: tissue.name, label: labelOf(tissue.name), group: tissue.group, segment: tissue.segment, vertices: Number(tissue.vertices),
+        capped: tissue.capVertices.length > 0,
       })),
       joints: opened.skeleton?.segments.map((segment) => segment.joint?.name || segment.name) ?? [],
       segments: opened.skeleton?.segments.map(({ name }) => name) ?? [],
@@ -168,6 +169,7 @@ export class Live {
       this.body.setTopology({
         vertices: vertexCount, indices,
         ranges: ranges.map(({ tissue, firstVertex, vertexCount: count, firstIndex, indexCount }) => ({ row: tissue, firstVertex, vertexCount: count, firstIndex, indexCount })),
+        caps: capsOf(this.client?.model?.tissues ?? [], frame.layout),
       });
     }
     this.body.setPositions(this.arrival.positionsOf(frame));

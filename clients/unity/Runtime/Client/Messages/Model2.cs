@@ -50,6 +50,7 @@ namespace Ecorche.Wire
         public bool HasTriangles; public readonly Array Triangles = new Array();
         public bool HasPackedTriangles; public readonly Array PackedTriangles = new Array();
         public ulong TriangleCount;
+        public byte[] CapVertices = System.Array.Empty<byte>();
 
         public void Clear()
         {
@@ -60,12 +61,14 @@ namespace Ecorche.Wire
             HasTriangles = false;
             HasPackedTriangles = false;
             TriangleCount = default;
+            CapVertices = System.Array.Empty<byte>();
         }
 
         internal void Read(ref WireReader from)
         {
             var oldName = Name;
             var oldGroup = Group;
+            var oldCapVertices = CapVertices;
             Clear();
             for (uint key; (key = from.Key()) != 0;)
             {
@@ -78,6 +81,7 @@ namespace Ecorche.Wire
                     case 42: { var inner = from.Message(); Triangles.Read(ref inner); } HasTriangles = true; break;
                     case 50: { var inner = from.Message(); PackedTriangles.Read(ref inner); } HasPackedTriangles = true; break;
                     case 56: TriangleCount = from.UInt64(); break;
+                    case 66: CapVertices = from.Bytes(oldCapVertices); break;
                     default: from.Skip(key); break;
                 }
             }

@@ -2,7 +2,7 @@
 // The tissue tree: groups and their tissues, searched, shown and hidden, chosen; below it what one does with the chosen one.
 import type { App } from "../app.js";
 import type { Tissue } from "../state/app_state.js";
-import { lookOf } from "../scene/palette.js";
+import { CAP_COLOR, CAP_LABEL, lookOf } from "../scene/palette.js";
 import { groupLabel, groupOrder, matches } from "../state/names.js";
 import { addSurface } from "./surface.js";
 import { addChosen } from "./chosen.js";
@@ -24,10 +24,11 @@ function mount(app: App, content: HTMLElement): void {
   const search = h("input", { type: "search", id: "tissue-search", placeholder: "Search", autocomplete: "off", aria: { label: "Search tissues" } });
   const tree = h("ul", { class: "tree", role: "tree", aria: { label: "Tissues" } });
   const none = h("p", { class: "none", hidden: true }, "No tissue has such a name.");
+  const cut = h("p", { class: "cut", hidden: true }, swatchOf(CAP_COLOR), CAP_LABEL);
   const seeThrough = h("button", { type: "button", class: "text-button", title: "See through the skin (S)", on: { click: () => app.layers.toggleSeeThrough() } }, icon("glass"), "See through");
   const all = h("button", { type: "button", class: "text-button", title: "Show all tissues (A)", on: { click: () => app.layers.showAll() } }, icon("eye"), "Show all");
   content.append(h("div", { class: "search" }, icon("search"), search), h("div", { class: "row-of-buttons" }, seeThrough, all),
-    h("div", { class: "tree-box" }, tree, none));
+    h("div", { class: "tree-box" }, tree, none, cut));
   addChosen(app, content);
   addSurface(app, content);
 
@@ -87,6 +88,7 @@ function mount(app: App, content: HTMLElement): void {
     }));
     const first = tree.querySelector<HTMLElement>("li");
     if (first) first.tabIndex = 0;
+    cut.hidden = !tissues.some(({ capped }) => capped);
     filter();
     paint();
     choose();
@@ -136,10 +138,15 @@ function eyeButton(app: App, rows: readonly number[]): HTMLButtonElement {
   return eye;
 }
 
+function swatchOf(color: number): HTMLElement {
+  const swatch = h("span", { class: "swatch" });
+  swatch.style.background = `#${color.toString(16).padStart(6, "0")}`;
+  return swatch;
+}
+
 function leaf(app: App, tissue: Tissue): Row {
   const eye = eyeButton(app, [tissue.row]);
-  const swatch = h("span", { class: "swatch" });
-  swatch.style.background = `#${lookOf(tissue.name, tissue.group).color.toString(16).padStart(6, "0")}`;
+  const swatch = swatchOf(lookOf(tissue.name, tissue.group).color);
   const item = h("li", {
     role: "treeitem", tabIndex: -1, data: { row: String(tissue.row) }, aria: { selected: false, level: "2" },
     on: {

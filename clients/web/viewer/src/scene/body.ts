@@ -19,6 +19,8 @@ export interface Topology {
   readonly vertices: number;
   readonly indices: Uint32Array;
   readonly ranges: readonly TissueRange[];
+  /** 255 for each vertex of a cap, where the border of the scan cuts the body: a triangle of three such is no tissue. */
+  readonly caps?: Uint8Array | null;
 }
 
 /** p = low + step * number, mm, LPS. Four numbers a vertex: x, y, z and the normal. */
@@ -194,6 +196,13 @@ export class Body {
     for (const { material } of [mesh, prepass, pick]) (material as THREE.Material).clippingPlanes = this.#clipping;
   }
 
+  /** Where the border of the scan cuts a tissue: which of its triangles, counted from its first, are a cap. */
+  isCap(row: number): ((triangle: number) => boolean) | null {
+    const { caps, indices } = this.#topology ?? {}, range = this.#topology?.ranges.find((each) => each.row === row);
+    if (!caps || !indices || !range || !isCut(caps, range)) return null;
+    return (triangle) => [0, 1, 2].every((corner) => caps[indices[range.firstIndex + 3 * triangle + corner]!]! > 0);
+  }
+
   range(row: number): TissueRange | undefined {
     return this.#parts.get(row)?.range;
   }
@@ -226,6 +235,7 @@ export class Body {
     const vertex = this.#source(positions);
     const index = new THREE.BufferAttribute(topology.indices, 1);
     const depth = depthMaterial();
+    const cap = topology.caps ? new THREE.BufferAttribute(topology.caps, 1, true) : null;
     for (const range of topology.ranges) {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute("vertex", vertex).setIndex(index);
@@ -233,6 +243,10 @@ export class Body {
       const mesh = new THREE.Mesh(geometry, new TissueMaterial(this.looks(range.row), this.shared));
       const prepass = new THREE.Mesh(geometry, depth);
       const pick = new THREE.Mesh(geometry, new PickMaterial(range.row, this.shared));
+      if (cap && isCut(topology.caps!, range)) {
+        geometry.setAttribute("cap", cap);
+        for (const { material } of [mesh, pick]) material.setCapped();
+      }
       prepass.visible = false;
       prepass.renderOrder = ORDER.depth;
       // Bounds would be those of numbers that change under them; the body is nearly always in view as a whole.
@@ -267,6 +281,10 @@ export class Body {
     this.#rest = null;
     this.#values = null;
   }
+}
+
+function isCut(caps: Uint8Array, { firstVertex, vertexCount }: TissueRange): boolean {
+  return caps.subarray(firstVertex, firstVertex + vertexCount).includes(255);
 }
 
 /** The same of numbers that are on the GPU. */

@@ -36,9 +36,23 @@ float scalar() { return length((bodyPosition() * poseBox.w + poseBox.xyz) - (vec
 #endif
 `;
 
+/** 1 at the vertices of a cap, where the border of the scan cuts the body. Where it is 1 throughout, nothing is tissue. */
+const CAP = /* glsl */ `
+#ifdef CAP
+attribute float cap;
+centroid varying float vCap;
+#endif
+`;
+const IS_CAP = /* glsl */ `
+#ifdef CAP
+centroid varying float vCap;
+bool isCap() { return vCap > 0.999; }
+#endif
+`;
+
 export const TISSUE_VERTEX = /* glsl */ `
 #include <common>
-${VERTEX}${NORMAL}
+${VERTEX}${NORMAL}${CAP}
 #ifdef SCALAR
 ${SCALAR}
 varying float vScalar;
@@ -53,6 +67,9 @@ void main() {
   vView = mvPosition.xyz;
   #ifdef SCALAR
   vScalar = scalar();
+  #endif
+  #ifdef CAP
+  vCap = cap;
   #endif
   gl_Position = projectionMatrix * mvPosition;
   #include <clipping_planes_vertex>
@@ -71,8 +88,10 @@ uniform float shine;
 uniform float opacity;
 uniform float glow;
 uniform vec3 accent;
+uniform vec3 capColor;
 centroid varying vec3 vNormal;
 centroid varying vec3 vView;
+${IS_CAP}
 #ifdef SCALAR
 uniform vec2 scalarRange;
 uniform bool scalarDiverges;
@@ -150,6 +169,10 @@ void main() {
   #endif
   gl_FragColor = vec4(lit, alpha);
   #include <tonemapping_fragment>
+  #ifdef CAP
+  // No light and no number falls on what is not there; it is as strong wherever one looks from.
+  if (isCap()) gl_FragColor = vec4(capColor, min(1.0, 2.4 * opacity));
+  #endif
   #include <colorspace_fragment>
 }
 `;
@@ -182,9 +205,10 @@ void main() {
 }
 `;
 
-/** Picking: the tissue's row and its scalar (a share of the range, or sixteenths of a millimetre from rest), and where the surface is, in one pixel of four u32. */
+/** Picking: the tissue's row, whether it is a cap there, and its scalar (a share of the range, or sixteenths of a millimetre from rest), and where the surface is, in one
+ *  pixel of four u32. */
 export const PICK_VERTEX = /* glsl */ `
-${VERTEX}#ifdef SCALAR
+${VERTEX}${CAP}#ifdef SCALAR
 ${SCALAR}
 varying float vScalar;
 #endif
@@ -195,6 +219,9 @@ void main() {
   vPlace = bodyPosition() * box.w + box.xyz;
   #ifdef SCALAR
   vScalar = scalar();
+  #endif
+  #ifdef CAP
+  vCap = cap;
   #endif
   vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
   gl_Position = projectionMatrix * mvPosition;
@@ -211,6 +238,7 @@ uniform vec2 scalarRange;
 varying float vScalar;
 #endif
 varying vec3 vPlace;
+${IS_CAP}
 layout(location = 0) out highp uvec4 picked;
 #include <clipping_planes_pars_fragment>
 void main() {
@@ -221,7 +249,11 @@ void main() {
   #elif defined(SCALAR)
   scalar = uint(clamp(vScalar * 16.0, 0.0, 65535.0));
   #endif
-  picked = uvec4((tissue + 1u) | (scalar << 16), floatBitsToUint(vPlace.x), floatBitsToUint(vPlace.y), floatBitsToUint(vPlace.z));
+  uint code = tissue + 1u;
+  #ifdef CAP
+  if (isCap()) code |= 0x8000u;
+  #endif
+  picked = uvec4(code | (scalar << 16), floatBitsToUint(vPlace.x), floatBitsToUint(vPlace.y), floatBitsToUint(vPlace.z));
 }
 `;
 

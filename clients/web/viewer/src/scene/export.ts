@@ -6,9 +6,9 @@ import { GLTFExporter } from "three/examples/jsm/exporters/GLTFExporter.js";
 import { STLExporter } from "three/examples/jsm/exporters/STLExporter.js";
 import type { Tissue } from "../state/app_state.js";
 import { STRIDE, type Body } from "./body.js";
-import { lookOf } from "./palette.js";
+import { CAP_COLOR, lookOf } from "./palette.js";
 
-/** Plain meshes in mm, LPS, with their normals, one per tissue. */
+/** Plain meshes in mm, LPS, with their normals, one per tissue; where the scan's border cuts it, its caps are one more, `NAME_cap`. */
 export function meshesOf(body: Body, tissues: readonly Tissue[], opacity: (row: number) => number): THREE.Mesh[] {
   const { positions, topology } = body;
   if (!positions || !topology) throw new Error("there is no body yet");
@@ -23,14 +23,20 @@ export function meshesOf(body: Body, tissues: readonly Tissue[], opacity: (row: 
       }
     }
     const indices = topology.indices.subarray(range.firstIndex, range.firstIndex + range.indexCount).map((index) => index - range.firstVertex);
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(places, 3)).setIndex(new THREE.BufferAttribute(indices, 1));
-    geometry.computeVertexNormals();
     const look = lookOf(tissue.name, tissue.group), strength = opacity(tissue.row);
-    const material = new THREE.MeshStandardMaterial({ color: look.color, roughness: look.roughness, metalness: 0, opacity: strength, transparent: strength < 1 });
-    const mesh = new THREE.Mesh(geometry, material);
-    mesh.name = tissue.name;
-    return [mesh];
+    const mesh = (name: string, corners: Uint32Array, color: number, roughness: number) => {
+      const geometry = new THREE.BufferGeometry();
+      // Places of its own: who writes it may move them.
+      geometry.setAttribute("position", new THREE.BufferAttribute(places.slice(), 3)).setIndex(new THREE.BufferAttribute(corners, 1));
+      geometry.computeVertexNormals();
+      const made = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ color, roughness, metalness: 0, opacity: strength, transparent: strength < 1 }));
+      made.name = name;
+      return made;
+    };
+    const isCap = body.isCap(tissue.row);
+    if (!isCap) return [mesh(tissue.name, indices, look.color, look.roughness)];
+    const part = (cap: boolean) => indices.filter((_, corner) => isCap(Math.floor(corner / 3)) === cap);
+    return [mesh(tissue.name, part(false), look.color, look.roughness), mesh(`${tissue.name}_cap`, part(true), CAP_COLOR, 1)];
   });
 }
 

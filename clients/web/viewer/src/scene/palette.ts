@@ -49,6 +49,10 @@ const ORGANS: readonly (readonly [RegExp, Look])[] = [
   [/tongue/, look(0xc9716b, 0x8a2b28, 0.35, 0.35, 0.6)],
 ];
 
+/** Where the border of the scan cuts the body: drawn flat, in a colour that no tissue has. */
+export const CAP_COLOR = 0x8f86c4;
+export const CAP_LABEL = "Cut by the scan's border";
+
 const VEIN = look(0x44659f, 0x18305e, 0.25, 0.3, 0.65);
 
 export function lookOf(name: string, group: string): Look {

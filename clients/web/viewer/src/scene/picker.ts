@@ -12,6 +12,8 @@ export interface Picked {
   /** What colours the surface there: mm from rest in steps of a sixteenth, or the vertices' own number, within the range that is shown.
    *  0 while there is none. */
   readonly scalar: number;
+  /** The border of the scan cuts the tissue there: this is no surface of it. */
+  readonly cap: boolean;
 }
 
 export class Picker {
@@ -82,11 +84,11 @@ export class Picker {
     renderer.setClearColor(color, alpha);
     renderer.xr.enabled = enabled;
     for (const mesh of shown) mesh.visible = true;
-    const tissue = this.#pixel[0]! & 0xffff;
+    const tissue = this.#pixel[0]! & 0x7fff, cap = (this.#pixel[0]! & 0x8000) !== 0;
     if (tissue === 0) return null;
     const point = new THREE.Vector3(this.#floats[1]!, this.#floats[2]!, this.#floats[3]!);
     const coded = this.#pixel[0]! >>> 16, { x: low, y: high } = this.body.shared.scalarRange.value;
-    return { row: tissue - 1, point, scalar: this.body.scalar === "values" ? low + (coded / 65535) * (high - low) : coded / 16 };
+    return { row: tissue - 1, point, cap, scalar: this.body.scalar === "values" ? low + (coded / 65535) * (high - low) : coded / 16 };
   }
 
   dispose(): void {

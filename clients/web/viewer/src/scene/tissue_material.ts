@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The materials of the body: one per tissue, of three.js' ShaderMaterial over the GLSL beside it.
 import * as THREE from "three";
-import type { Look } from "./palette.js";
+import { CAP_COLOR, type Look } from "./palette.js";
 import { DEPTH_FRAGMENT, DEPTH_VERTEX, OUTLINE_FRAGMENT, OUTLINE_VERTEX, PICK_FRAGMENT, PICK_VERTEX, TISSUE_FRAGMENT, TISSUE_VERTEX } from "./body_shader.js";
 
 /** Uniforms that all tissues share: set once, seen by every material. */
@@ -36,7 +36,7 @@ export class TissueMaterial extends THREE.ShaderMaterial {
       uniforms: {
         color: { value: new THREE.Color(look.color) }, scatter: { value: new THREE.Color(look.scatter) },
         wrap: { value: look.wrap }, roughness: { value: look.roughness }, shine: { value: look.shine },
-        opacity: { value: 1 }, glow: { value: 0 },
+        opacity: { value: 1 }, glow: { value: 0 }, capColor: { value: new THREE.Color(CAP_COLOR) },
         accent: shared.accent, scalarRange: shared.scalarRange, scalarDiverges: shared.scalarDiverges, poseBox: shared.poseBox, restBox: shared.restBox,
       },
     });
@@ -61,6 +61,11 @@ export class TissueMaterial extends THREE.ShaderMaterial {
 
   setScalar(kind: SurfaceScalar): void {
     setScalar(this, kind);
+  }
+
+  /** Its vertices have `cap`: where the border of the scan closes it, it is drawn flat. */
+  setCapped(): void {
+    setDefine(this, "CAP", true);
   }
 }
 
@@ -100,6 +105,10 @@ export class PickMaterial extends THREE.ShaderMaterial {
 
   setScalar(kind: SurfaceScalar): void {
     setScalar(this, kind);
+  }
+
+  setCapped(): void {
+    setDefine(this, "CAP", true);
   }
 }
 

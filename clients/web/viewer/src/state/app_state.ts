@@ -35,6 +35,8 @@ export interface Tissue {
   /** Row of the segment that carries a bone; -1 for what deforms. */
   readonly segment: number;
   readonly vertices: number;
+  /** The border of the scan cuts it, and flat caps close it there. */
+  readonly capped?: boolean;
 }
 
 export interface Model {
