@@ -8,6 +8,7 @@
 #include "core/values/text.hpp"
 #include "preprocess/scan/ct_body.hpp"
 #include "preprocess/scan/cut_bones.hpp"
+#include "preprocess/scan/part_vertebrae.hpp"
 #include "preprocess/scan/pieces.hpp"
 #include "preprocess/scan/place_template.hpp"
 
@@ -23,6 +24,8 @@ constexpr double kPointsMm = 8;
 constexpr double kLeastScale = 0.78, kMostScale = 1.17;
 constexpr double kMuch = 20;     // ml: an arm's bones, no table's screws
 constexpr double kSurest = 0.9;  // a template is no eye
+constexpr const char* kNeck = "cervical_spine";
+constexpr double kPlainJoint = 0.8;  // contrast of a joint that leaves no doubt
 constexpr const char* kSegmentFirst =
     "segment it first (TotalSegmentator, MOOSE, 3D Slicer), and give the label maps with it";
 
@@ -124,6 +127,7 @@ class Bones {
     labels.names_from = "the CT itself";
     double sum = 0, all = 0;
     std::vector<std::string> seen;
+    const std::vector<Vertebra> neck = vertebrae(body, placed, cut);
     for (std::size_t b = 0; b < cut.bones.size(); ++b) {
       const scan::FoundBone& bone = cut.bones[b];
       if (bone.voxels == 0) continue;
@@ -132,12 +136,16 @@ class Bones {
       const double sure = kSurest * bone.agreement;
       sum += bone.agreement * static_cast<double>(bone.voxels);
       all += static_cast<double>(bone.voxels);
+      const std::string how = "the CT alone: denser than " + ct_.value(options_.bone_hu) +
+                              ", parted and named by a template, of whose bone " +
+                              std::to_string(std::lround(100 * bone.agreement)) + " % agree";
       labels.map.names.emplace(id, name);
-      labels.guesses.emplace(id,
-                             LabelGuess{"the CT alone: denser than " + ct_.value(options_.bone_hu) +
-                                            ", parted and named by a template, of whose bone " +
-                                            std::to_string(std::lround(100 * bone.agreement)) + " % agree",
-                                        sure});
+      labels.guesses.emplace(id, LabelGuess{how, sure});
+      for (std::size_t v = 0; name == kNeck && v < neck.size(); ++v) {
+        const auto own = static_cast<std::int64_t>(cut.bones.size() + v + 1);
+        labels.map.names.emplace(own, neck[v].name);
+        labels.guesses.emplace(own, LabelGuess{how + "; " + neck[v].how, std::min(sure, neck[v].sure)});
+      }
       if (sure < kDoubtful)
         out_.doubts.push_back(name + ": hardly recognised (" + text::number(sure, 2) +
                               "): look at picture.png whether it is one, else take it off the case");
@@ -171,6 +179,56 @@ class Bones {
     std::copy(cut.of.begin(), cut.of.end(), image.scalars<std::uint16_t>().begin());
     labels.map.layers.push_back(std::move(image));
     return labels;
+  }
+
+  struct Vertebra {
+    std::string name, how;
+    double sure = 0;
+  };
+
+  // Those of the neck that come apart, whose voxels are numbered on behind the template's bones; none where
+  // it stays one.
+  std::vector<Vertebra> vertebrae(const scan::BodyTemplate& body, const scan::Placed& placed,
+                                  scan::CutBones& cut) {
+    const auto bone = std::find_if(body.bones.begin(), body.bones.end(),
+                                   [](const scan::TemplateBone& b) { return b.name == kNeck; });
+    const auto row = static_cast<std::size_t>(bone - body.bones.begin());
+    if (bone == body.bones.end() || cut.bones[row].voxels == 0) return {};
+    Voxels neck(cut.of.size(), 0), other(cut.of.size(), 0);
+    for (std::size_t v = 0; v < neck.size(); ++v) {
+      neck[v] = cut.of[v] == row + 1 ? 1 : 0;
+      other[v] = cut.of[v] != 0 && neck[v] == 0 ? 1 : 0;
+    }
+    const scan::PartedNeck found = scan::part_neck(
+        ct_.image, neck, other, placed.segments[static_cast<std::size_t>(bone->segment)].rotation,
+        options_.bone_hu, options_.skin_hu, context_.quiet());
+    if (found.pieces.size() < 2) {
+      out_.notes.push_back(name_ + ": the vertebrae of the neck stay one bone: " + found.why);
+      return {};
+    }
+    std::vector<Vertebra> out;
+    std::vector<std::string> apart;
+    for (const scan::VertebraPiece& piece : found.pieces) {
+      const bool one = piece.first == piece.last;
+      const std::string percent = std::to_string(std::lround(100 * piece.contrast)) + " %";
+      const std::string level = "C" + std::to_string(piece.first);
+      Vertebra vertebra{kNeck, "", kSurest * std::min(1.0, piece.contrast / kPlainJoint)};
+      if (one) {
+        vertebra.name = "vertebra_c" + std::to_string(piece.first);
+        vertebra.how = "its joints are " + percent + " darker than bone";
+        apart.push_back(level + " (" + text::number(vertebra.sure, 2) + ")");
+      } else {
+        vertebra.how = level + " to C" + std::to_string(piece.last) + " did not come apart";
+        out_.notes.push_back(name_ + ": " + vertebra.how +
+                             ": between them nothing is darker than bone; they stay " + kNeck);
+      }
+      out.push_back(std::move(vertebra));
+    }
+    out_.notes.push_back(name_ + ": vertebrae of the neck that came apart: " + text::joined(apart));
+    for (std::size_t v = 0; v < neck.size(); ++v) {
+      if (found.of[v] != 0) cut.of[v] = static_cast<std::uint16_t>(cut.bones.size() + found.of[v]);
+    }
+    return out;
   }
 
   const ScanImage& ct_;
