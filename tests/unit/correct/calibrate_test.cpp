@@ -161,7 +161,8 @@ TEST(Neighbourhoods, HoldBonesAndTheirBorder) {
   const auto model = bar();
   std::vector<std::vector<RigidTransform>> motions{
       kinematics::forward(model->rig, correct::turned(model->rig.skeleton, 1, {0.5, 0, 0}))};
-  const correct::Neighbourhood part = correct::neighbourhood(*model, elastic::flesh_of(*model), motions, 1e-3);
+  const correct::Neighbourhood part =
+      correct::neighbourhood(*model, elastic::flesh_of(*model), motions, 1e-3);
   ASSERT_GT(part.mesh.free_nodes, 0U);
   EXPECT_LT(part.node.size(), model->node_count());
   for (std::size_t i = 0; i < part.node.size(); ++i) {
