@@ -24,6 +24,7 @@
 #include "app/tokens_file.hpp"
 #include "app/viewer/viewer_files.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/files/page_store.hpp"
 #include "core/platform/heap.hpp"
 #include "core/platform/service.hpp"
 #include "core/platform/terminal.hpp"
@@ -106,6 +107,8 @@ server::Options options_of(const ServeSettings& settings) {
     options.passes = read_tokens(settings.tokens);
     options.read_passes = [path = settings.tokens] { return read_tokens(path); };
   }
+  if (!settings.shared_models.empty())
+    options.pages = std::make_shared<const files::PageStore>(settings.shared_models);
   if (!options.elsewhere.empty()) wire::parse_address(options.elsewhere);
   if (settings.log_format == "json") options.log = json_lines();
   options.version = ECORCHE_VERSION;

@@ -65,6 +65,9 @@ void declare_serve_options(CLI::App& command, ServeSettings& settings) {
   command.add_flag(
       "--merge-pages", settings.merge_pages,
       "let the kernel keep one copy of what several servers of this machine have in memory alike");
+  command.add_option("--shared-models", settings.shared_models,
+                     "a folder in memory (tmpfs), where servers of this machine keep one copy of what their "
+                     "models have alike; made for this user where it is missing");
   command.add_option("--log", settings.log, "what to log on stderr")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();

@@ -24,6 +24,7 @@ struct ServeSettings {
   std::string log = "info", log_format = "text";
   bool real_time = false;
   bool merge_pages = false;
+  std::string shared_models;
   server::Options options;
 };
 

@@ -163,6 +163,19 @@ const Model& Probe::model() const {
   return *impl_->model;
 }
 
+HeldArrays Probe::arrays() const {
+  HeldArrays out;
+  impl_->copies.add_arrays(out);
+  impl_->runs.add_arrays(out);
+  impl_->columns.add_arrays(out);
+  // At rest, where all is fitted.
+  add_array(impl_->rest_nodes, out);
+  add_array(impl_->rest.above, out);
+  add_array(impl_->rest.lowest, out);
+  add_array(impl_->rest.runs, out);
+  return out;
+}
+
 void Probe::follow(std::span<const float> nodes, PosedTree& tree) const {
   tree.copied.resize(3 * impl_->copies.nodes());
   impl_->copies.place(nodes, tree.copied);

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/runtime/held_arrays.hpp>
 #include <ecorche/values/model.hpp>
 
 namespace ecorche::runtime {
@@ -27,6 +28,10 @@ class TissueColumns {
 
   /// All closed surfaces.
   std::vector<const Tissue*> closed() const;
+  void add_arrays(HeldArrays& out) const {
+    add_array(begin_, out);
+    add_array(triangle_, out);
+  }
 
  private:
   struct Surface {

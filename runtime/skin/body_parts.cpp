@@ -153,6 +153,17 @@ void BodyParts::make_scratch(PosedBody::Scratch& scratch) const {
   scratch.modes.assign(corrections_.modes(), 0.0F);
 }
 
+void BodyParts::add_arrays(HeldArrays& out) const {
+  const auto add = [&](const auto&... arrays) { (add_array(arrays, out), ...); };
+  add(clusters_.node, clusters_.lane, clusters_.rest, clusters_.centre, clusters_.begin, clusters_.palette,
+      clusters_.weight, corrections_.fields(), bones_, runs_);
+  for (const Part& part : tissues_) {
+    const VertexGroups& groups = part.groups;
+    add(groups.cells, groups.groups, groups.vertex, groups.rows, groups.corners, groups.narrow, groups.wide,
+        groups.normal, part.normals, part.mask);
+  }
+}
+
 // What is to be done for a frame, as all its threads read it.
 struct BodyParts::Frame {
   const Model& model;

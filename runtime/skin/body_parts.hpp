@@ -32,6 +32,7 @@ class BodyParts {
   const NodeClusters& clusters() const { return clusters_; }
   /// Row of a tissue that hangs on tets.
   const VertexGroups& groups(std::size_t tissue) const { return tissues_[tissue].groups; }
+  void add_arrays(HeldArrays& out) const;
 
  private:
   struct Part {

@@ -170,6 +170,12 @@ std::span<const std::uint32_t> BodyPoser::lanes() const {
   return impl_->parts.clusters().lane;
 }
 
+HeldArrays BodyPoser::arrays() const {
+  HeldArrays out;
+  impl_->parts.add_arrays(out);
+  return out;
+}
+
 PosedBody BodyPoser::make_frame(const FrameParts& parts) const {
   const Model& model = *impl_->model;
   PosedBody frame;

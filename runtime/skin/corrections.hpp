@@ -64,6 +64,7 @@ class Corrections {
   /// Whether `modes` moves anything of the cluster.
   bool moves(std::size_t cluster, std::span<const float> modes) const;
   const std::int16_t* field(const Part& part) const { return &field_[part.field]; }
+  std::span<const std::int16_t> fields() const { return field_; }
 
  private:
   struct OfJoint {

@@ -33,6 +33,7 @@ class TetBlocks {
   std::span<const std::uint32_t> groups_of(std::size_t b) const {
     return std::span(group_).subspan(begin_[b], begin_[b + 1] - begin_[b]);
   }
+  void add_arrays(HeldArrays& out) const { add_array(group_, out); }
 
  private:
   std::size_t nodes_ = 0, base_ = 0;  // all; the first copied one

@@ -36,6 +36,11 @@ class TetPalettes {
   }
   /// Where run `r` begins is read from here.
   const std::uint32_t* where(std::size_t r) const { return &begin_[r]; }
+  void add_arrays(HeldArrays& out) const {
+    add_array(begin_, out);
+    add_array(count_, out);
+    add_array(word_, out);
+  }
 
  private:
   std::vector<std::uint32_t> begin_;  // #runs + 1

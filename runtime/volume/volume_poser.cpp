@@ -125,6 +125,14 @@ const Model& VolumePoser::model() const {
   return *impl_->model;
 }
 
+HeldArrays VolumePoser::arrays() const {
+  HeldArrays out;
+  impl_->copies.add_arrays(out);
+  impl_->blocks.add_arrays(out);
+  impl_->palettes().add_arrays(out);
+  return out;
+}
+
 const TetPalettes& VolumePoser::Impl::palettes() const {
   std::call_once(palettes_made, [&] {
     // A thread that waits here must not begin another volume of this poser: it would wait for itself.

@@ -53,8 +53,8 @@ SessionRegistry::SessionRegistry(net::io_context& io, Workers& workers, Options 
   for (NamedModel& model : models) {
     if (!sources_.emplace(model.name, std::move(model.read_again)).second)
       throw Error(ErrorKind::config, model.name, "two models have this name", "rename one of the files");
-    models_.push_back(std::make_shared<const ServedModel>(model.name, std::move(model.model),
-                                                          std::move(model.clips), std::move(model.poses)));
+    models_.push_back(std::make_shared<const ServedModel>(
+        model.name, std::move(model.model), std::move(model.clips), std::move(model.poses), options_.pages));
     // The first frame of all will want it.
     executor_.submit(Service::frames, [served = models_.back()] { warm_up(*served); });
     prepare_details(models_.back());
@@ -87,6 +87,7 @@ void SessionRegistry::prepare_details(std::shared_ptr<const ServedModel> model, 
     try {
       if (tissue == 0) model->pack_triangles();
       model->make_levels({tissue});
+      if (tissue + 1 == model->model().tissues.size()) model->share_details();
       prepare_details(std::move(model), tissue + 1);
     } catch (const std::bad_alloc&) {  // who asks is told
     }
@@ -276,11 +277,11 @@ void SessionRegistry::reload(const std::string& name, std::function<void(const S
     std::shared_ptr<const ServedModel> model;
   };
   const auto reading = std::make_shared<Reading>();
-  const auto work = [reading, read = source->second, name] {
+  const auto work = [reading, read = source->second, name, pages = options_.pages] {
     try {
       ModelParts parts = read();
       reading->model = std::make_shared<const ServedModel>(name, parts.model, std::move(parts.clips),
-                                                           std::move(parts.poses));
+                                                           std::move(parts.poses), pages);
       warm_up(*reading->model);
     } catch (const std::bad_alloc&) {
       until_memory([&] {

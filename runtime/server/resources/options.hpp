@@ -13,6 +13,10 @@
 #include "runtime/server/net/passes.hpp"
 #include "runtime/server/resources/journal.hpp"
 
+namespace ecorche::files {
+class PageStore;
+}  // namespace ecorche::files
+
 namespace ecorche::server {
 
 /// Field by field as in proto/ecorche/v1/hello.proto, which tells clients.
@@ -74,6 +78,7 @@ struct Options {
   std::string elsewhere;  ///< and to whom: HOST:PORT of frames; empty: to the same address
   Journal::Write log;     ///< takes the log's lines about clients and sessions; none: spdlog, as text
   Limits limits;
+  std::shared_ptr<const files::PageStore> pages = {};  ///< for what servers of a machine have alike; or null
 };
 
 }  // namespace ecorche::server

@@ -130,10 +130,11 @@ struct ServedModel::Made {
 };
 
 ServedModel::ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> moves,
-                         std::vector<NamedPose> poses)
-    : ServedModel(Made(std::move(name), model, std::move(moves)), std::move(poses)) {}
+                         std::vector<NamedPose> poses, std::shared_ptr<const files::PageStore> pages)
+    : ServedModel(Made(std::move(name), model, std::move(moves)), std::move(poses), std::move(pages)) {}
 
-ServedModel::ServedModel(Made made, std::vector<NamedPose> poses)
+ServedModel::ServedModel(Made made, std::vector<NamedPose> poses,
+                         std::shared_ptr<const files::PageStore> pages)
     : summary(std::move(made.summary)),
       opened(std::move(made.opened)),
       triangles(std::move(made.triangles)),
@@ -143,12 +144,17 @@ ServedModel::ServedModel(Made made, std::vector<NamedPose> poses)
       background_bodies(*poser_),
       levels_(model().tissues.size()),
       balls_(model().volumes.size()),
-      skinning_(model().rig.skeleton, std::move(poses)) {
+      skinning_(model().rig.skeleton, std::move(poses)),
+      shared_(std::move(pages), summary.name()) {
   for (Clip& clip : made.clips) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
   runtime::PosedBody body = poser_->make_frame({.positions = false});
   const Pose rest = Pose::rest(model().segment_count());
   if (poser_->run(rest, runtime::Skinning::lbs, {}, body, runtime::NodesOf::tissues).ok())
     step = body.box.step;
+  runtime::HeldArrays arrays = arrays_of(model());
+  for (const auto& array : poser_->arrays()) arrays.push_back(array);
+  runtime::add_array(*topology, arrays);
+  shared_.add("arrays", arrays);
 }
 
 const runtime::QualityMeter& ServedModel::meter() const {
@@ -165,8 +171,10 @@ const runtime::VolumeBalls& ServedModel::balls(std::size_t volume) const {
 }
 
 const runtime::VolumePoser& ServedModel::volumes() const {
-  once(volumes_made_,
-       [this] { volumes_ = std::make_unique<const runtime::VolumePoser>(poser_->shared_model()); });
+  once(volumes_made_, [this] {
+    volumes_ = std::make_unique<const runtime::VolumePoser>(poser_->shared_model());
+    if (shared_.wanted()) shared_.add("arrays for volumes", volumes_->arrays());
+  });
   return *volumes_;
 }
 
@@ -198,6 +206,19 @@ void ServedModel::pack_triangles() const {
   });
 }
 
+void ServedModel::share_details() const {
+  if (!shared_.wanted()) return;
+  runtime::HeldArrays arrays;
+  for (const Levels& row : levels_) {
+    for (const MeshRows& rows : row.levels) {
+      runtime::add_array(rows.vertices, arrays);
+      runtime::add_array(rows.triangles, arrays);
+    }
+  }
+  runtime::add_array(*packed_triangles_.payload, arrays);
+  shared_.add("levels of detail", arrays);
+}
+
 void ServedModel::describe_skinning(const std::vector<std::uint32_t>& tissues, std::uint32_t detail,
                                     v1::SkinningData& out, wire::Payload& payload) const {
   make_levels(tissues);
@@ -208,8 +229,10 @@ void ServedModel::describe_skinning(const std::vector<std::uint32_t>& tissues, s
 }
 
 const runtime::Probe& ServedModel::probe() const {
-  once(probe_made_,
-       [this] { probe_ = std::make_unique<const runtime::Probe>(poser_->shared_model(), poser_->lanes()); });
+  once(probe_made_, [this] {
+    probe_ = std::make_unique<const runtime::Probe>(poser_->shared_model(), poser_->lanes());
+    if (shared_.wanted()) shared_.add("arrays for probes", probe_->arrays());
+  });
   return *probe_;
 }
 

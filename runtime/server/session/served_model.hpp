@@ -20,6 +20,7 @@
 #include "runtime/server/session/mesh_rows.hpp"
 #include "runtime/server/session/packed_triangles.hpp"
 #include "runtime/server/session/rest_pose.hpp"
+#include "runtime/server/session/shared_arrays.hpp"
 #include "runtime/server/session/skinning_data.hpp"
 #include "runtime/settle/settle_flesh.hpp"
 #include "runtime/spheres/pose_volume.hpp"
@@ -36,9 +37,9 @@ struct VolumeScratch {
 /// client wants, which is made when it is first asked for.
 struct ServedModel {
   /// `name` is what OpenModel asks for; `clips` are of the model's rig, and so are `poses`, by which the
-  /// skinning of clients is measured.
+  /// skinning of clients is measured; `pages`, where there are any, keep what does not change.
   ServedModel(std::string name, const std::shared_ptr<const Model>& model, std::vector<Clip> clips = {},
-              std::vector<NamedPose> poses = {});
+              std::vector<NamedPose> poses = {}, std::shared_ptr<const files::PageStore> pages = {});
 
   const runtime::BodyPoser& poser() const { return *poser_; }
   const Model& model() const { return poser_->model(); }
@@ -50,6 +51,8 @@ struct ServedModel {
   const MeshRows& level(std::uint32_t level, std::uint32_t tissue) const {
     return levels_[tissue].levels[level - 1];
   }
+  /// All levels of detail are at hand, and so are the packed triangles: they, too, are kept by the pages.
+  void share_details() const;
   /// Packs the triangles, on the calling thread; throws bad_alloc.
   void pack_triangles() const;
   /// Null where they are not packed yet. From any thread.
@@ -75,7 +78,7 @@ struct ServedModel {
 
  private:
   struct Made;
-  ServedModel(Made made, std::vector<NamedPose> poses);
+  ServedModel(Made made, std::vector<NamedPose> poses, std::shared_ptr<const files::PageStore> pages);
   std::unique_ptr<const runtime::BodyPoser> poser_;
 
  public:
@@ -114,6 +117,7 @@ struct ServedModel {
   mutable std::unique_ptr<const runtime::Probe> probe_;
   mutable std::once_flag settler_made_;
   mutable std::unique_ptr<const runtime::FleshSettler> settler_;
+  mutable SharedArrays shared_;
 };
 
 }  // namespace ecorche::server

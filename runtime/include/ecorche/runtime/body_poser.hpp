@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <ecorche/runtime/aligned.hpp>
+#include <ecorche/runtime/held_arrays.hpp>
 #include <ecorche/runtime/quantise_box.hpp>
 #include <ecorche/runtime/segment_motion.hpp>
 #include <ecorche/values/error.hpp>
@@ -110,6 +111,9 @@ class BodyPoser {
 
   /// #nodes: which row of PosedBody::Scratch::lanes holds a node.
   std::span<const std::uint32_t> lanes() const;
+
+  /// What it holds besides the model.
+  HeldArrays arrays() const;
 
  private:
   struct Impl;

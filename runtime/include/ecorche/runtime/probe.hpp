@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/runtime/held_arrays.hpp>
 #include <ecorche/runtime/resample.hpp>
 #include <ecorche/runtime/tet_runs.hpp>
 #include <ecorche/values/model.hpp>
@@ -81,6 +82,9 @@ class Probe {
 
   /// What is probed.
   const Model& model() const;
+
+  /// What it holds besides the model, but for what the first who asks for tissues waits for.
+  HeldArrays arrays() const;
 
  private:
   struct Impl;

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <ecorche/runtime/held_arrays.hpp>
 #include <ecorche/values/mesh.hpp>
 #include <ecorche/values/model.hpp>
 
@@ -54,6 +55,12 @@ class RigidCopies {
   }
   /// The first copy's drawn index.
   std::size_t first() const { return first_; }
+
+  /// Of all copies.
+  void add_arrays(HeldArrays& out) const {
+    add_array(corners_, out);
+    add_array(rest_, out);
+  }
 
  private:
   // Nodes of one segment's bones that tell its motion, and the copies that follow it.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <ecorche/runtime/aligned.hpp>
+#include <ecorche/runtime/held_arrays.hpp>
 #include <ecorche/runtime/rigid_copies.hpp>
 #include <ecorche/values/mesh.hpp>
 
@@ -74,6 +75,12 @@ class TetRuns {
   const std::uint32_t* begin(std::size_t r) const { return &begin_[r]; }
   /// The tets of run `r`, sixteen; the last run is filled up with its last tet.
   const std::uint32_t* tets(std::size_t r) const { return tet_.data() + width * r; }
+
+  /// Of all runs.
+  void add_arrays(HeldArrays& out) const {
+    for (const auto* array : {&tet_, &order_, &shared_, &begin_, &rows_}) add_array(*array, out);
+    add_array(corners_, out);
+  }
 
  private:
   static constexpr std::uint8_t unpacked = 64;  // added to the bytes of a run whose nodes do not fit

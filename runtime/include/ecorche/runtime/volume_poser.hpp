@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <ecorche/runtime/bricks.hpp>
+#include <ecorche/runtime/held_arrays.hpp>
 #include <ecorche/runtime/resample.hpp>
 #include <ecorche/values/context.hpp>
 #include <ecorche/values/image.hpp>
@@ -74,6 +75,9 @@ class VolumePoser {
 
   /// What is posed.
   const Model& model() const;
+
+  /// What it holds besides the model; made now where that would have waited for the first volume.
+  HeldArrays arrays() const;
 
  private:
   struct Impl;
