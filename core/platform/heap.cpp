@@ -38,6 +38,12 @@ void use_tidy_heap() {
 #endif
 }
 
+void give_back_heap() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
 bool merge_equal_pages() {
   constexpr int kMemoryMerge = 67;  // PR_SET_MEMORY_MERGE, younger than Debian 12's headers
   return prctl(kMemoryMerge, 1, 0, 0, 0) == 0;

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/platform/heap.hpp"
 #include "runtime/server/net/tls.hpp"
 #include "runtime/server/registry/unnamed_files.hpp"
 #include "runtime/server/resources/shares.hpp"
@@ -212,7 +213,10 @@ void SessionRegistry::sweep(Clock::time_point now) {
   };
   std::erase_if(sessions_, [&](const auto& entry) { return ends(entry.second); });
   std::erase_if(retired_, ends);
-  for (auto& model : old) executor_.destroy_later(std::move(model));
+  if (!old.empty()) {
+    for (auto& model : old) executor_.destroy_later(std::move(model));
+    tidy_up();
+  }
   const auto linger = duration(options_.limits.linger_seconds);
   std::erase_if(places_, [&](const auto& entry) {
     return now - entry.second.since >= linger || entry.second.session.expired();
@@ -297,12 +301,21 @@ void SessionRegistry::reload(const std::string& name, std::function<void(const S
     reloading_ = false;
     if (reading->status.ok()) replace(reading->model);
     executor_.destroy_later(std::exchange(reading->model, nullptr));
+    tidy_up();
     done(reading->status);
     if (reloading_ || reload_again_.empty()) return;
     reload_all([calls = std::exchange(reload_again_, {})] {
       for (const auto& call : calls) call();
     });
   });
+}
+
+// Beside the model itself, reading one makes and drops tens of MiB of small arrays, among what sessions make.
+void SessionRegistry::tidy_up() noexcept {
+  try {
+    executor_.submit(Service::disposal, [] { platform::give_back_heap(); });  // after what is destroyed there
+  } catch (const std::bad_alloc&) {
+  }
 }
 
 void SessionRegistry::reload_passes(std::function<void(bool)> done) {

@@ -111,6 +111,7 @@ class SessionRegistry {
   void replace(std::shared_ptr<const ServedModel> model);
   void reload_from(std::size_t row, std::function<void()> done);
   bool evict(const std::string& address = {});
+  void tidy_up() noexcept;
 
   net::io_context& io_;
   Options options_;
