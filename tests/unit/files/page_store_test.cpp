@@ -376,6 +376,7 @@ TEST(PageStore, OnlyAFolderOfOnesOwnInMemory) {
   fs::create_symlink("new", memory.path() / "link");
   ASSERT_TRUE(refused(memory.path() / "link"));
   EXPECT_EQ(refused(memory.path() / "link")->kind(), ErrorKind::cannot_create);
+  EXPECT_EQ(refused(memory.path() / "link")->problem(), "cannot be used: Not a directory");
   EXPECT_TRUE(refused(memory.path() / "not" / "there"));
 
   if (::geteuid() == 0) {
