@@ -41,7 +41,7 @@ void listen() {
 }  // namespace
 
 std::stop_token stop_on_signals() {
-  const std::stop_token stop = listener().source.get_token();
+  std::stop_token stop = listener().source.get_token();
   if (!platform::catch_stops()) return stop;  // signals then end the process at once
   std::thread(listen).detach();               // lives as long as the process: nothing waits for it
   return stop;

@@ -100,9 +100,10 @@ class LevelFinder {
         int last = j;
         double before = k == 0 ? 0 : -1e30;
         for (int d = -1; k > 0 && d <= 1; ++d) {
-          if (j + d < 0 || j + d >= nj) continue;
-          const double b = best[row - 1][static_cast<std::size_t>(j + d)] - (d == 0 ? 0 : kBend);
-          if (b > before) before = b, last = j + d;
+          const int next = j + d;
+          if (next < 0 || next >= nj) continue;
+          const double b = best[row - 1][static_cast<std::size_t>(next)] - (d == 0 ? 0 : kBend);
+          if (b > before) before = b, last = next;
         }
         best[row].push_back(before + sum / (2 * kSmoothedBy + 1));
         from[row].push_back(last);
