@@ -22,7 +22,7 @@ void use_tidy_heap();
 /// Has the system take back the pages of the heap that hold nothing, wherever in it they lie: after work that
 /// made much and dropped it again while things that stay were made in between. Without it such pages stay,
 /// and the next work of that kind, which finds other gaps than the last one, adds some more. Other threads
-/// wait for memory meanwhile, a millisecond or so. Does nothing where the C library is not glibc.
+/// that ask for memory wait meanwhile. Does nothing where the C library is not glibc.
 void give_back_heap();
 
 /// Lets the kernel keep one copy of what this process and others that ask for it have alike, page by page,
