@@ -43,10 +43,10 @@ function(ecorche_library name)
   endif()
 endfunction()
 
-# ecorche_unity(TARGET): its sources are compiled six at a time, as one: what they share is then read, instantiated and
+# ecorche_unity(TARGET): its sources are compiled 24 at a time, as one: what they share is then read, instantiated and
 # optimised once. With ECORCHE_UNITY off each is compiled alone.
 function(ecorche_unity name)
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ${ECORCHE_UNITY} UNITY_BUILD_BATCH_SIZE 6)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${ECORCHE_UNITY} UNITY_BUILD_BATCH_SIZE 24)
 endfunction()
 
 # What the sanitizers build.
@@ -72,12 +72,6 @@ function(ecorche_test name)
   add_executable(${name} ${A_SOURCES})
   set_property(TARGET ${name} PROPERTY LINKER_LANGUAGE CXX)
   target_link_libraries(${name} PRIVATE ecorche_flags ecorche_sanitizers ${A_LIBS} GTest::gtest GTest::gtest_main)
-  # Tests themselves are compiled a fifth faster so; what they test keeps its own options.
-  target_compile_options(${name} PRIVATE -O1)
-  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # At -O1 gcc 12 does not see that a value of std::optional is read only where there is one.
-    target_compile_options(${name} PRIVATE -Wno-maybe-uninitialized)
-  endif()
   ecorche_unity(${name})
   if(A_SOURCES STREQUAL sources)
     ecorche_precompiled(${name} ${A_PRECOMPILED})

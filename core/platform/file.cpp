@@ -8,12 +8,10 @@
 #include <cerrno>
 #include <utility>
 
+#include "core/platform/last_error.hpp"
+
 namespace ecorche::platform {
 namespace {
-
-std::error_code last_error() {
-  return {errno, std::generic_category()};
-}
 
 int flags_of(Open how) {
   switch (how) {

@@ -13,14 +13,12 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/platform/last_error.hpp"
+
 namespace ecorche::platform {
 namespace {
 
 constexpr mode_t kWriting = 0600, kSealed = 0400, kWrite = 0222, kOthersWrite = 0022;
-
-std::error_code last_error() {
-  return {errno, std::generic_category()};
-}
 
 std::error_code untrusted() {
   return std::make_error_code(std::errc::permission_denied);

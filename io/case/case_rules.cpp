@@ -11,7 +11,7 @@ namespace {
 
 using yaml::Value;
 
-constexpr std::array<std::string_view, 2> kFileKeys{"ecorche_regions", "regions"};
+constexpr std::array<std::string_view, 2> kRegionKeys{"ecorche_regions", "regions"};
 
 bool holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -73,7 +73,7 @@ std::optional<std::string> skeleton_template(const std::string& name) {
 
 std::vector<PlacedRegion> read_regions_file(const std::filesystem::path& path, const Frame& frame) {
   const Value file = Value::read(path);
-  file.allow(kFileKeys);
+  file.allow(kRegionKeys);
   const Value version = file.at("ecorche_regions");
   if (version.text() != "1")
     version.fail("version '" + version.text() + "' is not known", "this ecorche reads version 1");

@@ -20,11 +20,6 @@ using yaml::Value;
 constexpr double kPinned = 3;  // times the weight of a target
 constexpr std::size_t kMost = 1000;
 
-Vector3d vector(const Value& value) {
-  const auto [x, y, z] = value.numbers<3>();
-  return {x, y, z};
-}
-
 // A segment and a point of it on the scanned body; the joint's centre where none is named.
 struct Place {
   std::size_t row = 0;
@@ -42,7 +37,7 @@ Place read_place(const Value& value, const Rig& rig) {
   }
   Place out{static_cast<std::size_t>(row), rig.skeleton.segments[static_cast<std::size_t>(row)].joint.center,
             segment.text()};
-  if (const auto point = value.find("point")) out.point = vector(*point);
+  if (const auto point = value.find("point")) out.point = yaml::vector(*point);
   return out;
 }
 
@@ -97,7 +92,8 @@ IkRequest read_ik(const std::filesystem::path& path, const Rig& rig) {
     constexpr std::array<std::string_view, 4> target_keys{"segment", "point", "goal", "weight"};
     item.allow(target_keys);
     const Place place = read_place(item, rig);
-    out.problem.targets.push_back({place.row, place.point, vector(item.at("goal")), read_weight(item, 1)});
+    out.problem.targets.push_back(
+        {place.row, place.point, yaml::vector(item.at("goal")), read_weight(item, 1)});
     out.names.push_back(place.name);
   }
   for (const Value& item : list(file, "pinned")) {
@@ -112,10 +108,10 @@ IkRequest read_ik(const std::filesystem::path& path, const Rig& rig) {
     constexpr std::array<std::string_view, 5> look_keys{"segment", "point", "direction", "at", "weight"};
     item.allow(look_keys);
     const Place place = read_place(item, rig);
-    kinematics::IkLook look{place.row, place.point, -Vector3d::UnitY(), vector(item.at("at")),
+    kinematics::IkLook look{place.row, place.point, -Vector3d::UnitY(), yaml::vector(item.at("at")),
                             read_weight(item, 1)};
     if (const auto direction = item.find("direction")) {
-      look.direction = vector(*direction);
+      look.direction = yaml::vector(*direction);
       if (!(look.direction.norm() > 1e-6)) direction->fail("has no length", "write for example [0, -1, 0]");
       look.direction.normalize();
     }

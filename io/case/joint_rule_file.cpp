@@ -13,13 +13,8 @@ using yaml::Value;
 
 constexpr double kLeastLength = 1e-12;
 
-Eigen::Vector3d vector(const Value& value) {
-  const auto numbers = value.numbers<3>();
-  return {numbers[0], numbers[1], numbers[2]};
-}
-
 Eigen::Vector3d direction_of(const Value& value, const Frame& frame) {
-  const Eigen::Vector3d file = vector(value);
+  const Eigen::Vector3d file = yaml::vector(value);
   if (file.stableNorm() < kLeastLength) value.fail("has no length", "write a direction");
   return frame.axes * file.stableNormalized();
 }
@@ -80,7 +75,7 @@ RegionUse RuleReader::use(const Value& value) const {
 PointSource RuleReader::point(const Value& value) const {
   PointSource source;
   if (value.kind() != Kind::map) {
-    source.point = frame_.point(vector(value));
+    source.point = frame_.point(yaml::vector(value));
     return source;
   }
   value.allow(skeleton_keys::center);

@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace ecorche::io::yaml {
 
 inline constexpr std::size_t largest_file = std::size_t{16} << 20;
@@ -89,6 +91,12 @@ class Value {
   const Node* node_;
   std::string path_;
 };
+
+/// Three numbers.
+inline Eigen::Vector3d vector(const Value& value) {
+  const auto [x, y, z] = value.numbers<3>();
+  return {x, y, z};
+}
 
 /// The word of `known` nearest to `word`, or empty where none is near.
 std::string nearest(std::string_view word, std::span<const std::string> known);

@@ -14,7 +14,7 @@ namespace {
 
 using fields::refuse;
 
-constexpr std::uint32_t kItem = 0xe000fffe, kEnd = 0xe0ddfffe;  // as they are read, little endian
+constexpr std::uint32_t kItemBytes = 0xe000fffe, kEndBytes = 0xe0ddfffe;  // as they are read, little endian
 
 static_assert(std::endian::native == std::endian::little, "numbers are read as they are stored");
 
@@ -62,8 +62,8 @@ void PixelFile::find_fragments() {
     std::array<std::uint32_t, 2> head{};
     read_at(at, std::as_writable_bytes(std::span(head)));
     at += 8;
-    if (head[0] == kEnd) break;
-    if (head[0] != kItem || head[1] > file_bytes_ - at)
+    if (head[0] == kEndBytes) break;
+    if (head[0] != kItemBytes || head[1] > file_bytes_ - at)
       refuse(path_, "its packed pixels are damaged at byte " + std::to_string(at - 8),
              "copy it from the archive again");
     if (table) {

@@ -17,8 +17,8 @@ using Index3 = std::array<std::int32_t, 3>;
 // A ray that leaves the crop sees this many empty voxels below and above: those above are a cell's far
 // corner.
 constexpr std::int32_t kBelow = 1, kAbove = 2;
-constexpr std::size_t kSlack = 2;  // the last voxel is loaded with what comes behind it
-constexpr float kMostSteps = 65535;
+constexpr std::size_t kBehind = 2;  // the last voxel is loaded with what comes behind it
+constexpr float kLargestStep = 65535;
 constexpr double kMostHu = 65535;  // no scanner says more
 
 // The box of voxels that attenuate, and the densest.
@@ -84,7 +84,7 @@ struct Steps {
   std::uint16_t operator()(float hu) const {
     const float above_air = hu + 1000;
     const float steps = per_hu * (above_air > 0 ? above_air : 0) + beyond_water * (hu > 0 ? hu : 0) + 0.5F;
-    return static_cast<std::uint16_t>(static_cast<std::int32_t>(steps < kMostSteps ? steps : kMostSteps));
+    return static_cast<std::uint16_t>(static_cast<std::int32_t>(steps < kLargestStep ? steps : kLargestStep));
   }
 };
 
@@ -128,7 +128,7 @@ void fill(const Image& hu, const Attenuation& attenuation, const Index3& first, 
       }
     }
   });
-  std::fill_n(&out.steps[out.grid.voxels()], kSlack, std::uint16_t{0});
+  std::fill_n(&out.steps[out.grid.voxels()], kBehind, std::uint16_t{0});
 }
 
 }  // namespace
@@ -154,7 +154,7 @@ void attenuation_map(const Image& hu, const Attenuation& attenuation, Attenuatio
     out.grid.origin =
         hu.grid.point(content.first[0] - kBelow, content.first[1] - kBelow, content.first[2] - kBelow);
     out.step = attenuation.of_hu(std::min(content.most_hu, kMostHu)) / 65535;
-    const std::size_t count = out.grid.voxels() + kSlack;
+    const std::size_t count = out.grid.voxels() + kBehind;
     if (out.room < count) {  // first written by those who fill it, not here
       out.room = 0;
       out.steps = std::make_unique_for_overwrite<std::uint16_t[]>(count);

@@ -8,16 +8,13 @@
 #include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>
 #include "runtime/skin/body_parts.hpp"
+#include "runtime/skin/unfit.hpp"
 
 namespace ecorche::runtime {
 namespace {
 
 constexpr double kUnitTolerance = 1e-2;  // a sender's rounding; anything beyond is not a rotation
 constexpr std::array<std::string_view, 3> kSkinnings{"lbs", "dqs", "cor"};
-
-[[noreturn]] void unfit(const Model& model, const std::string& what) {
-  throw Error(ErrorKind::data, "model " + model.name, what, "preprocess the case again");
-}
 
 template <class Index>
 bool below(const Index* rows, std::size_t count, std::size_t limit) {

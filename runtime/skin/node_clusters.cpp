@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include <ecorche/values/error.hpp>
+#include "runtime/skin/unfit.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -16,10 +17,6 @@ namespace {
 constexpr float kSmallestWeight = 1e-4F;  // 0.08 mm on the reference body; below it memory traffic is wasted
 constexpr std::size_t kClusterSize = NodeClusters::size;
 constexpr std::size_t kOtherRun = 2048;  // of nodes that no tissue hangs on
-
-[[noreturn]] void unfit(const Model& model, const std::string& what) {
-  throw Error(ErrorKind::data, "model " + model.name, what, "preprocess the case again");
-}
 
 void check(const Model& model) {
   const Weights& stored = model.weights;

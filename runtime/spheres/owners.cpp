@@ -17,7 +17,7 @@
 namespace ecorche::runtime {
 namespace {
 
-constexpr double kMostVoxels = 2147483648.0;
+constexpr double kMostOwned = 2147483648.0;
 // Centres stay within what a 32-bit number of voxels holds with room for every sum.
 constexpr double kFarthest = 1e6;
 
@@ -172,7 +172,7 @@ LatticeBox grown_box(const BallSet& set) {
     box.size[a] = static_cast<std::int32_t>(high[a] - low[a] + 1);
     voxels *= box.size[a];
   }
-  if (voxels > kMostVoxels) {
+  if (voxels > kMostOwned) {
     throw Error(ErrorKind::data, "posed volume", "the posed body needs more than 2^31 voxels",
                 "use a region, coarser voxels, or a pose nearer to the scanned place");
   }

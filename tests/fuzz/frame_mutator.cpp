@@ -116,8 +116,8 @@ std::uint64_t odd_number(Dice& dice, std::uint64_t was) {
 
 // Any bytes, a little longer than they were at most.
 void change_bytes(std::string& bytes, const ChangeBytes& change) {
-  const std::size_t most = bytes.size() + 64;
-  bytes = change(std::move(bytes), most);
+  const std::size_t longest = bytes.size() + 64;
+  bytes = change(std::move(bytes), longest);
 }
 
 WireField new_field(Dice& dice) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <sstream>
 #include <string>
 
@@ -10,16 +9,13 @@
 #include "io/motion/bvh.hpp"
 #include "io/motion/gltf_clip.hpp"
 #include "io/motion/table_file.hpp"
+#include "tests/fuzz/promises.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace ecorche::fuzz {
 namespace {
 
 constexpr std::size_t kFrames = 16;  // read of each clip, over its length
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
 
 std::string text_of(Bytes bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};

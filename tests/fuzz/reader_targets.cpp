@@ -3,7 +3,6 @@
 // measured.
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <initializer_list>
 #include <string>
 
@@ -33,6 +32,7 @@
 #include "io/surface/vtu.hpp"
 #include "tests/fuzz/peak_bytes.hpp"
 #include "tests/fuzz/place.hpp"
+#include "tests/fuzz/promises.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/toy_model.hpp"
 
@@ -47,12 +47,6 @@ constexpr std::uint64_t kBeside = 1 << 16, kBesideImage = 3 << 20;
 // A tree of YAML has no budget of its own: a value of one letter and a comma is a node of a hundred bytes, in
 // a list that doubles, and a token of yaml-cpp.
 constexpr std::uint64_t kPerByteOfText = 1024;
-
-void must(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "broken: %s\n", what);
-  std::abort();
-}
 
 void look_at(const SurfaceMesh& mesh) {
   must(mesh.F.rows() > 0 && mesh.V.allFinite(), "a surface has triangles, and points that are finite");

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -15,6 +14,7 @@
 #include "runtime/server/handlers/message_reader.hpp"
 #include "runtime/server/handlers/message_table.hpp"
 #include "runtime/server/net/web.hpp"
+#include "tests/fuzz/promises.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/toy_model.hpp"
 
@@ -22,12 +22,6 @@ namespace ecorche::fuzz {
 namespace {
 
 using namespace server;
-
-constexpr wire::FrameLimits kLimits{.envelope_bytes = 1 << 16, .payload_bytes = 1 << 16};
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
 
 // The toy body, served.
 struct Stage {
@@ -108,7 +102,7 @@ class GivenTransport final : public Transport {
 
 // A client that speaks WebSocket: its messages, to the end.
 net::awaitable<void> read_messages(std::unique_ptr<Transport> transport) {
-  MessageReader reader(kLimits);
+  MessageReader reader(kFrameLimits);
   boost::system::error_code ec;
   while (true) {
     const std::size_t n = co_await transport->read_some(reader.buffer(), ec);
@@ -175,7 +169,7 @@ void requests(Bytes bytes) {
     open.mutable_open_model()->set_session("fuzzed");
     send(std::move(open));
   }
-  wire::FrameReader reader(kLimits);
+  wire::FrameReader reader(kFrameLimits);
   while (!bytes.empty()) {
     const auto into = reader.prepare();
     const std::size_t n = std::min(into.size(), bytes.size());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <functional>
 
@@ -12,16 +11,11 @@
 #include "proto/arrays.hpp"
 #include "proto/recording.hpp"
 #include "tests/fuzz/peak_bytes.hpp"
+#include "tests/fuzz/promises.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace ecorche::fuzz {
 namespace {
-
-constexpr wire::FrameLimits kLimits{.envelope_bytes = 1 << 16, .payload_bytes = 1 << 16};
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
 
 void look_at(const v1::Array& array, const wire::Payload& payload) {
   std::span<const std::byte> found;
@@ -66,7 +60,7 @@ void framing(Bytes bytes) {
   if (bytes.empty()) return;
   const std::size_t piece = 1 + std::to_integer<std::size_t>(bytes[0]);
   bytes = bytes.subspan(1);
-  wire::FrameReader reader(kLimits);
+  wire::FrameReader reader(kFrameLimits);
   std::size_t read = 0, written = 0;
   while (!bytes.empty()) {
     const auto into = reader.prepare();
@@ -111,7 +105,7 @@ void must_stay_small(Bytes bytes, std::int64_t declared, const std::function<voi
 // Every frame of the bytes, up to the first that is none.
 template <class Look>
 void each_frame(Bytes bytes, Look&& look) {
-  wire::FrameReader reader(kLimits);
+  wire::FrameReader reader(kFrameLimits);
   while (!bytes.empty()) {
     const auto into = reader.prepare();
     const std::size_t n = std::min(into.size(), bytes.size());
@@ -125,7 +119,7 @@ void each_frame(Bytes bytes, Look&& look) {
 }  // namespace
 
 void meshes(Bytes bytes) {
-  must_stay_small(bytes, kLimits.envelope_bytes + kLimits.payload_bytes, [&] {
+  must_stay_small(bytes, kFrameLimits.envelope_bytes + kFrameLimits.payload_bytes, [&] {
     wire::MeshDecoder decoder;
     std::vector<wire::DecodedTissue> tissues;
     each_frame(bytes, [&](const wire::Frame& frame) {

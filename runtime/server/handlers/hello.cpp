@@ -22,7 +22,7 @@ constexpr std::array kFeatures{v1::FEATURE_VOLUMES,  v1::FEATURE_QUALITY,      v
                                v1::FEATURE_PRESENCE, v1::FEATURE_SKINNING,     v1::FEATURE_RADIOGRAPH,
                                v1::FEATURE_FIELDS,   v1::FEATURE_HANG_SPHERES, v1::FEATURE_SETTLE};
 
-void describe(const Limits& limits, v1::Limits& out) {
+void write_limits(const Limits& limits, v1::Limits& out) {
   out.set_hello_bytes(limits.hello_bytes);
   out.set_hello_seconds(limits.hello_seconds);
   out.set_envelope_bytes(limits.envelope_bytes);
@@ -88,7 +88,7 @@ Status handle_client_hello(Client& client, const v1::ClientHello& hello, const R
   if (registry.recordings().enabled()) out.add_features(v1::FEATURE_RECORD);
   for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
     out.add_encodings(encoding);
-  describe(registry.limits(), *out.mutable_limits());
+  write_limits(registry.limits(), *out.mutable_limits());
   out.set_connection(client.number());
   const std::string resume_token = random_token();
   out.set_resume_token(resume_token);

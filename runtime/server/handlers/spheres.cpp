@@ -34,8 +34,8 @@ v1::Array append_rows_of(wire::Payload& payload, const std::vector<T>& values, s
   return wire::append(payload, std::span<const T>(values), components);
 }
 
-void describe(const VolumetricSkeleton& skeleton, const runtime::Hanging& hanging, v1::Spheres& out,
-              wire::Payload& payload) {
+void write_spheres(const VolumetricSkeleton& skeleton, const runtime::Hanging& hanging, v1::Spheres& out,
+                   wire::Payload& payload) {
   out.set_name(skeleton.name);
   wire::to_proto(skeleton.grid, *out.mutable_grid());
   out.set_metric(skeleton.metric == DistanceMetric::euclidean ? v1::Spheres::METRIC_EUCLIDEAN
@@ -95,8 +95,8 @@ Status handle_get_spheres(Client& client, const v1::GetSpheres& get, const Reque
   v1::Envelope envelope;
   auto payload = std::make_shared<wire::Payload>();
   const VolumetricSkeleton& skeleton = model.spheres[row];
-  describe(skeleton, hung ? hung->hanging() : runtime::hanging_of(skeleton, model.rig.skeleton),
-           *envelope.mutable_spheres(), *payload);
+  write_spheres(skeleton, hung ? hung->hanging() : runtime::hanging_of(skeleton, model.rig.skeleton),
+                *envelope.mutable_spheres(), *payload);
   envelope.mutable_spheres()->set_by_hand(hung != nullptr);
   client.answer(request.id(), std::move(envelope), std::move(payload));
   return {};

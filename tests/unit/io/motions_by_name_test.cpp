@@ -19,7 +19,7 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kInRadians = std::numbers::pi / 180;
 
 Rig rig_of(const std::string& example) {
   return {read_skeleton(std::string(ECORCHE_SOURCE) + "/examples/" + example + "/skeleton.yaml"), {}};
@@ -28,7 +28,7 @@ Rig rig_of(const std::string& example) {
 double degrees(const Rig& rig, const Pose& pose, const std::string& joint, std::size_t angle) {
   const auto row = static_cast<std::size_t>(rig.skeleton.find_joint(joint));
   return kinematics::angles_from_rotation(rig.skeleton.segments.at(row).joint, pose.rotation.at(row))[angle] /
-         kDegree;
+         kInRadians;
 }
 
 TEST(PoseLibrary, AnglesMeanTheSameOnEveryBody) {
@@ -44,7 +44,7 @@ TEST(PoseLibrary, AnglesMeanTheSameOnEveryBody) {
       std::vector<ClampedJoint> clamped;
       kinematics::constrain(rig.skeleton, done, clamped);
       for (const ClampedJoint& c : clamped)
-        EXPECT_LT(c.removed, 11 * kDegree)
+        EXPECT_LT(c.removed, 11 * kInRadians)
             << body << " " << name << " "
             << rig.skeleton.segments[static_cast<std::size_t>(c.joint)].joint.name;
     }

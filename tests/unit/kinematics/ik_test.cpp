@@ -17,7 +17,7 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kInRadians = std::numbers::pi / 180;
 constexpr double kUpper = 300, kFore = 250;
 
 // A trunk at the origin, an arm that hangs, straight: ball, hinge (flexion 0 to 150 degrees), hand.
@@ -39,7 +39,7 @@ Rig arm() {
   add("upper", 0, JointKind::ball, {200, 0, 500});
   AngleAxis& elbow = add("fore", 1, JointKind::hinge, {200, 0, 500 - kUpper}).sequence[0];
   elbow.min = 0;
-  elbow.max = 150 * kDegree;
+  elbow.max = 150 * kInRadians;
   add("hand", 2, JointKind::universal, {200, 0, 500 - kUpper - kFore});
   return rig;
 }
@@ -89,16 +89,16 @@ TEST(Ik, AStraightArmIsPulledIn) {
 // The twin looks at every elbow angle that the limit leaves; the shoulder turns the wrist to any side.
 TEST(Ik, LimitsHoldAndTheRestIsTheBest) {
   Rig rig = arm();
-  rig.skeleton.segments[2].joint.sequence[0].max = 80 * kDegree;
+  rig.skeleton.segments[2].joint.sequence[0].max = 80 * kInRadians;
   const Vector3d goal = kShoulder + Vector3d(0, -220, 0);
   const IkResult result = solve_ik(rig, Pose::rest(4), wrist_to(goal));
   double best = 1e9;
   for (double angle = 0; angle <= 80; angle += 0.01) {
-    const double inner = std::numbers::pi - angle * kDegree;
+    const double inner = std::numbers::pi - angle * kInRadians;
     const double reach = std::sqrt(kUpper * kUpper + kFore * kFore - 2 * kUpper * kFore * std::cos(inner));
     best = std::min(best, std::abs(reach - 220));
   }
-  EXPECT_LE(elbow_of(rig, result.pose), 80 * kDegree + 1e-9);
+  EXPECT_LE(elbow_of(rig, result.pose), 80 * kInRadians + 1e-9);
   EXPECT_NEAR(result.away_mm[0], best, 0.5);
 }
 
@@ -114,8 +114,8 @@ Rig body() {
       segment.joint.kind = k == 1 ? JointKind::hinge : JointKind::ball;
       segment.joint.center = {x, 0, -20.0 - 400.0 * k};
       segment.joint.sequence = test::sequence({0, 1, 2}, {k == 1 ? 1.0 : -1.0, 1, 1});
-      segment.joint.sequence[0].min = (k == 1 ? 0 : -60) * kDegree;
-      segment.joint.sequence[0].max = 140 * kDegree;
+      segment.joint.sequence[0].min = (k == 1 ? 0 : -60) * kInRadians;
+      segment.joint.sequence[0].max = 140 * kInRadians;
       rig.skeleton.segments.push_back(segment);
       rig.fits.push_back({segment.joint.name, CenterRule::given, 0, 0, 1, 0});
     }
@@ -129,8 +129,8 @@ Rig body() {
   head.joint.center = {0, 0, 600};
   head.joint.sequence = test::sequence({0, 1, 2});
   for (AngleAxis& angle : head.joint.sequence) {
-    angle.min = -50 * kDegree;
-    angle.max = 50 * kDegree;
+    angle.min = -50 * kInRadians;
+    angle.max = 50 * kInRadians;
   }
   rig.skeleton.segments.push_back(head);
   rig.fits.push_back({"neck", CenterRule::given, 0, 0, 1, 0});
@@ -152,7 +152,7 @@ TEST(Ik, FeetStayWhileTheBodyGoesDown) {
   for (const double away : result.away_mm) EXPECT_LT(away, 0.1);
   for (const std::size_t shank : {std::size_t{5}, std::size_t{8}})
     EXPECT_GT(angles_from_rotation(rig.skeleton.segments[shank].joint, result.pose.rotation[shank])[0],
-              40 * kDegree);
+              40 * kInRadians);
 }
 
 TEST(Ik, SeveralTargetsAndALook) {
@@ -170,8 +170,8 @@ TEST(Ik, SeveralTargetsAndALook) {
   // Behind the back: as far as the neck goes.
   problem.looks[0].at = {100, 900, 600};
   const IkResult behind = solve_ik(rig, Pose::rest(11), problem);
-  EXPECT_GT(behind.off[0], 30 * kDegree);
-  EXPECT_LT(behind.off[0], 175 * kDegree);
+  EXPECT_GT(behind.off[0], 30 * kInRadians);
+  EXPECT_LT(behind.off[0], 175 * kInRadians);
 }
 
 TEST(Ik, CoupledJointsFollow) {

@@ -11,6 +11,7 @@
 
 #include "preprocess/rig/bone_end.hpp"
 #include "preprocess/rig/local_normals.hpp"
+#include "tests/unit/rig/axis_angle.hpp"
 #include "tests/unit/rig/balls.hpp"
 
 namespace ecorche::rig {
@@ -19,10 +20,6 @@ namespace {
 using Eigen::Vector3d;
 
 const Vector3d kAt(30, -20, 400), kAxle = Vector3d(0.95, 0.2, -0.24).normalized();
-
-double degrees(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
-}
 
 // From the axis through kAt along kAxle, mm.
 double off_axis(const Vector3d& p) {

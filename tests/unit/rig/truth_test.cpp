@@ -14,6 +14,7 @@
 #include "phantom/isosurface.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/rig/joint_sources.hpp"
+#include "tests/unit/rig/axis_angle.hpp"
 #include "tests/unit/rig/balls.hpp"
 
 namespace ecorche::rig {
@@ -21,10 +22,6 @@ namespace {
 
 using Eigen::Vector3d;
 using phantom::Landmarks;
-
-double degrees(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
-}
 
 /// A joint of the phantom: its bone, and the true sphere (no axis) or cylinder on it.
 struct Truth {

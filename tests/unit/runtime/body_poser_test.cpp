@@ -20,7 +20,7 @@ namespace {
 using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 Pose random_pose(std::mt19937& random, double most) {
   std::uniform_real_distribution<double> angle(-most, most), mm(-500, 500);

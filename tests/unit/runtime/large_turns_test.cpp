@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::AngleAxisd;
 using Eigen::Vector3d;
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // Largest growth of any edge of the tets: a tear would stretch edges across it to the size of the body.
 double largest_stretch(const Model& model, const std::vector<float>& nodes) {

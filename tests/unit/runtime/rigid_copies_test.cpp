@@ -22,14 +22,14 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Posed {
+struct PosedCopies {
   std::shared_ptr<const Model> model;
   std::vector<RigidTransform> motion;
   std::vector<float> nodes;
 };
 
-Posed posed_toy(double flexion, const std::shared_ptr<const Model>& model) {
-  Posed out{model, {}, {}};
+PosedCopies posed_toy(double flexion, const std::shared_ptr<const Model>& model) {
+  PosedCopies out{model, {}, {}};
   Pose pose = Pose::rest(3);
   pose.rotation[0] = Eigen::AngleAxisd(0.3, Vector3d(1, 2, 2) / 3);
   pose.rotation[1] = Eigen::AngleAxisd(flexion, Vector3d::UnitX());
@@ -42,7 +42,7 @@ Posed posed_toy(double flexion, const std::shared_ptr<const Model>& model) {
   out.nodes = body.nodes;
   return out;
 }
-Posed posed_toy(double flexion) {
+PosedCopies posed_toy(double flexion) {
   return posed_toy(flexion, std::make_shared<const Model>(test::contested_toy()));
 }
 
@@ -62,7 +62,7 @@ std::span<const float> rest_of(const Model& model) {
 
 TEST(RigidCopies, FollowTheirSegmentsToTheRoundingOfFloats) {
   for (const double flexion : {0.0, 0.7, 1.6}) {
-    const Posed posed = posed_toy(flexion);
+    const PosedCopies posed = posed_toy(flexion);
     const Model& model = *posed.model;
     const RigidCopies copies(model);
     ASSERT_EQ(copies.tets(), model.contested.size());
@@ -120,7 +120,7 @@ struct Sure {
   int bone = -1;
   Vector3d rest = Vector3d::Zero();
 };
-Sure sure_bone(const Posed& posed, const Vector3d& at) {
+Sure sure_bone(const PosedCopies& posed, const Vector3d& at) {
   Sure out;
   int touching = 0;
   for (int b = 0; b < 3; ++b) {
@@ -153,7 +153,7 @@ ModelVolume heights() {
 }
 
 // Voxels that show something else than the rigidly moved scan does, by over 1.5 mm.
-std::size_t wrong_bone_voxels(const Posed& posed, const Image& scan) {
+std::size_t wrong_bone_voxels(const PosedCopies& posed, const Image& scan) {
   const auto value = scan.scalars<std::uint16_t>();
   std::size_t wrong = 0, bone = 0;
   for (int k = 0; k < scan.grid.size[2]; ++k) {
@@ -174,7 +174,7 @@ std::size_t wrong_bone_voxels(const Posed& posed, const Image& scan) {
 TEST(RigidCopies, KeepTheBonesOfAPosedVolumeWhole) {
   const ModelVolume bones = heights();
   for (const double flexion : {0.5, 1.2}) {
-    const Posed posed = posed_toy(flexion);
+    const PosedCopies posed = posed_toy(flexion);
     ImageGrid grid = bones.image.grid;
     grid.spacing = {2, 2, 2};
     grid = lattice_over(grid, posed.nodes);
@@ -189,7 +189,7 @@ TEST(RigidCopies, KeepTheBonesOfAPosedVolumeWhole) {
 }
 
 TEST(RigidCopies, VolumesArePosedAsByTheirSlowTwins) {
-  const Posed posed = posed_toy(1.2);
+  const PosedCopies posed = posed_toy(1.2);
   const ModelVolume bones = heights();
   const ImageGrid grid = lattice_over(bones.image.grid, posed.nodes);
   const Image fast = pose_volume(posed.model, posed.nodes, bones, Sampling::nearest, grid);
@@ -223,7 +223,7 @@ TEST(RigidCopies, VolumesArePosedAsByTheirSlowTwins) {
   VolumePoser::Scratch scratch;
   PosedVolume kept;
   for (const double flexion : {1.2, 1.21, 0.4}) {
-    const Posed next = posed_toy(flexion, posed.model);
+    const PosedCopies next = posed_toy(flexion, posed.model);
     poser.follow(next.nodes, bones, Sampling::nearest, grid, kept, scratch);
     const Image whole = pose_volume(posed.model, next.nodes, bones, Sampling::nearest, grid);
     EXPECT_EQ(kept.image.bytes, whole.bytes) << flexion;
@@ -231,7 +231,7 @@ TEST(RigidCopies, VolumesArePosedAsByTheirSlowTwins) {
 }
 
 TEST(RigidCopies, ProbesFindWhatIsDrawn) {
-  const Posed posed = posed_toy(1.2);
+  const PosedCopies posed = posed_toy(1.2);
   const Model& model = *posed.model;
   const RigidCopies copies(model);
   const DrawnBody drawn = drawn_body(model.tets, rest_of(model), posed.nodes, copies);

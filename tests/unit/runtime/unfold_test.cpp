@@ -97,7 +97,7 @@ TEST(Lbfgs, FindsTheLeastOfAValley) {
 }
 
 /// The beam, its lowest and highest thirds in bones, bent at the middle joint.
-struct Bent {
+struct BentLattice {
   std::shared_ptr<const Model> model;
   BodyPoser poser;
   PosedBody body;
@@ -117,7 +117,7 @@ struct Bent {
     return model;
   }
 
-  explicit Bent(double angle)
+  explicit BentLattice(double angle)
       : model(std::make_shared<const Model>(boned())), poser(model), body(poser.make_frame()) {
     Pose pose = Pose::rest(3);
     pose.rotation[1] = Eigen::AngleAxisd(angle, Vector3d::UnitX());
@@ -129,7 +129,7 @@ struct Bent {
 };
 
 TEST(Unfold, LeavesNoTetInvertedThatIsFree) {
-  Bent bent(2.2);
+  BentLattice bent(2.2);
   const std::size_t before = bent.inverted();
   ASSERT_GT(before, 5u);
   const Unfolding done = unfold(*bent.model, bent.body, Context{});
@@ -143,7 +143,7 @@ TEST(Unfold, LeavesNoTetInvertedThatIsFree) {
 }
 
 TEST(Unfold, BonesStayAndTissuesHangOnTheirTets) {
-  Bent bent(2.2);
+  BentLattice bent(2.2);
   const PosedBody skinned = bent.body;
   unfold(*bent.model, bent.body, Context{});
   const Model& model = *bent.model;
@@ -177,7 +177,7 @@ TEST(Unfold, BonesStayAndTissuesHangOnTheirTets) {
 }
 
 TEST(Unfold, LeavesABodyWithoutFoldsToTheBit) {
-  Bent bent(0.3);
+  BentLattice bent(0.3);
   ASSERT_EQ(bent.inverted(), 0u);
   const PosedBody skinned = bent.body;
   const Unfolding done = unfold(*bent.model, bent.body, Context{});
@@ -187,7 +187,7 @@ TEST(Unfold, LeavesABodyWithoutFoldsToTheBit) {
 }
 
 TEST(Unfold, WhatBonesSqueezeStaysAndIsCounted) {
-  Bent bent(0);
+  BentLattice bent(0);
   // A tet between two bones, its corners all held, turned inside out.
   Model model = *bent.model;
   std::size_t squeezed = 0;
@@ -219,8 +219,8 @@ TEST(Unfold, WhatBonesSqueezeStaysAndIsCounted) {
 
 /// Beside the bend, the free end of the beam is sheared, and two nodes of the bone below it have changed
 /// places: what lies on them cannot be unfolded.
-struct Hopeless : Bent {
-  Hopeless() : Bent(2.2) {
+struct Hopeless : BentLattice {
+  Hopeless() : BentLattice(2.2) {
     Model changed = *model;
     float end = 0;  // of the bone
     for (std::size_t t = 0; t < changed.tet_count(); ++t) {
@@ -275,14 +275,14 @@ TEST(Unfold, WhatCannotBeUnfoldedPushesNothingAway) {
 
 TEST(Unfold, SameForAnyNumberOfThreads) {
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
-  Bent one(2.2), four(2.2);
+  BentLattice one(2.2), four(2.2);
   tbb::task_arena(1).execute([&] { unfold(*one.model, one.body, Context{}); });
   tbb::task_arena(4).execute([&] { unfold(*four.model, four.body, Context{}); });
   EXPECT_EQ(one.body.nodes, four.body.nodes);
 }
 
 TEST(Unfold, CanBeInterrupted) {
-  Bent bent(2.2);
+  BentLattice bent(2.2);
   std::stop_source stop;
   stop.request_stop();
   Context context;

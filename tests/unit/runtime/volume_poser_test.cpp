@@ -23,7 +23,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-std::vector<float> bent_nodes(const std::shared_ptr<const Model>& model, double flexion) {
+std::vector<float> flexed_nodes(const std::shared_ptr<const Model>& model, double flexion) {
   const BodyPoser poser(model);
   PosedBody body = poser.make_frame();
   Pose pose = Pose::rest(3);
@@ -104,7 +104,7 @@ class PosedInOnePass : public testing::Test {
   void expect_slow_twin(const ModelVolume& volume, Sampling sampling, const ImageGrid& grid, double most) {
     for (const double flexion : {0.0, 1.2, 2.9}) {
       SCOPED_TRACE(flexion);
-      const std::vector<float> nodes = bent_nodes(model, flexion);
+      const std::vector<float> nodes = flexed_nodes(model, flexion);
       poser.pose(nodes, volume, sampling, grid, out, scratch);
       // Ties and faces: a voxel in a thousand may go the other way.
       EXPECT_LE((differing<T>(*model, nodes, volume, sampling, out, most)), 1e-3);
@@ -141,7 +141,7 @@ TEST_F(PosedInOnePass, FinerAndCoarserGridsAndTheirParts) {
   const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
   // A third, not a half: no place of the part at rest lies half way between two voxels.
   expect_slow_twin<std::uint8_t>(volume, Sampling::nearest, skewed_grid(false, 3), 0);
-  const std::vector<float> nodes = bent_nodes(model, 1.2);
+  const std::vector<float> nodes = flexed_nodes(model, 1.2);
   const ImageGrid whole = skewed_grid(false, 2);
   Image all, part;
   poser.pose(nodes, volume, Sampling::trilinear, whole, all, scratch);
@@ -173,7 +173,7 @@ TEST_F(PosedInOnePass, FinerAndCoarserGridsAndTheirParts) {
 
 TEST_F(PosedInOnePass, SlicePlanes) {
   const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
-  const std::vector<float> nodes = bent_nodes(model, 1.2);
+  const std::vector<float> nodes = flexed_nodes(model, 1.2);
   ImageGrid slice = skewed_grid(true, 5);
   slice.origin = slice.point(0, 0, 78.5);
   slice.size[2] = 1;
@@ -311,7 +311,7 @@ TEST_F(PosedInOnePass, FlatTetsAndNodesThatAreNoNumbersDoNoHarm) {
 
 TEST_F(PosedInOnePass, SameBytesForAnyNumberOfThreads) {
   const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
-  const std::vector<float> nodes = bent_nodes(model, 2.9);
+  const std::vector<float> nodes = flexed_nodes(model, 2.9);
   Image one, four;
   tbb::task_arena(1).execute(
       [&] { one = pose_volume(model, nodes, volume, Sampling::trilinear, skewed_grid(false, 2)); });

@@ -7,12 +7,6 @@
 namespace ecorche::server {
 namespace {
 
-v1::Envelope claim() {
-  v1::Envelope envelope;
-  envelope.mutable_claim_control();
-  return envelope;
-}
-
 v1::Envelope release() {
   v1::Envelope envelope;
   envelope.mutable_release_control();

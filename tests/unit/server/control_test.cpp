@@ -6,12 +6,6 @@
 namespace ecorche::server {
 namespace {
 
-v1::Envelope claim() {
-  v1::Envelope envelope;
-  envelope.mutable_claim_control();
-  return envelope;
-}
-
 v1::Envelope open(const std::string& session) {
   v1::Envelope envelope;
   envelope.mutable_open_model()->set_model("toy");

@@ -7,12 +7,6 @@
 namespace ecorche::server {
 namespace {
 
-Options with_http() {
-  Options options;
-  options.http = Endpoint{};
-  return options;
-}
-
 // What a WebSocket hears last: the Status, and the close code behind it.
 struct Last {
   std::optional<Status> status;

@@ -67,7 +67,7 @@ bool changed(const v1::Envelope& envelope) {
   return envelope.has_model_changed();
 }
 
-v1::Envelope open(const std::string& model) {
+v1::Envelope open_model(const std::string& model) {
   v1::Envelope envelope;
   envelope.mutable_open_model()->set_model(model);
   return envelope;
@@ -106,8 +106,8 @@ TEST(Reload, AWishThatComesMeanwhileIsKept) {
 TEST(Reload, OthersStreamOnAndAreNotTold) {
   TestServer server;
   client::Client twin(server.address(), "test"), asks(server.address(), "test");
-  const v1::ModelOpened opened = twin.call(open("twin")).envelope.model_opened();
-  asks.call(open("twin"));
+  const v1::ModelOpened opened = twin.call(open_model("twin")).envelope.model_opened();
+  asks.call(open_model("twin"));
   v1::Envelope mesh;
   mesh.mutable_subscribe()->mutable_mesh();
   twin.call(mesh);
@@ -152,14 +152,14 @@ TEST(Reload, OthersStreamOnAndAreNotTold) {
   TestClient late(server);
   EXPECT_NE(late.opened().identity(), toy.opened().identity());
   client::Client later(server.address(), "test");
-  EXPECT_EQ(later.call(open("twin")).envelope.model_opened().identity(), opened.identity());
+  EXPECT_EQ(later.call(open_model("twin")).envelope.model_opened().identity(), opened.identity());
 }
 
 // Again and again: each model goes with the last who looks at it, or memory would fill.
 TEST(Reload, AModelGoesWithItsLastSession) {
   TestServer server;
   client::Client asks(server.address(), "test");
-  asks.call(open("twin"));
+  asks.call(open_model("twin"));
   std::vector<std::weak_ptr<const Model>> models;
   std::vector<std::unique_ptr<TestClient>> clients;
   for (int which = 1; which <= 4; ++which) {
@@ -181,7 +181,7 @@ TEST(Reload, AModelGoesWithItsLastSession) {
   for (const auto& model : models) EXPECT_FALSE(model.expired());
   clients[1].reset();
   EXPECT_TRUE(gone(1));
-  clients[0]->client().call(open("toy"));  // goes on with the newest
+  clients[0]->client().call(open_model("toy"));  // goes on with the newest
   EXPECT_TRUE(gone(0));
   // The others have seen nothing of it.
   for (const int which : {2, 3}) {
@@ -204,11 +204,11 @@ TEST(Reload, APlaceOfTheModelThatWasIsNotComeBackTo) {
   }
   server.reads([] { return ModelParts{another(1)}; });
   client::Client asks(server.address(), "test");
-  asks.call(open("twin"));
+  asks.call(open_model("twin"));
   asks.call(reload("toy"));
   client::Client back(server.address(), "test", access);
   EXPECT_FALSE(back.server().has_resumed());
-  v1::Envelope again = open("toy");
+  v1::Envelope again = open_model("toy");
   again.mutable_open_model()->set_session("shared");
   EXPECT_EQ(back.call(again).envelope.model_opened().role(), v1::ROLE_CONTROLLER);
 }
@@ -258,7 +258,7 @@ TEST(Reload, ModelsDoNotGoOnTheThreadThatServes) {
                                   if (serves.load() == std::thread::id{}) serves = std::this_thread::get_id();
                                 }});
   client::Client asks(server.address(), "test");
-  asks.call(open("twin"));
+  asks.call(open_model("twin"));
   const auto watched = [&](std::shared_ptr<const Model> model) {
     const Model* const body = model.get();
     return std::shared_ptr<const Model>(body, [&, model = std::move(model)](const Model*) mutable {

@@ -56,6 +56,19 @@ class TestServer {
   std::thread thread_;
 };
 
+/// With a port for browsers, too.
+inline Options with_http() {
+  Options options;
+  options.http = Endpoint{};
+  return options;
+}
+
+inline v1::Envelope claim() {
+  v1::Envelope envelope;
+  envelope.mutable_claim_control();
+  return envelope;
+}
+
 /// A client with the toy body open.
 class TestClient {
  public:

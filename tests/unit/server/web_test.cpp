@@ -9,12 +9,6 @@
 namespace ecorche::server {
 namespace {
 
-Options with_http() {
-  Options options;
-  options.http = Endpoint{};
-  return options;
-}
-
 // One that the server has greeted.
 struct Greeted : WebClient {
   explicit Greeted(const TestServer& server) : WebClient(server.http()) {

@@ -13,11 +13,11 @@ namespace {
 
 // A tree like a man's: a spine along z from 0 to 9, legs from its foot, arms from voxel 7; 2 mm voxels, the
 // root of the tree where nobody picks.
-struct Body {
+struct PickedBody {
   VolumetricSkeleton skeleton;
   Mask mask;  // flesh about it, one voxel thick
 
-  Body() {
+  PickedBody() {
     skeleton.grid.size = {30, 5, 30};
     skeleton.grid.origin = {-30, 0, 100};
     skeleton.grid.spacing = {2, 2, 2};
@@ -64,7 +64,7 @@ std::string parent_of(const Skeleton& rig, const std::string& name) {
 }
 
 TEST(Picks, ParentsAreTheNearestOnTheWayToTheFirst) {
-  const Body body;
+  const PickedBody body;
   // Knees before hips, hands before the chest.
   const std::vector<Pick> picks{{"pelvis", "", body.at(15, 10)},           {"knee_left", "", body.at(20, 5)},
                                 {"hand_right", "", body.at(8, 17)},        {"hip_left", "", body.at(16, 9)},
@@ -104,7 +104,7 @@ TEST(Picks, ParentsAreTheNearestOnTheWayToTheFirst) {
 TEST(Picks, ALineWithinTheBodyCountsMoreThanTheTree) {
   // Flesh between the left elbow and the left hip: they are in one lump, as in a body that was scanned
   // sitting.
-  Body body;
+  PickedBody body;
   const std::vector<Pick> picks{{"pelvis", "", body.at(15, 11)},
                                 {"hip", "", body.at(19, 6)},
                                 {"hand", "", body.at(20, 17)},
@@ -129,7 +129,7 @@ TEST(Picks, ALineWithinTheBodyCountsMoreThanTheTree) {
 }
 
 TEST(Picks, WhatNoTreeCanMeanIsRefused) {
-  Body body;
+  PickedBody body;
   std::vector<Snapped> moved;
   const auto refused = [&](const std::vector<Pick>& picks, const std::string& why) {
     try {
