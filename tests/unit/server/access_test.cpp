@@ -47,10 +47,6 @@ std::string message_of(const std::function<void()>& work) {
   return "no error";
 }
 
-bool says(const std::string& message, const std::string& part) {
-  return message.find(part) != std::string::npos;
-}
-
 ErrorKind kind_of(const std::function<void()>& work) {
   try {
     work();

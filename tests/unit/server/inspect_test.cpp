@@ -42,13 +42,13 @@ Pose far_bent(const TestClient& client) {
   return pose;
 }
 
-struct Offline {
+struct OfflineInspected {
   std::shared_ptr<const Model> model;
   runtime::BodyPoser poser;
   runtime::PosedBody body;
   RigidTransform root;
 
-  Offline(const Model& of, const Pose& pose)
+  OfflineInspected(const Model& of, const Pose& pose)
       : model(std::make_shared<const Model>(of)), poser(model), body(poser.make_frame()) {
     EXPECT_TRUE(poser
                     .run(pose, runtime::Skinning::cor, poser.all_tissues(), body, runtime::NodesOf::body,
@@ -82,7 +82,7 @@ TEST(InspectTest, ARadiographIsThatMadeOffline) {
   TestClient client(server);
   client.send(4, far_bent(client));
   client.next_ack();
-  const Offline offline(server.model(), far_bent(client));
+  const OfflineInspected offline(server.model(), far_bent(client));
   const runtime::ChosenSetup setup = offline.setup("tip");
   const wire::Frame answer = client.client().call(shot("tip"));
   const v1::Radiograph& picture = answer.envelope.radiograph();
@@ -119,7 +119,7 @@ TEST(InspectTest, SurfacesAndPlacesAsOffline) {
   TestClient client(server);
   client.send(1, far_bent(client));
   client.next_ack();
-  const Offline offline(server.model(), far_bent(client));
+  const OfflineInspected offline(server.model(), far_bent(client));
   const runtime::ChosenSetup setup = offline.setup("middle");
   v1::Envelope first = shot("middle");
   first.mutable_render_radiograph()->set_surfaces(true);
@@ -233,7 +233,7 @@ TEST(InspectTest, FieldsAreThoseOfTheTets) {
   client.send(9, far_bent(client));
   client.next_ack();
   const Model& model = server.model();
-  const Offline offline(model, far_bent(client));
+  const OfflineInspected offline(model, far_bent(client));
   const std::vector<float> det = runtime::tet_det_f(model, offline.body.nodes);
   v1::Envelope request;
   request.mutable_sample_field()->set_kind(v1::SampleField::KIND_DET_F);

@@ -88,9 +88,9 @@ Pose turned(std::size_t pose) {
 }
 
 // The same asked of a pose offline.
-class Offline {
+class OfflineProbe {
  public:
-  explicit Offline(const Model& model)
+  explicit OfflineProbe(const Model& model)
       : model_(std::make_shared<const Model>(model)), poser_(model_), probe_(model_) {}
 
   void pose(const Pose& pose) {
@@ -150,7 +150,7 @@ TEST(ProbeTest, BothWaysAsOffline) {
   poser.send(4, poser.bent(0.6));
   poser.next_ack();
   Prober prober(server);
-  Offline offline(server.model());
+  OfflineProbe offline(server.model());
   offline.pose(poser.bent(0.6));
 
   // Few are asked on the spot, many by a worker.
@@ -252,7 +252,7 @@ TEST(ProbeTest, FewAndManyAtOnceWhilePosesCome) {
   const TestServer server({}, layered());
   const std::vector<double> points = along(kCount);
   std::vector<std::vector<float>> expected;  // by pose
-  Offline offline(server.model());
+  OfflineProbe offline(server.model());
   for (std::size_t pose = 0; pose < kPoses; ++pose) {
     offline.pose(turned(pose));
     expected.push_back(offline.ask(points, kToRest).points);

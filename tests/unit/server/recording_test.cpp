@@ -35,13 +35,6 @@ class RecordingTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
-v1::Envelope record(bool on, const std::string& name = {}) {
-  v1::Envelope envelope;
-  envelope.mutable_record()->set_on(on);
-  envelope.mutable_record()->set_name(name);
-  return envelope;
-}
-
 Status read(const std::string& bytes, wire::RecordedSession& out) {
   return wire::read_recording(std::as_bytes(std::span(bytes)), out);
 }

@@ -41,13 +41,6 @@ class RecordingsTest : public testing::Test {
   fs::path folder_;
 };
 
-v1::Envelope record(bool on, const std::string& name = {}) {
-  v1::Envelope envelope;
-  envelope.mutable_record()->set_on(on);
-  envelope.mutable_record()->set_name(name);
-  return envelope;
-}
-
 // Why it is refused; empty where it is not.
 std::string refusal(TestClient& client, const v1::Envelope& request) {
   try {
@@ -56,10 +49,6 @@ std::string refusal(TestClient& client, const v1::Envelope& request) {
   } catch (const Error& error) {
     return error.what();
   }
-}
-
-bool says(const std::string& text, const std::string& what) {
-  return text.find(what) != std::string::npos;
 }
 
 template <class Done>

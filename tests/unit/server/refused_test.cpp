@@ -16,7 +16,7 @@ Status answer_to(TestClient& client, v1::Envelope request) {
   return got.has_status() ? wire::from_proto(got.status()) : Status{};
 }
 
-bool says(const Status& status, const std::string& part) {
+bool status_says(const Status& status, const std::string& part) {
   return status.message.find(part) != std::string::npos;
 }
 
@@ -45,12 +45,12 @@ TEST(Refused, OtherNumbersThatStandForNothing) {
   for (const int number : {-1, 9}) {
     v1::Envelope mesh, volume, probe;
     mesh.mutable_subscribe()->mutable_mesh()->set_encoding(static_cast<v1::Encoding>(number));
-    EXPECT_TRUE(says(answer_to(client, mesh), "encoding " + std::to_string(number)));
+    EXPECT_TRUE(status_says(answer_to(client, mesh), "encoding " + std::to_string(number)));
     volume.mutable_subscribe()->mutable_volume()->set_volume("ct");
     volume.mutable_subscribe()->mutable_volume()->set_deformer(static_cast<v1::Deformer>(number));
-    EXPECT_TRUE(says(answer_to(client, volume), "deformer " + std::to_string(number)));
+    EXPECT_TRUE(status_says(answer_to(client, volume), "deformer " + std::to_string(number)));
     probe.mutable_probe_points()->set_direction(static_cast<v1::ProbePoints::Direction>(number));
-    EXPECT_TRUE(says(answer_to(client, probe), "no direction"));
+    EXPECT_TRUE(status_says(answer_to(client, probe), "no direction"));
   }
 }
 
@@ -61,7 +61,7 @@ TEST(Refused, PingsThatAreNoPings) {
   ping.mutable_ping()->set_data(std::string(65, 'x'));
   const Status status = answer_to(client, ping);
   EXPECT_EQ(status.code, StatusCode::invalid_argument);
-  EXPECT_TRUE(says(status, "ping: 65 bytes of data (send at most 64)")) << status.message;
+  EXPECT_TRUE(status_says(status, "ping: 65 bytes of data (send at most 64)")) << status.message;
   ping.mutable_ping()->mutable_data()->resize(64);
   EXPECT_EQ(client.client().call(ping).envelope.pong().data(), ping.ping().data());
 }
@@ -78,7 +78,7 @@ TEST(Refused, MeshRegionsThatShowNothing) {
     mesh.set_level(level);
     const Status status = answer_to(client, request);
     EXPECT_EQ(status.code, StatusCode::invalid_argument);
-    EXPECT_TRUE(says(status, "no vertex of the tissues lies in the region")) << status.message;
+    EXPECT_TRUE(status_says(status, "no vertex of the tissues lies in the region")) << status.message;
   }
   for (auto* corner : {box.mutable_min(), box.mutable_max()}) {
     const double sign = corner == box.mutable_min() ? -1 : 1;

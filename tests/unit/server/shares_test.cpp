@@ -15,10 +15,6 @@
 namespace ecorche::server {
 namespace {
 
-bool starts(const std::string& text, const std::string& with) {
-  return text.rfind(with, 0) == 0;
-}
-
 // A client at another address of this machine.
 class Elsewhere {
  public:

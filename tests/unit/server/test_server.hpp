@@ -69,6 +69,21 @@ inline v1::Envelope claim() {
   return envelope;
 }
 
+inline v1::Envelope record(bool on, const std::string& name = {}) {
+  v1::Envelope envelope;
+  envelope.mutable_record()->set_on(on);
+  envelope.mutable_record()->set_name(name);
+  return envelope;
+}
+
+inline bool starts(const std::string& text, const std::string& with) {
+  return text.rfind(with, 0) == 0;
+}
+
+inline bool says(const std::string& text, const std::string& what) {
+  return text.find(what) != std::string::npos;
+}
+
 /// A client with the toy body open.
 class TestClient {
  public:

@@ -18,10 +18,6 @@ struct Greeted : WebClient {
   }
 };
 
-bool starts(const std::string& text, const std::string& with) {
-  return text.rfind(with, 0) == 0;
-}
-
 TEST(Web, HealthAndReadinessAreTold) {
   const TestServer server(with_http());
   EXPECT_TRUE(starts(WebClient(server.http()).get("/healthz"), "HTTP/1.1 200"));
