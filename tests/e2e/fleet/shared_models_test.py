@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Servers of one machine with one copy of a model's pages between them, by PSS; and frames right whatever stands in their folder.
+"""Servers of one machine with one copy of a model's pages between them, by PSS of data; and frames right whatever stands in their folder.
 
 usage: shared_models_test.py SOURCE; the environment is that of the fixtures
 """
@@ -23,9 +23,9 @@ CLIP = sorted(pathlib.Path(os.environ["ECORCHE_CASE"]).glob("**/walk.bvh"))[0]
 
 
 def pss(server):
-    """MiB of a process, of what others have, too, its share."""
+    """MiB of a process' data, of what others have, too, its share. Its code is shared with whatever else of ecorche runs just then."""
     rollup = pathlib.Path(f"/proc/{server.process.pid}/smaps_rollup").read_text()
-    return int(re.search(r"^Pss: +(\d+) kB", rollup, re.M)[1]) / 1024
+    return sum(int(kilobytes) for kilobytes in re.findall(r"^Pss_(?:Anon|Shmem): +(\d+) kB", rollup, re.M)) / 1024
 
 
 def of_folder(server, folder):

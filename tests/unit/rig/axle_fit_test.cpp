@@ -126,7 +126,9 @@ TEST(Axle, is_sought_where_it_is_expected_only) {
   EXPECT_FALSE(fit_axle(few));
   for (int i = 0; i < 11; ++i) add(few, Vector3d(i, i * i, 0), Vector3d(0, 0, 1));
   EXPECT_FALSE(fit_axle(few));
-  for (int i = 0; i < 100; ++i) add(few, Vector3d(i % 10, i / 10, 0), Vector3d(0, 0, 1));
+  for (int row = 0; row < 10; ++row) {
+    for (int i = 0; i < 10; ++i) add(few, Vector3d(i, row, 0), Vector3d(0, 0, 1));
+  }
   EXPECT_FALSE(fit_axle(few));  // a plane has no axle
 }
 
@@ -136,7 +138,8 @@ TEST(Normals, are_kept_where_the_surface_is_smooth_and_found_again_where_it_is_r
   std::uniform_real_distribution<double> share(-1, 1);
   for (int i = 0; i < 400; ++i) {
     const Vector3d wild(share(random), share(random), 0.4 + share(random));
-    add(flat, Vector3d(3 * (i % 20), 3 * (i / 20), 0.3 * share(random)), i < 200 ? wild : Vector3d(0, 0, 1));
+    const int row = i / 20;
+    add(flat, Vector3d(3 * (i % 20), 3 * row, 0.3 * share(random)), i < 200 ? wild : Vector3d(0, 0, 1));
   }
   SurfacePoints smooth = flat;
   for (Eigen::Index p = 0; p < smooth.at.rows(); ++p)
