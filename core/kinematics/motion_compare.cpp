@@ -16,7 +16,7 @@ using Eigen::Quaterniond;
 constexpr double kShiftFrames = 2;       // of the slower motion, either way
 constexpr std::size_t kShiftTried = 96;  // frames that a shift is judged by
 constexpr double kBetter = 0.95;         // of what varies without a shift
-constexpr double kNoneLeft = 1e-6;       // radians, over all joints: nothing to mend
+constexpr double kNothingToMend = 1e-6;  // radians, over all joints: nothing to mend
 
 // The pose at a time; nothing before the first and after the last frame.
 std::optional<Pose> pose_at(const PoseTrack& track, double seconds) {
@@ -97,7 +97,7 @@ double find_shift(const Rig& rig, const PoseTrack& one, const PoseTrack& other) 
   const auto steps = static_cast<int>(
       std::lround(kShiftFrames * std::max(one.frame_seconds, other.frame_seconds) / least_step));
   const double none = varying(0);
-  double best = 0, least = kBetter * none - kNoneLeft;
+  double best = 0, least = kBetter * none - kNothingToMend;
   for (int k = 1; k <= steps; ++k) {
     for (const double shift : {-k * least_step, k * least_step}) {
       const double here = varying(shift);

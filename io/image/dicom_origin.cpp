@@ -20,8 +20,8 @@ constexpr std::array<Tag, 15> kIdentity{0x00100010, 0x00100020, 0x00100021, 0x00
                                         0x00080030, 0x00080050, 0x00080090, 0x00200010, 0x00081030};
 // Body part, kV, exposure time, tube current, exposure, filter, kernel, window centre and width, and whether
 // it was packed with loss.
-constexpr std::array<Tag, 10> kTaking{0x00180015, 0x00180060, 0x00181150, 0x00181151, 0x00181152,
-                                      0x00181160, 0x00181210, 0x00281050, 0x00281051, 0x00282110};
+constexpr std::array<Tag, 10> kAcquisitionTags{0x00180015, 0x00180060, 0x00181150, 0x00181151, 0x00181152,
+                                               0x00181160, 0x00181210, 0x00281050, 0x00281051, 0x00282110};
 
 template <std::size_t N>
 DicomOrigin::Values values(const Item& top, const std::array<Tag, N>& tags) {
@@ -53,7 +53,8 @@ DicomOrigin read_dicom_origin(const std::filesystem::path& path, const files::Re
     fields::refuse(path, "is a series of " + first.modality,
                    "posed volumes are written as CT: name a CT series");
   const DataSet set = read_data_set(first.path, options);
-  DicomOrigin out{values(set.top, kIdentity), values(set.top, kTaking), set.top.text(kClass), {}, {}};
+  DicomOrigin out{
+      values(set.top, kIdentity), values(set.top, kAcquisitionTags), set.top.text(kClass), {}, {}};
   for (const Slice& slice : stack.slices) {
     if (slice.frame == 0) out.objects.push_back(slice.file->object);
   }

@@ -17,7 +17,7 @@
 namespace ecorche::server {
 namespace {
 
-class Joining final : public Member {
+class GuestMember final : public Member {
  public:
   std::set<std::uint32_t> shown;  // subscriptions
 
@@ -58,7 +58,7 @@ struct Open {
   }
   // Opened and left again; may be come back to.
   std::weak_ptr<Session> leave(const std::string& name = {}) {
-    Joining guest;
+    GuestMember guest;
     const auto session = open(name);
     if (!session) return {};
     session->join(guest);
@@ -76,7 +76,7 @@ TEST(SessionRegistry, KeepsFewPlacesOfThoseWhoComeAndGo) {
   Limits limits;
   limits.connections = 3;
   Open open(limits);
-  Joining guest;
+  GuestMember guest;
   const auto session = open.open("shared");
   session->join(guest);
   for (const char* token : {"z", "y", "a", "b", "c"}) {
@@ -97,7 +97,7 @@ TEST(SessionRegistry, WhoLeavesSessionsBehindKeepsNobodyOut) {
   Limits limits;
   limits.sessions = 4;
   Open open(limits);
-  Joining guest;
+  GuestMember guest;
   const auto used = open.open("used");
   used->join(guest);
   const auto wait = [] { std::this_thread::sleep_for(std::chrono::milliseconds(2)); };
@@ -131,7 +131,7 @@ TEST(SessionRegistry, WhoLeavesSessionsBehindKeepsNobodyOut) {
 // The end of the server is that of every session's volumes.
 TEST(SessionRegistry, WhoStopsMakesNoVolumes) {
   Open open(Limits{});
-  Joining guest;
+  GuestMember guest;
   const auto session = open.open("body");
   session->join(guest);
   const auto see = [&](const StreamSpec& spec) {
