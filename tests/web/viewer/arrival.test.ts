@@ -93,6 +93,25 @@ test("a large body is shown by a coarser level first, and whole after that pictu
   assert.equal(levels[0], 2);
 });
 
+test("whoever follows again chooses alone: what had only begun to gives up", async () => {
+  const choosers = await page().evaluate(async () => {
+    const { live: { client, stream, arrival }, stage } = (window as any).ecorche, { on } = stream;
+    let choosers = 0;
+    stream.on = (name: string, listener: () => void) => {
+      const off = on.call(stream, name, listener);
+      ++choosers;
+      return () => { --choosers; off(); };
+    };
+    arrival.follow(client, stream);
+    arrival.follow(client, stream);
+    stage.invalidate();
+    await new Promise((resolve) => setTimeout(resolve, 3000));
+    stream.on = on;
+    return choosers;
+  });
+  assert.equal(choosers, 1);
+});
+
 test("on a fast line the body stays with frames", async (context) => {
   let late = false;
   await move(5000, async () => {

@@ -19,7 +19,8 @@ export class Arrival {
   #adaptation: Adaptation | null = null;
   #make: typeof GpuSkinner | null = null;
   #skinner: GpuSkinner | null = null;
-  #stream: MeshStream | null = null;
+  /** Of `follow`: whoever began before the latest one gives up. */
+  #followed = 0;
   #drawStart = 0;
   /** The GPU does not take it: frames, then, as long as this page lives. */
   #fault: string | null = null;
@@ -42,17 +43,16 @@ export class Arrival {
   follow(client: Client, stream: MeshStream): void {
     this.#adaptation?.stop();
     this.#adaptation = null;
-    this.#stream = stream;
-    this.#begin(client, stream).catch((error: unknown) => this.say(`The body goes on coming as frames: ${wordsOf(error)}`));
+    this.#begin(client, stream, ++this.#followed).catch((error: unknown) => this.say(`The body goes on coming as frames: ${wordsOf(error)}`));
   }
 
-  async #begin(client: Client, stream: MeshStream): Promise<void> {
+  async #begin(client: Client, stream: MeshStream, turn: number): Promise<void> {
     await this.#drawn(stream);
     // The whole body at once, where the picture shows less of it.
     if (!stream.options.level) await new Promise((resolve) => setTimeout(resolve, CHOOSE_AFTER_MS));
     // Whoever skins has the code ready before the first motions come.
     this.#make = (await import("../../protocol/src/skinning/gpu.js")).GpuSkinner;
-    if (this.#stream === stream) this.#adaptation = adapt(client, stream, undefined, { adaptive: true, held: this.#held });
+    if (this.#followed === turn) this.#adaptation = adapt(client, stream, undefined, { adaptive: true, held: this.#held });
   }
 
   /** There is a picture of the stream's body. */
