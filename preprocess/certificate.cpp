@@ -3,7 +3,6 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +11,7 @@
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/preprocess/pipeline.hpp>
+#include "core/linear/decompositions.hpp"
 #include "preprocess/bounds.hpp"
 #include "preprocess/geometry/closest_point.hpp"
 #include "preprocess/geometry/dihedral.hpp"
@@ -145,16 +145,13 @@ PointsF moved(const PointsF& V, const RigidTransform& motion) {
   return (turned.cast<double>().rowwise() + to).cast<float>();
 }
 
-// The largest distance, mm, that remains between `to` and the best rigid motion of `from` (Kabsch, by SVD).
+// The largest distance, mm, that remains between `to` and the best rigid motion of `from`.
 double rigid_residual(const PointsF& from, const PointsF& to) {
   const Points a = from.cast<double>(), b = to.cast<double>();
   const Eigen::RowVector3d mean_a = a.colwise().mean(), mean_b = b.colwise().mean();
-  const Eigen::Matrix3d covariance = (a.rowwise() - mean_a).transpose() * (b.rowwise() - mean_b);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
-  sign(2, 2) = (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d rotation = svd.matrixV() * sign * svd.matrixU().transpose();
-  const Points fitted = ((a.rowwise() - mean_a) * rotation.transpose()).rowwise() + mean_b;
+  const Eigen::Matrix3d turn =
+      linear::nearest_turn((b.rowwise() - mean_b).transpose() * (a.rowwise() - mean_a));
+  const Points fitted = ((a.rowwise() - mean_a) * turn.transpose()).rowwise() + mean_b;
   return (fitted - b).rowwise().norm().maxCoeff();
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/kinematics/marker_fit.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::kinematics {
 
@@ -31,17 +31,9 @@ Similarity similarity(const std::vector<Vector3d>& x, const std::vector<Vector3d
     variance += (a - mean_x).squaredNorm();
   });
   if (out.pairs >= 3 && variance > 0) {
-    // Horn 1987: the turn is the eigenvector of the largest eigenvalue of a symmetric 4 by 4 matrix.
-    const Eigen::Matrix3d S = spread.transpose();
-    Eigen::Matrix4d N;
-    N << S.trace(), S(1, 2) - S(2, 1), S(2, 0) - S(0, 2), S(0, 1) - S(1, 0),                   //
-        S(1, 2) - S(2, 1), S(0, 0) - S(1, 1) - S(2, 2), S(0, 1) + S(1, 0), S(2, 0) + S(0, 2),  //
-        S(2, 0) - S(0, 2), S(0, 1) + S(1, 0), S(1, 1) - S(0, 0) - S(2, 2), S(1, 2) + S(2, 1),  //
-        S(0, 1) - S(1, 0), S(2, 0) + S(0, 2), S(1, 2) + S(2, 1), S(2, 2) - S(0, 0) - S(1, 1);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(N);
-    const Eigen::Vector4d q = solver.eigenvectors().col(3);
-    out.turn = Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-    const double scale = (out.turn.toRotationMatrix().transpose() * spread).trace() / variance;
+    const Eigen::Matrix3d turn = linear::nearest_turn(spread);
+    out.turn = Quaterniond(turn);
+    const double scale = turn.cwiseProduct(spread).sum() / variance;  // the trace of turn' spread
     if (scale > 0) out.scale = scale;
   }
   out.way = mean_y - out.scale * (out.turn * mean_x);

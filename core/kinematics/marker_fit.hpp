@@ -14,8 +14,8 @@ struct MarkerOnBody {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< LPS mm
 };
 
-/// How one set of points lies beside another: y = scale * turn * x + way, least squares (Horn 1987). Pairs
-/// with a NaN are passed over; `pairs` counts the others.
+/// How one set of points lies beside another: y = scale * turn * x + way, least squares (Kabsch76, its scale
+/// by Umeyama91). Pairs with a NaN are passed over; `pairs` counts the others.
 struct Similarity {
   double scale = 1;
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();

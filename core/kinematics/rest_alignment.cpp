@@ -8,6 +8,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/kinematics/mean_turn.hpp"
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::kinematics {
 namespace {
@@ -79,7 +80,7 @@ Quaterniond facing(const Skeleton& skeleton, const std::vector<int>& child, cons
 Quaterniond aligned(const Rig& rig, const Limb& limb, const ClipPlaces& reference,
                     const std::vector<int>& clip_joint, const std::vector<int>& child,
                     const std::vector<LimbBend>& bends, std::size_t s, const Quaterniond& above) {
-  Quaterniond turn = (Quaterniond::FromTwoVectors(above * limb.scanned, limb.drawn) * above).normalized();
+  Quaterniond turn = (linear::turn_between(above * limb.scanned, limb.drawn) * above).normalized();
   if (bends.empty()) return turn;
   // Its own hinge and the one at its end: a shank has the knee alone, a thigh too; the knee tells both.
   const std::size_t hinge = bends[s].known ? s : static_cast<std::size_t>(child[s]);
@@ -175,8 +176,9 @@ void hang_ends(const Rig& rig, const ClipPlaces& zero, const std::vector<int>& c
     const Limb here = limb_of(rig.skeleton, child, shortest, zero, clip_joint, s);
     limb[s] = here.is;
     if (here.is)
-      away[s] = Quaterniond::FromTwoVectors(upright * here.scanned, here.drawn)
-                    .angularDistance(Quaterniond::Identity()) > kStretched;
+      away[s] =
+          linear::turn_between(upright * here.scanned, here.drawn).angularDistance(Quaterniond::Identity()) >
+          kStretched;
     if (here.is || segments[s].parent < 0) continue;
     const auto p = static_cast<std::size_t>(segments[s].parent);
     moved[s] = moved[p] || (limb[p] && away[p] && clip_joint[s] >= 0 && clip_joint[p] >= 0);

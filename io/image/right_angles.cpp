@@ -2,12 +2,12 @@
 #include "io/image/right_angles.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "core/linear/decompositions.hpp"
 #include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -64,8 +64,8 @@ void make_right_angled(ImageGrid& grid, const std::filesystem::path& path,
   const double skew = (direction.transpose() * direction - Direction::Identity()).cwiseAbs().maxCoeff();
   if (skew <= kExact) return;
   const ImageGrid before = grid;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  direction = svd.matrixU() * svd.matrixV().transpose();
+  const linear::Svd of = linear::svd(direction);
+  direction = of.U * of.V.transpose();  // the nearest, left-handed where it was
   if (skew <= kRounding) return;
   const auto middle = [](const ImageGrid& g) {
     return vector(g.point(0.5 * (g.size[0] - 1), 0.5 * (g.size[1] - 1), 0.5 * (g.size[2] - 1)));

@@ -3,10 +3,12 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::check {
 namespace {
@@ -54,9 +56,8 @@ std::vector<SegmentBones> bones_of(const Case& patient, const Skeleton& skeleton
       bones.tree = std::make_unique<geometry::FaceTree>(bones.surface);
       bones.box = {V.colwise().minCoeff().transpose(), V.colwise().maxCoeff().transpose()};
       const Points from = V.rowwise() - V.colwise().mean();
-      const Eigen::Matrix3d scatter = from.transpose() * from;
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-      if (eigen.eigenvalues()[2] > kLong * eigen.eigenvalues()[1]) bones.shaft = eigen.eigenvectors().col(2);
+      const linear::SymmetricEigen axes = linear::symmetric_eigen(from.transpose() * from);
+      if (axes.values[2] > kLong * axes.values[1]) bones.shaft = axes.vectors.col(2);
     }
   });
   return out;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/fem/isotropic.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
+
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::fem {
 
@@ -10,8 +12,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 Principal principal(const Matrix3d& F) {
-  const Eigen::JacobiSVD<Matrix3d> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Principal out{svd.matrixU(), svd.matrixV(), svd.singularValues()};
+  const linear::Svd of = linear::svd(F);
+  Principal out{of.U, of.V, of.s};
   if (out.U.determinant() < 0) {
     out.U.col(2) *= -1;
     out.s[2] *= -1;
@@ -34,10 +36,8 @@ Matrix9d hessian(const Principal& at, const Stretched& density, bool filtered) {
   const bool definite =
       scaling(0, 0) > 0 && scaling.topLeftCorner<2, 2>().determinant() > 0 && scaling.determinant() > 0;
   if (filtered && !definite) {
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(scaling);
-    if (eigen.eigenvalues()[0] < 0)
-      scaling = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
-                eigen.eigenvectors().transpose();
+    const linear::SymmetricEigen of = linear::symmetric_eigen(scaling);
+    if (of.values[0] < 0) scaling = of.vectors * of.values.cwiseMax(0).asDiagonal() * of.vectors.transpose();
   }
   // In the principal axes an entry F_ij couples with F_ji alone, and the diagonal ones with each other.
   Matrix9d local = Matrix9d::Zero();

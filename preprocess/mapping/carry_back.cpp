@@ -5,8 +5,8 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
+#include "core/linear/decompositions.hpp"
 #include "preprocess/mapping/tet_corners.hpp"
 
 namespace ecorche::mapping {
@@ -30,23 +30,21 @@ class Gradient {
     inside_out_ = (posed.determinant() < 0) != (rest.determinant() < 0);
   }
 
-  bool folded() const { return inside_out_ || !(svd_.singularValues()[2] >= kLeastStretch); }
+  bool folded() const { return inside_out_ || !(svd_.s[2] >= kLeastStretch); }
 
   Vector3d back(const Vector3d& way) const {
-    const Vector3d stretch = svd_.singularValues().cwiseMax(kLeastStretch);
-    return svd_.matrixV() * (svd_.matrixU().transpose() * way).cwiseQuotient(stretch);
+    const Vector3d stretch = svd_.s.cwiseMax(kLeastStretch);
+    return svd_.V * (svd_.U.transpose() * way).cwiseQuotient(stretch);
   }
 
  private:
-  using Svd = Eigen::JacobiSVD<Matrix3d>;
-
   // A tet without volume at rest (rounded nodes of a sliver) has none.
-  static Svd gradient(const Matrix3d& rest, const Matrix3d& posed) {
+  static linear::Svd gradient(const Matrix3d& rest, const Matrix3d& posed) {
     const Matrix3d f = posed * rest.inverse();
-    return Svd(f.allFinite() ? f : Matrix3d::Zero(), Eigen::ComputeFullU | Eigen::ComputeFullV);
+    return linear::svd(f.allFinite() ? f : Matrix3d::Zero());
   }
 
-  Svd svd_;
+  linear::Svd svd_;
   bool inside_out_ = false;
 };
 

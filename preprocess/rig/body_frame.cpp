@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/rig/body_frame.hpp"
 
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <memory>
 #include <optional>
 #include <string_view>
 
+#include "core/linear/decompositions.hpp"
 #include "preprocess/rig/parted_bones.hpp"
 
 namespace ecorche::rig {
@@ -100,11 +101,7 @@ Matrix3d body_frame(const Case& patient) {
   const double size = here.norm();
   if (!(size > kLeastMm)) return Matrix3d::Identity();
   straight *= size / straight.norm();
-  const Eigen::JacobiSVD<Matrix3d> svd(here * straight.transpose(),
-                                       Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Matrix3d sign = Matrix3d::Identity();
-  sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Matrix3d frame = svd.matrixU() * sign * svd.matrixV().transpose();
+  const Matrix3d frame = linear::nearest_turn(here * straight.transpose());
   return (here - frame * straight).norm() > kUnlike * size ? Matrix3d::Identity() : frame;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/rig/bone_end.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/linear/decompositions.hpp"
 #include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::rig {
@@ -57,16 +57,15 @@ std::optional<BoneEnd> bone_end(const SurfaceMesh& bone, const SurfaceMesh& othe
   if (bone.V.rows() == 0 || other.F.rows() == 0) return std::nullopt;
   const Eigen::Vector3d near = nearest_part(bone, other), mean = bone.V.colwise().mean().transpose();
   const Points from = bone.V.rowwise() - mean.transpose();
-  const Eigen::Matrix3d scatter = from.transpose() * from;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  const bool is_long = eigen.eigenvalues()[2] > kEndLong * eigen.eigenvalues()[1];
-  Eigen::Vector3d shaft = is_long ? Eigen::Vector3d(eigen.eigenvectors().col(2)) : mean - near;
+  const linear::SymmetricEigen axes = linear::symmetric_eigen(from.transpose() * from);
+  const bool is_long = axes.values[2] > kEndLong * axes.values[1];
+  Eigen::Vector3d shaft = is_long ? Eigen::Vector3d(axes.vectors.col(2)) : mean - near;
   if (!(shaft.norm() > 0)) return std::nullopt;
   shaft.normalize();
   BoneEnd end;
   if (shaft.z() < 0) shaft = -shaft;
   end.inward = shaft.dot(mean - near) < 0 ? -1 : 1;
-  end.axes = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), shaft).toRotationMatrix();
+  end.axes = linear::turn_between(Eigen::Vector3d::UnitZ(), shaft).toRotationMatrix();
 
   std::vector<double> depth;
   for (Eigen::Index v = 0; v < from.rows(); ++v) depth.push_back(end.inward * from.row(v).dot(shaft));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/rig/local_normals.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -31,7 +32,7 @@ Eigen::Vector3d plane_normal(const Points& at, const std::vector<Eigen::Index>& 
     const Eigen::Vector3d from = at.row(row).transpose() - mean;
     scatter += from * from.transpose();
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0);
+  return linear::symmetric_eigen(scatter).vectors.col(0);
 }
 
 }  // namespace

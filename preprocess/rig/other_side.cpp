@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/rig/other_side.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
+#include "core/linear/decompositions.hpp"
 #include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::rig {
@@ -32,10 +32,7 @@ struct Motion {
 // Longest first; right-handed.
 Matrix3d principal_axes(const Points& points) {
   const Points from = points.rowwise() - points.colwise().mean();
-  const Matrix3d scatter = from.transpose() * from;
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(scatter);
-  Matrix3d out;
-  out << eigen.eigenvectors().col(2), eigen.eigenvectors().col(1), eigen.eigenvectors().col(0);
+  Matrix3d out = linear::symmetric_eigen(from.transpose() * from).vectors.rowwise().reverse();
   if (out.determinant() < 0) out.col(2) = -out.col(2);
   return out;
 }
@@ -78,12 +75,9 @@ double settle(const Points& points, const geometry::FaceTree& onto, int rounds, 
     Matrix3d product = Matrix3d::Zero();
     for (std::size_t k = 0; k < kept; ++k) {
       const auto row = static_cast<Index>(away[k].second);
-      product += (points.row(row).transpose() - here) * (to.row(row) - there.transpose());
+      product += (to.row(row).transpose() - there) * (points.row(row) - here.transpose());
     }
-    const Eigen::JacobiSVD<Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Matrix3d sign = Matrix3d::Identity();
-    sign(2, 2) = (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0 ? -1 : 1;
-    motion.turn = svd.matrixV() * sign * svd.matrixU().transpose();
+    motion.turn = linear::nearest_turn(product);
     motion.shift = there - motion.turn * here;
   }
   return rms;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/rig/plane_fit.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <array>
 
+#include "core/linear/decompositions.hpp"
 #include "preprocess/rig/robust.hpp"
 
 namespace ecorche::rig {
@@ -30,9 +30,9 @@ struct Spread {
       const Eigen::Vector3d from = points.row(i).transpose() - mean;
       scatter += from * from.transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter / static_cast<double>(chosen.size()));
-    variance = eigen.eigenvalues();
-    normal = eigen.eigenvectors().col(0);
+    const linear::SymmetricEigen axes = linear::symmetric_eigen(scatter / static_cast<double>(chosen.size()));
+    variance = axes.values;
+    normal = axes.vectors.col(0);
   }
 };
 

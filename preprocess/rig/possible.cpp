@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is not used of what bones show, and what stands in for it.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <sstream>
 
+#include "core/linear/decompositions.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 
 namespace ecorche::rig {
@@ -43,10 +43,9 @@ std::optional<Eigen::Vector3d> JointSources::shaft(int row) {
   const Points& V = bones_.segment(skeleton_.segments[static_cast<std::size_t>(parent)].name).V;
   if (V.rows() < 4) return std::nullopt;
   const Points from = V.rowwise() - V.colwise().mean();
-  const Eigen::Matrix3d scatter = from.transpose() * from;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  if (eigen.eigenvalues()[2] <= kLongShaft * eigen.eigenvalues()[1]) return std::nullopt;
-  return Eigen::Vector3d(eigen.eigenvectors().col(2));
+  const linear::SymmetricEigen axes = linear::symmetric_eigen(from.transpose() * from);
+  if (axes.values[2] <= kLongShaft * axes.values[1]) return std::nullopt;
+  return Eigen::Vector3d(axes.vectors.col(2));
 }
 
 bool JointSources::lacks_shaft(std::size_t row) {

@@ -3,9 +3,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <vector>
+
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::scan {
 
@@ -44,12 +45,10 @@ class SimilarityFit {
     const Eigen::Vector3d from = from_ / weight_, to = to_ / weight_;
     const Eigen::Matrix3d cross = cross_ / weight_ - to * from.transpose();
     const double spread = std::max(1e-9, square_ / weight_ - from.squaredNorm());
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Vector3d sign = Eigen::Vector3d::Ones();
-    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign[2] = -1;
     Similarity out;
-    out.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-    out.scale = std::clamp(svd.singularValues().dot(sign) / spread, least, most);
+    out.rotation = linear::nearest_turn(cross);
+    // The trace of R' M over the spread (Umeyama91).
+    out.scale = std::clamp(out.rotation.cwiseProduct(cross).sum() / spread, least, most);
     out.shift = to - out.scale * (out.rotation * from);
     return out;
   }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/scan/views.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::scan {
 namespace {
@@ -74,8 +76,7 @@ std::vector<std::pair<Eigen::Matrix3d, Eigen::Vector3d>> turns_of(View view, con
   }
   const auto axis_of = [](const Points& points) -> Eigen::Vector3d {
     const Points centred = points.rowwise() - points.colwise().mean();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(centred.transpose() * centred);
-    return solver.eigenvectors().col(2);
+    return linear::symmetric_eigen(centred.transpose() * centred).vectors.col(2);
   };
   const Eigen::Vector3d own = axis_of(own_points);
   Eigen::Vector3d theirs = axis_of(theirs_points);
@@ -83,7 +84,7 @@ std::vector<std::pair<Eigen::Matrix3d, Eigen::Vector3d>> turns_of(View view, con
   const bool arm = view == View::arm_left || view == View::arm_right;
   for (const double sign : {1.0, -1.0}) {
     if (!arm && sign < 0 && std::abs(theirs.z()) > 0.5) continue;  // legs point down
-    const Eigen::Matrix3d onto = Eigen::Quaterniond::FromTwoVectors(own, sign * theirs).toRotationMatrix();
+    const Eigen::Matrix3d onto = linear::turn_between(own, sign * theirs).toRotationMatrix();
     for (int spin = 0; spin < 4; ++spin) {
       const double angle = spin * std::numbers::pi / 2;
       out.emplace_back(Eigen::AngleAxisd(angle, theirs).toRotationMatrix() * onto, theirs);

@@ -3,7 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -11,6 +10,7 @@
 
 #include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/verdict.hpp>
+#include "core/linear/decompositions.hpp"
 #include "runtime/quality/floats.hpp"
 
 namespace ecorche::runtime {
@@ -152,10 +152,7 @@ double rigid_residual(std::span<const float> rest, std::span<const float> posed)
   for (std::size_t v = 0; v < rest.size() / 3; ++v) {
     covariance += (point(posed, v) - to) * (point(rest, v) - from).transpose();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double mirrored = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d turn =
-      svd.matrixU() * Vector3d(1, 1, mirrored).asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d turn = linear::nearest_turn(covariance);
   double worst = 0;
   for (std::size_t v = 0; v < rest.size() / 3; ++v) {
     worst = std::max(worst, (turn * (point(rest, v) - from) + to - point(posed, v)).norm());

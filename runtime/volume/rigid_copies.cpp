@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ecorche/runtime/rigid_copies.hpp>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <map>
 #include <utility>
+
+#include "core/linear/decompositions.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -31,14 +32,6 @@ std::vector<std::int32_t> spread(const std::vector<std::int32_t>& nodes, const P
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
-}
-
-// The rotation nearest to the sum of (to * from') over points about their middles (Kabsch, by SVD).
-Eigen::Matrix3d nearest_turn(const Eigen::Matrix3d& covariance) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
-  sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * sign * svd.matrixV().transpose();
 }
 
 }  // namespace
@@ -129,7 +122,7 @@ void RigidCopies::place(const Follower& follower, std::span<const float> nodes, 
   };
   if (!moved) return copy(follower.begin, follower.end);
   if (!covariance.allFinite()) covariance.setZero();  // the middle is no number then, nor is what comes of it
-  const Eigen::Matrix3d turn = nearest_turn(covariance);
+  const Eigen::Matrix3d turn = linear::nearest_turn(covariance);
   for (std::size_t n = follower.begin; n < follower.end; ++n) {
     const Eigen::Vector3d at = turn * (point(rest_, n) - follower.middle) + middle;
     for (std::size_t a = 0; a < 3; ++a) out[3 * n + a] = static_cast<float>(at[static_cast<Eigen::Index>(a)]);
