@@ -2,6 +2,7 @@
 #include <ecorche/client/client.hpp>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace ecorche::client {
@@ -94,6 +95,21 @@ void Client::send(const v1::Envelope& envelope, const std::shared_ptr<const wire
   wire::encode_head(envelope, payload ? payload->size() : 0, head_);
   socket_.write(std::as_bytes(std::span(head_)), Clock::now() + patience);
   if (payload) socket_.write(*payload, Clock::now() + patience);
+}
+
+void Client::leave(Clock::time_point until) noexcept {
+  try {
+    v1::Envelope& last = compose();
+    last.mutable_goodbye();
+    wire::encode_head(last, 0, head_);
+    socket_.write(std::as_bytes(std::span(head_)), until);
+    // What is still on its way is read: to close over unread bytes resets the connection, and the goodbye may
+    // be lost with it.
+    std::array<std::byte, 16384> rest{};
+    while (Clock::now() < until && socket_.read(rest, until) > 0) {
+    }
+  } catch (const std::exception&) {  // it hung up
+  }
 }
 
 std::optional<wire::Frame> Client::receive(Clock::time_point until) {

@@ -244,6 +244,12 @@ class Clients(unittest.TestCase):
                 second.show(second.send())
                 np.testing.assert_allclose(second.positions("skin"), shown, atol=0.1)
 
+    def test_who_closes_leaves_control_to_the_next(self):
+        for degrees in (30, 60):  # a script that is run again, frames still on their way
+            with ecorche.connect(self.server.address, session="again") as client:
+                self.assertTrue(client.controls)
+                client.set("elbow_left", flexion=degrees).send()
+
     def test_what_is_refused(self):
         with self.assertRaisesRegex(ecorche.Unavailable, "127.0.0.1:1: cannot be reached"):
             ecorche.connect("127.0.0.1:1")

@@ -17,7 +17,7 @@ internal static partial class Check
     {
         ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
         ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["cut"] = Cut, ["native"] = NativeChecks.Run,
-        ["bench"] = Bench, ["zstd"] = ZstdChecks.Run,
+        ["bench"] = Bench, ["leave"] = Leave, ["zstd"] = ZstdChecks.Run,
     };
 
     private static int Main(string[] words)
@@ -206,6 +206,22 @@ internal static partial class Check
             Wait(client, stream, next);
             Console.WriteLine("back " + (client.Server.HasResumed ? "resumed" : "anew"));
         }
+    }
+
+    /// <summary>leave ADDRESS: poses a session, goes with frames on their way, and comes as somebody else.</summary>
+    private static void Leave(string[] words)
+    {
+        for (int i = 0; i < 3; ++i)
+        {
+            using (var client = Client.Connect(words[0]))
+            {
+                client.Open("", "left");
+                True(client.Controls, "control is free");
+                client.Subscribe(new StreamOptions());
+                client.SendPose(client.NewPose().SetAngle("knee_left", "flexion", 0.1 * i));
+            }
+        }
+        Console.WriteLine("controlled by each");
     }
 
     /// <summary>volume ADDRESS [compressed]: bends an elbow, and prints what the volume is then.</summary>

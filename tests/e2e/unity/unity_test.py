@@ -241,6 +241,9 @@ class Unity(unittest.TestCase):
         told = subprocess.run(["readelf", "-d", LIBRARIES / "libecorche.so"], capture_output=True, text=True, check=True).stdout
         self.assertIn("NODELETE", told)
 
+    def test_who_goes_leaves_control_to_the_next(self):
+        self.assertEqual(check("leave", self.server.address), "controlled by each\n")
+
     def test_the_line_is_cut_and_mended(self):
         self.comes_back_by_resume(self.server, lambda: None, "back resumed\n")
 

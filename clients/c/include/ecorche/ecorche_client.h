@@ -57,6 +57,8 @@ typedef struct ecorche_client_options {
  * greet; `options` may be NULL. UNAVAILABLE where nobody answers there. */
 ECORCHE_API ecorche_code ecorche_client_connect(const char* address, const ecorche_client_options* options,
                                                 ecorche_client** out);
+/* Says goodbye, so that its control is free at once, and nobody comes back to its place. Waits for the server
+ * to hear it, half a second at most. */
 ECORCHE_API void ecorche_client_close(ecorche_client* client);
 /* Which ecorche answers: "0.1.0". */
 ECORCHE_API const char* ecorche_client_server(const ecorche_client* client);

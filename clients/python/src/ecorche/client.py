@@ -63,7 +63,7 @@ class Client(Anatomy):
             raise
 
     def close(self) -> None:
-        """Hangs up."""
+        """Says goodbye and hangs up: its control is free at once."""
         if self._handle:
             self._library.ask("close", self._handle)
             self._handle = ctypes.c_void_p()

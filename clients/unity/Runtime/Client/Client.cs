@@ -122,7 +122,17 @@ namespace Ecorche
         /// <summary>From any thread: a Poll that waits returns.</summary>
         internal void Wake() => _line?.Wake();
 
-        public void Dispose() => _line?.Dispose();
+        /// <summary>Says goodbye, so that its control is free at once. Waits for the server to hear it, half a second at most.</summary>
+        public void Dispose()
+        {
+            if (_line == null) return;
+            Begin(_out).HasGoodbye = true;
+            _out.Goodbye.Clear();
+            _writer.Begin();
+            _out.Write(_writer);
+            _line.Leave(_writer.Written);
+            _line.Dispose();
+        }
 
         private void Greet(byte[] resumeToken)
         {

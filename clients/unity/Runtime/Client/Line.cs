@@ -25,7 +25,7 @@ namespace Ecorche
         private readonly Queue<FrameBytes> _came = new Queue<FrameBytes>();
         private readonly Stack<FrameBytes> _spent = new Stack<FrameBytes>();
         private EcorcheException _ended;
-        private bool _closed, _woken;
+        private bool _closed, _leaving, _woken;
         private byte[] _out = new byte[4096];
         private long _received;
 
@@ -99,7 +99,7 @@ namespace Ecorche
                     FrameBytes next;
                     lock (_lock)
                     {
-                        while (_came.Count >= MostWaiting && !_closed) Monitor.Wait(_lock);
+                        while (_came.Count >= MostWaiting && !_closed && !_leaving) Monitor.Wait(_lock);
                         if (_closed) return;
                         next = _spent.Count > 0 ? _spent.Pop() : new FrameBytes();
                     }
@@ -107,7 +107,8 @@ namespace Ecorche
                     Interlocked.Add(ref _received, next.Size);
                     lock (_lock)
                     {
-                        _came.Enqueue(next);
+                        if (_leaving) _spent.Push(next);
+                        else _came.Enqueue(next);
                         Monitor.PulseAll(_lock);
                     }
                 }
@@ -178,6 +179,29 @@ namespace Ecorche
             {
                 // Why the server hung up may still wait to be read.
                 throw new EcorcheException(Code.Unavailable, "the connection was lost: " + error.Message, error);
+            }
+        }
+
+        /// <summary>Sends a last message, and waits until the server hangs up on it, half a second at most. Nothing comes any more.</summary>
+        /// <remarks>What is still on its way is read: to close over unread bytes resets the connection, and the message may be lost with it.</remarks>
+        public void Leave(ReadOnlySpan<byte> envelope)
+        {
+            const int longest = 500;
+            lock (_lock)
+            {
+                if (_closed) return;
+                _leaving = true;
+                Monitor.PulseAll(_lock);
+            }
+            try
+            {
+                _socket.SendTimeout = longest;
+                Send(envelope, default);
+                _reader.Join(longest);
+            }
+            catch (Exception error) when (error is EcorcheException || error is SocketException)
+            {
+                // It was lost before.
             }
         }
 

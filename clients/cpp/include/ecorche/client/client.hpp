@@ -83,6 +83,10 @@ class Client {
   /// messages have come.
   std::optional<Message> receive_in_place(Clock::time_point until);
 
+  /// Says goodbye: the server keeps no place for who says so, and what it controlled is free at once. Waits
+  /// until the server hangs up, no longer than `until`; nothing else may be called then. Throws nothing.
+  void leave(Clock::time_point until) noexcept;
+
   /// An empty message to be filled and sent before any other call here, likewise.
   v1::Envelope& compose() { return outgoing_.make(); }
 

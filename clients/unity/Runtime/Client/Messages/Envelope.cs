@@ -98,6 +98,7 @@ namespace Ecorche.Wire
 
         internal void Write(WireWriter to)
         {
+            if (HasGoodbye) { int end = to.Size; Goodbye.Write(to); to.Close(346, end); }
             if (HasStatus) { int end = to.Size; Status.Write(to); to.Close(338, end); }
             if (HasPong) { int end = to.Size; Pong.Write(to); to.Close(330, end); }
             if (HasPing) { int end = to.Size; Ping.Write(to); to.Close(322, end); }

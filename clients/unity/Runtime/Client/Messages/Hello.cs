@@ -348,5 +348,12 @@ namespace Ecorche.Wire
                 }
             }
         }
+
+        internal void Write(WireWriter to)
+        {
+            if (Elsewhere.Length > 0) to.String(26, Elsewhere);
+            if (RetrySeconds != 0) to.Double(17, RetrySeconds);
+            if (HasStatus) { int end = to.Size; Status.Write(to); to.Close(10, end); }
+        }
     }
 }
