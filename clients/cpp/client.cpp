@@ -37,6 +37,28 @@ ErrorKind kind_of(std::uint32_t code) {
   }
 }
 
+// What a frame shows, of which subscription.
+struct Shown {
+  bool mesh, key;  // key: others may be against it
+  std::uint32_t subscription, level;
+};
+
+std::optional<Shown> shown_by(const v1::Envelope& envelope) {
+  if (envelope.has_mesh_frame()) {
+    const v1::MeshFrame& mesh = envelope.mesh_frame();
+    return Shown{true, mesh.keyframe() == mesh.frame(), mesh.subscription(), mesh.level()};
+  }
+  if (!envelope.has_volume_frame()) return std::nullopt;
+  const v1::VolumeFrame& volume = envelope.volume_frame();
+  return Shown{false, volume.keyframe() == volume.frame(), volume.subscription(), 0};
+}
+
+// Whether nobody needs `older` once `newer` is there.
+bool replaces(const Shown& newer, const Shown& older) {
+  if (newer.mesh != older.mesh || newer.subscription != older.subscription) return false;
+  return !older.key || (newer.key && newer.level == older.level);
+}
+
 }  // namespace
 
 ServerError::ServerError(const std::string& where, const v1::Status& status)
@@ -80,7 +102,7 @@ wire::Frame Client::call(v1::Envelope request, const std::shared_ptr<const wire:
   const auto until = Clock::now() + within;
   while (auto frame = read_frame(until)) {
     if (frame->envelope.request_id() != id) {
-      waiting_.push_back(std::move(*frame));
+      put_by(std::move(*frame));
       continue;
     }
     if (frame->envelope.has_status() && frame->envelope.status().code() != 0)
@@ -89,6 +111,17 @@ wire::Frame Client::call(v1::Envelope request, const std::shared_ptr<const wire:
   }
   throw Error(ErrorKind::temporary, "server", "no answer within " + std::to_string(within.count()) + " s",
               "try again");
+}
+
+// They are acknowledged already, so more come: for who asks more often than it receives they would pile up.
+void Client::put_by(wire::Frame frame) {
+  if (const auto newer = shown_by(frame.envelope)) {
+    std::erase_if(waiting_, [&](const wire::Frame& waits) {
+      const auto older = shown_by(waits.envelope);
+      return older && replaces(*newer, *older);
+    });
+  }
+  waiting_.push_back(std::move(frame));
 }
 
 void Client::send(const v1::Envelope& envelope, const std::shared_ptr<const wire::Payload>& payload) {

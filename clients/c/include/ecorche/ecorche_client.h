@@ -21,7 +21,9 @@
  * ecorche_client_error_message().
  *
  * Threads: a client is for one thread at a time. It starts none: it reads and answers the server within
- * ecorche_client_poll and within what waits for an answer, so call the former every frame.
+ * ecorche_client_poll and within what waits for an answer, so call the former for every picture until nothing
+ * more comes: who takes one thing a picture falls ever farther behind. Of frames that come while an answer is
+ * waited for the newest stays.
  *
  * After UNAVAILABLE the connection is gone: ecorche_client_resume() comes back.
  */

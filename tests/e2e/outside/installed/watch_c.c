@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   check(ecorche_client_set_angle(client, argv[2], argv[3], atof(argv[4]) / 57.29577951308232));
   check(ecorche_client_send_pose(client, ECORCHE_SKINNING_COR, &sent));
 
-  /* A game polls once a picture, with 0 s; here there is nothing else to do. */
+  /* A game polls with 0 s, for each picture until nothing more comes; here there is nothing else to do. */
   ecorche_event event = ECORCHE_EVENT_INIT;
   do {
     check(ecorche_client_poll(client, 10, &event));

@@ -62,8 +62,9 @@ class Client {
   /// HOST:PORT of another server, where this one sent its clients to when it said goodbye; else empty.
   const std::string& elsewhere() const { return elsewhere_; }
 
-  /// Sends a request and waits for its answer; other messages meanwhile wait for receive(). Throws when the
-  /// answer is a Status that is not OK.
+  /// Sends a request and waits for its answer; other messages meanwhile wait for receive(), but of each
+  /// subscription's frames the newest only, and its keyframe. Throws when the answer is a Status that is not
+  /// OK.
   wire::Frame call(v1::Envelope request, const std::shared_ptr<const wire::Payload>& payload = nullptr,
                    std::chrono::seconds within = patience);
 
@@ -103,6 +104,7 @@ class Client {
   bool read(Clock::time_point until, wire::MessageArena* arena);
   std::optional<wire::Frame> read_frame(Clock::time_point until);
   void attend(const v1::Envelope& envelope);
+  void put_by(wire::Frame frame);
 
   Socket socket_;
   wire::FrameReader reader_;
