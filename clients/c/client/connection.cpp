@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/c/client/connection.hpp"
 
-#include <chrono>
 #include <random>
 #include <span>
 #include <string_view>
@@ -104,8 +103,7 @@ ecorche_code ecorche_client_connect(const char* address, const ecorche_client_op
 }
 
 void ecorche_client_close(ecorche_client* client) {
-  constexpr std::chrono::milliseconds longest{500};
-  if (client != nullptr) client->connection->leave(client::Clock::now() + longest);
+  if (client != nullptr) client->connection->leave(client::Clock::now() + c::longest_goodbye);
   delete client;
 }
 

@@ -2,6 +2,7 @@
 // What the handle of ecorche_client.h is.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -83,7 +84,10 @@ std::string random_key();
 /// What `opened` is, made ready. Throws Error{protocol} where its parts do not fit together.
 std::unique_ptr<OpenedBody> read_opened(wire::Frame opened);
 
-/// Frames of what is wanted come from now on.
-void subscribe(ecorche_client& client);
+/// Frames of what is wanted come from now on, and after coming back. Where the server refuses it all stays.
+void subscribe(ecorche_client& client, const v1::Subscribe& wanted);
+
+/// For the server to hear one.
+inline constexpr std::chrono::milliseconds longest_goodbye{500};
 
 }  // namespace ecorche::c

@@ -8,13 +8,11 @@ namespace ecorche::c {
 namespace {
 
 // The place that the server kept; false where it kept none.
-bool take_place(ecorche_client& client) {
-  const v1::ServerHello& hello = client.connection->server();
+bool take_place(ecorche_client& client, const v1::ServerHello& hello) {
   if (!hello.has_resumed()) return false;
   const v1::Resumed& resumed = hello.resumed();
   client.controls = resumed.role() == v1::ROLE_CONTROLLER;
   client.body->sequence = std::max(client.body->sequence, resumed.last_sequence());
-  client.frame.forget_keyframes();
   const auto was = std::exchange(client.subscription, std::nullopt);
   for (const v1::ResumedSubscription& one : resumed.subscriptions()) {
     if (was == one.was()) client.subscription = one.is();
@@ -23,13 +21,13 @@ bool take_place(ecorche_client& client) {
 }
 
 // The session by its name, as anybody opens it. False where its model is another one by now.
-bool open_again(ecorche_client& client) {
+bool open_again(ecorche_client& client, client::Client& connection) {
   v1::Envelope request;
   v1::OpenModel& open = *request.mutable_open_model();
   const v1::ModelOpened& before = client.body->opened;
   open.set_model(before.model());
   open.set_session(before.session());
-  const std::unique_ptr<OpenedBody> now = read_opened(client.connection->call(std::move(request)));
+  const std::unique_ptr<OpenedBody> now = read_opened(connection.call(std::move(request)));
   if (now->opened.topology_digest() != before.topology_digest() ||
       now->opened.rig_digest() != before.rig_digest())
     return false;
@@ -50,11 +48,15 @@ ecorche_code ecorche_client_resume(ecorche_client* client) {
     access.resume_token = client->connection->server().resume_token();
     const std::string& elsewhere = client->connection->elsewhere();
     if (!elsewhere.empty()) client->address = wire::parse_address(elsewhere);
-    client->connection = std::make_unique<client::Client>(client->address, client->name, access);
-    if (!c::take_place(*client) && !c::open_again(*client))
+    auto connection = std::make_unique<client::Client>(client->address, client->name, access);
+    if (!c::take_place(*client, connection->server()) && !c::open_again(*client, *connection)) {
+      connection->leave(client::Clock::now() + c::longest_goodbye);
       return c::fail(ECORCHE_FAILED_PRECONDITION,
                      "client: the server's model is another one by now (close, and connect anew)");
-    if (client->wanted && !client->subscription) c::subscribe(*client);
+    }
+    client->connection = std::move(connection);
+    client->frame.forget_keyframes();
+    if (client->wanted && !client->subscription) c::subscribe(*client, *client->wanted);
     return ECORCHE_OK;
   });
 }

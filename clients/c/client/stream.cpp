@@ -83,12 +83,13 @@ bool take(ecorche_client& client, const client::Client::Message& came, ecorche_e
 
 }  // namespace
 
-void subscribe(ecorche_client& client) {
+void subscribe(ecorche_client& client, const v1::Subscribe& wanted) {
   v1::Envelope request;
-  *request.mutable_subscribe() = *client.wanted;
-  client.frame.clear();
+  *request.mutable_subscribe() = wanted;
   const wire::Frame answer = client.connection->call(std::move(request));
   client.subscription = answer.envelope.subscribed().subscription();
+  client.frame.forget_keyframes();
+  client.wanted = wanted;
 }
 
 }  // namespace ecorche::c
@@ -176,6 +177,8 @@ ecorche_code ecorche_client_subscribe(ecorche_client* client, const ecorche_stre
     mesh.set_quality(chosen.quality != 0);
     subscribe.set_max_rate(chosen.max_rate);
     const v1::ModelOpened& opened = client->body->opened;
+    if (chosen.tissues != nullptr && chosen.tissue_count == 0)
+      return c::fail(ECORCHE_INVALID_ARGUMENT, "tissues: are none (NULL for all)");
     for (std::size_t i = 0; chosen.tissues != nullptr && i < chosen.tissue_count; ++i) {
       if (chosen.tissues[i] >= static_cast<std::uint32_t>(opened.tissues_size()))
         return c::fail(ECORCHE_INVALID_ARGUMENT, "tissues: the model has not so many");
@@ -187,8 +190,13 @@ ecorche_code ecorche_client_subscribe(ecorche_client* client, const ecorche_stre
       client->subscription.reset();
       client->connection->call(std::move(last));
     }
-    client->wanted = subscribe;
-    c::subscribe(*client);
+    try {
+      c::subscribe(*client, subscribe);
+    } catch (const client::ServerError&) {
+      if (client->wanted) c::subscribe(*client, *client->wanted);
+      throw;
+    }
+    client->frame.clear();
     return ECORCHE_OK;
   });
 }

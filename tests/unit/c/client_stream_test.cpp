@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,28 @@ TEST(ClientStream, FramesDoNotPileUpForWhoOnlyAsks) {
     const std::size_t numbers = std::size_t{3} * info.vertex_count;
     EXPECT_EQ(std::vector<float>(theirs, theirs + numbers), std::vector<float>(mine, mine + numbers));
   }
+}
+
+TEST(ClientStream, WhatIsRefusedReplacesNothing) {
+  const server::TestServer server;
+  const Caller caller(server);
+  ASSERT_EQ(ecorche_client_subscribe(caller.client, nullptr), ECORCHE_OK);
+  ASSERT_GE(caller.frames_until(caller.bend(0.1)), 0);
+  ecorche_stream_options bad = ECORCHE_STREAM_OPTIONS_INIT;
+  for (const double rate : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    bad.max_rate = rate;
+    EXPECT_EQ(ecorche_client_subscribe(caller.client, &bad), ECORCHE_INVALID_ARGUMENT);
+    EXPECT_NE(std::string(ecorche_client_error_message()).find("max_rate"), std::string::npos);
+    EXPECT_NE(ecorche_client_positions(caller.client, 0), nullptr) << "what was shown";
+    EXPECT_GE(caller.frames_until(caller.bend(0.2)), 0) << "frames go on";
+  }
+  bad.max_rate = 0;
+  const std::uint32_t none = 0;
+  bad.tissues = &none;  // and no count
+  EXPECT_EQ(ecorche_client_subscribe(caller.client, &bad), ECORCHE_INVALID_ARGUMENT);
+  EXPECT_STREQ(ecorche_client_error_message(), "tissues: are none (NULL for all)");
+  EXPECT_EQ(ecorche_client_resume(caller.client), ECORCHE_OK) << ecorche_client_error_message();
+  EXPECT_GE(caller.frames_until(caller.bend(0.3)), 0) << "and after coming back";
 }
 
 }  // namespace

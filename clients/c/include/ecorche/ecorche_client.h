@@ -129,7 +129,8 @@ typedef struct ecorche_stream_options {
 #define ECORCHE_STREAM_OPTIONS_INIT \
   { sizeof(ecorche_stream_options), ECORCHE_ENCODING_U16_DELTA, 1, 0, 0, 0, 0 }
 
-/* Frames come from now on; `options` may be NULL. Another call replaces the last one. */
+/* Frames come from now on; `options` may be NULL. Another call replaces the last one, but where it is refused
+ * (INVALID_ARGUMENT for a rate that is none, or no tissues at all): then frames go on as before. */
 ECORCHE_API ecorche_code ecorche_client_subscribe(ecorche_client* client,
                                                   const ecorche_stream_options* options);
 
