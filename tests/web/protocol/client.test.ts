@@ -2,7 +2,7 @@
 // The typed client against the real server.
 import assert from "node:assert/strict";
 import { after, before, test, type TestContext } from "node:test";
-import { Client, Encoding, Role, ServerError, type BodyFrame, type MeshStream } from "../../../clients/web/protocol/src/index.js";
+import { Client, ConnectionError, Encoding, Role, ServerError, type BodyFrame, type MeshStream } from "../../../clients/web/protocol/src/index.js";
 import { Server, within } from "../support/server.js";
 
 let server: Server;
@@ -60,6 +60,25 @@ test("opens, shows the rest pose, poses, and says what a joint cannot do", async
 test("a refusal is an error with the server's line", async (t) => {
   const client = await connected(t);
   await assert.rejects(client.open("nobody"), (error: ServerError) => error instanceof ServerError && error.code === 5 && /no model of that name/.test(error.message));
+});
+
+test("what is no address is told at once", async () => {
+  for (const url of ["", "nonsense", "ftp://127.0.0.1/v1"]) {
+    await assert.rejects(within(5, Client.connect(url), url), (error) => error instanceof ConnectionError && error.message.startsWith(`'${url}' is no address`));
+  }
+});
+
+test("a pose that cannot be written is told to who gave it, and the one before goes on", async (t) => {
+  const client = await connected(t);
+  const model = await client.open();
+  const rotation = model.skeleton!.segments.flatMap(() => [1, 0, 0, 0]);
+  const taken = within(20, new Promise<bigint>((resolve) => { client.on("pose", ({ sequence }) => resolve(sequence)); }), "a PoseAck");
+  client.setPose({ rotation });
+  assert.throws(() => client.setPose({ rotation, translation: [{ joint: -1, offset: [0, 0, 0] }] }), /joint/);
+  assert.throws(() => client.setPose({ rotation, skinning: 1.5 as number }), /skinning/);
+  assert.equal(await taken, 1n);
+  assert.equal((await client.probe([0, 0, 0])).poseSequence, 1n);
+  assert.equal(client.state.state, "open");
 });
 
 test("the session stands in the address, where a balancer looks for it", async (t) => {

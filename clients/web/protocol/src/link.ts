@@ -54,7 +54,13 @@ export class Link {
 
   private dial(url: string, hello: Uint8Array): void {
     this.drop();
-    const socket = new WebSocket(url, SUBPROTOCOL);
+    let socket: WebSocket;
+    try {
+      socket = new WebSocket(url, SUBPROTOCOL);
+    } catch (error) {
+      const why = error instanceof Error ? error.message : String(error);
+      return this.post({ kind: "refused", message: `'${url}' is no address of a WebSocket, as ws://127.0.0.1:8080/v1 (${why})` });
+    }
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => socket.send(encodeFrame(hello));

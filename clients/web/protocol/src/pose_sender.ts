@@ -2,7 +2,7 @@
 // Poses on their way: few at a time, and of those that wait only the newest. A queue would show what the user did long ago.
 import { Skinning, type JointTranslation } from "./gen/ecorche/v1/common_pb.js";
 import type { PoseUpdate } from "./gen/ecorche/v1/stream_pb.js";
-import type { Message } from "./requests.js";
+import { encode, type Message } from "./requests.js";
 
 /** A whole pose; docs/reference/protocol.md, "Poses" and "Angles". */
 export interface Pose {
@@ -33,6 +33,8 @@ export class PoseSender {
   constructor(private readonly send: (message: Message) => boolean) {}
 
   set(pose: Pose, rigDigest: bigint): void {
+    // What cannot be written is told to who gave it: it may wait, and would break the connection when it leaves.
+    encode({ case: "poseUpdate", value: updateOf(pose, 0n, rigDigest) });
     this.newest = pose;
     this.rig = rigDigest;
     this.waits = true;
