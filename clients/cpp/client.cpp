@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
+
+#include "core/values/utf8.hpp"
 
 namespace ecorche::client {
 namespace {
@@ -35,6 +38,15 @@ ErrorKind kind_of(std::uint32_t code) {
     default:
       return ErrorKind::protocol;
   }
+}
+
+// 64 bytes of it at most, in whole characters: a message with half a one is none.
+std::string short_text(std::string_view name) {
+  std::string line = text::one_line(name);
+  std::size_t end = std::min<std::size_t>(line.size(), 64);
+  while (end < line.size() && (static_cast<unsigned char>(line[end]) & 0xC0U) == 0x80U) --end;
+  line.resize(end);
+  return line;
 }
 
 // What a frame shows, of which subscription.
@@ -73,7 +85,7 @@ Client::Client(const wire::Address& address, const std::string& name, const Acce
   v1::ClientHello& hello = *envelope.mutable_client_hello();
   hello.set_protocol_min(kProtocol);
   hello.set_protocol_max(kProtocol);
-  hello.set_client(name.substr(0, 64));
+  hello.set_client(short_text(name));
   // MeshDecoder reads them all.
   for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
     hello.add_encodings(encoding);

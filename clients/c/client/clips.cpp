@@ -27,7 +27,7 @@ ecorche_code ecorche_client_play(ecorche_client* client, const char* clip, doubl
   return c::with_client(client, true, [&] {
     v1::Envelope request;
     v1::PlayClip& play = *request.mutable_play_clip();
-    if (clip != nullptr) play.set_name(clip);
+    play.set_name(c::text_of(clip, "clip"));
     play.set_speed(speed);
     play.set_loop(loop != 0);
     client->connection->call(std::move(request));
@@ -40,7 +40,7 @@ ecorche_code ecorche_client_record(ecorche_client* client, const char* name) {
     v1::Envelope request;
     v1::Record& record = *request.mutable_record();
     record.set_on(name != nullptr);
-    if (name != nullptr) record.set_name(name);
+    record.set_name(c::text_of(name, "name"));
     client->connection->call(std::move(request));
     return ECORCHE_OK;
   });

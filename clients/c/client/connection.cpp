@@ -8,6 +8,7 @@
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
 #include <ecorche/wire/convert.hpp>
+#include "core/values/utf8.hpp"
 #include "proto/arrays.hpp"
 
 namespace ecorche::c {
@@ -41,6 +42,16 @@ void take_pose(const v1::PoseState& state, OpenedBody& body) {
 }
 
 }  // namespace
+
+std::string text_of(const char* given, const char* name) {
+  const std::string_view text = given == nullptr ? "" : given;
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t size = text::first_character(rest).second;
+    if (size == 0) throw Error(ErrorKind::usage, name, "is not UTF-8", "give text in UTF-8");
+    rest.remove_prefix(size);
+  }
+  return std::string(text);
+}
 
 std::string random_key() {
   std::random_device random;
@@ -93,7 +104,7 @@ ecorche_code ecorche_client_connect(const char* address, const ecorche_client_op
     client::Access access;
     access.authorities = text(chosen.authorities, "");
     access.token = text(chosen.token, "");
-    access.session = chosen.session == nullptr ? c::random_key() : chosen.session;
+    access.session = chosen.session == nullptr ? c::random_key() : c::text_of(chosen.session, "session");
     auto made = std::make_unique<ecorche_client>(
         ecorche_client{wire::parse_address(address), text(chosen.name, "ecorche_client"), access, nullptr});
     made->connection = std::make_unique<client::Client>(made->address, made->name, access);
@@ -140,8 +151,8 @@ ecorche_code ecorche_client_open(ecorche_client* client, const char* model, cons
                      "client: has a model already (connect once more for another)");
     v1::Envelope request;
     v1::OpenModel& open = *request.mutable_open_model();
-    if (model != nullptr) open.set_model(model);
-    if (session != nullptr) open.set_session(session);
+    open.set_model(c::text_of(model, "model"));
+    open.set_session(c::text_of(session, "session"));
     client->body = c::read_opened(client->connection->call(std::move(request)));
     client->controls = client->body->opened.role() == v1::ROLE_CONTROLLER;
     return ECORCHE_OK;

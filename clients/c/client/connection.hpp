@@ -78,6 +78,10 @@ ecorche_code with_client(const ecorche_client* client, bool opened, const Work& 
   return guarded_call(work);
 }
 
+/// What a caller gave, "" for null. Throws Error{usage} with the `name` of what is no UTF-8, since a message
+/// with it is none, and the connection would end.
+std::string text_of(const char* given, const char* name);
+
 /// A name for a session of one's own, by which a balancer finds its server again.
 std::string random_key();
 

@@ -169,6 +169,18 @@ class Aio(unittest.IsolatedAsyncioTestCase):
         with self.assertRaisesRegex(ecorche.NotPossible, "client: is closed"):
             await client.models()
 
+    async def test_what_is_refused_costs_no_connection(self):
+        async with ecorche.aio.connect(self.server.address) as client:
+            with self.assertRaisesRegex(ecorche.InvalidArgument, r"translation: has the shape \(2,\)"):
+                await client.set_root((1, 2))
+            with self.assertRaisesRegex(ecorche.InvalidArgument, r"xyzw: has the shape \(3,\)"):
+                await client.set_rotation("elbow_left", (0, 0, 1))
+            with self.assertRaisesRegex(ecorche.InvalidArgument, "clip: is not UTF-8"):
+                client._waiting._call("play", client._waiting._handle, b"\xff", 1.0, 0)
+            await client.show(await client.send())
+        with self.assertRaisesRegex(ecorche.InvalidArgument, "session: is not UTF-8"):
+            await ecorche.aio.connect(self.server.address, session=b"\xff".decode(errors="surrogateescape"))
+
     async def test_a_server_that_goes_and_comes_back(self):
         with Relay(self.server.port) as relay:
             async with ecorche.aio.connect(relay.address) as client:

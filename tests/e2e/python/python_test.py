@@ -147,6 +147,8 @@ class Python(unittest.TestCase):
             self.model.pose().copy(space="mars")
         with self.assertRaisesRegex(ecorche.InvalidArgument, r"points: have the shape \(3,\)"):
             self.model.pose().to_rest([1, 2, 3])
+        for wrong in (lambda p: p.set_root((1, 2)), lambda p: p.set_rotation(0, (0, 0, 1)), lambda p: p.set_rotation(0, (0, 0, 0, 1, 0))):
+            self.assertRaisesRegex(ecorche.InvalidArgument, r"\(give [34] numbers\)", wrong, ecorche.Pose(self.model))
         body = ecorche.Body(self.model, normals=False).update(ecorche.Pose(self.model), tissues=["skin"])
         with self.assertRaisesRegex(ecorche.InvalidArgument, "the last update did not pose it"):
             body.positions(1)

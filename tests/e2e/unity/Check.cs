@@ -17,7 +17,7 @@ internal static partial class Check
     {
         ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
         ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["cut"] = Cut, ["native"] = NativeChecks.Run,
-        ["bench"] = Bench, ["leave"] = Leave, ["zstd"] = ZstdChecks.Run,
+        ["bench"] = Bench, ["leave"] = Leave, ["probes"] = Probes, ["zstd"] = ZstdChecks.Run,
     };
 
     private static int Main(string[] words)
@@ -222,6 +222,29 @@ internal static partial class Check
             }
         }
         Console.WriteLine("controlled by each");
+    }
+
+    /// <summary>probes ADDRESS: numbers that are no points, or too many, cost no connection.</summary>
+    private static void Probes(string[] words)
+    {
+        using (var client = Client.Connect(words[0]))
+        {
+            client.Open();
+            int refused = 0;
+            foreach (int numbers in new[] { 0, 4, 30003, 600000 })
+            {
+                try
+                {
+                    client.Probe(new double[numbers]);
+                }
+                catch (EcorcheException error) when (error.Code == Code.InvalidArgument)
+                {
+                    ++refused;
+                }
+            }
+            True(client.Probe(new double[30000]).Points.Length == 30000, "as many as may be");
+            Console.WriteLine("refused " + refused);
+        }
     }
 
     /// <summary>volume ADDRESS [compressed]: bends an elbow, and prints what the volume is then.</summary>

@@ -244,6 +244,9 @@ class Unity(unittest.TestCase):
     def test_who_goes_leaves_control_to_the_next(self):
         self.assertEqual(check("leave", self.server.address), "controlled by each\n")
 
+    def test_what_is_no_point_costs_no_connection(self):
+        self.assertEqual(check("probes", self.server.address), "refused 4\n")
+
     def test_the_line_is_cut_and_mended(self):
         self.comes_back_by_resume(self.server, lambda: None, "back resumed\n")
 

@@ -102,5 +102,31 @@ TEST(ClientStream, WhatIsRefusedReplacesNothing) {
   EXPECT_GE(caller.frames_until(caller.bend(0.3)), 0) << "and after coming back";
 }
 
+TEST(ClientStream, TextThatIsNoneCostsNoConnection) {
+  const server::TestServer server;
+  const std::string address = "127.0.0.1:" + std::to_string(server.address().port);
+  ecorche_client_options options = ECORCHE_CLIENT_OPTIONS_INIT;
+  ecorche_client* client = nullptr;
+  options.session = "ward\xff";
+  EXPECT_EQ(ecorche_client_connect(address.c_str(), &options, &client), ECORCHE_INVALID_ARGUMENT);
+  EXPECT_STREQ(ecorche_client_error_message(), "session: is not UTF-8 (give text in UTF-8)");
+  options.session = nullptr;
+  // A name is cut to 64 bytes, which may lie within a character.
+  for (const std::string& name :
+       {std::string(63, 'x') + "\xc3\xa9", std::string("\xff\xfe"), std::string(200, 'x')}) {
+    options.name = name.c_str();
+    ASSERT_EQ(ecorche_client_connect(address.c_str(), &options, &client), ECORCHE_OK)
+        << ecorche_client_error_message();
+    EXPECT_EQ(ecorche_client_open(client, "\xff", nullptr), ECORCHE_INVALID_ARGUMENT);
+    EXPECT_EQ(ecorche_client_open(client, "toy", "\xc3"), ECORCHE_INVALID_ARGUMENT);
+    EXPECT_EQ(ecorche_client_open(client, "toy", nullptr), ECORCHE_OK) << ecorche_client_error_message();
+    EXPECT_EQ(ecorche_client_play(client, "\xed\xa0\x80", 1, 0), ECORCHE_INVALID_ARGUMENT);
+    EXPECT_EQ(ecorche_client_record(client, "\xff"), ECORCHE_INVALID_ARGUMENT);
+    std::uint32_t clips = 0;
+    EXPECT_EQ(ecorche_client_clips(client, &clips), ECORCHE_OK) << "the connection is whole";
+    ecorche_client_close(client);
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::c

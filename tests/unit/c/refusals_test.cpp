@@ -32,6 +32,18 @@ TEST_F(Refusals, FilesThatAreNoModels) {
   EXPECT_EQ(ecorche_model_open(nullptr, &none), ECORCHE_INVALID_ARGUMENT);
 }
 
+TEST_F(Refusals, MessagesAreUtf8WhateverTheNames) {
+  EXPECT_EQ(ecorche_pose_set_angle(pose, "\xff", "a\xc3", 0), ECORCHE_NOT_FOUND);
+  EXPECT_EQ(message().find("?.a?: "), 0U) << message();
+  // Two bytes a character: of one of both paths the end of the buffer lies within one.
+  for (std::string path : {"/nowhere/", "/nowhere1/"}) {
+    for (int i = 0; i < 1000; ++i) path += "\xc3\xa9";
+    ecorche_model* none = nullptr;
+    EXPECT_NE(ecorche_model_open(path.c_str(), &none), ECORCHE_OK);
+    EXPECT_EQ(message().back(), '\xa9') << "a whole character";
+  }
+}
+
 TEST_F(Refusals, NullHandles) {
   std::array<double, 12> numbers{};
   std::array<float, 3> point{};

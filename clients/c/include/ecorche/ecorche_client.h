@@ -18,7 +18,7 @@
  *   }
  *
  * Units, errors, ownership and structs are as in ecorche.h, but for the error message, which is
- * ecorche_client_error_message().
+ * ecorche_client_error_message(). Text is UTF-8; INVALID_ARGUMENT where it is not.
  *
  * Threads: a client is for one thread at a time. It starts none: it reads and answers the server within
  * ecorche_client_poll and within what waits for an answer, so call the former for every picture until nothing

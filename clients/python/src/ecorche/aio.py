@@ -54,11 +54,13 @@ class Client(Anatomy):
         return self._waiting.model_changed
 
     async def close(self) -> None:
-        """Hangs up, after what is under way; whoever waits for frames gets NotPossible."""
+        """Says goodbye and hangs up, after what is under way; whoever waits for frames gets NotPossible."""
         async with self._lock:
+            if self._closed:
+                return
             self._closed = True
             self._stir()
-            self._waiting.close()
+            await asyncio.shield(self._loop.run_in_executor(None, self._waiting.close))
 
     async def __aenter__(self) -> "Client":
         return self

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ._library import (AngleInfo, ClientOptions, EventInfo, InvalidArgument, NotPossible, ProbedInfo, QualityInfo, SegmentInfo, StreamOptions,
                        TissueInfo, client_library)
 from .body import SKINNING, SPACES, Quality
-from .model import Anatomy, read_angles, read_segments, read_tissues, view
+from .model import Anatomy, numbers, read_angles, read_segments, read_tissues, view
 
 ENCODINGS = {"f32": 1, "u16": 2, "u16-delta": 3}
 NONE, FRAME, POSE, CONTROL, MODEL_CHANGED = range(5)
@@ -120,12 +120,12 @@ class Client(Anatomy):
 
     def set_rotation(self, segment: Union[str, int], xyzw: Sequence[float]) -> "Client":
         """The turn of a segment from the scan, in its joint's axes: a unit quaternion x, y, z, w."""
-        self._call("set_rotation", self._handle, self.segment(segment).row, (ctypes.c_double * 4)(*xyzw))
+        self._call("set_rotation", self._handle, self.segment(segment).row, numbers("xyzw", xyzw, 4))
         return self
 
     def set_root(self, translation: Sequence[float]) -> "Client":
         """Where the whole body goes from the scan: LPS mm."""
-        self._call("set_root", self._handle, (ctypes.c_double * 3)(*translation))
+        self._call("set_root", self._handle, numbers("translation", translation, 3))
         return self
 
     def send(self, *, skinning: str = "cor") -> int:

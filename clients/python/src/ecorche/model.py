@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Mapping, Optional, Sequence, Union
 import numpy as np
 import numpy.typing as npt
 
-from ._library import AngleInfo, GridInfo, NotFound, SegmentInfo, TissueInfo, VolumeInfo, ask, call
+from ._library import AngleInfo, GridInfo, InvalidArgument, NotFound, SegmentInfo, TissueInfo, VolumeInfo, ask, call
 
 if TYPE_CHECKING:
     from .body import Body
@@ -28,6 +28,14 @@ def view(pointer, shape, owner) -> np.ndarray:
     out = np.frombuffer(block, dtype=np.dtype(pointer._type_)).reshape(shape)
     out.flags.writeable = False
     return out
+
+
+def numbers(what: str, values: npt.ArrayLike, count: int) -> ctypes.Array:
+    """Exactly so many, for the library: ctypes would fill up with zeros."""
+    given = np.asarray(values, float)
+    if given.shape != (count,):
+        raise InvalidArgument(f"{what}: has the shape {given.shape} (give {count} numbers)")
+    return (ctypes.c_double * count)(*given)
 
 
 @dataclass(frozen=True)
@@ -77,8 +85,8 @@ class Grid:
         return cls(tuple(info.size), np.array(info.origin), np.array(info.spacing), np.array(info.direction).reshape(3, 3))
 
     def _info(self) -> GridInfo:
-        return GridInfo((ctypes.c_int32 * 3)(*self.size), (ctypes.c_double * 3)(*self.origin), (ctypes.c_double * 3)(*self.spacing),
-                        (ctypes.c_double * 9)(*np.asarray(self.direction, float).ravel()))
+        return GridInfo((ctypes.c_int32 * 3)(*self.size), numbers("origin", self.origin, 3), numbers("spacing", self.spacing, 3),
+                        numbers("direction", np.ravel(self.direction), 9))
 
 
 @dataclass(frozen=True)
@@ -206,7 +214,7 @@ class Pose:
 
     def set_rotation(self, segment: Union[str, int], xyzw: Sequence[float]) -> "Pose":
         """The turn of a segment from the scan, in its joint's axes: a unit quaternion x, y, z, w."""
-        call("pose_set_rotation", self._handle, self.model.segment(segment).row, (ctypes.c_double * 4)(*xyzw))
+        call("pose_set_rotation", self._handle, self.model.segment(segment).row, numbers("xyzw", xyzw, 4))
         return self
 
     def rotation(self, segment: Union[str, int]) -> npt.NDArray[np.float64]:
@@ -217,7 +225,7 @@ class Pose:
 
     def set_root(self, translation: Sequence[float]) -> "Pose":
         """Where the whole body goes from the scan: LPS mm."""
-        call("pose_set_root", self._handle, (ctypes.c_double * 3)(*translation))
+        call("pose_set_root", self._handle, numbers("translation", translation, 3))
         return self
 
 

@@ -182,9 +182,13 @@ namespace Ecorche
         }
 
         /// <summary>Points (three each, LPS mm) of the posed body back to the scan, or the other way, of the pose that was shown last; 10000 at most.</summary>
+        /// <exception cref="EcorcheException">InvalidArgument: not three each, none, or too many.</exception>
         public Probed Probe(double[] points, bool toRest = true, bool tissues = false)
         {
+            const int most = 10000;
             Opened();
+            if (points == null || points.Length % 3 != 0 || points.Length < 3 || points.Length > 3 * most)
+                throw new EcorcheException(Code.InvalidArgument, "points: are not three numbers each of 1 to " + most + " points");
             var probe = Begin(_out).ProbePoints;
             _out.HasProbePoints = true;
             probe.Clear();
