@@ -18,11 +18,14 @@ ecorche_code multiply(const std::array<float, 9>& m, std::size_t count, const fl
     return fail(ECORCHE_INVALID_ARGUMENT, "stride: is less than three floats (12 bytes, or 0 for that)");
   const auto* from = reinterpret_cast<const char*>(in);
   auto* to = reinterpret_cast<char*>(out);
-  for (std::size_t i = 0; i < count; ++i, from += in_stride, to += out_stride) {
+  // In place: where points move apart the last one goes first, before the one below it is written over it.
+  const bool backwards = out_stride > in_stride;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t at = backwards ? count - 1 - i : i;
     std::array<float, 3> p{}, q{};
-    std::memcpy(p.data(), from, point);
+    std::memcpy(p.data(), from + at * in_stride, point);
     for (std::size_t r = 0; r < 3; ++r) q[r] = m[3 * r] * p[0] + m[3 * r + 1] * p[1] + m[3 * r + 2] * p[2];
-    std::memcpy(to, q.data(), point);
+    std::memcpy(to + at * out_stride, q.data(), point);
   }
   return ECORCHE_OK;
 }

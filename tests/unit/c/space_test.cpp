@@ -56,7 +56,7 @@ TEST(Space, LeftFrontAndUpAreWhereTheEngineHasThem) {
   }
 }
 
-TEST(Space, TrianglesAreWoundTheOtherWayRoundWhereTheSpaceIsLeftHanded) {
+TEST(Space, ItMirrorsWhereTheSpaceIsLeftHanded) {
   for (const Engine& engine : engines) {
     RowMajor matrix;
     EXPECT_EQ(ecorche_space_matrix(engine.space, matrix.data()), engine.left_handed ? 1 : 0) << engine.space;
@@ -65,6 +65,20 @@ TEST(Space, TrianglesAreWoundTheOtherWayRoundWhereTheSpaceIsLeftHanded) {
     EXPECT_LT((matrix * point - moved(engine.space, point)).norm(), 1e-4);
   }
   EXPECT_EQ(ecorche_space_matrix(static_cast<ecorche_space>(6), RowMajor().data()), -1);
+}
+
+// By the engines' own formulas for the side that a triangle is seen from: Unity takes (b - a) x (c - a),
+// Unreal (b - c) x (a - c), glTF and all right-handed ones the right hand's rule.
+TEST(Space, OnlyUnityWantsCornersSwapped) {
+  const Vector3d a(100, -20, 1000), b(130, 15, 1010), c(95, 10, 1060);  // counter-clockwise from `outside`
+  const Vector3d outside = a + (b - a).cross(c - a);
+  for (const Engine& engine : engines) {
+    const Vector3d p = moved(engine.space, a), eye = moved(engine.space, outside);
+    Vector3d q = moved(engine.space, b), r = moved(engine.space, c);
+    if (engine.space == ECORCHE_SPACE_UNITY) q.swap(r);
+    const Vector3d front = engine.space == ECORCHE_SPACE_UNREAL ? (q - r).cross(p - r) : (q - p).cross(r - p);
+    EXPECT_GT(front.dot(eye - p), 0) << engine.space;
+  }
 }
 
 TEST(Space, ATurnMovesPointsThereAsItDoesHere) {
@@ -99,6 +113,24 @@ TEST(Space, PointsComeBackAndStridesAreKept) {
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       EXPECT_EQ(there[i].mark, 7);
       for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(back[i].at[c], vertices[i].at[c], 1e-4);
+    }
+  }
+}
+
+TEST(Space, InPlaceWhateverTheStrides) {
+  constexpr std::size_t count = 50, narrow = 3, wide = 5;
+  std::vector<float> points(narrow * count), expected(narrow * count);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = static_cast<float>(i);
+  ASSERT_EQ(ecorche_space_points(ECORCHE_SPACE_ROS, count, points.data(), 0, expected.data(), 0), ECORCHE_OK);
+  for (const auto& [from, to] : {std::pair{narrow, wide}, {wide, narrow}, {wide, wide}}) {
+    std::vector<float> room(wide * count);
+    for (std::size_t i = 0; i < count; ++i) std::copy_n(&points[3 * i], 3, &room[from * i]);
+    ASSERT_EQ(ecorche_space_points(ECORCHE_SPACE_ROS, count, room.data(), from * sizeof(float), room.data(),
+                                   to * sizeof(float)),
+              ECORCHE_OK);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t c = 0; c < 3; ++c)
+        ASSERT_EQ(room[to * i + c], expected[3 * i + c]) << from << " to " << to << ", " << i;
     }
   }
 }

@@ -97,11 +97,13 @@ typedef enum ecorche_space {
   ECORCHE_SPACE_RAS_MM = 5 /* OpenIGTLink, 3D Slicer: x right, y front, z up; right-handed, mm */
 } ecorche_space;
 
-/* From LPS mm: `matrix` is 3 by 3, row by row, and scales as well; 1 where it mirrors, so that triangles have
- * to be wound the other way round (swap two corners), else 0, and -1 for a space that does not exist. */
+/* From LPS mm: `matrix` is 3 by 3, row by row, and scales as well; 1 where it mirrors, for the space is
+ * left-handed, else 0, and -1 for a space that does not exist.
+ * Triangles are counter-clockwise as seen from outside in every space. That is the front in Unreal, glTF and
+ * OpenGL. In Unity the front is clockwise: swap two corners of each triangle there. */
 ECORCHE_API int ecorche_space_matrix(ecorche_space space, double matrix[9]);
 /* `count` points of three floats, LPS mm, into the space, `stride` bytes from one to the next (0: 12); `out`
- * may be `in`. */
+ * may be `in`, whatever the strides. */
 ECORCHE_API ecorche_code ecorche_space_points(ecorche_space space, size_t count, const float* in,
                                               size_t in_stride, float* out, size_t out_stride);
 /* A point of the space back into LPS mm: what a probe takes. */
