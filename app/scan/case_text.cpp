@@ -32,6 +32,11 @@ std::string sure(const ScanEntry& entry) {
   return out + "\n";
 }
 
+// How bones and tissues name label `id`: a word of digits would mean the label of that number.
+std::string label_word(std::size_t id, const std::string& name) {
+  return name.find_first_not_of("0123456789") == name.npos ? std::to_string(id) : write_text(name);
+}
+
 }  // namespace
 
 std::string case_text(const ScanCase& scan, const std::string& name, const std::string& folder,
@@ -61,16 +66,17 @@ std::string case_text(const ScanCase& scan, const std::string& name, const std::
   out += scan.skin.close_mm > 0 ? "skin: {labels: all, close_mm: " + text::number(scan.skin.close_mm) + "}\n"
                                 : "skin: {labels: all}\n";
   out += "bones:\n";
-  for (const ScanEntry& entry : scan.entries) {
-    if (entry.role != Role::bone || !entry.drawn || entry.voxels == 0) continue;
-    out += "  - {name: " + entry.name + ", labels: [" + entry.name + "], segment: " + entry.segment + "}" +
-           sure(entry);
-  }
   std::string tissues;
-  for (const ScanEntry& entry : scan.entries) {
-    if (entry.role != Role::tissue || !entry.drawn || entry.voxels == 0) continue;
-    tissues += "  - {name: " + entry.name + ", labels: [" + entry.name +
-               "], group: " + std::string(group_name(entry.group)) + "}" + sure(entry);
+  for (std::size_t e = 0; e < scan.entries.size(); ++e) {
+    const ScanEntry& entry = scan.entries[e];
+    if (entry.role == Role::body || !entry.drawn || entry.voxels == 0) continue;
+    const std::string begin =
+        "  - {name: " + write_text(entry.name) + ", labels: [" + label_word(e + 1, entry.name) + "], ";
+    if (entry.role == Role::bone) {
+      out += begin + "segment: " + entry.segment + "}" + sure(entry);
+    } else {
+      tissues += begin + "group: " + std::string(group_name(entry.group)) + "}" + sure(entry);
+    }
   }
   if (!tissues.empty()) out += "tissues:\n" + tissues;
   if (!volumes.empty()) out += "volumes:\n";
