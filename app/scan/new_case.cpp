@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "app/scan/unread_files.hpp"
+
 namespace ecorche::app {
 namespace {
 
@@ -61,6 +63,7 @@ NewCase new_case(const Program& program, const ScanSettings& settings, const fil
   if (!settings.side.empty()) options.side = settings.side == "left" ? Side::left : Side::right;
   Scan scan = read_scan(settings.scan, reading(program, limits), settings.choice, program.context("read"));
   NewCase out{decide(scan, options, program.context("labels")), {}};
+  for (std::string& line : unread_below(settings.scan)) out.made.doubts.push_back(std::move(line));
   out.name = write_scan_case(folder, settings.scan, scan, out.made, program.context("write")).name;
   return out;
 }

@@ -12,6 +12,7 @@
 
 #include "core/values/text.hpp"
 #include "io/image/dicom.hpp"
+#include "io/image/dicom_image.hpp"
 #include "io/image/dicom_segmentation.hpp"
 #include "io/image/equal_run.hpp"
 #include "io/image/image_file.hpp"
@@ -234,11 +235,10 @@ class Reader {
 
   void take(const fs::path& path, Looked looked) {
     if (io::is_dicom(path)) {
-      if (std::optional<io::Segmentation> map = io::read_dicom_segmentation(path, options_, {})) {
-        out_.labels.push_back({path, std::move(*map), "its segments"});
-      } else {
-        add_grey(path, io::read_image(path, options_, choice_));
-      }
+      std::optional<io::Segmentation> map = io::read_dicom_segmentation(path, options_, {});
+      // A study's folder may hold both: the series, and what was segmented in it.
+      if (!map || io::holds_slices(path, options_)) add_grey(path, io::read_image(path, options_, choice_));
+      if (map) out_.labels.push_back({path, std::move(*map), "its segments"});
       return;
     }
     if (is_slicer(path)) {

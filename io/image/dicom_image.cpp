@@ -171,6 +171,12 @@ std::vector<fs::path> dicom_files(const fs::path& path) {
   return out;
 }
 
+bool holds_slices(const fs::path& path, const files::ReadOptions& options) {
+  const std::vector<fs::path> files = dicom_files(path);
+  return std::any_of(files.begin(), files.end(),
+                     [&](const fs::path& file) { return shows_slices(read_data_set(file, options)); });
+}
+
 Image read_dicom(const fs::path& path, const files::ReadOptions& options, const ImageChoice& choice,
                  bool labels) {
   std::vector<Slice> slices;

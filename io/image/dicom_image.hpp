@@ -23,4 +23,7 @@ Image read_dicom(const std::filesystem::path& path, const files::ReadOptions& op
 /// The files that `read_dicom` would read: `path` itself, or those of the folder that are DICOM.
 std::vector<std::filesystem::path> dicom_files(const std::filesystem::path& path);
 
+/// Whether any of them shows slices of an image, beside segmentations, reports and contours.
+bool holds_slices(const std::filesystem::path& path, const files::ReadOptions& options);
+
 }  // namespace ecorche::io

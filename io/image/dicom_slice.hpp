@@ -62,6 +62,9 @@ struct Slice {
   std::string name() const;  ///< file and frame, for messages
 };
 
+/// Whether there are pictures of an image, and not something else (a report, contours, a segmentation).
+bool shows_slices(const DataSet& set);
+
 /// The pictures of an image; none where the file holds something else (a report, contours, a segmentation).
 /// Throws Error{data} for one that cannot become a volume: colours, frames without a place, values behind a
 /// table.

@@ -198,12 +198,17 @@ std::vector<Slice> framed_slices(const DataSet& set) {
   return out;
 }
 
+bool shows_slices(const DataSet& set) {
+  const Item& top = set.top;
+  if (set.pixels_at == 0 || top.text(kClass).starts_with(kSegmentationClass.substr(0, 26))) return false;
+  // Screenshots and dose reports lie with their series; nothing says where.
+  return top.find(kPosition) != nullptr || top.find(kSharedGroups) != nullptr ||
+         top.find(kFrameGroups) != nullptr;
+}
+
 std::vector<Slice> slices_of(const DataSet& set) {
   const Item& top = set.top;
-  if (set.pixels_at == 0 || top.text(kClass).starts_with(kSegmentationClass.substr(0, 26))) return {};
-  // Screenshots and dose reports lie with their series; nothing says where.
-  const bool placed = top.find(kPosition) != nullptr || top.find(kSharedGroups) != nullptr;
-  if (!placed && top.find(kFrameGroups) == nullptr) return {};
+  if (!shows_slices(set)) return {};
   const std::string colours = top.text(kPhotometric);
   if (top.whole(kSamples).value_or(1) != 1 || colours.starts_with("RGB") || colours.starts_with("YBR") ||
       colours.starts_with("PALETTE")) {

@@ -68,6 +68,37 @@ class GivenScans(unittest.TestCase):
             voxels = 8**3 * np.count_nonzero(self.total == self.names[name])
             self.assertLess(abs(volumes[word] - voxels), 0.2 * voxels, name)
 
+    def test_a_study_with_its_segmentation_in_one_folder(self):
+        """A folder of DICOM with a series and a DICOM SEG is both, and what is no DICOM in it is told."""
+        place = self.place()
+        words = [*sorted(self.scan.glob("*.nii.gz")), "-o", place / "posed", "--pose", "lib:anatomical", "--max-tets", "20000"]
+        result = run("pose", "--scan", *words, "--volumes", "all", "--volume-format", "dicom", "--grid", "rest")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        study = place / "study"
+        shutil.copytree(place / "posed/ct.dicom", study / "ct")
+        shutil.copytree(study / "ct", place / "series")
+        shutil.copy(place / "posed/labels.dcm", study)
+        shutil.copy(self.scan / "body.nii.gz", study)
+        told = self.new(study, "-o", place / "one")
+        self.assertIn("study: 1 image below it is not read, the first body.nii.gz", told)
+        self.assertNotIn("not read", self.new(study, study / "body.nii.gz", "-o", place / "three"))
+        self.new(place / "series", study / "labels.dcm", "-o", place / "two")
+        for name in ("ct.nrrd", "labels.nrrd"):
+            self.assertEqual((place / "one" / name).read_bytes(), (place / "two" / name).read_bytes(), name)
+
+    def test_folders_below_are_told(self):
+        """A folder that holds the CT, and the segmentation in folders below it, is not taken for a CT alone without a word."""
+        place = self.place()
+        (place / "scan/segmentations").mkdir(parents=True)
+        shutil.copy(self.scan / "ct.nii.gz", place / "scan")
+        for task in ("total", "body"):
+            shutil.copy(self.scan / f"{task}.nii.gz", place / "scan/segmentations")
+        told = self.new(place / "scan", "-o", place / "alone")
+        self.assertIn("scan: 2 images below it are not read, the first segmentations/body.nii.gz: where they belong to this scan, give them", told)
+        told = self.new(place / "scan", place / "scan/segmentations", "-o", place / "both")
+        self.assertNotIn("not read", told)
+        self.assertNotIn("by a template", told)
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
