@@ -11,6 +11,7 @@
 #include <set>
 
 #include "core/values/text.hpp"
+#include "io/case/structures.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/dicom_image.hpp"
 #include "io/image/dicom_segmentation.hpp"
@@ -225,8 +226,14 @@ class Reader {
     check_components(path, out.image);
     out.values = label_values(out.image);
     out.names = io::read_nifti_names(path);
-    const bool alone = out.values && out.values->size() <= 1 && out.names.empty();
-    if (alone && folders_.contains(path.parent_path()) && !table_for(path)) {
+    if (!out.values && out.names.empty()) {
+      if (std::optional<Image> mask = io::as_binary(out.image))
+        out.image = std::move(*mask), out.values = {1};
+    }
+    const bool alone = (!out.values || out.values->size() <= 1) && out.names.empty() &&
+                       folders_.contains(path.parent_path()) && !table_for(path);
+    if (alone && !out.values) check_is_picture(path, out.image);
+    if (alone && out.values) {
       out.mask = io::as_mask(out.image);
       out.image = {};
     }
@@ -283,6 +290,18 @@ class Reader {
                 "has " + std::to_string(image.components) + " numbers a voxel",
                 colours ? "it is a picture in colours: save the grey values, or the label map"
                         : "save one number a voxel, or take one by --phase where they follow in time");
+  }
+
+  // Among masks, with a name as they have: then it is one of them, and must not be lost as a picture.
+  static void check_is_picture(const fs::path& path, const Image& image) {
+    if (io::recognise(io::image_stem(path)).structure == nullptr) return;
+    const std::size_t shares = io::count_shares(image);
+    if (shares == 0) return;
+    throw Error(ErrorKind::data, path.string(),
+                "is named as a mask, but " + std::to_string(shares) + " of its " +
+                    std::to_string(image.grid.voxels()) + " values are NaN, or between 0 and 1",
+                "save 0 and 1 (of probabilities, 1 from 0.5 on); an image is given by its own name, not by "
+                "its folder's");
   }
 
   void add_grey(const fs::path& path, Image image) {

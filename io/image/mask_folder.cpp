@@ -105,6 +105,34 @@ std::optional<Mask> as_mask(const Image& image) {
   });
 }
 
+std::optional<Image> as_binary(const Image& image) {
+  const std::optional<Mask> mask = as_mask(image);
+  if (!mask || mask->runs.empty()) return std::nullopt;
+  Image out(image.grid, ScalarType::u8);
+  const auto voxels = out.scalars<std::uint8_t>();
+  for (const Run& run : mask->runs) std::fill(voxels.data() + run.begin, voxels.data() + run.end, 1);
+  const bool whole = std::find(voxels.begin(), voxels.end(), 0) == voxels.end();
+  const bool positive = with_scalar_type(image.type, [&](auto zero) {
+    const auto value = image.scalars<decltype(zero)>()[mask->runs.front().begin];
+    return value > zero || static_cast<double>(value) == -1;
+  });
+  if (whole || !positive) return std::nullopt;
+  return out;
+}
+
+std::size_t count_shares(const Image& image) {
+  if (image.components != 1) return 0;
+  return with_scalar_type(image.type, [&](auto zero) -> std::size_t {
+    std::size_t out = 0;
+    for (const auto value : image.scalars<decltype(zero)>()) {
+      const double v = static_cast<double>(value);
+      if (v < 0 || v > 1) return 0;
+      out += v == 0 || v == 1 ? 0 : 1;
+    }
+    return out;
+  });
+}
+
 void MaskLayers::add(const Mask& mask, const Path& path) {
   if (count_++ == 0) first_ = path.filename().string();
   check_count(count_, path.parent_path());

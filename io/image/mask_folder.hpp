@@ -35,6 +35,14 @@ struct Mask {
 /// The image as a mask; nothing where it holds more than one value besides 0, or several components.
 std::optional<Mask> as_mask(const Image& image);
 
+/// An image of 0 and one other value as a mask of 0 and 1: of shares (0.9), scaled, or 255 in a signed byte.
+/// Nothing where no value, or every one, is 0, or the other one is below 0 and not -1: that is a picture.
+std::optional<Image> as_binary(const Image& image);
+
+/// How many values are NaN, or shares between 0 and 1, of an image that holds no others but 0 and 1; 0 of any
+/// other image.
+std::size_t count_shares(const Image& image);
+
 /// Masks put together as `read_masks` has them, one by one.
 class MaskLayers {
  public:

@@ -99,6 +99,59 @@ class GivenScans(unittest.TestCase):
         self.assertNotIn("not read", told)
         self.assertNotIn("by a template", told)
 
+    def masks(self, change):
+        """A folder of masks, one changed, beside the body: the words for `new`."""
+        place = self.place()
+        (place / "total").mkdir()
+        for name in ("femur_left", "femur_right", "hip_left", "hip_right", "sacrum", "tibia_left"):
+            mask = (self.total == self.names.get(name, 255)).astype("u1")
+            nibabel.save(nibabel.Nifti1Image(change(mask) if name == "femur_left" else mask, self.affine), place / f"total/{name}.nii.gz")
+        return [self.scan / "body.nii.gz", place / "total", "-o", place / "case"]
+
+    def check_masks(self, change):
+        words = self.masks(change)
+        told = self.new(*words)
+        self.assertIn("1 of 6 masks are empty", told)
+        case = yaml.safe_load((words[-1] / "case.yaml").read_text())
+        self.assertIn("femur_left", [bone["name"] for bone in case["bones"]])
+        self.assertNotIn("volumes", case)
+
+    def test_a_mask_of_shares(self):
+        self.check_masks(lambda mask: mask.astype("f4") * np.float32(0.9))
+
+    def test_a_mask_of_255_in_a_signed_byte(self):
+        self.check_masks(lambda mask: (mask * 255).view("i1"))
+
+    def refused_mask(self, change, count):
+        words = self.masks(change)
+        result = run("new", *words)
+        self.assertEqual(result.returncode, 65, result.stderr)
+        self.assertIn(f"femur_left.nii.gz: is named as a mask, but {count} of its {self.total.size} values are NaN, or between 0 and 1 (save 0 and 1", result.stderr)
+        self.assertFalse(words[-1].exists())
+
+    def test_a_mask_with_nan(self):
+        def change(mask):
+            out = mask.astype("f4")
+            out[0, 0, 0] = np.nan
+            return out
+        self.refused_mask(change, 1)
+
+    def test_a_mask_of_probabilities(self):
+        def change(mask):
+            out = mask.astype("f4")
+            out[0, 0, :3] = 0.2, 0.5, 0.7
+            return out
+        self.refused_mask(change, 3)
+
+    def test_an_image_beside_masks_stays_one(self):
+        """Names such as T1 are those of images, too; of a vertebra's mask they say nothing."""
+        words = self.masks(lambda mask: mask)
+        image = np.random.default_rng(1).uniform(0, 900, self.total.shape).astype("f4")
+        nibabel.save(nibabel.Nifti1Image(image, self.affine), words[1] / "T1.nii.gz")
+        self.new(*words)
+        case = yaml.safe_load((words[-1] / "case.yaml").read_text())
+        self.assertEqual([volume["name"] for volume in case["volumes"]], ["t1"])
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
