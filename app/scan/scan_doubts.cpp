@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/values/text.hpp"
+
 namespace ecorche::app {
 namespace {
 
@@ -67,24 +69,77 @@ std::vector<Point> middles(const ScanCase& scan) {
   return sum;
 }
 
-void tell_exchanged(ScanCase& out) {
+// The bones of both sides of one name.
+struct BonePair {
+  std::string name;       // without its side
+  Point to_left{};        // from the right one's middle to the left one's, mm
+  bool of_trunk = false;  // whose sides no posture exchanges
+};
+
+std::vector<BonePair> pairs_of(const ScanCase& scan) {
   const auto shown = [](const ScanEntry& e) { return e.role == Role::bone && e.drawn && e.voxels > 0; };
-  const std::vector<Point> middle = middles(out);
+  const std::vector<Point> middle = middles(scan);
+  std::vector<BonePair> out;
+  for (std::size_t e = 0; e < scan.entries.size(); ++e) {
+    const ScanEntry& left = scan.entries[e];
+    if (!shown(left) || !left.name.ends_with("_left")) continue;
+    BonePair pair{left.name.substr(0, left.name.size() - 5), {}, true};
+    const auto right = std::find_if(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& o) {
+      return shown(o) && o.name == pair.name + "_right";
+    });
+    if (right == scan.entries.end()) continue;
+    for (const char* limb : {"forearm", "hand", "shank", "foot", "toes"})
+      pair.of_trunk = pair.of_trunk && !left.segment.starts_with(limb);
+    const Point& other = middle[static_cast<std::size_t>(right - scan.entries.begin()) + 1];
+    for (std::size_t k = 0; k < 3; ++k) pair.to_left[k] = middle[e + 1][k] - other[k];
+    out.push_back(pair);
+  }
+  return out;
+}
+
+double inner(const Point& a, const Point& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// Of a trunk's bones, thighs and upper arms those whose left one lies where all others have their right one.
+void tell_odd_pairs(ScanCase& out, const std::vector<BonePair>& pairs) {
+  Point sum{};
+  std::size_t count = 0;
+  for (const BonePair& pair : pairs) {
+    if (!pair.of_trunk) continue;
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += pair.to_left[k];
+    ++count;
+  }
+  std::vector<std::string> odd;
+  for (const BonePair& pair : pairs) {
+    Point others = sum;
+    for (std::size_t k = 0; k < 3; ++k) others[k] -= pair.to_left[k];
+    const double along = inner(pair.to_left, others), length = std::sqrt(inner(others, others));
+    if (pair.of_trunk && along < -kApartMm * length) odd.push_back(pair.name);
+  }
+  if (odd.empty()) return;
+  const std::string said = "left and right are exchanged in the names of one or the other";
+  if (odd.size() == count) {
+    out.doubts.push_back(text::joined(odd, " and ") + " have their left ones on different sides: " + said);
+    return;
+  }
+  std::string like;
+  for (std::size_t i = 1; i < odd.size(); ++i) like += (i == 1 ? ", as does " : ", ") + odd[i] + "_left";
+  out.doubts.push_back(odd.front() + "_left lies to the right of " + odd.front() + "_right, against " +
+                       std::to_string(count - odd.size()) + " other pairs of bones" + like + ": " + said);
+}
+
+void tell_exchanged(ScanCase& out) {
+  const std::vector<BonePair> pairs = pairs_of(out);
   std::size_t right = 0, exchanged = 0;
   std::string first;
-  for (std::size_t e = 0; e < out.entries.size(); ++e) {
-    const std::string& name = out.entries[e].name;
-    if (!shown(out.entries[e]) || !name.ends_with("_left")) continue;
-    const std::string other = name.substr(0, name.size() - 5) + "_right";
-    const auto pair = std::find_if(out.entries.begin(), out.entries.end(),
-                                   [&](const ScanEntry& o) { return shown(o) && o.name == other; });
-    if (pair == out.entries.end()) continue;
-    const double x = middle[e + 1][0] - middle[static_cast<std::size_t>(pair - out.entries.begin()) + 1][0];
+  for (const BonePair& pair : pairs) {
+    const double x = pair.to_left[0];
     if (std::abs(x) < kApartMm) continue;
     ++(x > 0 ? right : exchanged);
-    if (x < 0 && first.empty()) first.append(name).append(" lies to the right of ").append(other);
+    if (x < 0 && first.empty()) first = pair.name + "_left lies to the right of " + pair.name + "_right";
   }
-  if (exchanged <= right) return;
+  if (exchanged <= right) return tell_odd_pairs(out, pairs);
   out.doubts.push_back(
       first + ", and so do " + std::to_string(exchanged) + " of " + std::to_string(exchanged + right) +
       " pairs of bones: left and right are exchanged in the labels' names, or the image's axes "

@@ -152,6 +152,25 @@ class GivenScans(unittest.TestCase):
         case = yaml.safe_load((words[-1] / "case.yaml").read_text())
         self.assertEqual([volume["name"] for volume in case["volumes"]], ["t1"])
 
+    def test_one_pair_of_bones_the_other_way_round(self):
+        """Told wherever the patient lies, and of no scan whose names are right."""
+        place = self.place()
+        swap = {"femur_left": "femur_right", "femur_right": "femur_left"}
+        said = "femur_left lies to the right of femur_right, against "
+        others = ("body", "appendicular_bones")
+        for turn in (np.eye(4), np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])):
+            affine = turn @ self.affine
+            for names in (self.names, {swap.get(name, name): label for name, label in self.names.items()}):
+                shutil.rmtree(place / "case", ignore_errors=True)
+                write_labels(place / "total.nii.gz", self.total, names, affine)
+                for task in others:
+                    write_labels(place / f"{task}.nii.gz", *read_labels(self.scan / f"{task}.nii.gz"), affine)
+                told = self.new(place / "total.nii.gz", *(place / f"{task}.nii.gz" for task in others), "-o", place / "case")
+                self.assertEqual(said in told, names is not self.names, told)
+                self.assertEqual("are exchanged" in told, names is not self.names, told)
+                if names is not self.names:
+                    self.assertRegex(told, r"against 1\d other pairs of bones: left and right are exchanged in the names of one or the other")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
