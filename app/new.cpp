@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "app/command.hpp"
+#include "app/scan/case_text.hpp"
 #include "app/scan/new_case.hpp"
 #include "app/scan/scan_page.hpp"
 #include "core/files/atomic_file.hpp"
@@ -19,9 +20,19 @@ struct NewSettings {
   files::ReadLimits limits;
 };
 
+// Before a case stands that a second try would find in its way. Its own folder is yet to be made.
+void check_report(const NewSettings& settings) {
+  if (settings.report.empty()) return;
+  std::error_code ignored;
+  const auto place = [&](const fs::path& path) { return fs::weakly_canonical(path, ignored); };
+  const fs::path within = place(settings.report).lexically_relative(place(settings.output));
+  if (within.empty() || *within.begin() == "..") files::AtomicFile{settings.report};
+}
+
 int run(const Program& program, const NewSettings& settings) {
   platform::use_big_heap();
   check_case_target(settings.output, settings.scan.scan);
+  check_report(settings);
   const auto [made, name] = new_case(program, settings.scan, settings.limits, settings.output);
   if (!settings.report.empty()) files::write_text(settings.report, scan_page(made, name));
   const std::string case_file = (settings.output / "case.yaml").string();
@@ -31,7 +42,7 @@ int run(const Program& program, const NewSettings& settings) {
     text += "warning: " + doubt + "\n";
   }
   for (const std::string& note : made.notes) text += "note: " + note + "\n";
-  text += "Next: ecorche preprocess " + settings.output.string() + " -o " + settings.output.string() + ".hdf";
+  text += "Next: " + next_commands(settings.output).preprocess;
   nlohmann::json result = scan_json(made);
   result["case"] = case_file;
   program.result(text, result);

@@ -26,6 +26,34 @@ Image narrow(const Image& labels, std::size_t most) {
   return out;
 }
 
+// The files of a case; gone again, with the folder where it is new, unless all were written.
+class Unfinished {
+ public:
+  explicit Unfinished(const fs::path& folder) : folder_(folder) {
+    std::error_code ignored;
+    made_ = !fs::exists(folder, ignored);
+    files::make_folder(folder);
+  }
+  ~Unfinished() {
+    std::error_code ignored;
+    for (const fs::path& file : files_) fs::remove(file, ignored);
+    if (made_ && !whole_) fs::remove(folder_, ignored);
+  }
+  Unfinished(const Unfinished&) = delete;
+  Unfinished& operator=(const Unfinished&) = delete;
+
+  const fs::path& add(const std::string& name) { return files_.emplace_back(folder_ / name); }
+  void whole() {
+    files_.clear();
+    whole_ = true;
+  }
+
+ private:
+  fs::path folder_;
+  std::vector<fs::path> files_;
+  bool made_ = false, whole_ = false;
+};
+
 }  // namespace
 
 void check_case_target(const fs::path& folder, const std::vector<fs::path>& inputs) {
@@ -45,8 +73,8 @@ void check_case_target(const fs::path& folder, const std::vector<fs::path>& inpu
 
 WrittenCase write_scan_case(const fs::path& folder, const std::vector<fs::path>& inputs, const Scan& scan,
                             const ScanCase& made, const Context& context) {
-  files::make_folder(folder);
-  io::write_image(folder / "labels.nrrd", narrow(made.labels, made.entries.size()));
+  Unfinished unfinished(folder);
+  io::write_image(unfinished.add("labels.nrrd"), narrow(made.labels, made.entries.size()));
   context.report(0.4);
   std::vector<CaseVolumeFile> volumes;
   for (const ScanImage& image : scan.images) {
@@ -58,11 +86,11 @@ WrittenCase write_scan_case(const fs::path& folder, const std::vector<fs::path>&
          ++number)
       name = first + "_" + std::to_string(number);
     const std::string file = name + ".nrrd";
-    io::write_image(folder / file, image.image);
+    io::write_image(unfinished.add(file), image.image);
     volumes.push_back({name, file, image.background});
   }
   context.report(0.9);
-  files::write_text(folder / "picture.png", report::png_bytes(both_views(made, kPicturePixels)));
+  files::write_text(unfinished.add("picture.png"), report::png_bytes(both_views(made, kPicturePixels)));
   std::vector<std::string> from;
   for (const fs::path& input : inputs)
     from.push_back(input.filename().empty() ? input.parent_path().filename().string()
@@ -71,7 +99,8 @@ WrittenCase write_scan_case(const fs::path& folder, const std::vector<fs::path>&
   if (clean.filename().empty()) clean = clean.parent_path();
   std::string name = identifier_from(clean.filename().string());
   if (name.empty()) name = "patient";
-  files::write_text(folder / "case.yaml", case_text(made, name, clean.string(), from, volumes));
+  files::write_text(unfinished.add("case.yaml"), case_text(made, name, folder, from, volumes));
+  unfinished.whole();
   context.report(1);
   return {name};
 }

@@ -18,7 +18,8 @@ struct WrittenCase {
   std::string name;
 };
 
-/// Writes labels.nrrd, the images, picture.png, and last case.yaml, so that a folder with one is whole.
+/// Writes labels.nrrd, the images, picture.png, and last case.yaml, so that a folder with one is whole. Where
+/// that fails, nothing of it stays.
 WrittenCase write_scan_case(const std::filesystem::path& folder,
                             const std::vector<std::filesystem::path>& inputs, const Scan& scan,
                             const ScanCase& made, const Context& context);

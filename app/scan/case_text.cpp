@@ -2,8 +2,10 @@
 #include "app/scan/case_text.hpp"
 
 #include <algorithm>
+#include <cctype>
 
 #include "core/values/text.hpp"
+#include "core/values/utf8.hpp"
 #include "io/case/yaml_text.hpp"
 
 namespace ecorche::app {
@@ -12,22 +14,27 @@ namespace {
 using io::yaml::write_text;
 using Role = ScanEntry::Role;
 
-// One line of a comment: what stands in files is a stranger's.
-std::string plain(std::string_view text) {
-  std::string out;
-  for (const char c : text) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
-  return out;
+// A word of a shell's line.
+std::string shell_word(const std::string& word) {
+  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c > 0x7f ||
+           std::string_view("/._-+=:,@%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (plain) return word;
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? "'\\''" : std::string(1, c);
+  return out + "'";
 }
 
 std::string comments(const char* title, const std::vector<std::string>& lines) {
   if (lines.empty()) return {};
   std::string out = std::string("#\n# ") + title + "\n";
-  for (const std::string& line : lines) out += "#   " + plain(line) + "\n";
+  for (const std::string& line : lines) out += "#   " + text::one_line(line) + "\n";
   return out;
 }
 
 std::string sure(const ScanEntry& entry) {
-  std::string out = "  # " + text::number(entry.confidence, 2) + ": " + plain(entry.how);
+  std::string out = "  # " + text::number(entry.confidence, 2) + ": " + text::one_line(entry.how);
   if (!entry.cut.empty()) out += "; cut by the " + text::joined(entry.cut, " and ") + " border";
   return out + "\n";
 }
@@ -39,14 +46,23 @@ std::string label_word(std::size_t id, const std::string& name) {
 
 }  // namespace
 
-std::string case_text(const ScanCase& scan, const std::string& name, const std::string& folder,
+NextCommands next_commands(const std::filesystem::path& folder) {
+  std::filesystem::path clean = folder.lexically_normal();
+  if (clean.filename().empty()) clean = clean.parent_path();
+  const std::string last = clean.filename().string(), word = shell_word(clean.string());
+  const bool named = !last.empty() && last != "." && last != "..";
+  return {"ecorche check " + word, "ecorche preprocess " + word + " -o " +
+                                       shell_word(named ? clean.string() + ".hdf" : "patient.hdf")};
+}
+
+std::string case_text(const ScanCase& scan, const std::string& name, const std::filesystem::path& folder,
                       const std::vector<std::string>& from, const std::vector<CaseVolumeFile>& volumes) {
-  std::string out = "# Written by `ecorche new` from " + plain(text::joined(from)) + ".\n" +
+  const NextCommands next = next_commands(folder);
+  std::string out = "# Written by `ecorche new` from " + text::one_line(text::joined(from)) + ".\n" +
                     "# Behind each line stands how sure it is, from 0 to 1, and why. picture.png shows it. "
                     "Change what you know\n"
-                    "# better (docs/reference/case.md), then:\n#   ecorche check " +
-                    plain(folder) + "\n#   ecorche preprocess " + plain(folder) + " -o " + plain(folder) +
-                    ".hdf\n";
+                    "# better (docs/reference/case.md), then:\n#   " +
+                    text::one_line(next.check) + "\n#   " + text::one_line(next.preprocess) + "\n";
   out += comments("To be looked at:", scan.doubts);
   out += comments("Also:", scan.notes);
   out += "name: " + write_text(name) + "\n";
@@ -58,10 +74,10 @@ std::string case_text(const ScanCase& scan, const std::string& name, const std::
     if (scan.entries[e].voxels > 0)
       out += "    " + std::to_string(e + 1) + ": " + write_text(scan.entries[e].name) + "\n";
   }
-  out += "# " + text::number(scan.skin.confidence, 2) + ": " + plain(scan.skin.how) + "\n";
+  out += "# " + text::number(scan.skin.confidence, 2) + ": " + text::one_line(scan.skin.how) + "\n";
   if (!scan.skin.caps.empty()) {
     out += "# The image ends within the body, where the skin is cut flat. These caps are no skin:\n";
-    for (const std::string& cap : scan.skin.caps) out += "#   " + plain(cap) + "\n";
+    for (const std::string& cap : scan.skin.caps) out += "#   " + text::one_line(cap) + "\n";
   }
   out += scan.skin.close_mm > 0 ? "skin: {labels: all, close_mm: " + text::number(scan.skin.close_mm) + "}\n"
                                 : "skin: {labels: all}\n";

@@ -181,10 +181,14 @@ void write_image(const Path& path, const Image& image, bool compress) {
                 "report this");
   }
   files::AtomicFile file(path);
-  if (format == Format::nrrd && compress && image.components == 1) {
-    write_packed_nrrd(file.temporary(), image);
-  } else {
-    itk_images::write(file.temporary(), format, image, compress);
+  try {
+    if (format == Format::nrrd && compress && image.components == 1) {
+      write_packed_nrrd(file.temporary(), image);
+    } else {
+      itk_images::write(file.temporary(), format, image, compress);
+    }
+  } catch (const Error& error) {  // by the name that the user knows
+    throw Error(error.kind(), path.string(), error.problem(), error.mend());
   }
   file.commit();
 }

@@ -2,8 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scans as strangers give them to `ecorche new`: nothing of a scan is lost or taken for another without a word."""
 import json
+import os
 import pathlib
+import resource
 import shutil
+import signal
+import subprocess
 import tempfile
 import unittest
 import xml.etree.ElementTree as xml
@@ -12,7 +16,7 @@ import nibabel
 import numpy as np
 import yaml
 
-from posed_files import run
+from posed_files import ECORCHE, run
 
 
 def read_labels(path):
@@ -170,6 +174,52 @@ class GivenScans(unittest.TestCase):
                 self.assertEqual("are exchanged" in told, names is not self.names, told)
                 if names is not self.names:
                     self.assertRegex(told, r"against 1\d other pairs of bones: left and right are exchanged in the names of one or the other")
+
+    def test_a_report_that_cannot_be_written(self):
+        """It is refused before a case stands in the way of the next try; one within the case can be."""
+        place = self.place()
+        words = [self.scan / "total.nii.gz", self.scan / "body.nii.gz", "-o", place / "case"]
+        for report in (place / "none/page.html", place):
+            result = run("new", *words, "--report", report)
+            self.assertEqual(result.returncode, 73, result.stderr)
+            self.assertEqual(list(place.iterdir()), [])
+        self.new(*words, "--report", place / "case/page.html")
+        self.assertEqual(sorted(path.name for path in (place / "case").iterdir()), ["case.yaml", "labels.nrrd", "page.html", "picture.png"])
+
+    def test_a_case_that_cannot_be_written_whole(self):
+        """Nothing of it stays, so that it can be tried again when there is room."""
+        place = self.place()
+        words = ["new", *sorted(self.scan.glob("*.nii.gz")), "-o", place / "case"]
+        self.new(*words[1:])
+        sizes = {name: (place / "case" / name).stat().st_size for name in ("labels.nrrd", "ct.nrrd")}
+        shutil.rmtree(place / "case")
+        self.assertLess(sizes["labels.nrrd"], sizes["ct.nrrd"])
+
+        def small_files():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (sizes["ct.nrrd"] - 1, sizes["ct.nrrd"] - 1))
+
+        for made in (False, True):
+            if made:
+                (place / "case").mkdir()
+            result = subprocess.run([ECORCHE, *map(str, words)], capture_output=True, text=True, timeout=120, preexec_fn=small_files, restore_signals=False)
+            self.assertEqual((result.returncode, "/case/ct.nrrd: " in result.stderr), (74, True), result.stderr)
+            self.assertEqual(list(place.glob("**/*")), [place / "case"] if made else [])
+        self.new(*words[1:])
+
+    def test_the_commands_that_are_told_can_be_run(self):
+        """Whatever the folder is called; and the case is text in UTF-8."""
+        place = self.place()
+        for name in ("a case/", "it's", ".", os.fsdecode(b"h\xfcfte")):
+            here = place / str(len(list(place.iterdir())))
+            here.mkdir()
+            result = subprocess.run([ECORCHE, "new", self.scan / "total.nii.gz", self.scan / "body.nii.gz", "-o", name], capture_output=True, cwd=here, timeout=120)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            line = next(line for line in result.stdout.splitlines() if line.startswith(b"Next: ecorche "))
+            command = b"'" + os.fsencode(ECORCHE) + b"' " + line[14:] + b" --max-tets 20000"
+            done = subprocess.run(["sh", "-c", command], capture_output=True, cwd=here, timeout=120)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            (here / name / "case.yaml").read_bytes().decode()
 
 
 if __name__ == "__main__":
