@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "app/command_line.hpp"
 
+#include <cmath>
+#include <cstdlib>
 #include <map>
 #include <string>
 #include <string_view>
@@ -115,6 +117,19 @@ Error misuse(const CLI::App& app, std::string_view word, const CLI::ParseError& 
   return {ErrorKind::usage, command, what, mend};
 }
 
+// Whatever range an option has, no comparison keeps a NaN out of it.
+void refuse_nan(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_type_name().find("FLOAT") == std::string::npos) continue;
+    for (const std::string& value : option->results()) {
+      if (!std::isnan(std::strtod(value.c_str(), nullptr))) continue;
+      const std::string name = "ecorche " + command.get_name();
+      throw Error(ErrorKind::usage, name, option->get_name() + ": '" + value + "' is no number",
+                  "see " + name + " --help");
+    }
+  }
+}
+
 }  // namespace
 
 void dress_help(CLI::App& app) {
@@ -144,6 +159,7 @@ void parse(CLI::App& app, int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
+    for (const CLI::App* command : app.get_subcommands()) refuse_nan(*command);
   } catch (const CLI::Success&) {
     throw;
   } catch (const CLI::ParseError& error) {

@@ -54,6 +54,12 @@ class Unfinished {
   bool made_ = false, whole_ = false;
 };
 
+// Whether files of a posed body, or of the case, are called so.
+bool is_taken(const std::string& name) {
+  return name.empty() || name == "labels" || name.starts_with("labels_") || name == "mask" ||
+         name == "displacement";
+}
+
 }  // namespace
 
 void check_case_target(const fs::path& folder, const std::vector<fs::path>& inputs) {
@@ -79,7 +85,7 @@ WrittenCase write_scan_case(const fs::path& folder, const std::vector<fs::path>&
   std::vector<CaseVolumeFile> volumes;
   for (const ScanImage& image : scan.images) {
     std::string name = image.ct ? "ct" : identifier_from(image.path.filename().stem().stem().string(), 40);
-    if (name.empty() || name == "labels" || name.starts_with("labels_")) name = "image";
+    if (is_taken(name)) name = "image";
     const std::string first = name;
     for (int number = 2;
          std::any_of(volumes.begin(), volumes.end(), [&](const CaseVolumeFile& v) { return v.name == name; });

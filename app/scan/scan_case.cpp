@@ -227,7 +227,7 @@ class Decider {
     }
     throw Error(ErrorKind::data, scan_.labels.front().path.string(),
                 "nothing says where the skin is: " + percent_of(exposed) +
-                    " of the outside of all that is labelled is bone",
+                    " of the outside of all that is labelled is bone" + images_without_hu(scan_.images),
                 "give the CT too, or a label of the whole body (TotalSegmentator -ta body), before or after "
                 "these files");
   }

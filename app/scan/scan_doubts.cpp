@@ -153,4 +153,11 @@ void tell_contradictions(ScanCase& out, const std::vector<ScanImage>& images) {
   tell_exchanged(out);
 }
 
+std::string images_without_hu(const std::vector<ScanImage>& images) {
+  if (images.empty() || std::any_of(images.begin(), images.end(), [](const ScanImage& i) { return i.ct; }))
+    return {};
+  return "; " + images.front().path.filename().string() + " is no CT in HU (its least value is " +
+         text::number(images.front().background) + ")";
+}
+
 }  // namespace ecorche::app

@@ -141,6 +141,9 @@ class Reader {
     read_files(files);
     if (choice_.phase != 0 && !in_time_)
       throw Error(ErrorKind::usage, "--phase", "no image here is in time", "leave it out");
+    if (!choice_.series.empty() && !dicom_)
+      throw Error(ErrorKind::usage, "--series", "nothing here is DICOM, which alone has series",
+                  "leave it out");
     take_mask_groups();
     name_labels();
     if (out_.labels.empty() && out_.images.empty())
@@ -193,7 +196,8 @@ class Reader {
       for (std::size_t i = 0; i < some.size(); ++i) {
         for (const std::string& note : some[i].notes) options_.say(note);
         if (some[i].error) std::rethrow_exception(some[i].error);
-        in_time_ = in_time_ || some[i].in_time || io::is_dicom(files[begin + i]);
+        dicom_ = dicom_ || io::is_dicom(files[begin + i]);
+        in_time_ = in_time_ || some[i].in_time || dicom_;
         take(files[begin + i], std::move(some[i]));
         context_.report((done += bytes[begin + i]) / all);
       }
@@ -376,7 +380,7 @@ class Reader {
   std::vector<fs::path> tables_;
   std::set<fs::path> folders_;
   std::map<fs::path, MaskFolder> masks_;
-  bool in_time_ = false;  // whether a phase may be chosen of any of the files
+  bool in_time_ = false, dicom_ = false;  // whether a phase, a series may be chosen of any of the files
 };
 
 }  // namespace

@@ -124,6 +124,7 @@ std::uint64_t ImageHeader::voxel_bytes() const {
 }
 
 std::string inflate_head(std::string_view packed, std::size_t limit, const Path& path) {
+  if (packed.empty()) refuse(path, "is empty: it has no bytes", "copy it again");
   z_stream stream{};
   if (!packed.starts_with("\x1f\x8b") || inflateInit2(&stream, 15 + 16) != Z_OK)
     refuse(path, "is not packed by gzip");
@@ -199,9 +200,11 @@ std::vector<std::byte> stored_voxels(const ImageHeader& header, const Path& path
         const auto* bytes = reinterpret_cast<const std::byte*>(from);
         out.insert(out.end(), bytes + (begin - at), bytes + (end - at));
       });
+  if (!count)
+    refuse(path, "its gzip stream is cut off behind the voxels: its checksum is missing", "copy it again");
   if (count != expected)
     refuse(path, "declares " + std::to_string(expected) + " bytes of voxels, but its compressed data hold " +
-                     (count && *count > expected ? "more" : std::to_string(count.value_or(expected))));
+                     (*count > expected ? "more" : std::to_string(*count)));
   return out;
 }
 

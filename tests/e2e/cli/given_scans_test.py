@@ -221,6 +221,47 @@ class GivenScans(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             (here / name / "case.yaml").read_bytes().decode()
 
+    def test_files_that_are_cut(self):
+        place = self.place()
+        whole = (self.scan / "total.nii.gz").read_bytes()
+        for data, line in ((b"", "is empty: it has no bytes (copy it again)"), (whole[:-5], "its gzip stream is cut off behind the voxels: its checksum is missing (copy it again)")):
+            (place / "total.nii.gz").write_bytes(data)
+            result = run("new", place / "total.nii.gz", self.scan / "body.nii.gz", "-o", place / "case")
+            self.assertEqual((result.returncode, result.stderr.strip()), (65, f"error: {place / 'total.nii.gz'}: {line}"))
+
+    def test_an_image_called_as_files_of_a_posed_body_are(self):
+        """It goes by another name: else posing is refused for an option that nobody gave."""
+        place = self.place()
+        for name in ("mask", "displacement"):
+            shutil.copy(self.scan / "ct.nii.gz", place / f"{name}.nii.gz")
+            image = nibabel.load(self.scan / "ct.nii.gz")
+            nibabel.save(nibabel.Nifti1Image(np.asarray(image.dataobj).astype("f4") + 1000.5, image.affine), place / f"{name}.nii.gz")
+        self.new(self.scan / "total.nii.gz", self.scan / "body.nii.gz", place / "mask.nii.gz", place / "displacement.nii.gz", "-o", place / "case")
+        case = yaml.safe_load((place / "case/case.yaml").read_text())
+        self.assertEqual([volume["name"] for volume in case["volumes"]], ["image", "image_2"])
+
+    def test_options_that_mean_nothing(self):
+        """A NaN lies within no range, and a series is DICOM's."""
+        place = self.place()
+        scan = [self.scan / "total.nii.gz", self.scan / "body.nii.gz", "-o", place / "case"]
+        for words, line in (
+                (["new", *scan, "--skin-hu", "nan"], "ecorche new: --skin-hu: 'nan' is no number (see ecorche new --help)"),
+                (["repair", "none", "-o", place / "case", "--weld", "-NaN"], "ecorche repair: --weld: '-NaN' is no number (see ecorche repair --help)"),
+                (["new", *scan, "--series", "1.2"], "--series: nothing here is DICOM, which alone has series (leave it out)"),
+        ):
+            result = run(*words)
+            self.assertEqual((result.returncode, result.stderr.strip()), (64, f"error: {line}"))
+            self.assertFalse((place / "case").exists())
+
+    def test_an_image_that_is_no_ct_is_told(self):
+        """Where the skin is drawn from a CT, an image that was given and is none is named."""
+        place = self.place()
+        image = nibabel.load(self.scan / "ct.nii.gz")
+        nibabel.save(nibabel.Nifti1Image((np.asarray(image.dataobj).astype("i4") + 1024).clip(0).astype("u2"), image.affine), place / "ct.nii.gz")
+        result = run("new", place / "ct.nii.gz", self.scan / "appendicular_bones.nii.gz", self.scan / "craniofacial_structures.nii.gz", "-o", place / "case")
+        self.assertEqual(result.returncode, 65, result.stderr)
+        self.assertRegex(result.stderr, r"nothing says where the skin is: .* is bone; ct.nii.gz is no CT in HU \(its least value is 0\) \(give the CT too")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
