@@ -42,6 +42,8 @@ struct StreamSettings {
 
 // After the last pose: how long a silence ends the wait for its frames.
 constexpr std::chrono::seconds kSilence{3};
+// For the server to hear that this client goes.
+constexpr std::chrono::milliseconds kGoodbye{500};
 
 double milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -115,6 +117,8 @@ class Stream {
         skinning_(runtime::skinning_from_name(settings.skinning)),
         client_(wire::parse_address(settings.address), std::string("ecorche stream ") + ECORCHE_VERSION,
                 settings.access) {}
+  // Else the server keeps its place for it: nobody else could pose the session meanwhile.
+  ~Stream() { client_.leave(Clock::now() + kGoodbye); }
 
   int run() {
     open();
@@ -144,6 +148,7 @@ class Stream {
                   "another client controls session '" + settings_.session + "'",
                   "choose another --session, or wait until it has left");
     }
+    before_ = sequence_ = settled_ = opened_.last_sequence();
   }
 
   // False when the server's model cannot even be compared.
@@ -194,7 +199,7 @@ class Stream {
     while (Clock::now() < end) {
       check_stop();
       if (Clock::now() >= due) {
-        send_pose(motion.at(sequence_));
+        send_pose(motion.at(sequence_ - before_));
         due += period;
         // What could not be sent in time is not made up for: the pace is a pace.
         if (due < Clock::now()) due = Clock::now();
@@ -261,6 +266,7 @@ class Stream {
   }
 
   void take_frame(std::uint64_t sequence, Arrivals& arrivals, wire::Frame frame) {
+    if (before_ > 0 && sequence <= before_) return;  // somebody else's pose
     last_frame_ = Clock::now();
     ++arrivals.frames;
     const auto sent = sent_.find(sequence);
@@ -285,7 +291,7 @@ class Stream {
     const double fps = static_cast<double>(meshes_.frames) / seconds;
     nlohmann::json figures{{"server", client_.server().server()},
                            {"model", opened_.model()},
-                           {"poses", sequence_},
+                           {"poses", sequence_ - before_},
                            {"skipped", skipped_},
                            {"clamped_poses", clamped_},
                            {"frames", meshes_.frames},
@@ -324,6 +330,7 @@ class Stream {
   std::unique_ptr<StreamCheck> check_;
   bool same_model_ = true;
 
+  std::uint64_t before_ = 0;            // of the last pose that the session had when it was joined
   std::uint64_t sequence_ = 0;          // of the last pose sent
   std::uint64_t settled_ = 0;           // the newest pose of which everything came
   std::map<std::uint64_t, Sent> sent_;  // poses whose frames may still come

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <limits>
 #include <string>
 
 #include "clients/c/guard.hpp"
@@ -30,6 +31,8 @@ enum class Way : std::uint8_t { to_rest, to_posed };
 ecorche_code probe(ecorche_body* body, Way way, const float* points, std::size_t count, ecorche_probed* out) {
   if (body == nullptr || out == nullptr || (points == nullptr && count > 0))
     return fail(ECORCHE_INVALID_ARGUMENT, "body, points, out: is null");
+  if (count > std::numeric_limits<std::uint32_t>::max())
+    return fail(ECORCHE_INVALID_ARGUMENT, "count: is more than 4294967295 points");
   return guarded([&] {
     const OpenModel& open = *body->open;
     const ecorche_probed to = read(out, ecorche_probed ECORCHE_PROBED_INIT);

@@ -39,6 +39,13 @@ class Aio(unittest.IsolatedAsyncioTestCase):
     def setUp(self):
         self.threads = threading.active_count()
 
+    async def test_a_name_is_not_cut_at_a_nul(self):
+        for wrong in (lambda: ecorche.Model(f"{MODEL}\0.txt"), lambda: self.model.pose("lib:arms_up\0"), lambda: self.model.pose(knee_right={"flexion\0": 10}),
+                      lambda: ecorche.connect(self.server.address, session="ward\0")):
+            self.assertRaisesRegex(ecorche.InvalidArgument, "holds a NUL", wrong)
+        with self.assertRaisesRegex(ecorche.InvalidArgument, "holds a NUL"):
+            await ecorche.aio.connect(self.server.address, "model\0")
+
     async def test_five_steps(self):
         async with ecorche.aio.connect(self.server.address, encoding="f32", normals=True, quality=True) as client:  # connect, open
             self.assertTrue(await client.controls())

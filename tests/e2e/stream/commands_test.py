@@ -162,6 +162,13 @@ class Commands(unittest.TestCase):
             self.assertEqual(report["frames"], 5)
             self.assertEqual(report["mismatches"], 0)
 
+    def test_a_session_is_free_as_soon_as_its_poser_has_gone(self):
+        with Server(MODEL) as server:
+            for _ in range(2):
+                done = subprocess.run([ECORCHE, "stream", server.address, "--session", "ward", "--seconds", "0.2", "--rate", "20"], capture_output=True, text=True,
+                                      timeout=60)
+                self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_points_go_both_ways(self):
         with Server(MODEL) as server, Client("127.0.0.1", server.port) as client:
             body = client.open()

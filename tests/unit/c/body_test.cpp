@@ -285,6 +285,10 @@ TEST_F(Bodies, PointsGoThereAndBack) {
   std::vector<float> other(points.size());
   out.points = other.data();
   ASSERT_EQ(ecorche_body_rest_to_posed(body, points.data(), 4, &out), ECORCHE_OK);
+  // Three times as many floats would be one and a third of a point, by the size of an address.
+  EXPECT_EQ(ecorche_body_rest_to_posed(body, points.data(), SIZE_MAX / 3 + 2, &out),
+            ECORCHE_INVALID_ARGUMENT);
+  EXPECT_STREQ(ecorche_error_message(), "count: is more than 4294967295 points");
   EXPECT_GT(std::abs(other[7] - there[7]), 20);
 }
 

@@ -354,7 +354,8 @@ typedef struct ecorche_probed {
 #define ECORCHE_PROBED_INIT \
   { sizeof(ecorche_probed), 0, 0, 0, 0, 0, 0 }
 
-/* `points`: 3 * `count`, LPS mm, in the posed body: where were they in the scan, and what is there? */
+/* `points`: 3 * `count`, LPS mm, in the posed body: where were they in the scan, and what is there? At most
+ * 2^32 - 1 of them. */
 ECORCHE_API ecorche_code ecorche_body_posed_to_rest(ecorche_body* body, const float* points, size_t count,
                                                     ecorche_probed* out);
 /* Points of the scan: where did they go? */

@@ -4,7 +4,7 @@ import ctypes
 import functools
 import os
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_size_t, c_ssize_t, c_uint, c_uint32, c_uint64, c_void_p
-from typing import Any
+from typing import Any, Optional, Union
 
 ABI_VERSION = 0
 
@@ -213,6 +213,16 @@ class Library:
     def ask(self, name: str, *arguments: Any) -> Any:
         """Of what returns something else."""
         return getattr(self._library, self._prefix + name)(*arguments)
+
+
+def text(value: Optional[Union[str, "os.PathLike[str]"]]) -> Optional[bytes]:
+    """What the library is given; None stays."""
+    if value is None:
+        return None
+    data = os.fsencode(value)
+    if b"\0" in data:
+        raise InvalidArgument(f"{value!r}: holds a NUL, where the library would take it to end (leave it out)")
+    return data
 
 
 _posing = Library("libecorche.so.0", "ECORCHE_LIBRARY", "ecorche_", _POSING_CODE, _POSING_OTHER)

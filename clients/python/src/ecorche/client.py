@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._library import (AngleInfo, ClientOptions, EventInfo, InvalidArgument, NotPossible, ProbedInfo, QualityInfo, SegmentInfo, StreamOptions,
-                       TissueInfo, client_library)
+                       TissueInfo, client_library, text)
 from .body import SKINNING, SPACES, Quality
 from .model import Anatomy, numbers, read_angles, read_segments, read_tissues, view
 
@@ -45,9 +45,8 @@ class Client(Anatomy):
         self._library = client_library()
         self._handle = ctypes.c_void_p()
         self.model_changed = False  # the server has read the model anew: this session stays as it is; connect again for the new one
-        text = lambda value: None if value is None else os.fsencode(value)  # noqa: E731
         options = ClientOptions(name=b"python", token=text(token), authorities=text(authorities), session=text(session))
-        self._call("connect", address.encode(), ctypes.byref(options), ctypes.byref(self._handle))
+        self._call("connect", text(address), ctypes.byref(options), ctypes.byref(self._handle))
         try:
             self._call("open", self._handle, text(model), text(session))
             self.session: str = self._library.ask("session", self._handle).decode()
@@ -115,7 +114,7 @@ class Client(Anatomy):
     def set(self, joint: str, **degrees: float) -> "Client":
         """Anatomical angles of a joint, absolute, of the pose that is sent next; others stay."""
         for angle, value in degrees.items():
-            self._call("set_angle", self._handle, joint.encode(), angle.encode(), math.radians(value))
+            self._call("set_angle", self._handle, text(joint), text(angle), math.radians(value))
         return self
 
     def set_rotation(self, segment: Union[str, int], xyzw: Sequence[float]) -> "Client":
@@ -198,11 +197,11 @@ class Client(Anatomy):
 
     def play(self, clip: Optional[str], *, speed: float = 1, loop: bool = False) -> None:
         """The server poses by itself, until the clip ends, a pose is sent, or `clip` is None."""
-        self._call("play", self._handle, None if clip is None else clip.encode(), speed, int(loop))
+        self._call("play", self._handle, text(clip), speed, int(loop))
 
     def record(self, name: Optional[str]) -> None:
         """The server records under this name, which becomes a clip; None: ends."""
-        self._call("record", self._handle, None if name is None else name.encode())
+        self._call("record", self._handle, text(name))
 
     def _call(self, name: str, *arguments: object) -> None:
         self._library.call(name, *arguments)

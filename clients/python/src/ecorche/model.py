@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Mapping, Optional, Sequence, Union
 import numpy as np
 import numpy.typing as npt
 
-from ._library import AngleInfo, GridInfo, InvalidArgument, NotFound, SegmentInfo, TissueInfo, VolumeInfo, ask, call
+from ._library import AngleInfo, GridInfo, InvalidArgument, NotFound, SegmentInfo, TissueInfo, VolumeInfo, ask, call, text
 
 if TYPE_CHECKING:
     from .body import Body
@@ -124,7 +124,7 @@ class Model(Anatomy):
     def __init__(self, path: Union[str, "os.PathLike[str]"]) -> None:
         """Reads and checks the file: a moment. Raises NotFound, and InvalidArgument for what is no model."""
         self._handle = ctypes.c_void_p()
-        call("model_open", os.fsencode(path), ctypes.byref(self._handle))
+        call("model_open", text(path), ctypes.byref(self._handle))
         self.name: str = ask("model_name", self._handle).decode()
         self.identity: int = ask("model_identity", self._handle)
         self.segments = read_segments(self._rows("segment", SegmentInfo))
@@ -194,13 +194,13 @@ class Pose:
 
     def load(self, name: Union[str, "os.PathLike[str]"]) -> "Pose":
         """A pose file, or `lib:` and anatomical, arms_up, lateral, lithotomy, prone, sitting or supine; all else is as scanned."""
-        call("pose_load", self._handle, os.fsencode(name))
+        call("pose_load", self._handle, text(name))
         return self
 
     def set(self, joint: str, **degrees: float) -> "Pose":
         """Anatomical angles of a joint, absolute: `pose.set("elbow_left", flexion=90)`. Others of the joint stay."""
         for angle, value in degrees.items():
-            call("pose_set_angle", self._handle, joint.encode(), angle.encode(), math.radians(value))
+            call("pose_set_angle", self._handle, text(joint), text(angle), math.radians(value))
         return self
 
     def get(self, joint: str, angle: str) -> float:
