@@ -98,6 +98,7 @@ WrittenCase write_scan_case(const fs::path& folder, const std::vector<fs::path>&
   context.report(0.9);
   files::write_text(unfinished.add("picture.png"), report::png_bytes(both_views(made, kPicturePixels)));
   std::vector<std::string> from;
+  from.reserve(inputs.size());
   for (const fs::path& input : inputs)
     from.push_back(input.filename().empty() ? input.parent_path().filename().string()
                                             : input.filename().string());
