@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "app/command_line.hpp"
 
-#include <cmath>
-#include <cstdlib>
 #include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "app/nan_value.hpp"
 #include "core/values/text.hpp"
 #include "io/case/yaml_reader.hpp"
 
@@ -117,16 +116,13 @@ Error misuse(const CLI::App& app, std::string_view word, const CLI::ParseError& 
   return {ErrorKind::usage, command, what, mend};
 }
 
-// Whatever range an option has, no comparison keeps a NaN out of it.
 void refuse_nan(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
-    if (option->get_type_name().find("FLOAT") == std::string::npos) continue;
-    for (const std::string& value : option->results()) {
-      if (!std::isnan(std::strtod(value.c_str(), nullptr))) continue;
-      const std::string name = "ecorche " + command.get_name();
-      throw Error(ErrorKind::usage, name, option->get_name() + ": '" + value + "' is no number",
-                  "see " + name + " --help");
-    }
+    const std::string* value = nan_value(*option);
+    if (value == nullptr) continue;
+    const std::string name = "ecorche " + command.get_name();
+    throw Error(ErrorKind::usage, name, option->get_name() + ": '" + *value + "' is no number",
+                "see " + name + " --help");
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/nan_value.hpp"
 #include "io/case/yaml_reader.hpp"
 
 namespace ecorche::app {
@@ -63,6 +64,7 @@ void take_value(const Value& value, CLI::Option& option) {
   } catch (const CLI::ParseError& error) {
     value.fail(error.what(), "see --help");
   }
+  if (const std::string* nan = nan_value(option)) value.fail("'" + *nan + "' is no number", "see --help");
 }
 
 }  // namespace

@@ -68,6 +68,7 @@ class Config(Folder):
             f"models: [{MODEL}]\nlog: loud\n": "2:log: --log: loud not in {debug,info,warn,error,off} (see --help)",
             "log: [info, warn]\n": "1:log: a list, where one value belongs (give one value)",
             "models: []\n": "1:models: an empty list (leave the key out, or give values)",
+            "pose_rate: nan\n": "1:pose_rate: 'nan' is no number (see --help)",
             "insecure: yes\n": "1:insecure: 'yes' is neither true nor false (write one of the two)",
             "http: 127.0.0.1:0\nno_http: true\n": "2:no_http: goes not together with http (leave one of them out)",
             "config: other.yaml\n": "1:config: unknown key 'config'",
