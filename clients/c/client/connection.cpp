@@ -103,7 +103,7 @@ ecorche_code ecorche_client_connect(const char* address, const ecorche_client_op
     };
     client::Access access;
     access.authorities = text(chosen.authorities, "");
-    access.token = text(chosen.token, "");
+    access.token = c::text_of(chosen.token, "token");
     access.session = chosen.session == nullptr ? c::random_key() : c::text_of(chosen.session, "session");
     auto made = std::make_unique<ecorche_client>(
         ecorche_client{wire::parse_address(address), text(chosen.name, "ecorche_client"), access, nullptr});

@@ -111,6 +111,10 @@ TEST(ClientStream, TextThatIsNoneCostsNoConnection) {
   EXPECT_EQ(ecorche_client_connect(address.c_str(), &options, &client), ECORCHE_INVALID_ARGUMENT);
   EXPECT_STREQ(ecorche_client_error_message(), "session: is not UTF-8 (give text in UTF-8)");
   options.session = nullptr;
+  options.token = "\xff";
+  EXPECT_EQ(ecorche_client_connect(address.c_str(), &options, &client), ECORCHE_INVALID_ARGUMENT);
+  EXPECT_STREQ(ecorche_client_error_message(), "token: is not UTF-8 (give text in UTF-8)");
+  options.token = nullptr;
   // A name is cut to 64 bytes, which may lie within a character.
   for (const std::string& name :
        {std::string(63, 'x') + "\xc3\xa9", std::string("\xff\xfe"), std::string(200, 'x')}) {
