@@ -85,7 +85,7 @@ class StageClient {
   }
   /// The next answer to a request that is made on another thread.
   std::optional<v1::Envelope> wait_for(std::uint64_t request_id) {
-    const auto until = Clock::now() + std::chrono::seconds(20);
+    const auto until = Clock::now() + std::chrono::seconds(60);
     while (Clock::now() < until) {
       stage_.io.restart();
       stage_.io.run_for(std::chrono::milliseconds(5));

@@ -107,7 +107,7 @@ class TestClient {
   /// The next message for which `wanted` holds; others are dropped. Fails the test after some seconds.
   template <class Wanted>
   wire::Frame next(Wanted&& wanted) {
-    const auto until = client::Clock::now() + std::chrono::seconds(20);
+    const auto until = client::Clock::now() + std::chrono::seconds(60);
     while (auto frame = client_.receive(until)) {
       if (wanted(frame->envelope)) return std::move(*frame);
     }
@@ -138,11 +138,11 @@ class RawClient {
   void send(const std::string& bytes);
   void send(const v1::Envelope& envelope, std::shared_ptr<const wire::Payload> payload = nullptr);
   void send_hello();
-  std::optional<wire::Frame> receive(double seconds = 10);
+  std::optional<wire::Frame> receive(double seconds = 60);
   /// The code of the Status that ends the connection, and that it then ends; `unknown` when none came.
   StatusCode last_words();
   /// The server hung up within the time.
-  bool hung_up(double seconds = 10);
+  bool hung_up(double seconds = 60);
 
  private:
   client::Socket socket_;

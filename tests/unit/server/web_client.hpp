@@ -26,7 +26,7 @@ class WebClient {
   }
 
   /// What comes until the server hangs up, or says nothing for some seconds.
-  std::string rest(double seconds = 10) {
+  std::string rest(double seconds = 60) {
     try {
       while (read(seconds)) {
       }
@@ -73,7 +73,7 @@ class WebClient {
   void send_frame(const v1::Envelope& envelope) { send_message(wire::encode(envelope).head); }
 
   /// The next data message of the server, whole; nothing when it hung up, closed or said nothing.
-  std::optional<std::string> message(double seconds = 10) {
+  std::optional<std::string> message(double seconds = 60) {
     std::string data;
     while (true) {
       if (!spec(2, seconds)) return std::nullopt;
