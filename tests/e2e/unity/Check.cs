@@ -17,7 +17,7 @@ internal static partial class Check
     {
         ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
         ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["hostile"] = Hostile, ["cut"] = Cut, ["native"] = NativeChecks.Run,
-        ["bench"] = Bench, ["leave"] = Leave, ["probes"] = Probes, ["zstd"] = ZstdChecks.Run,
+        ["bench"] = Bench, ["leave"] = Leave, ["replaced"] = Replaced, ["probes"] = Probes, ["zstd"] = ZstdChecks.Run,
     };
 
     private static int Main(string[] words)
@@ -186,17 +186,7 @@ internal static partial class Check
             ulong sent = client.SendPose(pose.SetAngle("knee_left", "flexion", 0.5));
             Wait(client, stream, sent);
             Console.WriteLine("shown " + sent);
-            Console.ReadLine();
-            try
-            {
-                while (client.Poll(5000).Kind != EventKind.None) { }
-                True(false, "the line was cut");
-            }
-            catch (EcorcheException error)
-            {
-                True(error.Code == Code.Unavailable, error.Message);
-                Console.WriteLine("lost " + error.Message);
-            }
+            Lose(client);
             Console.ReadLine();
             client.Resume();
             // A new session shows the scan.
@@ -205,6 +195,47 @@ internal static partial class Check
             True(next > sent && client.Controls, "poses go on");
             Wait(client, stream, next);
             Console.WriteLine("back " + (client.Server.HasResumed ? "resumed" : "anew"));
+        }
+    }
+
+    /// <summary>replaced ADDRESS: comes back and finds another body, each time that it tries.</summary>
+    private static void Replaced(string[] words)
+    {
+        using (var client = Client.Connect(words[0]))
+        {
+            client.Open("", "kept");
+            client.Subscribe(new StreamOptions());
+            Console.WriteLine("shown 0");
+            Lose(client);
+            Console.ReadLine();
+            int refused = 0;
+            for (int i = 0; i < 2; ++i)
+            {
+                try
+                {
+                    client.Resume();
+                }
+                catch (EcorcheException error)
+                {
+                    if (error.Code == Code.FailedPrecondition) ++refused;
+                }
+            }
+            Console.WriteLine("refused " + refused);
+        }
+    }
+
+    private static void Lose(Client client)
+    {
+        Console.ReadLine();
+        try
+        {
+            while (client.Poll(5000).Kind != EventKind.None) { }
+            True(false, "the line was cut");
+        }
+        catch (EcorcheException error)
+        {
+            True(error.Code == Code.Unavailable, error.Message);
+            Console.WriteLine("lost " + error.Message);
         }
     }
 

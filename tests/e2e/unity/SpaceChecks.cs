@@ -78,7 +78,7 @@ internal static class SpaceChecks
         return new Turn(x.X * q.x + y.X * q.y + z.X * q.z, x.Y * q.x + y.Y * q.y + z.Y * q.z, x.Z * q.x + y.Z * q.y + z.Z * q.z, q.w);
     }
 
-    /// <summary>The posed skin encloses a positive volume in every space, and the bone of the left hand is where its character's left is.</summary>
+    /// <summary>The posed skin encloses a volume in every space, negative where left-handed numbers are not wound anew as Unity wants them, and the bone of the left hand is where its character's left is.</summary>
     private static void Body(string address)
     {
         using (var client = Client.Connect(address))
@@ -93,10 +93,11 @@ internal static class SpaceChecks
             {
                 var stream = client.Subscribe(new StreamOptions { Space = space, Tissues = new[] { "skin", body.Tissues[bone].Name } });
                 var frame = Check.Wait(client, stream, sent);
-                double volume = Volume(frame.Tissues[0], frame.Level.Parts[0].Triangles) / Math.Pow(Axes.Of(space).Scale, 3);
+                int sense = space == Space.Unreal ? -1 : 1;
+                double volume = sense * Volume(frame.Tissues[0], frame.Level.Parts[0].Triangles) / Math.Pow(Axes.Of(space).Scale, 3);
                 if (space == Space.LpsMm) whole = volume;
                 Check.True(volume > 1e6 && Math.Abs(volume / whole - 1) < 1e-3, "the skin's volume in " + space + " is " + volume);
-                Outward(frame.Tissues[0], frame.Level.Parts[0].Triangles, space);
+                Outward(frame.Tissues[0], frame.Level.Parts[0].Triangles, sense, space);
                 var (x, y, z) = Middle(frame.Tissues[1]);
                 double left = new[] { x, -x, -y, x, y, -x }[(int)space] / Axes.Of(space).Scale;
                 double up = new[] { z, y, z, y, z, z }[(int)space] / Axes.Of(space).Scale;
@@ -133,7 +134,7 @@ internal static class SpaceChecks
     }
 
     /// <summary>Normals point the way of their triangles.</summary>
-    private static void Outward(TissueVertices tissue, int[] triangles, Space space)
+    private static void Outward(TissueVertices tissue, int[] triangles, int sense, Space space)
     {
         var f = tissue.Floats;
         int agree = 0;
@@ -143,7 +144,7 @@ internal static class SpaceChecks
             double ux = f[b] - f[a], uy = f[b + 1] - f[a + 1], uz = f[b + 2] - f[a + 2], vx = f[c] - f[a], vy = f[c + 1] - f[a + 1], vz = f[c + 2] - f[a + 2];
             int bits = BitConverter.ToInt32(tissue.Bytes, 4 * (a + 3));
             double along = (uy * vz - uz * vy) * (sbyte)bits + (uz * vx - ux * vz) * (sbyte)(bits >> 8) + (ux * vy - uy * vx) * (sbyte)(bits >> 16);
-            if (along > 0) ++agree;
+            if (sense * along > 0) ++agree;
         }
         Check.True(agree > 0.95 * triangles.Length / 3, "normals in " + space + ": " + agree + " of " + triangles.Length / 3 + " triangles");
     }

@@ -251,6 +251,12 @@ class Unity(unittest.TestCase):
         self.comes_back_by_resume(self.server, lambda: None, "back resumed\n")
 
     def test_a_model_that_was_read_anew_meanwhile_is_opened_anew(self):
+        self.comes_back_to_a_replaced_model(OTHER_MODEL, "resume", "back anew\n")
+
+    def test_another_body_is_no_place_to_come_back_to(self):
+        self.comes_back_to_a_replaced_model(os.environ["ECORCHE_BAR_MODEL"], "replaced", "refused 2\n")
+
+    def comes_back_to_a_replaced_model(self, other_model, command_name, told):
         with tempfile.TemporaryDirectory() as name:
             served = pathlib.Path(name) / "body.hdf"
             shutil.copy(MODEL, served)
@@ -258,10 +264,10 @@ class Unity(unittest.TestCase):
                 def replace():
                     with Client("127.0.0.1", server.port) as other:
                         other.open(session="mine")
-                        shutil.copy(OTHER_MODEL, served.with_suffix(".new"))
+                        shutil.copy(other_model, served.with_suffix(".new"))
                         served.with_suffix(".new").rename(served)
                         other.reload("body")
-                self.comes_back_by_resume(server, replace, "back anew\n")
+                self.comes_back_by_resume(server, replace, told, command_name)
 
     def test_a_server_that_stops_sends_its_clients_elsewhere(self):
         with Server(MODEL) as other, Server(MODEL, options=["--elsewhere", other.address]) as server, \
@@ -277,10 +283,10 @@ class Unity(unittest.TestCase):
             client.stdin.close()
             self.assertEqual(client.wait(30), 0)
 
-    def comes_back_by_resume(self, server, meanwhile, told):
-        with Relay(server.port) as relay, subprocess.Popen(command("resume", relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    def comes_back_by_resume(self, server, meanwhile, told, command_name="resume"):
+        with Relay(server.port) as relay, subprocess.Popen(command(command_name, relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                                            text=True) as client:
-            self.assertEqual(client.stdout.readline(), "shown 1\n")
+            self.assertRegex(client.stdout.readline(), "^shown ")
             relay.cut()
             meanwhile()
             client.stdin.write("\n")

@@ -274,7 +274,12 @@ namespace Ecorche
         {
             var now = ReadBody(Body.Model, Body.Session);
             if (now.TopologyDigest != Body.TopologyDigest || now.RigDigest != Body.RigDigest)
+            {
+                // That place is the other body's: who tries again is not to have it as this one's.
+                Dispose();
+                Server.ResumeToken = System.Array.Empty<byte>();
                 throw new EcorcheException(Code.FailedPrecondition, "the server's model is another one by now (connect anew)");
+            }
             foreach (var stream in _streams) Subscribe(stream);
             foreach (var volume in _volumes) Subscribe(volume);
         }

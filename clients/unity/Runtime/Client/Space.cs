@@ -23,17 +23,19 @@ namespace Ecorche
     {
         private static readonly Axes[] All =
         {
-            new Axes(new[] { 0, 1, 2 }, new[] { 1, 1, 1 }, 1), new Axes(new[] { 0, 2, 1 }, new[] { -1, 1, -1 }, 1e-3),
+            new Axes(new[] { 0, 1, 2 }, new[] { 1, 1, 1 }, 1), new Axes(new[] { 0, 2, 1 }, new[] { -1, 1, -1 }, 1e-3, true),
             new Axes(new[] { 1, 0, 2 }, new[] { -1, -1, 1 }, 0.1), new Axes(new[] { 0, 2, 1 }, new[] { 1, 1, -1 }, 1e-3),
             new Axes(new[] { 1, 0, 2 }, new[] { -1, 1, 1 }, 1e-3), new Axes(new[] { 0, 1, 2 }, new[] { -1, -1, 1 }, 1),
         };
 
         private readonly int[] _from, _sign;
+        private readonly bool _clockwise;
 
-        private Axes(int[] from, int[] sign, double scale)
+        private Axes(int[] from, int[] sign, double scale, bool clockwise = false)
         {
             _from = from;
             _sign = sign;
+            _clockwise = clockwise;
             Scale = scale;
             // Two axes that change places mirror, and so does each that is turned round.
             bool swapped = from[0] != 0 || from[1] != 1;
@@ -45,7 +47,7 @@ namespace Ecorche
         /// <summary>Units a millimetre.</summary>
         public double Scale { get; }
 
-        /// <summary>Left and right change hands: triangles are wound the other way round, and rotations turn so.</summary>
+        /// <summary>The space is left-handed: rotations turn the other way round.</summary>
         public bool Mirrors { get; }
 
         /// <summary>Which axis of LPS lies along `axis`, and whether it points the same way (1) or not (-1).</summary>
@@ -80,10 +82,10 @@ namespace Ecorche
             return new Turn(Back(0, x, y, z), Back(1, x, y, z), Back(2, x, y, z), turn.w);
         }
 
-        /// <summary>Three corners each, wound as the space wants them.</summary>
+        /// <summary>Three corners each, counter-clockwise as seen from outside. That is the front everywhere but in Unity, where it is clockwise.</summary>
         internal void Wind(int[] triangles)
         {
-            if (!Mirrors) return;
+            if (!_clockwise) return;
             for (int i = 0; i + 2 < triangles.Length; i += 3)
             {
                 int corner = triangles[i + 1];
