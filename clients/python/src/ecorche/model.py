@@ -118,23 +118,27 @@ class Anatomy:
         raise NotFound(f"{name}: the model has no such segment or joint (it has {', '.join(s.name for s in self.segments)})")
 
 
+class ModelHandle(ctypes.c_void_p):
+    """The library's model. Views hold it rather than the Model that holds them: numpy tells the collector of no such circle, and nothing of it would ever go."""
+
+    def __del__(self) -> None:
+        if self:
+            ask("model_close", self)
+
+
 class Model(Anatomy):
     """A prepared body, as `ecorche preprocess` writes it. Never changes; any number of threads may use it."""
 
     def __init__(self, path: Union[str, "os.PathLike[str]"]) -> None:
         """Reads and checks the file: a moment. Raises NotFound, and InvalidArgument for what is no model."""
-        self._handle = ctypes.c_void_p()
+        self._handle = ModelHandle()
         call("model_open", text(path), ctypes.byref(self._handle))
         self.name: str = ask("model_name", self._handle).decode()
         self.identity: int = ask("model_identity", self._handle)
         self.segments = read_segments(self._rows("segment", SegmentInfo))
-        self.tissues = read_tissues(self._rows("tissue", TissueInfo), self.segments, self)
+        self.tissues = read_tissues(self._rows("tissue", TissueInfo), self.segments, self._handle)
         self.angles = read_angles(self._rows("angle", AngleInfo))
         self.volumes = self._read_volumes()
-
-    def __del__(self) -> None:
-        if getattr(self, "_handle", None):
-            ask("model_close", self._handle)
 
     def __repr__(self) -> str:
         return f"<ecorche.Model {self.name}: {len(self.tissues)} tissues, {len(self.segments)} segments>"
@@ -165,7 +169,7 @@ class Model(Anatomy):
             info = self._info("model_volume", row, VolumeInfo())
             scalar = np.ctypeslib.as_ctypes_type(SCALARS[info.type])
             grid = Grid._of(info.grid)
-            rest = view(ctypes.cast(info.rest, ctypes.POINTER(scalar)), voxel_shape(grid, info.components), self)
+            rest = view(ctypes.cast(info.rest, ctypes.POINTER(scalar)), voxel_shape(grid, info.components), self._handle)
             out.append(Volume(row, info.name.decode(), bool(info.labels), info.background, grid, rest))
         return out
 
