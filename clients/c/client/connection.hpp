@@ -48,6 +48,8 @@ struct ecorche_client {
   std::vector<ecorche::v1::ClipSummary> clips = {};
   std::unique_ptr<ecorche::c::OpenedBody> body = nullptr;
   bool controls = false;
+  bool sent_away = false;  ///< by the connection's server, to `address`
+  std::optional<ecorche::wire::Address> came_from = {};
 
   std::optional<ecorche::v1::Subscribe> wanted = {};  ///< what was subscribed to last
   std::optional<std::uint32_t> subscription = {};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Back to the session after the connection was lost.
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include "clients/c/client/connection.hpp"
 
@@ -37,6 +39,19 @@ bool open_again(ecorche_client& client, client::Client& connection) {
   return true;
 }
 
+// Where the server sent it; where nobody answers, at the next try where it was before.
+std::unique_ptr<client::Client> connect_again(ecorche_client& client, const client::Access& access) {
+  const std::string& elsewhere = client.connection->elsewhere();
+  if (!elsewhere.empty() && !std::exchange(client.sent_away, true))
+    client.came_from = std::exchange(client.address, wire::parse_address(elsewhere));
+  try {
+    return std::make_unique<client::Client>(client.address, client.name, access);
+  } catch (const Error&) {
+    if (client.came_from) std::swap(client.address, *client.came_from);
+    throw;
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::c
 
@@ -46,15 +61,14 @@ ecorche_code ecorche_client_resume(ecorche_client* client) {
   return c::with_client(client, true, [&] {
     client::Access access = client->access;
     access.resume_token = client->connection->server().resume_token();
-    const std::string& elsewhere = client->connection->elsewhere();
-    if (!elsewhere.empty()) client->address = wire::parse_address(elsewhere);
-    auto connection = std::make_unique<client::Client>(client->address, client->name, access);
+    auto connection = c::connect_again(*client, access);
     if (!c::take_place(*client, connection->server()) && !c::open_again(*client, *connection)) {
       connection->leave(client::Clock::now() + c::longest_goodbye);
       return c::fail(ECORCHE_FAILED_PRECONDITION,
                      "client: the server's model is another one by now (close, and connect anew)");
     }
     client->connection = std::move(connection);
+    client->sent_away = false;
     client->frame.forget_keyframes();
     if (client->wanted && !client->subscription) c::subscribe(*client, *client->wanted);
     return ECORCHE_OK;

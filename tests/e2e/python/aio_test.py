@@ -8,6 +8,7 @@ import asyncio
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -241,6 +242,34 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                 with self.assertRaisesRegex(ecorche.NotPossible, "the server's model is another one by now"):
                     await client.resume()
             await client.close()
+
+    async def test_it_follows_its_server_elsewhere_and_back(self):
+        with Server(MODEL) as second, Server(MODEL, options=("--elsewhere", second.address)) as first:
+            client = await ecorche.aio.connect(first.address, session="ward")
+            await client.show(await (await client.set("elbow_left", flexion=70)).send())
+            before = await client.positions("skin")
+            first.process.send_signal(signal.SIGTERM)
+            with self.assertRaisesRegex(ecorche.Unavailable, "stop"):
+                async for _ in client.frames(20):
+                    pass
+            await client.resume()
+            self.assertEqual((await client.controls(), client.session), (True, "ward"))
+            with ecorche.connect(second.address, session="ward") as watcher:
+                self.assertFalse(watcher.controls, "the session is on the other server")
+                sent = await client.send()
+                await client.show(sent)
+                watcher.show(sent)
+                np.testing.assert_array_equal(watcher.positions("skin"), before)
+            np.testing.assert_array_equal(await client.positions("skin"), before)
+            second.process.kill()
+            second.process.wait()
+            first.process.wait()
+            with Server(MODEL, port=first.port):
+                with self.assertRaises(ecorche.Unavailable):
+                    await client.resume()
+                await client.resume()
+                await client.show(await client.send())
+                await client.close()
 
     async def test_servers_that_are_none_of_ours(self):
         with HostileServers(self.server.port) as hostile:

@@ -9,7 +9,6 @@ import json
 import os
 import pathlib
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -337,23 +336,6 @@ class Clients(unittest.TestCase):
                         client.resume()
                 with ecorche.connect(server.address, session="ward") as anew:
                     self.assertTrue(anew.controls)
-
-    def test_it_follows_its_server_elsewhere(self):
-        with Server(MODEL) as second, Server(MODEL, options=("--elsewhere", second.address)) as first, ecorche.connect(first.address, session="ward") as client:
-            client.show(client.set("elbow_left", flexion=70).send())
-            before = client.positions("skin")
-            first.process.send_signal(signal.SIGTERM)
-            with self.assertRaisesRegex(ecorche.Unavailable, "stop"):
-                list(client.frames(20))
-            client.resume()
-            self.assertEqual((client.controls, client.session), (True, "ward"))
-            with ecorche.connect(second.address, session="ward") as watcher:
-                self.assertFalse(watcher.controls, "the session is on the other server")
-                sent = client.send()
-                client.show(sent)
-                watcher.show(sent)
-                np.testing.assert_array_equal(watcher.positions("skin"), before)
-            np.testing.assert_array_equal(client.positions("skin"), before)
 
     def test_clips_and_recordings(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -188,7 +188,14 @@ internal static partial class Check
             Console.WriteLine("shown " + sent);
             Lose(client);
             Console.ReadLine();
-            client.Resume();
+            try
+            {
+                client.Resume();
+            }
+            catch (EcorcheException error) when (error.Code == Code.Unavailable)
+            {
+                client.Resume();  // where it was sent nobody is
+            }
             // A new session shows the scan.
             Wait(client, stream, client.Server.HasResumed ? sent : 0);
             ulong next = client.SendPose(pose.SetAngle("knee_left", "flexion", 0.7));

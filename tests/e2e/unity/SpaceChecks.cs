@@ -78,7 +78,10 @@ internal static class SpaceChecks
         return new Turn(x.X * q.x + y.X * q.y + z.X * q.z, x.Y * q.x + y.Y * q.y + z.Y * q.z, x.Z * q.x + y.Z * q.y + z.Z * q.z, q.w);
     }
 
-    /// <summary>The posed skin encloses a volume in every space, negative where left-handed numbers are not wound anew as Unity wants them, and the bone of the left hand is where its character's left is.</summary>
+    /// <summary>
+    /// The posed skin encloses a volume in every space, in left-handed numbers a negative one where triangles are not wound anew as in Unity, and the bone of
+    /// the left hand is where its character's left is.
+    /// </summary>
     private static void Body(string address)
     {
         using (var client = Client.Connect(address))

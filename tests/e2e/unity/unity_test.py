@@ -9,6 +9,7 @@ import os
 import pathlib
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -282,6 +283,23 @@ class Unity(unittest.TestCase):
             self.assertEqual(client.stdout.readline(), "back anew\n")
             client.stdin.close()
             self.assertEqual(client.wait(30), 0)
+
+    def test_where_nobody_is_elsewhere_it_comes_back_to_the_first(self):
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            nobody = "127.0.0.1:%d" % taken.getsockname()[1]
+        with Server(MODEL, options=["--elsewhere", nobody]) as server, \
+                subprocess.Popen(command("resume", server.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:
+            self.assertEqual(client.stdout.readline(), "shown 1\n")
+            server.stop()
+            client.stdin.write("\n")
+            client.stdin.flush()
+            self.assertRegex(client.stdout.readline(), "^lost .*stop")
+            with Server(MODEL, port=server.port):
+                client.stdin.write("\n")
+                client.stdin.flush()
+                self.assertEqual(client.stdout.readline(), "back anew\n")
+                client.stdin.close()
+                self.assertEqual(client.wait(30), 0)
 
     def comes_back_by_resume(self, server, meanwhile, told, command_name="resume"):
         with Relay(server.port) as relay, subprocess.Popen(command(command_name, relay.address), stdin=subprocess.PIPE, stdout=subprocess.PIPE,

@@ -202,8 +202,8 @@ ECORCHE_API ecorche_code ecorche_client_quality(const ecorche_client* client, ec
 /* After the connection was lost: connects again, where its server said so to another one, and has the
  * session, its control and its frames as before, where the server kept the place (a minute), else as anybody
  * who opens the session by its name. Frames that were read stay good. Waits 5 s at most; UNAVAILABLE where
- * nobody answers yet: call again after a while. FAILED_PRECONDITION where the model is another one by now:
- * close the client, and connect anew. */
+ * nobody answers yet: call again after a while; a client that was sent to another server tries the two in turn.
+ * FAILED_PRECONDITION where the model is another one by now: close the client, and connect anew. */
 ECORCHE_API ecorche_code ecorche_client_resume(ecorche_client* client);
 
 /* Motion that the server holds; names are good until the next call. */

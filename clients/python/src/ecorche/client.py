@@ -185,7 +185,8 @@ class Client(Anatomy):
         return self._probe("rest_to_posed", points)
 
     def resume(self) -> None:
-        """Comes back after Unavailable, to the session, control and frames; raises Unavailable where nobody answers yet."""
+        """Comes back after Unavailable, to the session, control and frames; raises Unavailable where nobody answers yet. Who was
+        sent to another server tries the two in turn."""
         self._call("resume", self._handle)
 
     @property

@@ -39,8 +39,8 @@ namespace Ecorche
     /// </remarks>
     public sealed partial class Client : IDisposable
     {
-        private string _host;
-        private int _port;
+        private string _host, _otherHost;
+        private int _port, _otherPort;
         private readonly ClientOptions _options;
         private readonly Envelope _in = new Envelope(), _out = new Envelope(), _reply = new Envelope();
         private readonly WireWriter _writer = new WireWriter();
@@ -64,6 +64,7 @@ namespace Ecorche
             int colon = address.LastIndexOf(':');
             if (colon <= 0 || !int.TryParse(address.Substring(colon + 1), out int port) || port < 1 || port > 65535)
                 throw new EcorcheException(Code.InvalidArgument, "address: '" + address + "' is no HOST:PORT (for example 127.0.0.1:7070)");
+            (_otherHost, _otherPort) = (_host, _port);
             _host = address.Substring(0, colon).Trim('[', ']');
             _port = port;
         }
@@ -136,11 +137,11 @@ namespace Ecorche
 
         private void Greet(byte[] resumeToken)
         {
-            _received = Received;
             _line?.Dispose();
-            _line = new Line(_host, _port, _options);
             try
             {
+                var line = new Line(_host, _port, _options);
+                (_received, _line) = (Received, line);
                 var hello = Begin(_out).ClientHello;
                 _out.HasClientHello = true;
                 hello.Clear();
@@ -157,7 +158,9 @@ namespace Ecorche
             }
             catch
             {
-                _line.Dispose();
+                _line?.Dispose();
+                // Who was sent here tries next where it was before.
+                if (_otherHost != null) (_host, _port, _otherHost, _otherPort) = (_otherHost, _otherPort, _host, _port);
                 throw;
             }
         }

@@ -232,8 +232,8 @@ namespace Ecorche
         /// After the connection was lost: connects again and has the session, its control and its frames as before, where the server kept the place
         /// (a minute), else as anybody who opens the session by its name. Frames that were read stay good.
         /// </summary>
-        /// <exception cref="EcorcheException">Unavailable: nobody answers yet, call again after a while. FailedPrecondition: the model is another one by
-        /// now, connect anew.</exception>
+        /// <exception cref="EcorcheException">Unavailable: nobody answers yet, call again after a while; who was sent to another server tries the two in
+        /// turn. FailedPrecondition: the model is another one by now, connect anew.</exception>
         public void Resume()
         {
             Greet(Server.ResumeToken);
