@@ -2,7 +2,7 @@
 // What a client asks for by what arrives: on paper, and applied to a stream of the real server.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { adapt, Client, Encoding, LinePolicy, Policy, type Choice, type LineSeen, type Observed } from "../../../clients/web/protocol/src/index.js";
+import { adapt, Client, Encoding, LinePolicy, Policy, type AdaptedOptions, type Choice, type LineSeen, type Observed } from "../../../clients/web/protocol/src/index.js";
 import { bendingPose } from "../support/poses.js";
 import { Server, within } from "../support/server.js";
 
@@ -126,4 +126,32 @@ test("a stream follows: whole though it began coarse, coarse in motion, whole at
   assert.equal(stream.latest!.vertices.length, 4 * stream.latest!.layout.vertexCount);
   assert.equal(stream.options.level, 0);
   assert.ok(choices.some(({ level }) => level === 1));
+});
+
+test("what is skinned here has its table once, whatever the device bears", async (t) => {
+  class Restless extends Policy {
+    override choice(): Choice {
+      const odd = Math.floor(performance.now() / 400) % 2 === 1;
+      return { level: odd ? 1 : 0, encoding: odd ? Encoding.U16 : Encoding.U16_DELTA, maxRate: odd ? 5 : 0 };
+    }
+  }
+  const server = await Server.start();
+  t.after(() => server.stop());
+  const client = await within(20, Client.connect(server.url), "connecting");
+  t.after(() => client.close());
+  const model = await client.open();
+  const stream = await client.subscribeMesh();
+  const choices: AdaptedOptions[] = [];
+  const adaptation = adapt(client, stream, (choice) => choices.push(choice), { policy: new Restless() });
+  t.after(() => adaptation.stop());
+  let angle = 0;
+  const moving = setInterval(() => client.setPose(bendingPose(model, angle += 0.01)), 40);
+  t.after(() => clearInterval(moving));
+  await within(20, (async () => { while (choices.length < 3) await new Promise((resolve) => setTimeout(resolve, 50)); })(), "a policy that changes its mind");
+  await adaptation.hold({ motions: true });
+  const before = choices.length;
+  assert.equal(choices[before - 1].motions, true);
+  await new Promise((resolve) => setTimeout(resolve, 3000));
+  assert.equal(choices.length, before);
+  assert.equal(stream.options.maxRate, 0);
 });

@@ -48,7 +48,8 @@ export function adapt(client: Client, stream: MeshStream, onChoice: (choice: Ada
     const motions = by.held.motions ?? line.skins !== undefined, choice = policy.choice(moving);
     // Another level is another table: what is skinned keeps the one that it has, however the body moves.
     const level = by.held.level ?? (motions ? line.skins ?? 0 : choice.level);
-    return { ...choice, level, motions, adaptive: by.adaptive && !motions && by.held.level === undefined };
+    // Of motions every one is taken: a few bytes, decoded at once. Another subscription would bring the table anew.
+    return { ...choice, level, motions, maxRate: motions ? 0 : choice.maxRate, adaptive: by.adaptive && !motions && by.held.level === undefined };
   }
 
   /** One change after the other. */
@@ -116,5 +117,6 @@ export function adapt(client: Client, stream: MeshStream, onChoice: (choice: Ada
   };
 }
 
-const same = (one: AdaptedOptions, other: AdaptedOptions): boolean => one.level === other.level && one.encoding === other.encoding
-  && one.maxRate === other.maxRate && one.motions === other.motions && one.adaptive === other.adaptive;
+/** Motions have no encoding. */
+const same = (one: AdaptedOptions, other: AdaptedOptions): boolean => one.level === other.level && one.motions === other.motions
+  && (one.motions || one.encoding === other.encoding) && one.maxRate === other.maxRate && one.adaptive === other.adaptive;
