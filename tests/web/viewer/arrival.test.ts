@@ -168,6 +168,22 @@ test("held by hand, the GPU skins to the server's vertices, by every method", as
   await client.closeMesh(skinned);
 });
 
+test("the GPU skins once a picture, the newest pose, however many come", async () => {
+  const { before, after } = await page().evaluate(async () => {
+    const { live: { arrival, stream }, stage } = (window as any).ecorche, { positionsOf } = arrival;
+    const drawn = () => new Promise<void>((resolve) => { const off = stage.onAfterDraw(() => { off(); resolve(); }); stage.invalidate(); });
+    await drawn();
+    let skinned = 0;
+    arrival.positionsOf = (frame: unknown) => { ++skinned; return positionsOf.call(arrival, frame); };
+    for (let i = 0; i < 9; ++i) stream.emit("frame", stream.latest);
+    const before = skinned;
+    await drawn();
+    arrival.positionsOf = positionsOf;
+    return { before, after: skinned };
+  });
+  assert.deepEqual({ before, after }, { before: 1, after: 2 });
+});
+
 test("the body's bounds are of the skinned vertices, and it goes back to frames", async () => {
   const { theirs } = await show(0.6, Skinning.COR);
   const box = await page().evaluate(() => {

@@ -80,6 +80,24 @@ export class Arrival {
     return { ...(this.#level !== null && { level: this.#level }), ...(way !== null && { motions: way === "skinning" }) };
   }
 
+  /** The GPU skins for pictures: of the frames that come before the last one is drawn, only the newest is shown, after that. */
+  paced(show: (frame: BodyFrame) => void): (frame: BodyFrame) => void {
+    let drawn = true, waiting: BodyFrame | null = null;
+    const take = (frame: BodyFrame): void => {
+      waiting = frame.skinned && !drawn ? frame : null;
+      if (waiting) return this.stage.invalidate();
+      drawn = !frame.skinned;
+      show(frame);
+    };
+    this.stage.onAfterDraw(() => {
+      drawn = true;
+      // What was asked for anew meanwhile has another body.
+      if (waiting && waiting === waiting.stream.latest) take(waiting);
+      waiting = null;
+    });
+    return take;
+  }
+
   positionsOf(frame: BodyFrame): Positions {
     const { skinned } = frame;
     if (skinned && !this.#fault) {

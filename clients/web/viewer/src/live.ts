@@ -129,7 +129,7 @@ export class Live {
     performance.mark("ecorche opened");
     const stream = await client.subscribeMesh(Arrival.firstOf(model));
     this.stream = stream;
-    stream.on("frame", (frame) => this.#show(frame));
+    stream.on("frame", this.arrival.paced((frame) => this.#show(frame)));
     if (stream.latest) this.#show(stream.latest);
     this.arrival.follow(client, stream);
   }
