@@ -45,6 +45,16 @@ Status find_voxels(const v1::VolumeFrame& frame, const Payload& payload, std::ve
   return {};
 }
 
+// Whether the grid has as many voxels, which the product of its sizes may say of far larger ones.
+bool has_voxels(const ImageGrid& grid, std::uint64_t count) {
+  std::uint64_t product = 1;
+  for (const std::int32_t n : grid.size) {
+    product *= static_cast<std::uint64_t>(n);
+    if (product > kMostBytes) return false;
+  }
+  return product == count;
+}
+
 // Copies bricks into the keyframe's voxels.
 Status put_bricks(std::span<const std::uint32_t> bricks, std::span<const std::byte> voxels, Image& image) {
   const std::size_t voxel = scalar_bytes(image.type) * static_cast<std::size_t>(image.components);
@@ -79,9 +89,8 @@ Status put_bricks(std::span<const std::uint32_t> bricks, std::span<const std::by
 
 Status VolumeDecoder::decode(const v1::VolumeFrame& frame, const Payload& payload, Image& out) {
   Image like;
-  std::vector<std::byte> room;
   std::span<const std::byte> voxels;
-  if (Status status = find_voxels(frame, payload, room, like, voxels); !status.ok()) return status;
+  if (Status status = find_voxels(frame, payload, content_, like, voxels); !status.ok()) return status;
   const std::size_t voxel = scalar_bytes(like.type) * static_cast<std::size_t>(like.components);
   if (frame.has_grid()) {
     if (Status status = from_proto(frame.grid(), like.grid); !status.ok()) return status;
@@ -102,8 +111,9 @@ Status VolumeDecoder::decode(const v1::VolumeFrame& frame, const Payload& payloa
     out = keyframe_;
     return put_bricks(bricks, voxels, out);
   }
-  if (voxels.size() / voxel != like.grid.voxels() || voxels.size() % voxel != 0)
+  if (!has_voxels(like.grid, voxels.size() / voxel) || voxels.size() % voxel != 0)
     return bad_volume("its voxels are not those of its grid");
+  like.bytes = std::move(out.bytes);  // its memory
   like.bytes.assign(voxels.begin(), voxels.end());
   out = std::move(like);
   if (frame.keyframe() == 0) return {};

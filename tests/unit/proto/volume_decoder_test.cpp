@@ -86,5 +86,32 @@ TEST(VolumeDecoder, RowsOfSeveralComponentsCountWhole) {
   EXPECT_NE(triples(most).find("are damaged"), std::string::npos);
 }
 
+// Sizes whose product is 2^64 and so, of 64 bits, none at all: a keyframe of no voxels, into which bricks
+// would be written.
+TEST(VolumeDecoder, AGridWhoseVoxelsWrapIsRefused) {
+  Sent sent;
+  v1::Grid& grid = *sent.frame.mutable_grid();
+  grid.set_size_i(1U << 22);
+  grid.set_size_j(1U << 21);
+  grid.set_size_k(1U << 21);
+  for (const double d : {1, 0, 0, 0, 1, 0, 0, 0, 1}) grid.add_direction(d);
+  *sent.frame.mutable_voxels() = append(sent.payload, std::span<const std::uint8_t>(), 1);
+  sent.frame.set_frame(1);
+  sent.frame.set_keyframe(1);
+  EXPECT_NE(refusal(sent).find("are not those of its grid"), std::string::npos);
+}
+
+TEST(VolumeDecoder, AFrameOfTheSameSizeIsReadIntoTheSameMemory) {
+  VolumeDecoder decoder;
+  Image image;
+  const std::byte* first = nullptr;
+  for (int i = 0; i < 3; ++i) {
+    const Sent sent = compressed(zeros(1000), 1000);
+    ASSERT_TRUE(decoder.decode(sent.frame, sent.payload, image).ok());
+    if (i == 0) first = image.bytes.data();
+    EXPECT_EQ(image.bytes.data(), first);
+  }
+}
+
 }  // namespace
 }  // namespace ecorche::wire
