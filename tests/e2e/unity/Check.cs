@@ -299,6 +299,15 @@ internal static partial class Check
                 while (volume.PoseSequence < sent) True(client.Poll(20000).Kind != EventKind.None, "a volume");
                 Console.WriteLine(i + " " + volume.SizeI + " " + volume.SizeJ + " " + volume.SizeK + " " + Hash(volume.Voxels) + (volume.Bricks > 0 ? " by bricks" : ""));
             }
+            try
+            {
+                client.SubscribeVolume(body.Volumes[0].Name, spheres: true);
+                True(false, "a model without spheres");
+            }
+            catch (EcorcheException refused)
+            {
+                True(refused.Code == Code.FailedPrecondition && refused.Message.Contains("spheres"), refused.Message);
+            }
         }
     }
 }

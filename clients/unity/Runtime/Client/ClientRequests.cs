@@ -128,11 +128,11 @@ namespace Ecorche
         }
 
         /// <summary>Frames of a posed volume, whole or a `region` of the posed space (LPS mm). `changedBricks`: less on the way, all voxels here;
-        /// `compressed`: by zstd, for lines that are slower than its decoder.</summary>
+        /// `compressed`: by zstd, for lines that are slower than its decoder; `spheres`: posed by the balls that the model holds, not by tets.</summary>
         public VolumeStream SubscribeVolume(string name, bool nearest = false, bool changedBricks = false, double[] region = null, double maxRate = 0,
-            bool compressed = false)
+            bool compressed = false, bool spheres = false)
         {
-            var stream = new VolumeStream(Opened(), name, nearest, changedBricks, region, maxRate, compressed);
+            var stream = new VolumeStream(Opened(), name, nearest, changedBricks, region, maxRate, compressed, spheres);
             Subscribe(stream);
             _volumes.Add(stream);
             return stream;
@@ -150,6 +150,7 @@ namespace Ecorche
             subscribe.Volume.Nearest = stream.Nearest;
             subscribe.Volume.ChangedBricks = stream.ChangedBricks;
             subscribe.Volume.Compressed = stream.Compressed;
+            subscribe.Volume.Deformer = stream.Spheres ? Deformer.Spheres : Deformer.Tets;
             subscribe.Volume.HasRegion = SetBox(subscribe.Volume.Region, stream.Region);
             var came = Call(default);
             using (new Returned(_line, came)) stream.Begin(_in.Subscribed.Subscription);

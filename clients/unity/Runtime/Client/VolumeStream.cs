@@ -16,9 +16,9 @@ namespace Ecorche
         private ulong _keyframe;
         private bool _hasKey;
 
-        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate, bool compressed)
+        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate, bool compressed, bool spheres)
         {
-            (Name, Nearest, ChangedBricks, Region, MaxRate) = (name, nearest, changedBricks, region, maxRate);
+            (Name, Nearest, ChangedBricks, Region, MaxRate, Spheres) = (name, nearest, changedBricks, region, maxRate, spheres);
             for (int v = 0; v < body.Volumes.Count; ++v)
                 if (body.Volumes[v].Name == name) _volume = body.Volumes[v];
             if (_volume == null) throw new EcorcheException(Code.NotFound, name + ": the model has no such volume");
@@ -52,6 +52,7 @@ namespace Ecorche
         internal bool Compressed => _zstd != null;
         internal double[] Region { get; }
         internal double MaxRate { get; }
+        internal bool Spheres { get; }
 
         internal void Begin(uint subscription)
         {
