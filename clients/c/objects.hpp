@@ -18,6 +18,7 @@
 #include <ecorche/runtime/volume_poser.hpp>
 #include <ecorche/values/model.hpp>
 #include "clients/c/edited_pose.hpp"
+#include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::c {
 
@@ -51,6 +52,9 @@ struct OpenModel {
   const Skeleton& skeleton() const { return model->rig.skeleton; }
 };
 
+/// Throws Error{usage} for a row that is not there.
+const ModelVolume& volume_at(const OpenModel& open, std::uint32_t row);
+
 }  // namespace ecorche::c
 
 struct ecorche_model {
@@ -60,6 +64,14 @@ struct ecorche_model {
 struct ecorche_pose {
   std::shared_ptr<const ecorche::c::OpenModel> open;
   ecorche::c::EditedPose edited;
+};
+
+struct ecorche_spheres {
+  std::shared_ptr<const ecorche::c::OpenModel> open;
+  std::shared_ptr<const ecorche::VolumetricSkeleton> skeleton;
+  std::vector<float> radii;  ///< mm
+  /// One a volume.
+  std::unique_ptr<ecorche::c::Lazy<ecorche::runtime::VolumeBalls>[]> balls;
 };
 
 struct ecorche_body {
@@ -73,6 +85,7 @@ struct ecorche_body {
 
   ecorche::Image volume;
   ecorche::runtime::VolumePoser::Scratch volume_scratch;
+  ecorche::Image refilled;
   ecorche::runtime::Probe::PosedTree tree;
   bool tree_follows = false;
   ecorche::runtime::Probed probed;

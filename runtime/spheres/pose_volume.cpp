@@ -26,9 +26,11 @@ ImageGrid posed_lattice(const VolumetricSkeleton& skeleton, const ModelVolume& v
 }
 
 VolumeBalls::VolumeBalls(const Model& model, const ModelVolume& volume, bool bridged, const Context& context)
-    : skeleton_(spheres_for(model, volume)),
-      model_(model),
-      rest_(balls_at_rest(skeleton_, posed_lattice(skeleton_, volume))) {
+    : VolumeBalls(model, spheres_for(model, volume), volume, bridged, context) {}
+
+VolumeBalls::VolumeBalls(const Model& model, const VolumetricSkeleton& skeleton, const ModelVolume& volume,
+                         bool bridged, const Context& context)
+    : skeleton_(skeleton), model_(model), rest_(balls_at_rest(skeleton_, posed_lattice(skeleton_, volume))) {
   if (bridged) seams_ = seams_of(rest_, skeleton_.segment, model.rig.skeleton, context);
 }
 

@@ -33,6 +33,9 @@ class VolumeBalls {
   /// `bridged`: fill what opens between segments (seams.hpp). Throws as spheres_for.
   VolumeBalls(const Model& model, const ModelVolume& volume, bool bridged = true,
               const Context& context = {});
+  /// Those of another skeleton, which hangs on the model's segments; keeps a reference to that, too.
+  VolumeBalls(const Model& model, const VolumetricSkeleton& skeleton, const ModelVolume& volume,
+              bool bridged = true, const Context& context = {});
   /// Bridged, and hung as `by_hand` says; keeps a reference to that, too. Its sizes must be those of the
   /// skeleton and the rig.
   VolumeBalls(const Model& model, const ModelVolume& volume, const Hanging& by_hand,

@@ -14,10 +14,6 @@
 namespace ecorche::c {
 namespace {
 
-Error lie(const std::string& what) {
-  return Error(ErrorKind::protocol, "server", what, "check that it is ecorche serve");
-}
-
 // Every tissue's triangles are looked at once: later they are only pointed to.
 void check_triangles(const OpenedBody& body) {
   for (const v1::Tissue& tissue : body.opened.tissues()) {
@@ -28,6 +24,16 @@ void check_triangles(const OpenedBody& body) {
       if (row >= tissue.vertices())
         throw lie("a triangle of '" + tissue.name() + "' has a corner that is not there");
     }
+  }
+}
+
+void check_volumes(OpenedBody& body) {
+  for (const v1::Volume& volume : body.opened.volumes()) {
+    ScalarType type{};
+    ImageGrid& grid = body.volumes.emplace_back();
+    if (!wire::from_proto(volume.type(), type) || volume.components() < 1 || volume.components() > 16 ||
+        !wire::from_proto(volume.grid(), grid).ok())
+      throw lie("the volume '" + volume.name() + "' has no voxels that this client knows");
   }
 }
 
@@ -42,6 +48,10 @@ void take_pose(const v1::PoseState& state, OpenedBody& body) {
 }
 
 }  // namespace
+
+Error lie(const std::string& what) {
+  return Error(ErrorKind::protocol, "server", what, "check that it is ecorche serve");
+}
 
 std::string text_of(const char* given, const char* name) {
   const std::string_view text = given == nullptr ? "" : given;
@@ -69,6 +79,7 @@ std::unique_ptr<OpenedBody> read_opened(wire::Frame frame) {
   if (const Status status = wire::from_proto(body->opened.skeleton(), body->rig); !status.ok())
     throw lie(status.message);
   check_triangles(*body);
+  check_volumes(*body);
   body->angles = angle_rows(body->rig.skeleton);
   body->pose = EditedPose(body->rig.skeleton);
   body->sequence = body->opened.last_sequence();

@@ -12,6 +12,7 @@
 #include <ecorche/client/client.hpp>
 #include <ecorche/wire/address.hpp>
 #include "clients/c/client/shown_frame.hpp"
+#include "clients/c/client/volume_stream.hpp"
 #include "clients/c/edited_pose.hpp"
 #include "clients/c/guard.hpp"
 
@@ -23,6 +24,7 @@ struct OpenedBody {
   wire::Payload triangles;
   Rig rig;
   std::vector<AngleRow> angles;
+  std::vector<ImageGrid> volumes;  ///< at rest
   EditedPose pose{rig.skeleton};
   std::uint64_t sequence = 0;  ///< of the last pose that was sent
 
@@ -55,6 +57,9 @@ struct ecorche_client {
   std::optional<std::uint32_t> subscription = {};
   mutable ecorche::c::ShownFrame frame = {};  ///< that floats are made of it later nobody sees
   std::optional<ecorche::c::ToldQuality> quality = {};
+
+  std::vector<ecorche::c::VolumeStream> volumes = {};
+  std::uint32_t volumes_made = 0;  ///< of which the last has this number
 };
 
 namespace ecorche::c {
@@ -80,6 +85,9 @@ ecorche_code with_client(const ecorche_client* client, bool opened, const Work& 
   return guarded_call(work);
 }
 
+/// For what a server says that ours would not.
+Error lie(const std::string& what);
+
 /// What a caller gave, "" for null. Throws Error{usage} with the `name` of what is no UTF-8, since a message
 /// with it is none, and the connection would end.
 std::string text_of(const char* given, const char* name);
@@ -92,6 +100,13 @@ std::unique_ptr<OpenedBody> read_opened(wire::Frame opened);
 
 /// Frames of what is wanted come from now on, and after coming back. Where the server refuses it all stays.
 void subscribe(ecorche_client& client, const v1::Subscribe& wanted);
+
+/// The same of a volume, which becomes the stream's.
+void subscribe(ecorche_client& client, VolumeStream& stream);
+
+/// Whether the frame is of one of the client's streams; then it is that one's, and told as an event.
+bool take_volume(ecorche_client& client, const v1::VolumeFrame& frame, const wire::Payload& payload,
+                 ecorche_event& event);
 
 /// For the server to hear one.
 inline constexpr std::chrono::milliseconds longest_goodbye{500};

@@ -11,9 +11,8 @@ namespace {
 
 constexpr std::size_t kMostPoints = 10'000;  // docs/reference/protocol.md
 
-Error lie() {
-  return Error(ErrorKind::protocol, "server", "the answer to a probe is not what was asked for",
-               "check that it is ecorche serve");
+Error other_answer() {
+  return lie("the answer to a probe is not what was asked for");
 }
 
 ecorche_code probe(ecorche_client* client, v1::ProbePoints::Direction direction, const float* points,
@@ -36,10 +35,11 @@ ecorche_code probe(ecorche_client* client, v1::ProbePoints::Direction direction,
     const v1::Probed& found = answer.envelope.probed();
     std::span<const double> there;
     std::span<const std::int32_t> tissues;
-    if (!wire::find(found.points(), answer.payload, 3, there) || there.size() != 3 * count) throw lie();
+    if (!wire::find(found.points(), answer.payload, 3, there) || there.size() != 3 * count)
+      throw other_answer();
     if (to.tissues != nullptr &&
         (!wire::find(found.tissue(), answer.payload, 1, tissues) || tissues.size() != count))
-      throw lie();
+      throw other_answer();
     if (to.points != nullptr)
       std::transform(there.begin(), there.end(), to.points,
                      [](double value) { return static_cast<float>(value); });

@@ -15,10 +15,14 @@ bool take_place(ecorche_client& client, const v1::ServerHello& hello) {
   const v1::Resumed& resumed = hello.resumed();
   client.controls = resumed.role() == v1::ROLE_CONTROLLER;
   client.body->sequence = std::max(client.body->sequence, resumed.last_sequence());
-  const auto was = std::exchange(client.subscription, std::nullopt);
-  for (const v1::ResumedSubscription& one : resumed.subscriptions()) {
-    if (was == one.was()) client.subscription = one.is();
-  }
+  const auto renumber = [&](std::optional<std::uint32_t>& subscription) {
+    const auto was = std::exchange(subscription, std::nullopt);
+    for (const v1::ResumedSubscription& one : resumed.subscriptions()) {
+      if (was == one.was()) subscription = one.is();
+    }
+  };
+  renumber(client.subscription);
+  for (VolumeStream& stream : client.volumes) renumber(stream.subscription);
   return true;
 }
 
@@ -34,6 +38,7 @@ bool open_again(ecorche_client& client, client::Client& connection) {
       now->opened.rig_digest() != before.rig_digest())
     return false;
   client.subscription.reset();
+  for (VolumeStream& stream : client.volumes) stream.subscription.reset();
   client.controls = now->opened.role() == v1::ROLE_CONTROLLER;
   client.body->sequence = now->sequence;
   return true;
@@ -71,6 +76,10 @@ ecorche_code ecorche_client_resume(ecorche_client* client) {
     client->sent_away = false;
     client->frame.forget_keyframes();
     if (client->wanted && !client->subscription) c::subscribe(*client, *client->wanted);
+    for (c::VolumeStream& stream : client->volumes) {
+      stream.decoder = {};
+      if (!stream.subscription) c::subscribe(*client, stream);
+    }
     return ECORCHE_OK;
   });
 }

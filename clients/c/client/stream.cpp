@@ -37,15 +37,13 @@ ToldQuality to_c(const v1::PoseQuality& told) {
 // Whether the frame is of the present subscription; then it is the client's.
 bool take_frame(ecorche_client& client, const v1::MeshFrame& frame, const wire::Payload& payload) {
   if (client.subscription != frame.subscription()) return false;
-  if (const Status status = client.frame.take(frame, payload); !status.ok())
-    throw Error(ErrorKind::protocol, "server", status.message, "check that it is ecorche serve");
+  if (const Status status = client.frame.take(frame, payload); !status.ok()) throw lie(status.message);
   const v1::ModelOpened& opened = client.body->opened;
   for (const wire::DecodedTissue& tissue : client.frame.tissues()) {
     if (tissue.tissue >= static_cast<std::uint32_t>(opened.tissues_size()) ||
         tissue.vertices() != opened.tissues(static_cast<int>(tissue.tissue)).vertices()) {
       client.frame.clear();
-      throw Error(ErrorKind::protocol, "server", "a frame holds other tissues than the model",
-                  "check that it is ecorche serve");
+      throw lie("a frame holds other tissues than the model");
     }
   }
   if (frame.has_quality()) client.quality = to_c(frame.quality());
@@ -59,6 +57,8 @@ bool take(ecorche_client& client, const client::Client::Message& came, ecorche_e
     if (!take_frame(client, said.mesh_frame(), came.payload)) return false;
     event.kind = ECORCHE_EVENT_FRAME;
     event.sequence = said.mesh_frame().pose_sequence();
+  } else if (said.has_volume_frame()) {
+    return take_volume(client, said.volume_frame(), came.payload, event);
   } else if (said.has_pose_ack()) {
     event.kind = ECORCHE_EVENT_POSE;
     event.sequence = said.pose_ack().sequence();

@@ -96,6 +96,41 @@ TEST(ClientAllocation, AFrameAllocatesNothing) {
   }
 }
 
+TEST(ClientAllocation, AVolumesFrameAllocatesNothing) {
+  const ServerProcess server;
+  ecorche_client* client = nullptr;
+  ASSERT_EQ(ecorche_client_connect(server.address().c_str(), nullptr, &client), ECORCHE_OK);
+  ASSERT_EQ(ecorche_client_open(client, "toy", nullptr), ECORCHE_OK);
+  int failed = 0, shown = 0;
+  for (const int compressed : {0, 1}) {
+    ecorche_volume_options options = ECORCHE_VOLUME_OPTIONS_INIT;
+    options.compressed = compressed;
+    std::uint32_t stream = 0;
+    ASSERT_EQ(ecorche_client_subscribe_volume(client, 0, &options, &stream), ECORCHE_OK);
+    // As large in every pose.
+    const auto frame = [&](double angle) {
+      std::uint64_t sequence = 0;
+      failed += ecorche_client_set_angle(client, "middle_joint", "flexion", angle);
+      failed += ecorche_client_send_pose(client, ECORCHE_SKINNING_COR, &sequence);
+      ecorche_event event = ECORCHE_EVENT_INIT;
+      do failed += ecorche_client_poll(client, 10, &event);
+      while (event.kind != ECORCHE_EVENT_NONE &&
+             (event.kind != ECORCHE_EVENT_VOLUME || event.sequence < sequence));
+      ecorche_voxels voxels = ECORCHE_VOXELS_INIT;
+      failed += ecorche_client_voxels(client, stream, 0, &voxels);
+      shown += voxels.sequence == sequence ? 1 : 0;
+    };
+    for (int i = 0; i < 10; ++i) frame(0.0001 * i);
+    const std::size_t before = test::allocated;
+    for (int i = 0; i < 50; ++i) frame(0.0001 * i);
+    EXPECT_EQ(test::allocated - before, 0U) << compressed;
+    failed += ecorche_client_unsubscribe_volume(client, stream);
+  }
+  EXPECT_EQ(shown, 120);
+  EXPECT_EQ(failed, 0) << ecorche_client_error_message();
+  ecorche_client_close(client);
+}
+
 TEST(ClientAllocation, TheCounterCounts) {
   const ServerProcess server;
   const std::size_t before = test::allocated;

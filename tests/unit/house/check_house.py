@@ -41,7 +41,7 @@ ARROWS = {
                        "runtime/server/schedule", "runtime/server/session", "runtime/server/registry",
                        "runtime/server/handlers"],
     "clients/cpp": ["proto", "core/values"],
-    "clients/c": ["core", "runtime", "io/case", "proto", "clients/cpp"],
+    "clients/c": ["core", "preprocess/thin", "runtime", "io/case", "proto", "clients/cpp"],
     "app": ["core", "io", "phantom", "preprocess", "runtime", "proto", "clients"],
 }
 # What systems do each in their own way; its headers name nothing of any system. core/values needs none of it.

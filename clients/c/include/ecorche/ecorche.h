@@ -339,6 +339,61 @@ ECORCHE_API ecorche_code ecorche_body_volume_grid(const ecorche_body* body, uint
 ECORCHE_API ecorche_code ecorche_body_volume(ecorche_body* body, uint32_t volume, const ecorche_grid* grid,
                                              int nearest, void* voxels, size_t bytes);
 
+/* ---- volumes by spheres ---- */
+
+/* An object as the balls around a few of its voxels (its volumetric skeleton: Gagvani and Silver 2001), each
+ * hung on a segment. Never changes; may be used by any number of threads at once; keeps its model alive. */
+typedef struct ecorche_spheres ecorche_spheres;
+
+/* Those with which the model's volume is posed. FAILED_PRECONDITION where the model was prepared without any.
+ */
+ECORCHE_API ecorche_code ecorche_spheres_of_volume(const ecorche_model* model, uint32_t volume,
+                                                   ecorche_spheres** out);
+/* Thins an object of one's own: `inside` has a byte for each voxel of `grid`, not 0 where it is the object.
+ * `thinness`, voxels: -2 keeps every voxel, 2 none; 0.3 to 1 is usual, 0.48 keeps some three in a thousand.
+ * Each ball hangs on the segment whose skinning weight is largest there. INVALID_ARGUMENT where no ball is
+ * left, for voxels that are not cubic, and beyond 2^31 of them. Takes seconds for 256 * 256 * 256. */
+ECORCHE_API ecorche_code ecorche_spheres_thin(const ecorche_model* model, const ecorche_grid* grid,
+                                              const uint8_t* inside, double thinness, ecorche_spheres** out);
+/* What thinning at a higher thinness would have left, from the balls alone. */
+ECORCHE_API ecorche_code ecorche_spheres_thinner(const ecorche_spheres* spheres, double thinness,
+                                                 ecorche_spheres** out);
+/* The same balls, hung on other segments: a row of the model for each ball. */
+ECORCHE_API ecorche_code ecorche_spheres_hang(const ecorche_spheres* spheres, const int32_t* segments,
+                                              size_t count, ecorche_spheres** out);
+ECORCHE_API void ecorche_spheres_destroy(ecorche_spheres* spheres);
+
+typedef struct ecorche_spheres_info {
+  size_t struct_size;
+  uint32_t count;          /* of balls */
+  double thinness;         /* that they were thinned at */
+  ecorche_grid grid;       /* of the voxels that were thinned */
+  const uint16_t* voxels;  /* 3 * count: i, j, k of the centres */
+  const float* radii;      /* count, mm: a ball holds what is nearer to its centre */
+  const int32_t* segments; /* count: the rows that they hang on */
+} ecorche_spheres_info;
+#define ECORCHE_SPHERES_INFO_INIT                                                                          \
+  {                                                                                                        \
+    sizeof(ecorche_spheres_info), 0, 0, {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0}}, 0, \
+        0, 0                                                                                               \
+  }
+
+ECORCHE_API ecorche_code ecorche_spheres_describe(const ecorche_spheres* spheres, ecorche_spheres_info* out);
+
+/* Where the volume lies after the body's last update, when the balls pose it: the scan's own lattice, or
+ * cubes of its finest spacing where its voxels are not cubic, grown until it holds every ball; or the voxels
+ * of it whose centres lie in `region`, 6: the low and the high corner, both ends included, LPS mm (NULL:
+ * all). INVALID_ARGUMENT for a region without any. */
+ECORCHE_API ecorche_code ecorche_body_refill_grid(ecorche_body* body, const ecorche_spheres* spheres,
+                                                  uint32_t volume, const double region[6], ecorche_grid* out);
+/* The posed volume by the balls, beside ecorche_body_volume, which does it by tets: on a grid of the function
+ * above (or another part of that lattice), or on a slice: one voxel thick along k, wherever it lies. What
+ * opens between segments is bridged. The first call for a volume takes a moment longer, and each allocates
+ * some 200 bytes a ball. The rest as ecorche_body_volume. */
+ECORCHE_API ecorche_code ecorche_body_refill(ecorche_body* body, const ecorche_spheres* spheres,
+                                             uint32_t volume, const ecorche_grid* grid, int nearest,
+                                             void* voxels, size_t bytes);
+
 /* ---- probes ---- */
 
 /* The caller's buffers, a row for each point; those that are NULL are left out. */

@@ -138,27 +138,30 @@ typedef enum ecorche_event_kind {
   ECORCHE_EVENT_NONE = 0,  /* nothing more came */
   ECORCHE_EVENT_FRAME = 1, /* positions are new */
   ECORCHE_EVENT_POSE = 2, /* a pose was taken (`code` is OK), or refused for ecorche_client_error_message() */
-  ECORCHE_EVENT_CONTROL = 3,      /* ecorche_client_controls() changed, or control is free */
-  ECORCHE_EVENT_MODEL_CHANGED = 4 /* the server has read the model anew: connect again */
+  ECORCHE_EVENT_CONTROL = 3,       /* ecorche_client_controls() changed, or control is free */
+  ECORCHE_EVENT_MODEL_CHANGED = 4, /* the server has read the model anew: connect again */
+  ECORCHE_EVENT_VOLUME = 5 /* voxels of `stream` are new; or, where `code` is not OK, none could be made, and
+                              those before stay */
 } ecorche_event_kind;
 
 typedef struct ecorche_event {
   size_t struct_size;
   ecorche_event_kind kind;
   ecorche_code code;
-  uint64_t sequence; /* of FRAME and POSE: which pose */
+  uint64_t sequence; /* of FRAME, VOLUME and POSE: which pose */
   int32_t vacant;    /* of CONTROL: not 0: ecorche_client_claim would have it */
+  uint32_t stream;   /* of VOLUME: which of ecorche_client_subscribe_volume */
 } ecorche_event;
 #define ECORCHE_EVENT_INIT \
-  { sizeof(ecorche_event), ECORCHE_EVENT_NONE, ECORCHE_OK, 0, 0 }
+  { sizeof(ecorche_event), ECORCHE_EVENT_NONE, ECORCHE_OK, 0, 0, 0 }
 
 /* The next thing that came. Waits `seconds` for one; 0: never, for a game's loop. */
 ECORCHE_API ecorche_code ecorche_client_poll(ecorche_client* client, double seconds, ecorche_event* out);
 
 /* The connection's socket, for a loop of events that waits for many: when it can be read, call
- * ecorche_client_poll with 0 until nothing more comes; call it so, too, after every function that waits for an
- * answer, since what came with the answer waits in the client. Another one after ecorche_client_resume. Not to
- * be read, written or closed. -1 for none. */
+ * ecorche_client_poll with 0 until nothing more comes; call it so, too, after every function that waits for
+ * an answer, since what came with the answer waits in the client. Another one after ecorche_client_resume.
+ * Not to be read, written or closed. -1 for none. */
 ECORCHE_API intptr_t ecorche_client_descriptor(const ecorche_client* client);
 
 /* Of the last frame: 3 * vertex_count, LPS mm; NULL before the first, or for a tissue that was not asked for.
@@ -197,13 +200,71 @@ ECORCHE_API ecorche_code ecorche_client_copy_packed(const ecorche_client* client
 ECORCHE_API ecorche_code ecorche_client_quality(const ecorche_client* client, ecorche_quality* out,
                                                 uint64_t* sequence);
 
+/* ---- volumes ---- */
+
+/* Images that follow the body; see ecorche_model_volume. `rest` is NULL: voxels come by frames. */
+ECORCHE_API uint32_t ecorche_client_volume_count(const ecorche_client* client);
+ECORCHE_API ecorche_code ecorche_client_volume(const ecorche_client* client, uint32_t volume,
+                                               ecorche_volume_info* out);
+
+typedef enum ecorche_deformer {
+  ECORCHE_DEFORMER_TETS = 1,   /* as ecorche_body_volume */
+  ECORCHE_DEFORMER_SPHERES = 2 /* as ecorche_body_refill, by the spheres that the model holds */
+} ecorche_deformer;
+
+typedef struct ecorche_volume_options {
+  size_t struct_size;
+  ecorche_deformer deformer;
+  int32_t nearest;      /* not 0: no interpolation */
+  const double* region; /* 6: the low and the high corner of a box in the posed body, both ends included, LPS
+                           mm; NULL: all */
+  const ecorche_grid* slices; /* instead: so many planes, each one voxel thick along k, wherever it lies */
+  size_t slice_count;         /* at most 16 */
+  int32_t compressed;         /* not 0: fewer bytes on the way, more work at both ends */
+  double max_rate;            /* frames a second; 0: every pose */
+} ecorche_volume_options;
+#define ECORCHE_VOLUME_OPTIONS_INIT \
+  { sizeof(ecorche_volume_options), ECORCHE_DEFORMER_TETS, 0, 0, 0, 0, 0, 0 }
+
+/* Frames of the posed volume come from now on as well, also after coming back, each an ECORCHE_EVENT_VOLUME
+ * of this `stream`; who asks for the same again has the same stream. On the way are only the parts that
+ * changed. `options` may be NULL. FAILED_PRECONDITION for spheres that the model lacks, INVALID_ARGUMENT for
+ * a region beside slices, or one that holds no voxel. */
+ECORCHE_API ecorche_code ecorche_client_subscribe_volume(ecorche_client* client, uint32_t volume,
+                                                         const ecorche_volume_options* options,
+                                                         uint32_t* stream);
+/* No more of them. What is not a stream is NOT_FOUND. */
+ECORCHE_API ecorche_code ecorche_client_unsubscribe_volume(ecorche_client* client, uint32_t stream);
+
+/* The voxels of a volume, or of a slice, and where they lie: a volume on the scan's own lattice, grown until
+ * it holds the posed body, or the region of it. */
+typedef struct ecorche_voxels {
+  size_t struct_size;
+  uint64_t sequence; /* of the pose that they show */
+  ecorche_grid grid;
+  ecorche_scalar type;
+  int32_t components; /* of a voxel, side by side */
+  const void* voxels; /* i fastest */
+  size_t bytes;
+} ecorche_voxels;
+#define ECORCHE_VOXELS_INIT                                                                                \
+  {                                                                                                        \
+    sizeof(ecorche_voxels), 0, {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0, 0, 0, 0, 0, 0, 0}}, ECORCHE_U8, \
+        0, 0, 0                                                                                            \
+  }
+
+/* What the stream's last frame brought; good until the next poll. `slice`: which of those that were asked
+ * for; 0 without slices. FAILED_PRECONDITION where none has come. Allocates nothing. */
+ECORCHE_API ecorche_code ecorche_client_voxels(const ecorche_client* client, uint32_t stream, uint32_t slice,
+                                               ecorche_voxels* out);
+
 /* ---- coming back, clips, recordings ---- */
 
 /* After the connection was lost: connects again, where its server said so to another one, and has the
- * session, its control and its frames as before, where the server kept the place (a minute), else as anybody
- * who opens the session by its name. Frames that were read stay good. Waits 5 s at most; UNAVAILABLE where
- * nobody answers yet: call again after a while; a client that was sent to another server tries the two in turn.
- * FAILED_PRECONDITION where the model is another one by now: close the client, and connect anew. */
+ * session, its control, its frames and volumes as before, where the server kept the place (a minute), else as
+ * anybody who opens the session by its name. Frames that were read stay good. Waits 5 s at most; UNAVAILABLE
+ * where nobody answers yet: call again after a while; a client that was sent to another server tries the two
+ * in turn. FAILED_PRECONDITION where the model is another one by now: close the client, and connect anew. */
 ECORCHE_API ecorche_code ecorche_client_resume(ecorche_client* client);
 
 /* Motion that the server holds; names are good until the next call. */
