@@ -25,7 +25,9 @@ from ._library import Error, InvalidArgument, NotFound, NotPossible, Unavailable
 from .body import Body, Probed, Quality, Reason  # noqa: E402
 from .client import Client, Frame, connect  # noqa: E402
 from .model import Angle, Grid, Model, Pose, Segment, Tissue, Volume  # noqa: E402
+from .spheres import Spheres  # noqa: E402
+from .volume_stream import VolumeStream  # noqa: E402
 
 __version__ = version()
 __all__ = ["Angle", "Body", "Client", "Error", "Frame", "Grid", "InvalidArgument", "Model", "NotFound", "NotPossible", "Pose", "Probed", "Quality",
-           "Reason", "Segment", "Tissue", "Unavailable", "Volume", "connect"]
+           "Reason", "Segment", "Spheres", "Tissue", "Unavailable", "Volume", "VolumeStream", "connect"]

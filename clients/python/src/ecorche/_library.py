@@ -3,7 +3,7 @@
 import ctypes
 import functools
 import os
-from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_size_t, c_ssize_t, c_uint, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_size_t, c_ssize_t, c_uint, c_uint16, c_uint32, c_uint64, c_void_p
 from typing import Any, Optional, Union
 
 ABI_VERSION = 0
@@ -76,6 +76,11 @@ class VolumeInfo(Sized):
                 ("background", c_double), ("grid", GridInfo), ("rest", c_void_p)]
 
 
+class SpheresInfo(Sized):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint32), ("thinness", c_double), ("grid", GridInfo), ("voxels", POINTER(c_uint16)),
+                ("radii", POINTER(c_float)), ("segments", POINTER(c_int32))]
+
+
 class ProbedInfo(Sized):
     _fields_ = [("struct_size", c_size_t), ("points", c_void_p), ("tets", c_void_p), ("tissues", c_void_p), ("gradients", c_void_p),
                 ("values", c_void_p), ("volume", c_int32)]
@@ -104,6 +109,13 @@ _POSING_CODE = [  # what returns an ecorche_code
     ("body_reason", c_void_p, c_uint32, POINTER(ReasonInfo)),
     ("body_volume_grid", c_void_p, c_uint32, POINTER(GridInfo)),
     ("body_volume", c_void_p, c_uint32, POINTER(GridInfo), c_int, c_void_p, c_size_t),
+    ("spheres_of_volume", c_void_p, c_uint32, POINTER(c_void_p)),
+    ("spheres_thin", c_void_p, POINTER(GridInfo), c_void_p, c_double, POINTER(c_void_p)),
+    ("spheres_thinner", c_void_p, c_double, POINTER(c_void_p)),
+    ("spheres_hang", c_void_p, c_void_p, c_size_t, POINTER(c_void_p)),
+    ("spheres_describe", c_void_p, POINTER(SpheresInfo)),
+    ("body_refill_grid", c_void_p, c_void_p, c_uint32, POINTER(c_double), POINTER(GridInfo)),
+    ("body_refill", c_void_p, c_void_p, c_uint32, POINTER(GridInfo), c_int, c_void_p, c_size_t),
     ("body_posed_to_rest", c_void_p, c_void_p, c_size_t, POINTER(ProbedInfo)),
     ("body_rest_to_posed", c_void_p, c_void_p, c_size_t, POINTER(ProbedInfo)),
 ]
@@ -120,6 +132,7 @@ _POSING_OTHER = [
     (c_uint32, "model_volume_count", c_void_p),
     (None, "pose_destroy", c_void_p),
     (None, "body_destroy", c_void_p),
+    (None, "spheres_destroy", c_void_p),
     (POINTER(c_float), "body_positions", c_void_p, c_uint32),
     (POINTER(c_int16), "body_normals", c_void_p, c_uint32),
     (c_uint32, "body_clamped_count", c_void_p),
@@ -137,7 +150,18 @@ class StreamOptions(Sized):
 
 
 class EventInfo(Sized):
-    _fields_ = [("struct_size", c_size_t), ("kind", c_int), ("code", c_int), ("sequence", c_uint64), ("vacant", c_int32)]
+    _fields_ = [("struct_size", c_size_t), ("kind", c_int), ("code", c_int), ("sequence", c_uint64), ("vacant", c_int32),
+                ("stream", c_uint32)]
+
+
+class VolumeOptions(Sized):
+    _fields_ = [("struct_size", c_size_t), ("deformer", c_int), ("nearest", c_int32), ("region", POINTER(c_double)), ("slices", POINTER(GridInfo)),
+                ("slice_count", c_size_t), ("compressed", c_int32), ("max_rate", c_double)]
+
+
+class VoxelsInfo(Sized):
+    _fields_ = [("struct_size", c_size_t), ("sequence", c_uint64), ("grid", GridInfo), ("type", c_int), ("components", c_int32),
+                ("voxels", c_void_p), ("bytes", c_size_t)]
 
 
 _CLIENT_CODE = [
@@ -155,6 +179,10 @@ _CLIENT_CODE = [
     ("set_root", c_void_p, POINTER(c_double)),
     ("send_pose", c_void_p, c_int, POINTER(c_uint64)),
     ("subscribe", c_void_p, POINTER(StreamOptions)),
+    ("volume", c_void_p, c_uint32, POINTER(VolumeInfo)),
+    ("subscribe_volume", c_void_p, c_uint32, POINTER(VolumeOptions), POINTER(c_uint32)),
+    ("unsubscribe_volume", c_void_p, c_uint32),
+    ("voxels", c_void_p, c_uint32, c_uint32, POINTER(VoxelsInfo)),
     ("poll", c_void_p, c_double, POINTER(EventInfo)),
     ("copy", c_void_p, c_uint32, c_int, c_void_p, c_size_t, c_void_p, c_size_t, c_size_t),
     ("quality", c_void_p, POINTER(QualityInfo), POINTER(c_uint64)),
@@ -176,6 +204,7 @@ _CLIENT_OTHER = [
     (c_uint32, "tissue_count", c_void_p),
     (c_uint32, "segment_count", c_void_p),
     (c_uint32, "angle_count", c_void_p),
+    (c_uint32, "volume_count", c_void_p),
     (c_int, "controls", c_void_p),
     (c_char_p, "clip", c_void_p, c_uint32, POINTER(c_double)),
     (POINTER(c_float), "positions", c_void_p, c_uint32),

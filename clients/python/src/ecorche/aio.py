@@ -23,11 +23,12 @@ from typing import Any, AsyncIterator, Callable, Generator, Optional, Sequence, 
 import numpy as np
 import numpy.typing as npt
 
-from ._library import NotPossible
+from ._library import EventInfo, NotPossible
 from .body import Quality
 from .client import FRAME, NONE, Frame
 from .client import Client as Waiting
-from .model import Anatomy
+from .model import Anatomy, Grid
+from .volume_stream import VolumeStream as WaitingStream
 
 T = TypeVar("T")
 
@@ -44,7 +45,7 @@ class Client(Anatomy):
         self._arrival: Optional["asyncio.Future[None]"] = None
         self._watched, self._stirs = -1, 0
         self._closed = False
-        self.segments, self.tissues, self.angles = waiting.segments, waiting.tissues, waiting.angles
+        self.segments, self.tissues, self.angles, self.volumes = waiting.segments, waiting.tissues, waiting.angles, waiting.volumes
         self.session: str = waiting.session
         self.server: str = waiting.server
 
@@ -98,7 +99,7 @@ class Client(Anatomy):
         until = None if seconds is None else time.monotonic() + seconds
         while True:
             stirs = self._stirs
-            event = await self._now(self._waiting._poll, 0.0)
+            event = await self._next()
             if event.kind == FRAME:
                 yield Frame(event.sequence)
             elif event.kind == NONE and not await self._arrives(until, stirs):
@@ -106,10 +107,17 @@ class Client(Anatomy):
 
     async def show(self, sequence: int, seconds: float = 10) -> Frame:
         """Waits until the frame of a pose that was sent, or of a later one, is here."""
-        async for frame in self.frames(seconds):
-            if frame.sequence >= sequence:
-                return frame
-        raise NotPossible(f"pose {sequence}: was not shown within {seconds} s (is this client's control gone?)")
+        if not await self._until(lambda: self._waiting._shown >= sequence, seconds):
+            raise NotPossible(f"pose {sequence}: was not shown within {seconds} s (is this client's control gone?)")
+        return Frame(self._waiting._shown)
+
+    async def subscribe_volume(self, volume: Union[str, int] = 0, *, spheres: bool = False, nearest: bool = False,
+                               region: Optional[npt.ArrayLike] = None, slices: Sequence[Grid] = (), compressed: bool = False,
+                               max_rate: float = 0) -> "VolumeStream":
+        """Frames of a posed volume from now on, as ecorche.Client.subscribe_volume."""
+        made = await self._aside(lambda: self._waiting.subscribe_volume(volume, spheres=spheres, nearest=nearest, region=region, slices=slices,
+                                                                        compressed=compressed, max_rate=max_rate))
+        return VolumeStream(self, made)
 
     async def positions(self, tissue: Union[str, int] = 0) -> npt.NDArray[np.float32]:
         """(V, 3) of the last frame, LPS mm."""
@@ -200,6 +208,23 @@ class Client(Anatomy):
         done.add_done_callback(free)
         return await asyncio.shield(done)
 
+    async def _next(self) -> EventInfo:
+        """What came, without waiting."""
+        event = await self._now(self._waiting._poll, 0.0)
+        if event.kind != NONE:
+            self._stir()  # other tasks may have waited for it
+        return event
+
+    async def _until(self, done: Callable[[], bool], seconds: float) -> bool:
+        """Takes what comes until `done`; False where it is not within `seconds`."""
+        until = time.monotonic() + seconds
+        while not await self._now(done):
+            stirs = self._stirs
+            event = await self._next()
+            if time.monotonic() > until or (event.kind == NONE and not await self._arrives(until, stirs)):
+                return await self._now(done)
+        return True
+
     async def _arrives(self, until: Optional[float], stirs: int) -> bool:
         """False where nothing came until then. `stirs`: how many there were before the last look."""
         left = None if until is None else until - time.monotonic()
@@ -225,6 +250,32 @@ class Client(Anatomy):
         self._loop.remove_reader(self._watched)
         self._arrival.set_result(None)
         self._arrival = None
+
+
+class VolumeStream:
+    """Frames of a posed volume: Client.subscribe_volume() makes it. They come while any task takes frames, or waits in show()."""
+
+    def __init__(self, client: Client, waiting: WaitingStream) -> None:
+        self.client, self.volume = client, waiting.volume
+        self._waiting = waiting
+
+    async def sequence(self) -> Optional[int]:
+        """Of the pose that voxels() shows; None before the first frame."""
+        return await self.client._now(lambda: self._waiting.sequence)
+
+    async def show(self, sequence: int, seconds: float = 10) -> "VolumeStream":
+        """Waits until the pose that was sent, or a later one, is here. Raises why the server could make no voxels of a pose."""
+        if not await self.client._until(lambda: self._waiting.shows(sequence), seconds):
+            raise self._waiting.late(sequence, seconds)
+        return self
+
+    async def voxels(self, slice: int = 0) -> tuple[np.ndarray, Grid]:
+        """As ecorche.VolumeStream.voxels."""
+        return await self.client._now(self._waiting.voxels, slice)
+
+    async def close(self) -> None:
+        """No more of them."""
+        await self.client._aside(self._waiting.close)
 
 
 class connect:

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._library import BodyOptions, GridInfo, InvalidArgument, ProbedInfo, QualityInfo, ReasonInfo, ask, call
-from .model import Grid, Model, Pose, view, voxel_shape
+from .model import Grid, Model, Pose, Volume, numbers, view, voxel_shape
+from .spheres import Spheres
 
 SKINNING = {"lbs": 0, "dqs": 1, "cor": 2}
 SPACES = {"lps": 0, "unity": 1, "unreal": 2, "gltf": 3, "ros": 4, "ras": 5}
@@ -127,12 +128,24 @@ class Body:
             info = GridInfo()
             call("body_volume_grid", self._handle, found.row, ctypes.byref(info))
             grid = Grid._of(info)
-        components = 1 if found.rest.ndim == 3 else found.rest.shape[3]
-        if min(grid.size) < 1 or np.prod([float(n) for n in grid.size]) > 2**31:
-            raise InvalidArgument(f"grid: {grid.size} voxels are none, or more than 2^31 (ask for a part)")
-        out = np.empty(voxel_shape(grid, components), found.rest.dtype)
-        info = grid._info()
-        call("body_volume", self._handle, found.row, ctypes.byref(info), int(nearest), out.ctypes.data, out.nbytes)
+        out = _voxels(found, grid)
+        call("body_volume", self._handle, found.row, ctypes.byref(grid._info()), int(nearest), out.ctypes.data, out.nbytes)
+        return out, grid
+
+    def refill(self, spheres: Spheres, volume: Union[str, int] = 0, grid: Optional[Grid] = None, *,
+               region: Optional[npt.ArrayLike] = None, nearest: bool = False) -> tuple[np.ndarray, Grid]:
+        """The posed volume by balls, beside volume(), which does it by tets: the whole, or what lies in `region` (the low and the high corner,
+        6 numbers, LPS mm), or on `grid`, a part of that lattice or a slice (one voxel thick along k)."""
+        found = self.model.volume(volume)
+        if grid is None:
+            info = GridInfo()
+            call("body_refill_grid", self._handle, spheres._handle, found.row, None if region is None else numbers("region", region, 6),
+                 ctypes.byref(info))
+            grid = Grid._of(info)
+        elif region is not None:
+            raise InvalidArgument("region: there is a grid as well (give one of both)")
+        out = _voxels(found, grid)
+        call("body_refill", self._handle, spheres._handle, found.row, ctypes.byref(grid._info()), int(nearest), out.ctypes.data, out.nbytes)
         return out, grid
 
     def to_rest(self, points: npt.ArrayLike, volume: Optional[Union[str, int]] = None) -> Probed:
@@ -153,8 +166,15 @@ class Body:
         values, row = None, 0
         if volume is not None:
             found = self.model.volume(volume)
-            row, values = found.row, np.empty((count, 1 if found.rest.ndim == 3 else found.rest.shape[3]), np.float64)
+            row, values = found.row, np.empty((count, found.components), np.float64)
         out = ProbedInfo(points=there.ctypes.data, tets=tets.ctypes.data, tissues=tissues.ctypes.data, gradients=gradients.ctypes.data,
                          values=None if values is None else values.ctypes.data, volume=row)
         call(function, self._handle, asked.ctypes.data, count, ctypes.byref(out))
         return Probed(there, tets, [self.model.tissues[t].name if t >= 0 else None for t in tissues], gradients, values)
+
+
+def _voxels(volume: Volume, grid: Grid) -> np.ndarray:
+    """Room for those of a grid."""
+    if min(grid.size) < 1 or np.prod([float(n) for n in grid.size]) > 2**31:
+        raise InvalidArgument(f"grid: {grid.size} voxels are none, or more than 2^31 (ask for a part)")
+    return np.empty(voxel_shape(grid, volume.components), volume.rest.dtype)

@@ -11,13 +11,14 @@ from typing import Iterator, Optional, Sequence, Union
 import numpy as np
 import numpy.typing as npt
 
-from ._library import (AngleInfo, ClientOptions, EventInfo, InvalidArgument, NotPossible, ProbedInfo, QualityInfo, SegmentInfo, StreamOptions,
-                       TissueInfo, client_library, text)
+from ._library import (AngleInfo, ClientOptions, EventInfo, GridInfo, InvalidArgument, NotPossible, ProbedInfo, QualityInfo, SegmentInfo, StreamOptions,
+                       TissueInfo, VolumeInfo, VolumeOptions, client_library, text)
 from .body import SKINNING, SPACES, Quality
-from .model import Anatomy, numbers, read_angles, read_segments, read_tissues, view
+from .model import Anatomy, Grid, numbers, read_angles, read_segments, read_tissues, read_volumes, view
+from .volume_stream import VolumeStream
 
 ENCODINGS = {"f32": 1, "u16": 2, "u16-delta": 3}
-NONE, FRAME, POSE, CONTROL, MODEL_CHANGED = range(5)
+NONE, FRAME, POSE, CONTROL, MODEL_CHANGED, VOLUME = range(6)
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Client(Anatomy):
             raise InvalidArgument(f"encoding: {encoding} is none of {', '.join(ENCODINGS)}")
         self._library = client_library()
         self._handle = ctypes.c_void_p()
+        self._shown = -1  # the pose of the last frame
         self.model_changed = False  # the server has read the model anew: this session stays as it is; connect again for the new one
         options = ClientOptions(name=b"python", token=text(token), authorities=text(authorities), session=text(session))
         self._call("connect", text(address), ctypes.byref(options), ctypes.byref(self._handle))
@@ -53,6 +55,7 @@ class Client(Anatomy):
             self.segments = read_segments(self._rows("segment", SegmentInfo))
             self.tissues = read_tissues(self._rows("tissue", TissueInfo), self.segments)
             self.angles = read_angles(self._rows("angle", AngleInfo))
+            self.volumes = read_volumes(self._rows("volume", VolumeInfo))
             rows = None if tissues is None else np.array(sorted({self.tissue(name).row for name in tissues}), np.uint32)
             stream = StreamOptions(encoding=ENCODINGS[encoding], normals=int(normals), quality=int(quality), max_rate=max_rate,
                                    tissues=None if rows is None else rows.ctypes.data, tissue_count=0 if rows is None else len(rows))
@@ -147,10 +150,27 @@ class Client(Anatomy):
 
     def show(self, sequence: int, seconds: float = 10) -> Frame:
         """Waits until the frame of a pose that was sent, or of a later one, is here."""
+        if self._shown >= sequence:
+            return Frame(self._shown)
         for frame in self.frames(seconds):
             if frame.sequence >= sequence:
                 return frame
         raise NotPossible(f"pose {sequence}: was not shown within {seconds} s (is this client's control gone?)")
+
+    def subscribe_volume(self, volume: Union[str, int] = 0, *, spheres: bool = False, nearest: bool = False,
+                         region: Optional[npt.ArrayLike] = None, slices: Sequence[Grid] = (), compressed: bool = False,
+                         max_rate: float = 0) -> VolumeStream:
+        """Frames of a posed volume from now on, besides those of tissues: the whole, or what lies in `region` (the low and the high corner, 6
+        numbers, LPS mm), or at most 16 `slices`, one voxel thick along k. `spheres`: posed by balls, not by tets. `max_rate`: a second; 0: every pose."""
+        found = self.volume(volume)
+        options = VolumeOptions(deformer=2 if spheres else 1, nearest=int(nearest), compressed=int(compressed), max_rate=max_rate)
+        if region is not None:
+            options.region = numbers("region", region, 6)
+        if slices:
+            options.slices, options.slice_count = (GridInfo * len(slices))(*(grid._info() for grid in slices)), len(slices)
+        number = ctypes.c_uint32()
+        self._call("subscribe_volume", self._handle, found.row, ctypes.byref(options), ctypes.byref(number))
+        return VolumeStream(self, found, number.value)
 
     def positions(self, tissue: Union[str, int] = 0) -> npt.NDArray[np.float32]:
         """(V, 3) of the last frame, LPS mm."""
@@ -219,6 +239,8 @@ class Client(Anatomy):
         if event.code != 0:
             raise self._library.error(event.code)
         self.model_changed |= event.kind == MODEL_CHANGED
+        if event.kind == FRAME:
+            self._shown = event.sequence
         return event
 
     def _descriptor(self) -> int:

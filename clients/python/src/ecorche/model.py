@@ -13,6 +13,7 @@ from ._library import AngleInfo, GridInfo, InvalidArgument, NotFound, SegmentInf
 
 if TYPE_CHECKING:
     from .body import Body
+    from .spheres import Spheres
 
 SCALARS = (np.uint8, np.int8, np.uint16, np.int16, np.uint32, np.int32, np.float32, np.float64)
 Angles = Mapping[str, float]
@@ -97,7 +98,12 @@ class Volume:
     labels: bool  # ids, posed by the nearest voxel only
     background: float  # what lies outside the body
     grid: Grid
-    rest: np.ndarray  # (k, j, i) or (k, j, i, components), as scanned
+    rest: np.ndarray  # (k, j, i) or (k, j, i, components), as scanned; of a server's, which does not tell, without voxels
+
+    @property
+    def components(self) -> int:
+        """Numbers of a voxel."""
+        return 1 if self.rest.ndim == 3 else self.rest.shape[3]
 
 
 class Anatomy:
@@ -105,6 +111,7 @@ class Anatomy:
     segments: list[Segment]
     tissues: list[Tissue]  # the skin first
     angles: list[Angle]
+    volumes: list[Volume]
 
     def tissue(self, name: Union[str, int]) -> Tissue:
         """By name or row."""
@@ -116,6 +123,10 @@ class Anatomy:
             if name in (segment.name, segment.joint, segment.row):
                 return segment
         raise NotFound(f"{name}: the model has no such segment or joint (it has {', '.join(s.name for s in self.segments)})")
+
+    def volume(self, name: Union[str, int]) -> Volume:
+        """By name or row."""
+        return _find(self.volumes, name, "volume")
 
 
 class ModelHandle(ctypes.c_void_p):
@@ -138,14 +149,23 @@ class Model(Anatomy):
         self.segments = read_segments(self._rows("segment", SegmentInfo))
         self.tissues = read_tissues(self._rows("tissue", TissueInfo), self.segments, self._handle)
         self.angles = read_angles(self._rows("angle", AngleInfo))
-        self.volumes = self._read_volumes()
+        self.volumes = read_volumes(self._rows("volume", VolumeInfo), self._handle)
 
     def __repr__(self) -> str:
         return f"<ecorche.Model {self.name}: {len(self.tissues)} tissues, {len(self.segments)} segments>"
 
-    def volume(self, name: Union[str, int]) -> Volume:
-        """By name or row."""
-        return _find(self.volumes, name, "volume")
+    def spheres(self, volume: Union[str, int] = 0) -> "Spheres":
+        """The balls that pose a volume; raises NotPossible where the model was prepared without any."""
+        from .spheres import Spheres
+        return Spheres._made(self, "spheres_of_volume", self._handle, self.volume(volume).row)
+
+    def thin(self, inside: npt.ArrayLike, grid: Grid, thinness: float = 0.48) -> "Spheres":
+        """The balls of an object: `inside`, (k, j, i), is not 0 where it is. `thinness`, voxels: -2 keeps every voxel, 2 none."""
+        from .spheres import Spheres
+        mask = np.ascontiguousarray(np.asarray(inside) != 0, np.uint8)
+        if mask.shape != voxel_shape(grid, 1):
+            raise InvalidArgument(f"inside: has the shape {mask.shape} (give {voxel_shape(grid, 1)}, as the grid has it)")
+        return Spheres._made(self, "spheres_thin", self._handle, ctypes.byref(grid._info()), mask.ctypes.data, thinness)
 
     def pose(self, name: Optional[str] = None, *, skinning: str = "cor", **joints: Angles) -> "Body":
         """A posed body: `name` is a pose file or one of the library (`lib:sitting`), over which go angles of joints, degrees:
@@ -162,16 +182,6 @@ class Model(Anatomy):
 
     def _rows(self, what: str, kind: type) -> list:
         return [self._info("model_" + what, row, kind()) for row in range(ask(f"model_{what}_count", self._handle))]
-
-    def _read_volumes(self) -> list[Volume]:
-        out = []
-        for row in range(ask("model_volume_count", self._handle)):
-            info = self._info("model_volume", row, VolumeInfo())
-            scalar = np.ctypeslib.as_ctypes_type(SCALARS[info.type])
-            grid = Grid._of(info.grid)
-            rest = view(ctypes.cast(info.rest, ctypes.POINTER(scalar)), voxel_shape(grid, info.components), self._handle)
-            out.append(Volume(row, info.name.decode(), bool(info.labels), info.background, grid, rest))
-        return out
 
     def _info(self, function: str, row: int, info):
         call(function, self._handle, row, ctypes.byref(info))
@@ -252,6 +262,18 @@ def read_tissues(rows: Sequence[TissueInfo], segments: list[Segment], owner: obj
 def read_angles(rows: Sequence[AngleInfo]) -> list[Angle]:
     return [Angle(row, info.joint.decode(), info.name.decode(), *(math.degrees(value) for value in (info.rest, info.min, info.max)))
             for row, info in enumerate(rows)]
+
+
+def read_volumes(rows: Sequence[VolumeInfo], owner: object = None) -> list[Volume]:
+    """`owner`: of the library's memory, that the arrays show; None: there are no voxels."""
+    out = []
+    for row, info in enumerate(rows):
+        grid, scalar = Grid._of(info.grid), SCALARS[info.type]
+        shape = voxel_shape(grid, info.components)
+        rest = view(ctypes.cast(info.rest, ctypes.POINTER(np.ctypeslib.as_ctypes_type(scalar))), shape, owner) if info.rest else \
+            np.empty((0, 0, 0, *shape[3:]), scalar)
+        out.append(Volume(row, info.name.decode(), bool(info.labels), info.background, grid, rest))
+    return out
 
 
 def voxel_shape(grid: Grid, components: int) -> tuple[int, ...]:
