@@ -16,11 +16,12 @@ import unittest
 SOURCE, LIBRARY, CLIENT = (pathlib.Path(word) for word in sys.argv[1:4])
 MODEL, ECORCHE, PHANTOM = os.environ["ECORCHE_MODEL"], os.environ["ECORCHE_BIN"], pathlib.Path(os.environ["ECORCHE_CASE"])
 os.environ["ECORCHE_LIBRARY"], os.environ["ECORCHE_CLIENT_LIBRARY"] = str(LIBRARY), str(CLIENT)
-sys.path[:0] = [str(SOURCE / "clients" / "python" / "src"), str(SOURCE / "tests" / "e2e" / "stream")]
+sys.path[:0] = [str(SOURCE / "clients" / "python" / "src"), str(SOURCE / "clients" / "python"), str(SOURCE / "tests" / "e2e" / "stream")]
 
 import ecorche  # noqa: E402
 import ecorche.aio  # noqa: E402
 import numpy as np  # noqa: E402
+from hostile import VOLUME_LIES, HostileServers  # noqa: E402
 from serving import Server  # noqa: E402
 
 BENT = {"elbow_left": {"flexion": 60}, "knee_right": {"flexion": 40}}
@@ -141,6 +142,15 @@ class Streams(unittest.TestCase):
                 client.subscribe_volume("mri")
             with self.assertRaisesRegex(ecorche.NotPossible, "was not shown within 0.1 s"):
                 part.show(sequence + 100, 0.1)
+
+    def test_a_server_that_lies_of_volumes_is_found_out(self):
+        with HostileServers(int(self.server.address.partition(":")[2])) as servers:
+            for lie in VOLUME_LIES:
+                with self.subTest(lie), ecorche.connect(servers.address("volume_" + lie)) as client:
+                    stream = client.subscribe_volume("ct")
+                    with self.assertRaisesRegex(ecorche.Error, r"^server: .* \(check that it is ecorche serve\)$"):
+                        stream.show(0)
+                    self.assertIsNone(stream.sequence)
 
     def test_for_asyncio_several_wait_at_once(self):
         body = self.model.pose(**BENT)

@@ -118,6 +118,52 @@ def lying_frame(client, port):
             client.sendall(encode(envelope, payload[:len(payload) // 32 * 16] if envelope.WhichOneof("message") == "mesh_frame" else payload))
 
 
+def wrapped(frame, payload):
+    """A grid of 2^64 voxels, of which 64 bits leave none."""
+    frame.grid.size_i, frame.grid.size_j, frame.grid.size_k = 1 << 22, 1 << 21, 1 << 21
+    frame.voxels.count = 0
+    return payload
+
+
+def other_type(frame, payload):
+    """Half as many scalars of twice the size."""
+    frame.voxels.type, frame.voxels.count = {4: 7, 7: 4}.get(frame.voxels.type, 7), frame.voxels.count * 2 // 8
+    return payload
+
+
+def one_less(frame, payload):
+    """A layer less than the grid has."""
+    frame.voxels.count -= frame.grid.size_i * frame.grid.size_j
+    return payload
+
+
+def keyframe_of_none(frame, payload):
+    """Against a keyframe that nobody sent."""
+    frame.keyframe = frame.frame + 1000
+    frame.bricks.CopyFrom(frame.voxels)
+    return payload
+
+
+# What is done to frames of volumes: the envelope's, in place, and its payload.
+VOLUME_LIES = {function.__name__: function for function in (wrapped, other_type, one_less, keyframe_of_none)}
+VOLUME_LIES["cut"] = lambda _, payload: payload[:len(payload) // 32 * 16]
+
+
+def volume_kind(lie):
+    def lying_volume(client, port):
+        with good_server(client, port) as server:
+            for envelope, payload in messages(server):
+                if envelope.WhichOneof("message") == "volume_frame":
+                    payload = VOLUME_LIES[lie](envelope.volume_frame, payload)
+                client.sendall(encode(envelope, payload))
+
+    KINDS["volume_" + lie] = lying_volume
+
+
+for name in VOLUME_LIES:
+    volume_kind(name)
+
+
 class HostileServers:
     """All of them, as a context."""
 
