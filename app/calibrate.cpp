@@ -81,7 +81,9 @@ Made make(const Program& program, const CalibrateSettings& s, const Model& model
     return {
         correct::calibrate(model, s.options, store, program.context("finite elements")),
         fmt::format("p1 stable_neo_hookean, Poisson's ratio {:g}, step {:g} deg, from {:g} mm, folds {:g}",
-                    s.options.poisson, s.options.step_deg, s.options.least_mm, s.options.folds)};
+                    s.options.poisson, s.options.step_deg, s.options.least_mm, s.options.folds) +
+            (model.materials.empty() ? ""
+                                     : fmt::format(", {} Young's moduli", model.materials.tissue.size()))};
   const Model coarse = model_file::read(s.from, program.context("reading"));
   const auto how = coarse.provenance.find("correction");
   return {
@@ -162,8 +164,8 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
   command->add_flag("!--no-ranges", s->ranges, "leave out how far each joint may be turned");
   command->footer(
       "Skinning about centres of rotation is corrected, lbs and dqs are not.\n"
-      "Nearer to finite elements, never nearer to the patient: one material, glued to the bones, no "
-      "gravity.");
+      "Nearer to finite elements, never nearer to the patient: all flesh equally stiff unless the case "
+      "gives stiffness_kpa, glued to the bones, no gravity.");
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run(program, *s); }; });
 }
 

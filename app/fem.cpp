@@ -49,7 +49,9 @@ void declare_fem(CLI::App& app, Program& program, Run& chosen) {
       ->delimiter(',');
   command->add_flag("--tets", s->tets, "write the posed tets; body.vtu holds displacement, label and det F");
   command->footer(
-      "All flesh is one material, glued to the bones, without gravity or contact.\n"
+      "All flesh is equally stiff unless the case gives stiffness_kpa, and glued to the bones, without "
+      "gravity "
+      "or contact.\n"
       "What is not named is not written; without --tissues, --volumes and --tets everything is.");
   command->callback([&program, &chosen, s] { chosen = [&program, s] { return run_pose(program, *s); }; });
 }

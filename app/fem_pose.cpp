@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "app/materials_report.hpp"
 #include "app/usage_error.hpp"
 #include "preprocess/fem/reference.hpp"
 
@@ -88,6 +89,7 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
   }
   const fem::Seconds& seconds = solved.newton.seconds;
   return {{"verdict", solved.trusted() ? "pass" : "warn"},
+          {"materials", materials_json(model, solved.material_tets)},
           {"element", settings.element},
           {"material", settings.material},
           {"poisson", options.poisson},
@@ -146,7 +148,7 @@ void add_fem(const json& fem, json& quality) {
 
 std::string fem_line(const json& fem) {
   const json &to_cor = fem["to_cor"], &distance = fem["two_starts"]["distance_mm"];
-  return fmt::format(
+  std::string out = fmt::format(
       "  finite elements: {}, {} at {:g}, {} tets, {} iterations, residual {:.0e}, volume {:+.2f} %; from "
       "cor {:.1f} mm (mean), "
       "{:.1f} (95 %), {:.1f} (most); two starts {}\n",
@@ -156,6 +158,9 @@ std::string fem_line(const json& fem) {
       to_cor["p95_mm"].get<double>(), to_cor["max_mm"].get<double>(),
       distance.is_null() ? std::string("not compared")
                          : fmt::format("{:.1e} mm apart", distance.get<double>()));
+  if (const std::string materials = materials_line(fem["materials"]); !materials.empty())
+    out += "  Young's moduli: " + materials + "\n";
+  return out;
 }
 
 }  // namespace ecorche::app

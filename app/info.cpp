@@ -9,6 +9,7 @@
 #include "app/contacts_report.hpp"
 #include "app/correction_report.hpp"
 #include "app/joint_json.hpp"
+#include "app/materials_report.hpp"
 #include "app/pose_report.hpp"
 #include "app/text_line.hpp"
 #include "core/model_file/figures.hpp"
@@ -52,6 +53,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"spheres", Json::array()},
            {"contacts", contacts_json(model)},
            {"skin_caps", caps_json(model)},
+           {"materials", materials_json(model, soft_tets_by_material(model))},
            {"corrections", corrections_json(model)},
            {"safe_ranges", safe_ranges_json(model)},
            {"provenance", model.provenance}};
@@ -148,6 +150,8 @@ std::string info_text(const Json& info) {
                      count(row["vertices"]), count(row["triangles"]),
                      row["segment"].is_null() ? "the tets" : text(row["segment"]).c_str());
   }
+  if (const std::string materials = materials_line(info["materials"]); !materials.empty())
+    out += "\nYoung's moduli: " + printable(materials) + "\n";
   out += "\nvolumes: name, voxels, spacing (mm), type\n";
   for (const Json& row : info["volumes"]) {
     const Json &n = row["size"], &s = row["spacing_mm"];

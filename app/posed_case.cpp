@@ -24,6 +24,17 @@ void add_volume(Case& patient, const ModelVolume& volume, Image image) {
   }
 }
 
+void add_stiffness(const Model& model, Case& patient) {
+  for (std::size_t m = 0; m < model.materials.tissue.size(); ++m) {
+    const std::int32_t row = model.materials.tissue[m];
+    const double kpa = model.materials.young_kpa[m];
+    if (row < 0) patient.stiffness_kpa = kpa;
+    for (CaseTissue& tissue : patient.tissues)
+      if (row >= 0 && tissue.name == model.tissues[static_cast<std::size_t>(row)].name)
+        tissue.stiffness_kpa = kpa;
+  }
+}
+
 }  // namespace
 
 Case posed_case(const runtime::VolumePoser& poser, const runtime::PosedBody& body,
@@ -45,6 +56,7 @@ Case posed_case(const runtime::VolumePoser& poser, const runtime::PosedBody& bod
       patient.bones.push_back({tissue.name, patient.skeleton.segments[segment].name, std::move(surface)});
     }
   }
+  add_stiffness(model, patient);
   runtime::VolumePoser::Scratch scratch;
   for (const ModelVolume& volume : model.volumes) {
     context.check_stop();

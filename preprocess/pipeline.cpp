@@ -20,6 +20,7 @@
 #include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/cor/centres.hpp"
 #include "preprocess/mapping/bind.hpp"
+#include "preprocess/materials.hpp"
 #include "preprocess/provenance.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/skin_caps.hpp"
@@ -376,6 +377,7 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   model.tissues = stage.kept(
       [&](const Context& inner) { return bind_tissues(std::move(tissues), model, voxel_mm, inner); }, tissues,
       model.nodes, model.tets, voxel_mm);
+  model.materials = materials_of(patient, model, context);
   model.volumes = gather_volumes(patient);
   Options used = options;
   used.max_tets = max_tets;

@@ -48,6 +48,16 @@ std::vector<std::int32_t> anchored(std::size_t nodes, const Tets& T, const std::
   return out;
 }
 
+std::vector<double> stiffness_of(const Model& model, const std::vector<std::int32_t>& tets) {
+  std::vector<double> out;
+  const Materials& materials = model.materials;
+  if (materials.empty()) return out;
+  out.reserve(tets.size());
+  for (const std::int32_t t : tets)
+    out.push_back(materials.young_kpa[materials.of_tet[at(t)]] / materials.young_kpa[0]);
+  return out;
+}
+
 Flesh flesh_of(const Model& model) {
   Flesh out;
   const std::size_t nodes = model.node_count();

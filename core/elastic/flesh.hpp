@@ -26,6 +26,10 @@ struct Flesh {
 /// skinning puts them.
 Flesh flesh_of(const Model& model);
 
+/// Young's moduli of these tets (rows of the model's) over that of the model's first material, by which
+/// energies are told. Empty where the model says none: all are 1.
+std::vector<double> stiffness_of(const Model& model, const std::vector<std::int32_t>& tets);
+
 /// Of these rows of T those whose part of the mesh hangs on three held nodes or more, in their order.
 std::vector<std::int32_t> anchored(std::size_t nodes, const Tets& T, const std::vector<std::int32_t>& rows,
                                    const std::function<bool(std::int32_t)>& is_held);

@@ -6,8 +6,8 @@
 
 namespace ecorche::elastic {
 
-/// Lame's constants, in units of Young's modulus: it only scales the energy where all that moves a body is
-/// prescribed, so it is 1 here.
+/// Lame's constants, in units of Young's modulus. Where all that moves a body is prescribed, only the ratio
+/// of such moduli shapes it, so it is 1 here; flesh that is stiffer than other flesh weighs more in the sum.
 struct Lame {
   double mu = 0, lambda = 0;
 };

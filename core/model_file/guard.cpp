@@ -17,8 +17,8 @@ namespace {
 constexpr hsize_t kMaxMembers = 4096;      // of one group: tissues are tens, segments at most hundreds
 constexpr std::size_t kMaxText = 1 << 20;  // bytes of one text
 constexpr std::array<unsigned char, 8> kMagic{0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
-constexpr std::array<std::string_view, 8> kParts{"skeleton", "weights",    "cor",        "labels",
-                                                 "quality",  "safe_range", "provenance", "digests"};
+constexpr std::array<std::string_view, 9> kParts{
+    "skeleton", "weights", "cor", "labels", "materials", "quality", "safe_range", "provenance", "digests"};
 // Groups of groups, a name each.
 constexpr std::array<std::string_view, 4> kNamedParts{"tissues", "volumes", "spheres", "correction"};
 

@@ -38,6 +38,7 @@ class Checker {
     for (Eigen::Index t = 0; t < model_.tets.rows(); t += kTetsPerPart)
       part([this, t] { check_tets(t, std::min(model_.tets.rows(), t + kTetsPerPart)); });
     part([this] { check_labels(); });
+    part([this] { check_materials(); });
     part([this] { check_weights(); });
     part([this] { check_centres(); });
     part([this] { check_names(model_.tissues, "/ecorche/tissues"); });
@@ -213,6 +214,23 @@ class Checker {
       const std::uint16_t label = model_.contested[t];
       require_row(label != TetMesh::soft && label <= model_.bone_names.size(), at, "names no bone", t);
     }
+  }
+  void check_materials() const {
+    const Materials& materials = model_.materials;
+    const std::string tissue = "/ecorche/materials/tissue", tet = "/ecorche/materials/tet";
+    require(materials.young_kpa.size() == materials.tissue.size(), "/ecorche/materials/young_kpa",
+            "is not one row per material");
+    require(materials.of_tet.size() == (materials.empty() ? 0 : model_.tet_count()), tet,
+            "is not one row per tet");
+    for (std::size_t m = 0; m < materials.tissue.size(); ++m) {
+      const std::int32_t row = materials.tissue[m];
+      require_row(m == 0 ? row == -1 : row > materials.tissue[m - 1], tissue, "is not -1, then ascending", m);
+      require_row(row < static_cast<std::int32_t>(model_.tissues.size()), tissue, "names no tissue", m);
+      require_row(materials.young_kpa[m] > 0 && std::isfinite(materials.young_kpa[m]),
+                  "/ecorche/materials/young_kpa", "is not positive", m);
+    }
+    for (std::size_t t = 0; t < materials.of_tet.size(); ++t)
+      require_row(materials.of_tet[t] < materials.tissue.size(), tet, "names no material", t);
   }
   bool is_segment(std::int32_t row) const {
     return row >= 0 && static_cast<std::size_t>(row) < model_.segment_count();

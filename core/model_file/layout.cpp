@@ -37,6 +37,14 @@ void add_mesh(Layout& out, const Model& model) {
   out.view<std::uint16_t>("/ecorche/labels/contested", model.contested, {model.contested.size()});
 }
 
+void add_materials(Layout& out, const Materials& materials) {
+  if (materials.empty()) return;
+  const std::string at = "/ecorche/materials/";
+  out.copy(at + "tissue", materials.tissue);
+  out.copy(at + "young_kpa", materials.young_kpa);
+  out.view<std::uint16_t>(at + "tet", materials.of_tet, {materials.of_tet.size()});
+}
+
 void add_segments(Layout& out, const std::vector<Segment>& segments) {
   const std::string at = "/ecorche/skeleton/";
   const auto code = [](auto value) { return static_cast<std::uint8_t>(value); };
@@ -247,6 +255,7 @@ Layout lay_out(const Model& model) {
   add_mesh(out, model);
   add_skinning(out, model);
   for (std::size_t i = 0; i < model.tissues.size(); ++i) add_tissue(out, model.tissues[i], i);
+  add_materials(out, model.materials);
   for (std::size_t i = 0; i < model.volumes.size(); ++i) add_volume(out, model.volumes[i], i);
   for (std::size_t i = 0; i < model.spheres.size(); ++i) add_spheres(out, model.spheres[i], i);
   for (std::size_t i = 0; i < model.corrections.size(); ++i) {
@@ -260,6 +269,10 @@ Layout lay_out(const Model& model) {
   });
   add_provenance(out, model.provenance);
   return out;
+}
+
+std::int32_t minor_of(const Model& model) {
+  return !model.materials.empty() ? 4 : 3;
 }
 
 Layout lay_out_vtk(const Model& model) {

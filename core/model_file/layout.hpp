@@ -63,6 +63,10 @@ class Layout {
 /// Everything that a model is. Provenance lies under `/ecorche/provenance/`.
 Layout lay_out(const Model& model);
 
+/// The lowest minor version of the format that has all of it: a model without what is new stays as it was,
+/// to the byte.
+std::int32_t minor_of(const Model& model);
+
 /// What VTKHDF readers need or show beside that, derived from the model: counts, cell types, offsets, the
 /// heaviest segment of every node.
 Layout lay_out_vtk(const Model& model);

@@ -298,6 +298,12 @@ void read_arrays(const Source& source, Model& model) {
   part([&] { model.weights.weight = source.vector<float>("/ecorche/weights/weight"); });
   part([&] { model.cor.centre = source.matrix<PointsF>("/ecorche/cor/centre"); });
   part([&] { model.cor.has_centre = source.vector<std::uint8_t>("/ecorche/cor/has_centre"); });
+  if (source.catalogue().groups.contains("/ecorche/materials")) {
+    const std::string at = "/ecorche/materials/";
+    model.materials.tissue = source.vector<std::int32_t>(at + "tissue");
+    model.materials.young_kpa = source.vector<double>(at + "young_kpa", {model.materials.tissue.size()});
+    part([&] { model.materials.of_tet = source.vector<std::uint16_t>("/ecorche/materials/tet"); });
+  }
   const auto all = [&](const std::string& group, auto& rows, auto read) {
     const std::vector<std::string> names = source.ordered_members(group);
     rows.resize(names.size());

@@ -180,7 +180,7 @@ void write(const Model& model, const fs::path& path, const Context& context) {
     table.copy("/ecorche/digests/xxh64", digests);
     table.scalar("/ecorche/digests/own", contents_digest(table.entries()[0].bytes, table.entries()[1].bytes));
     for (const Entry& entry : table.entries()) file.add(entry);
-    file.set_attribute("/ecorche", "format", std::array<std::int32_t, 2>{format_major, format_minor});
+    file.set_attribute("/ecorche", "format", std::array<std::int32_t, 2>{format_major, minor_of(model)});
     file.set_attribute("/VTKHDF", "Version", std::array<std::int64_t, 2>{1, 0});
     file.set_attribute("/VTKHDF", "Type", "UnstructuredGrid");
     file.close();

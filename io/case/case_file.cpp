@@ -12,6 +12,7 @@
 #include "io/case/label_map.hpp"
 #include "io/case/label_sources.hpp"
 #include "io/case/skeleton_file.hpp"
+#include "io/case/stiffness.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/dicom_image.hpp"
@@ -26,14 +27,16 @@ namespace fs = std::filesystem;
 using yaml::Kind;
 using yaml::Value;
 
-constexpr std::array<std::string_view, 10> kCaseKeys{"name",  "frame",   "unit",    "skeleton", "skin",
-                                                     "bones", "regions", "tissues", "labels",   "volumes"};
+constexpr std::array<std::string_view, 11> kCaseKeys{"name",   "frame",   "unit",         "skeleton",
+                                                     "skin",   "bones",   "regions",      "tissues",
+                                                     "labels", "volumes", "stiffness_kpa"};
 constexpr std::array<std::string_view, 9> kSkinKeys{"file", "name",   "frame",  "unit",    "root",
                                                     "side", "labels", "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment", "frame",  "unit",
                                                      "root", "labels", "side",    "within", "close_mm"};
-constexpr std::array<std::string_view, 10> kTissueKeys{"name", "file",   "group", "frame",  "unit",
-                                                       "root", "labels", "side",  "within", "close_mm"};
+constexpr std::array<std::string_view, 11> kTissueKeys{"name",   "file",     "group",        "frame",
+                                                       "unit",   "root",     "labels",       "side",
+                                                       "within", "close_mm", "stiffness_kpa"};
 constexpr std::array<std::string_view, 7> kVolumeKeys{"name", "file",   "background", "root",
                                                       "form", "series", "phase"};
 constexpr std::array<std::string_view, 11> kLabelKeys{"file",   "table",        "root",   "form",
@@ -103,6 +106,7 @@ class CaseReader {
       }
       read_rest(*tissues);
     }
+    read_stiffness_of_flesh(root_, out_);
     if (const auto volumes = root_.find("volumes")) {
       for (const Value& entry : volumes->items()) read_volume(entry);
     }
@@ -283,10 +287,13 @@ class CaseReader {
       first = entry.where();
       std::set<std::string> taken;
       for (const auto& [name, where] : names_) taken.insert(name);
+      const std::size_t before = out_.tissues.size();
       for (CaseTissue& tissue : sources_->rest(entry, std::move(taken))) {
         names_.emplace(tissue.name, entry.where());
         out_.tissues.push_back(std::move(tissue));
       }
+      if (const auto stiffness = entry.find("stiffness_kpa"))
+        read_stiffness_of_groups(*stiffness, before, out_);
       step();
     }
   }
@@ -325,6 +332,7 @@ class CaseReader {
       }
       tissue.group = group_from_name(group->text());
     }
+    if (const auto stiffness = entry.find("stiffness_kpa")) tissue.stiffness_kpa = read_stiffness(*stiffness);
     read_source(entry, tissue.surface, tissue.source);
     out_.tissues.push_back(std::move(tissue));
   }

@@ -27,7 +27,8 @@ class CaseWriter {
     if (!patient_.generic)
       files::write_text(folder_ / "skeleton.yaml", skeleton_to_yaml(patient_.skeleton, patient_.size));
     yaml_ = "name: " + write_text(patient_.name) +
-            "\nframe: LPS\nunit: mm\nskeleton: " + (patient_.generic ? "generic" : "skeleton.yaml") + "\n";
+            "\nframe: LPS\nunit: mm\nskeleton: " + (patient_.generic ? "generic" : "skeleton.yaml") + "\n" +
+            (patient_.stiffness_kpa ? stiffness("", patient_.stiffness_kpa) + "\n" : "");
     surface("skin.stl", patient_.skin);
     yaml_ += patient_.skin_name == "skin"
                  ? "skin: skin.stl\n"
@@ -70,6 +71,9 @@ class CaseWriter {
     files::write_text(folder_ / "regions.yaml", regions_to_yaml(patient_.regions));
     yaml_ += "regions: regions.yaml\n";
   }
+  static std::string stiffness(const std::string& before, const std::optional<double>& kpa) {
+    return kpa ? before + "stiffness_kpa: " + yaml::write_number(*kpa) : "";
+  }
   void write_tissues() {
     if (patient_.tissues.empty()) return;
     files::make_folder(folder_ / "tissues");
@@ -78,7 +82,8 @@ class CaseWriter {
       const std::string file = "tissues/" + tissue.name + ".stl";
       surface(file, tissue.surface);
       yaml_ += "  - {name: " + write_text(tissue.name) + ", file: " + write_text(file) +
-               ", group: " + std::string(group_name(tissue.group)) + "}\n";
+               ", group: " + std::string(group_name(tissue.group)) + stiffness(", ", tissue.stiffness_kpa) +
+               "}\n";
     }
   }
   void write_volumes() {

@@ -20,7 +20,7 @@ constexpr double kWidestGap = 100;  // mm; wider ones fill the space between the
 constexpr std::array<std::string_view, 6> kWithinKeys{"file", "ids", "root", "form", "series", "phase"};
 constexpr std::array<std::string_view, 2> kApartKeys{"gap_mm", "limbs"};
 constexpr std::array<std::string_view, 3> kLimbsKeys{"labels", "segments", "joints"};
-constexpr std::array<std::string_view, 4> kRestKeys{"labels", "except", "group", "groups"};
+constexpr std::array<std::string_view, 5> kRestKeys{"labels", "except", "group", "groups", "stiffness_kpa"};
 
 std::optional<std::int64_t> whole_number(const std::string& text) {
   std::int64_t number = 0;

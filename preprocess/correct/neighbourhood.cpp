@@ -82,6 +82,7 @@ Neighbourhood neighbourhood(const Model& model, const elastic::Flesh& flesh,
       T(static_cast<Eigen::Index>(t), c) = local[static_cast<std::size_t>(model.tets(tets[t], c))];
   }
   out.mesh = fem::make_mesh(fem::Element::p1, V, T, held, {});
+  out.mesh.stiffness = elastic::stiffness_of(model, tets);
   return out;
 }
 

@@ -30,6 +30,7 @@ Body body_of(const Model& model, Element element) {
   for (std::size_t n = 0; n < nodes; ++n) held[n] = out.segment[n] >= 0 ? 1 : 0;
   const Edges held_edges = element == Element::p1 ? Edges() : edges_of(rows_of(model.tets, bone_tets));
   out.mesh = make_mesh(element, model.nodes.cast<double>(), rows_of(model.tets, out.tet), held, held_edges);
+  out.mesh.stiffness = elastic::stiffness_of(model, out.tet);
   for (const auto& [a, b] : out.mesh.middle) {
     const bool fixed = std::binary_search(held_edges.begin(), held_edges.end(), std::array{a, b});
     out.segment.push_back(fixed ? out.segment[at(a)] : -1);

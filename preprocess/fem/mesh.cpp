@@ -117,6 +117,15 @@ Mesh make_mesh(Element element, const Points& V, const Tets& T, const std::vecto
   return mesh;
 }
 
+double Mesh::mean_stiffness() const {
+  double sum = 0, volume = 0;
+  for (std::size_t t = 0; t < tets(); ++t) {
+    sum += stiffness_of(t) * rest[t].volume;
+    volume += rest[t].volume;
+  }
+  return stiffness.empty() || volume == 0 ? 1 : sum / volume;
+}
+
 Points with_middles(const Mesh& mesh, const Points& x) {
   const auto middles = static_cast<Eigen::Index>(mesh.middle.size());
   Points out(x.rows() + middles, 3);

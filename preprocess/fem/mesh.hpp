@@ -41,12 +41,17 @@ struct Mesh {
   Points X;                          ///< at rest, mm
   std::vector<std::int32_t> corner;  ///< #tets * rule.nodes, rows of X
   std::vector<RestTet> rest;         ///< #tets
-  std::vector<std::int32_t> free;    ///< #X: its number among the free nodes; -1: it is held, or of no tet
+  /// #tets, Young's moduli over the one that is 1; empty where all are (elastic::stiffness_of).
+  std::vector<double> stiffness;
+  std::vector<std::int32_t> free;  ///< #X: its number among the free nodes; -1: it is held, or of no tet
   std::size_t free_nodes = 0;
   /// Middles of edges: the rows of their two ends. Row r of X stands at r - (#X - #middle).
   std::vector<std::array<std::int32_t, 2>> middle;
 
   std::size_t tets() const { return rest.size(); }
+  double stiffness_of(std::size_t t) const { return stiffness.empty() ? 1 : stiffness[t]; }
+  /// The mean over the volume at rest.
+  double mean_stiffness() const;
   const Rule& rule() const { return rule_of(element); }
 };
 

@@ -64,7 +64,7 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     out.converged = true;
     return out;
   }
-  const double rounding = kRounding * std::abs(out.total.volume);
+  const double rounding = kRounding * mesh.mean_stiffness() * std::abs(out.total.volume);
   bool exact = false, may_be_exact = true;
   Points g;
   while (out.iterations < options.most_iterations) {

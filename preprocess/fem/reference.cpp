@@ -131,6 +131,9 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
   out.on_bones = body->on_bones;
   out.between = body->between.size();
   out.floating = body->floating;
+  out.material_tets.resize(model.materials.tissue.size());
+  for (const std::int32_t t : body->tet)
+    if (!out.material_tets.empty()) ++out.material_tets[model.materials.of_tet[static_cast<std::size_t>(t)]];
   out.rest_mm3 = body->rest_mm3;
   out.posed_mm3 = out.newton.total.volume;
   out.nodes = x.topRows(nodes);

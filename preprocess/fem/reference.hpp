@@ -40,6 +40,7 @@ struct Reference {
   std::string from;  ///< the start whose solution this is: `skinned` or `rest`
   std::size_t tets = 0, free_nodes = 0;
   std::size_t soft_tets = 0, on_bones = 0, between = 0, floating = 0;  ///< see Body
+  std::vector<std::size_t> material_tets;        ///< solved for, by material of the model where it has any
   std::size_t squeezed = 0;                      ///< of those between bones: posed inside out
   double rest_mm3 = 0, posed_mm3 = 0;            ///< of the tets solved for
   NewtonResult newton;                           ///< of this solution

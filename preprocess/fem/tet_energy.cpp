@@ -50,7 +50,8 @@ Stretched density(const Mesh& mesh, const Material& material, const Eigen::Vecto
 
 TetEnergy tet_energy(const Mesh& mesh, const Material& material, std::size_t t, const Points& x) {
   const PosedTet posed(mesh, t, x);
-  const double weight = mesh.rest[t].volume / posed.points, bulk = material.bulk() / 2;
+  const double weight = mesh.stiffness_of(t) * mesh.rest[t].volume / posed.points;
+  const double bulk = material.bulk() / 2;
   TetEnergy out;
   out.mean_j = posed.mean_j;
   out.least_j = posed.J[0];
@@ -67,7 +68,7 @@ TetDerivatives tet_derivatives(const Mesh& mesh, const Material& material, std::
                                bool filtered) {
   const PosedTet posed(mesh, t, x);
   const int nodes = mesh.rule().nodes, size = 3 * nodes;
-  const double weight = mesh.rest[t].volume / posed.points;
+  const double weight = mesh.stiffness_of(t) * mesh.rest[t].volume / posed.points;
   const bool mean = mesh.element == Element::p2p0;
   TetDerivatives out;
   out.gradient.setZero(size);
@@ -98,7 +99,8 @@ TetDerivatives tet_derivatives(const Mesh& mesh, const Material& material, std::
       dilatation.segment<3>(3 * a).noalias() += cofactor * B.row(a).transpose() / posed.points;
   }
   if (mean)
-    out.hessian.noalias() += mesh.rest[t].volume * material.bulk() * dilatation * dilatation.transpose();
+    out.hessian.noalias() +=
+        mesh.stiffness_of(t) * mesh.rest[t].volume * material.bulk() * dilatation * dilatation.transpose();
   return out;
 }
 

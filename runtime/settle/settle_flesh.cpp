@@ -60,6 +60,8 @@ FleshSettler::FleshSettler(const Model& model, const Context& context)
     row[static_cast<std::size_t>(node_[r])] = static_cast<std::int32_t>(r);
   patch_.tets.reserve(flesh.tet.size());
   for (const std::int32_t t : flesh.tet) patch_.tets.push_back(tet_of(model, t, row));
+  const std::vector<double> stiffness = elastic::stiffness_of(model, flesh.tet);
+  for (std::size_t t = 0; t < stiffness.size(); ++t) patch_.tets[t].weight *= stiffness[t];
   sum_ = std::make_unique<TetSum>(patch_);
   factor(context);
 }

@@ -12,7 +12,7 @@ runtime::HeldArrays arrays_of(const Model& model) {
   runtime::HeldArrays out;
   const auto add = [&](const auto&... arrays) { (runtime::add_array(arrays, out), ...); };
   add(model.nodes, model.tets, model.tet_label, model.contested, model.weights.offsets, model.weights.segment,
-      model.weights.weight, model.cor.centre, model.cor.has_centre);
+      model.weights.weight, model.cor.centre, model.cor.has_centre, model.materials.of_tet);
   for (const Tissue& tissue : model.tissues) add(tissue.V, tissue.F, tissue.tet, tissue.barycentric);
   for (const ModelVolume& volume : model.volumes) add(volume.image.bytes);
   for (const VolumetricSkeleton& balls : model.spheres)

@@ -3,6 +3,7 @@
 """A pose by finite elements, through the command: what it writes, what it says, what it refuses."""
 import json
 import pathlib
+import re
 import shutil
 import tempfile
 import unittest
@@ -23,11 +24,11 @@ class Fem(unittest.TestCase):
         done = run("preprocess", CASE, "-o", cls.model, "--mesher", "lattice", "--max-tets", 40000)
         assert done.returncode == 0, done.stderr
 
-    def solve(self, name, pose, *words, command=("fem",), code=0):
+    def solve(self, name, pose, *words, command=("fem",), code=0, model=None):
         file = self.folder / f"{name}.yaml"
         file.write_text(HEAD + pose)
         out = self.folder / name
-        done = run(*command, self.model, "-o", out, "--pose", file, "--tissues", "skin,humerus_right,femur_right", *words)
+        done = run(*command, model or self.model, "-o", out, "--pose", file, "--tissues", "skin,humerus_right,femur_right", *words)
         self.assertEqual(done.returncode, code, done.stderr)
         return out, done
 
@@ -103,6 +104,39 @@ class Fem(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             made[len(words)] = (out / "labels.nrrd").read_bytes()
         self.assertNotEqual(made[0], made[1])
+
+    def test_stiffer_muscles_bend_another_way(self):
+        case = self.folder / "stiff"
+        shutil.copytree(CASE, case)
+        text = (case / "case.yaml").read_text()
+        row = re.search(r".*name: biceps\w*_right,.*group: muscle\}", text)
+        text = text.replace(row.group(), row.group()[:-1] + ", stiffness_kpa: 200}") + "stiffness_kpa: 5\n"
+        (case / "case.yaml").write_text(text)
+        model = self.folder / "stiff.hdf"
+        done = run("preprocess", case, "-o", model, "--mesher", "lattice", "--max-tets", 40000)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        info = json.loads(run("info", model, "--json").stdout)["materials"]
+        muscle = re.search(r"name: (\w+)", row.group()).group(1)
+        self.assertEqual([(row["tissue"], row["young_kpa"]) for row in info], [(None, 5), (muscle, 200)])
+        self.assertGreater(info[1]["tets"], 20)
+        self.assertRegex(run("info", model).stdout, rf"\nYoung's moduli: flesh 5 kPa \({info[0]['tets']} tets\), {muscle} 200 kPa \({info[1]['tets']}\)\n")
+        self.assertEqual(run("verify", model).returncode, 0)
+        # All else is the body of before, and skinned as before; by finite elements it is another.
+        pose = "joints: {elbow_right: {flexion_deg: 40}}\n"
+        surfaces = {}
+        for name, of in (("even", self.model), ("uneven", model)):
+            for command in ("fem", "pose"):
+                out, done = self.solve(f"{name}_{command}", pose, *(("--one-start",) if command == "fem" else ()), command=(command,), model=of)
+                surfaces[name, command] = corners(out / "skin.stl")
+                if command == "fem":
+                    fem = json.loads((out / "fem.json").read_text())
+                    self.assertEqual([row["tissue"] for row in fem["materials"]], [None, muscle] if name == "uneven" else [])
+                    self.assertEqual(sum(row["tets"] for row in fem["materials"]), fem["tets"] if name == "uneven" else 0)
+                    self.assertEqual("  Young's moduli: flesh 5 kPa (" in done.stdout, name == "uneven")
+        self.assertTrue((surfaces["even", "pose"] == surfaces["uneven", "pose"]).all())
+        apart = np.linalg.norm(surfaces["even", "fem"] - surfaces["uneven", "fem"], axis=-1)
+        self.assertGreater(apart.max(), 0.5)
+        self.assertLess(apart.max(), 30)
 
     def test_beyond_its_range_it_warns(self):
         out, done = self.solve("deep", "joints: {knee_right: {flexion_deg: 110}}\n", "--one-start")

@@ -20,7 +20,7 @@ import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 WRITE_TOY_MODEL, ECORCHE = sys.argv[1], os.environ["ECORCHE_BIN"]
-# The toy body, by the last programs that wrote 1.1 and 1.2; never made again.
+# The toy body, by the last programs that wrote 1.1, 1.2 and 1.3, the last one with a correction; never made again.
 GOLDEN = ROOT / "tests" / "fixtures" / "golden"
 POSE = """ecorche_pose: 1
 skeleton: toy
@@ -81,7 +81,8 @@ class Versions(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             (folder / "before.hdf").write_bytes(gzip.decompress(golden.read_bytes()))
-            subprocess.run([WRITE_TOY_MODEL, folder / "today.hdf"], check=True)
+            words = ["corrected"] if golden.name == "toy_1_3.hdf.gz" else []
+            subprocess.run([WRITE_TOY_MODEL, folder / "today.hdf", *words], check=True)
             (folder / "bent.yaml").write_text(POSE)
             surfaces = {}
             for model in ("before", "today"):
@@ -99,6 +100,15 @@ class Versions(unittest.TestCase):
             self.assertEqual(surfaces["before"].keys(), surfaces["today"].keys())
             for surface, content in surfaces["today"].items():
                 self.assertEqual(surfaces["before"][surface], content, surface)
+
+    def test_a_model_has_the_lowest_minor_that_says_all_of_it(self):
+        with tempfile.TemporaryDirectory() as name:
+            for words, minor in (([], 3), (["corrected"], 4)):
+                model = pathlib.Path(name, "toy.hdf")
+                subprocess.run([WRITE_TOY_MODEL, model, *words], check=True)
+                with h5py.File(model, "r") as file:
+                    self.assertEqual(list(file["ecorche"].attrs["format"]), [1, minor])
+                    self.assertEqual("materials" in file["ecorche"], minor == 4)
 
     def test_another_major_is_refused(self):
         with tempfile.TemporaryDirectory() as name:

@@ -58,7 +58,7 @@ TEST_F(CaseRefusals, KeysAndTypes) {
   refused(
       "unit: mm", "atlas: r.yaml",
       "3:atlas: unknown key 'atlas' (use name, frame, unit, skeleton, skin, bones, regions, tissues, labels, "
-      "volumes)");
+      "volumes, stiffness_kpa)");
   refused("name: small\n", "", "1: lacks the key 'name' (add it)");
   refused("name: small", "name:", "1:name: must be a plain value, is nothing");
   refused("unit: mm", "unit: [mm]", "3:unit: must be a plain value, is a list");
@@ -110,6 +110,31 @@ TEST_F(CaseRefusals, Names) {
   write_image(scratch_ / "volumes" / "field.nrrd", field);
   expect_error(ErrorKind::data, "labels are no whole numbers, the first 0.25 at voxel (1, 0, 0)",
                [&] { read(changed(kCase, "labels.nrrd", "field.nrrd")); });
+}
+
+TEST_F(CaseRefusals, Stiffness) {
+  const std::string soft = changed(kCase, "unit: mm", "unit: mm\nstiffness_kpa: 5.5");
+  EXPECT_EQ(read(soft).stiffness_kpa, 5.5);
+  EXPECT_FALSE(read(soft).tissues[0].stiffness_kpa);
+  const Case both = read(changed(soft, "group: muscle", "group: muscle, stiffness_kpa: 12e1"));
+  EXPECT_EQ(both.tissues[0].stiffness_kpa, 120);
+  // And back.
+  const Scratch again;
+  write_case(again.path(), both, Context{});
+  const Case back = read_case(again.path(), {}, Context{});
+  EXPECT_EQ(back.stiffness_kpa, 5.5);
+  EXPECT_EQ(back.tissues[0].stiffness_kpa, 120);
+  refused("group: muscle", "group: muscle, stiffness_kpa: 12",
+          "10:tissues[0].stiffness_kpa: the flesh about this tissue has none (give the case a stiffness_kpa, "
+          "too: of flesh in no tissue that says its own)");
+  for (const char* bad : {"0", "-3", "0.009", "1000001", "1e300"})
+    refused("unit: mm", std::string("unit: mm\nstiffness_kpa: ") + bad,
+            std::string("4:stiffness_kpa: ") + bad +
+                " is out of range (give Young's modulus in kPa, 0.01 to 1000000: fat has a few, muscle some "
+                "tens)");
+  refused("unit: mm", "unit: mm\nstiffness_kpa: soft", "4:stiffness_kpa: must be a number, is 'soft'");
+  refused("segment: pelvis}", "segment: pelvis, stiffness_kpa: 5}",
+          "7:bones[0].stiffness_kpa: unknown key 'stiffness_kpa'");
 }
 
 TEST_F(CaseRefusals, Files) {

@@ -96,6 +96,27 @@ TEST_F(LabelCase, IsRead) {
   EXPECT_TRUE(patient.input_digests.contains("regions.nrrd"));
 }
 
+TEST_F(LabelCase, TheRestMaySayItsStiffness) {
+  const std::string soft = changed(kCase, "name: labelled", "name: labelled\nstiffness_kpa: 4");
+  const auto kpa = [&](const std::string& words) {
+    std::vector<double> out;
+    for (const CaseTissue& t : read(changed(soft, "{labels: rest,", "{labels: rest, " + words + ",")).tissues)
+      out.push_back(t.stiffness_kpa.value_or(0));
+    return out;  // liver, muscle_leg, vessels, liver_8
+  };
+  EXPECT_EQ(kpa("stiffness_kpa: 9"), (std::vector<double>{0, 9, 9, 9}));
+  EXPECT_EQ(kpa("stiffness_kpa: {muscle: 20, fat: 2}"), (std::vector<double>{0, 20, 0, 2}));
+  refused("{labels: rest,", "{labels: rest, stiffness_kpa: {muscle: 20},",
+          "10:tissues[1].stiffness_kpa: the flesh about this tissue has none");
+  refused("{labels: rest,", "{labels: rest, stiffness_kpa: {muscle: 0},",
+          "10:tissues[1].stiffness_kpa.muscle: 0 is out of range");
+  refused("{labels: rest,", "{labels: rest, stiffness_kpa: {musle: 3},",
+          "10:tissues[1].stiffness_kpa.musle: unknown group 'musle' (did you mean 'muscle'?)");
+  refused("{labels: rest,", "{labels: rest, stiffness_kpa: {nerve: 3},",
+          "10:tissues[1].stiffness_kpa.nerve: unknown group 'nerve' (use muscle, vessel, fat; no tissue of "
+          "this entry is of it)");
+}
+
 TEST_F(LabelCase, TheRestMayLeaveLabelsOut) {
   const Case patient = read(changed(kCase, "{labels: rest,", "{labels: rest, except: [Vessels, 8, 9],"));
   ASSERT_EQ(patient.tissues.size(), 2u);

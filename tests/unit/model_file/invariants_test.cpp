@@ -171,6 +171,16 @@ const std::vector<Break> kBreaks{
     {"/ecorche/safe_range/skinned_volume", [](Model& m) { m.safe_ranges[1].skinned.volume = kNan; }},
     {"/ecorche/safe_range/corrected_inverted", [](Model& m) { m.safe_ranges[1].corrected.inverted = -0.1; }},
     {"/ecorche/safe_range/bones", [](Model& m) { m.safe_ranges[1].bones = 2.6; }},
+    {"/ecorche/materials/tissue", [](Model& m) { m.materials.tissue[0] = 0; }},
+    {"/ecorche/materials/tissue", [](Model& m) { m.materials.tissue[1] = -1; }},
+    {"/ecorche/materials/tissue",
+     [](Model& m) { m.materials.tissue[1] = static_cast<std::int32_t>(m.tissues.size()); }},
+    {"/ecorche/materials/young_kpa", [](Model& m) { m.materials.young_kpa[1] = 0; }},
+    {"/ecorche/materials/young_kpa", [](Model& m) { m.materials.young_kpa[0] = kNan; }},
+    {"/ecorche/materials/young_kpa", [](Model& m) { m.materials.young_kpa.pop_back(); }},
+    {"/ecorche/materials/tet", [](Model& m) { m.materials.of_tet[5] = 2; }},
+    {"/ecorche/materials/tet", [](Model& m) { m.materials.of_tet.pop_back(); }},
+    {"/ecorche/materials/tet", [](Model& m) { m.materials.tissue.clear(), m.materials.young_kpa.clear(); }},
 };
 
 TEST(Invariants, HoldForAGoodModel) {

@@ -84,6 +84,7 @@ Model full_model() {
   const Model corrected = corrected_toy_model();
   model.corrections = corrected.corrections;
   model.safe_ranges = corrected.safe_ranges;
+  model.materials = corrected.materials;
   double figure = 1;
   Certificate& c = model.certificate;
   for (double* value :
@@ -223,6 +224,9 @@ void expect_same(const Model& a, const Model& b) {
     EXPECT_EQ(a.spheres[i].parent, b.spheres[i].parent);
     EXPECT_EQ(a.spheres[i].segment, b.spheres[i].segment);
   }
+  EXPECT_EQ(a.materials.tissue, b.materials.tissue);
+  EXPECT_EQ(a.materials.young_kpa, b.materials.young_kpa);
+  EXPECT_EQ(a.materials.of_tet, b.materials.of_tet);
   ASSERT_EQ(a.corrections.size(), b.corrections.size());
   for (std::size_t i = 0; i < a.corrections.size(); ++i) {
     EXPECT_EQ(a.corrections[i].joint, b.corrections[i].joint);

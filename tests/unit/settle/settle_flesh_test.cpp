@@ -25,8 +25,8 @@ struct Bent {
   BodyPoser poser;
   PosedBody body;
 
-  explicit Bent(double degrees)
-      : model(std::make_shared<const Model>(boned())),
+  explicit Bent(double degrees, const Model& of = boned())
+      : model(std::make_shared<const Model>(of)),
         pose(bent(*model, degrees)),
         poser(model),
         body(poser.make_frame()) {
@@ -47,8 +47,16 @@ double largest_row(const Points& rows) {
   return rows.rowwise().norm().maxCoeff();
 }
 
-TEST(SettleFlesh, HasTheEnergyOfFiniteElements) {
-  const Bent bend(50);
+/// Every third soft tet four times as stiff as the others.
+Model unequal() {
+  Model model = boned();
+  model.materials = {{-1, 4}, {5, 20}, std::vector<std::uint16_t>(model.tet_count(), 0)};
+  for (std::size_t t = 0; t < model.tet_count(); t += 3)
+    if (model.tet_label[t] == TetMesh::soft) model.materials.of_tet[t] = 1;
+  return model;
+}
+
+void expect_energy_of_finite_elements(const Bent& bend) {
   const FleshSettler settler(*bend.model, {});
   std::vector<double> gradient;
   const double energy = settler.energy(bend.body.nodes, gradient);
@@ -64,6 +72,15 @@ TEST(SettleFlesh, HasTheEnergyOfFiniteElements) {
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(gradient[3 * r + static_cast<std::size_t>(c)], forces(settler.free_nodes()[r], c),
                   1e-9 * forces.cwiseAbs().maxCoeff());
+}
+
+TEST(SettleFlesh, HasTheEnergyOfFiniteElements) {
+  expect_energy_of_finite_elements(Bent(50));
+  expect_energy_of_finite_elements(Bent(50, unequal()));
+  std::vector<double> unused;
+  const Bent plain(50), stiffer(50, unequal());
+  EXPECT_GT(FleshSettler(*stiffer.model, {}).energy(stiffer.body.nodes, unused),
+            1.5 * FleshSettler(*plain.model, {}).energy(plain.body.nodes, unused));
 }
 
 TEST(SettleFlesh, ItsGradientIsThatOfDifferences) {

@@ -52,6 +52,7 @@ struct CaseTissue {
   Group group = Group::other;
   SurfaceMesh surface;
   std::optional<LabelSource> source = {};
+  std::optional<double> stiffness_kpa = {};  ///< Young's modulus of the flesh in it
 };
 
 /// An image that follows the body.
@@ -97,6 +98,8 @@ struct Case {
   std::vector<CaseTissue> tissues;  ///< without skin and bones
   std::vector<CaseVolume> volumes;
   std::optional<CaseLabels> labels;
+  /// Young's modulus of flesh in no tissue that says its own; there wherever a tissue does.
+  std::optional<double> stiffness_kpa = {};
   /// XXH64 of every file that was read, by path as written in the case: provenance of the model.
   std::map<std::string, std::uint64_t> input_digests;
 };

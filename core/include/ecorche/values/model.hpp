@@ -46,6 +46,17 @@ struct Tissue {
   Eigen::Matrix<float, Eigen::Dynamic, 4, Eigen::RowMajor> barycentric;
 };
 
+/// How stiff flesh is, where the case says so. Empty, and the same everywhere, where it does not.
+struct Materials {
+  /// By material: the row of the tissue whose flesh it is. First -1, flesh of no tissue that says its own;
+  /// then ascending.
+  std::vector<std::int32_t> tissue;
+  std::vector<double> young_kpa;      ///< by material, Young's modulus
+  std::vector<std::uint16_t> of_tet;  ///< #T, row of the material; 0 for tets of bones, which are rigid
+
+  bool empty() const { return tissue.empty(); }
+};
+
 /// A sampled volume that follows the body.
 struct ModelVolume {
   std::string name;
@@ -105,6 +116,7 @@ struct Model {
   /// corner of it belongs to another segment's bone, so that it cannot move rigidly with its own; drawn, it
   /// does (runtime/volume/rigid_copies.hpp).
   std::vector<std::uint16_t> contested;
+  Materials materials;
   std::vector<std::string> bone_names;     ///< bone i has label i + 1
   std::vector<std::int32_t> bone_segment;  ///< #bones, row of the owning segment
   Weights weights;
