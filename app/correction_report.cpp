@@ -29,6 +29,12 @@ std::string word(const Json& value) {
   return value.is_null() ? "-" : fmt::format("{:.0f}", value.get<double>());
 }
 
+// `?` where an older program did not look.
+std::string words(const Json& ends) {
+  return fmt::format("{:>5} {:>5} {:>5}", word(ends["inverted"]), word(ends["volume"]),
+                     ends.contains("contact") ? word(ends["contact"]) : "?");
+}
+
 }  // namespace
 
 Json corrections_json(const Model& model) {
@@ -52,14 +58,18 @@ Json safe_ranges_json(const Model& model) {
     const auto at = [&](double turn) {
       return std::isfinite(turn) ? Json((angle.rest + r.way * turn) / kDegree) : Json();
     };
-    out.push_back(
-        {{"joint", joint.name},
-         {"angle", angle.name},
-         {"way", r.way},
-         {"looked_deg", at(r.looked)},
-         {"skinned_deg", {{"inverted", at(r.skinned.inverted)}, {"volume", at(r.skinned.volume)}}},
-         {"corrected_deg", {{"inverted", at(r.corrected.inverted)}, {"volume", at(r.corrected.volume)}}},
-         {"bones_deg", at(r.bones)}});
+    const auto ends = [&](const SafeRange::Ends& e) {
+      Json all{{"inverted", at(e.inverted)}, {"volume", at(e.volume)}};
+      if (!std::isnan(e.contact)) all["contact"] = at(e.contact);
+      return all;
+    };
+    out.push_back({{"joint", joint.name},
+                   {"angle", angle.name},
+                   {"way", r.way},
+                   {"looked_deg", at(r.looked)},
+                   {"skinned_deg", ends(r.skinned)},
+                   {"corrected_deg", ends(r.corrected)},
+                   {"bones_deg", at(r.bones)}});
   }
   return out;
 }
@@ -75,15 +85,13 @@ std::string correction_text(const Json& corrections, const Json& ranges) {
   }
   if (!ranges.empty()) {
     out +=
-        "\nsafe ranges (deg): joint, angle, looked to; first tet inverted and a tissue's volume changed by "
-        "10 %, by skinning and\n"
-        "corrected; bones overlap; - where nothing was met\n";
+        "\nsafe ranges (deg): joint, angle, looked to; first tet inverted, a tissue's volume changed by 10 % "
+        "and flesh runs into\n"
+        "other flesh by a voxel, by skinning and corrected; bones overlap; - where nothing was met\n";
     for (const Json& row : ranges)
-      out += fmt::format("  {:<24} {:<16} {:>5}  {:>5} {:>5}  {:>5} {:>5}  {:>5}\n",
-                         row["joint"].get<std::string>(), row["angle"].get<std::string>(),
-                         word(row["looked_deg"]), word(row["skinned_deg"]["inverted"]),
-                         word(row["skinned_deg"]["volume"]), word(row["corrected_deg"]["inverted"]),
-                         word(row["corrected_deg"]["volume"]), word(row["bones_deg"]));
+      out += fmt::format("  {:<24} {:<16} {:>5}  {}  {}  {:>5}\n", row["joint"].get<std::string>(),
+                         row["angle"].get<std::string>(), word(row["looked_deg"]), words(row["skinned_deg"]),
+                         words(row["corrected_deg"]), word(row["bones_deg"]));
   }
   return out;
 }

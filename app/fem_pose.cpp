@@ -16,6 +16,17 @@ json warning(const char* kind, std::string what, std::string mend) {
   return {{"kind", kind}, {"what", std::move(what)}, {"mend", std::move(mend)}};
 }
 
+json contact_warning(const fem::SelfContact& contact) {
+  json out = warning("fem_contact",
+                     fmt::format("the flesh runs through itself at {} nodes, {:.1f} mm deep: finite elements "
+                                 "know no contact here",
+                                 contact.nodes, contact.depth_mm),
+                     "turn the joints less: the range of this solution ends where skin touches skin");
+  const Eigen::Vector3d& at = contact.deepest;
+  out["at_mm"] = {at.x(), at.y(), at.z()};
+  return out;
+}
+
 /// What keeps the solution from being believed.
 json warnings_of(const fem::Reference& solved, bool two_starts) {
   json out = json::array();
@@ -26,6 +37,7 @@ json warnings_of(const fem::Reference& solved, bool two_starts) {
     out.push_back(warning("fem_no_solution",
                           "finite elements do not converge: " + way + "; the body is left as skinned",
                           "turn the joints less: this is beyond the range of a solution without contact"));
+    if (solved.contact.nodes > 0) out.push_back(contact_warning(solved.contact));
     return out;
   }
   if (solved.inverted())
@@ -47,16 +59,7 @@ json warnings_of(const fem::Reference& solved, bool two_starts) {
                     : fmt::format("finite elements find a balance from one start alone ({})", solved.from),
                 "turn the joints less: flesh that creases has no single shape"));
   }
-  if (solved.contact.nodes > 0) {
-    json contact =
-        warning("fem_contact",
-                fmt::format("the flesh runs through itself at {} nodes: finite elements know no contact here",
-                            solved.contact.nodes),
-                "turn the joints less: the range of this solution ends where skin touches skin");
-    const Eigen::Vector3d& at = solved.contact.at;
-    contact["at_mm"] = {at.x(), at.y(), at.z()};
-    out.push_back(std::move(contact));
-  }
+  if (solved.contact.nodes > 0) out.push_back(contact_warning(solved.contact));
   return out;
 }
 
@@ -126,6 +129,7 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
             {"rest_steps", solved.steps},
             {"rest_refused", solved.refused}}},
           {"contact_nodes", solved.contact.nodes},
+          {"contact_depth_mm", solved.contact.depth_mm},
           {"seconds",
            {{"build", solved.seconds_build},
             {"skinned_start", solved.seconds_skinned},

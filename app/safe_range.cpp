@@ -13,9 +13,12 @@
 #include "core/elastic/flesh.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/correct/samples.hpp"
+#include "preprocess/fem/self_contact.hpp"
 
 namespace ecorche::app {
 namespace {
+
+constexpr int kContactStride = 4;  // steps between looks for contact, which goes on where it has begun
 
 // Of the preparation; a millimetre where the model does not say.
 double voxel_mm(const Model& model) {
@@ -52,8 +55,9 @@ Watched watched(const Model& model) {
 // One way of skinning.
 class Skinned {
  public:
-  Skinned(const std::shared_ptr<const Model>& model, const Watched& watched)
-      : poser_(model), watched_(watched), body_(poser_.make_frame()) {}
+  Skinned(const std::shared_ptr<const Model>& model, const Watched& watched,
+          const fem::SelfContactFinder& contact)
+      : poser_(model), watched_(watched), contact_(contact), body_(poser_.make_frame()) {}
 
   // Writes `turn` into what of `ends` fails here first.
   void look(const Pose& pose, double turn, SafeRange::Ends& ends) {
@@ -64,6 +68,13 @@ class Skinned {
     if (!poser_.run(pose, runtime::Skinning::cor, tissues, body_).ok()) return;
     if (tets && any_inverted()) ends.inverted = turn;
     if (volumes && any_changed()) ends.volume = turn;
+  }
+
+  // Whether flesh lies deeper than that in other flesh.
+  bool meets_itself(const Pose& pose, double by_mm) {
+    if (!poser_.run(pose, runtime::Skinning::cor, {}, body_).ok()) return false;
+    const auto rows = static_cast<Eigen::Index>(body_.nodes.size() / 3);
+    return contact_(Eigen::Map<const PointsF>(body_.nodes.data(), rows, 3).cast<double>()).depth_mm > by_mm;
   }
 
  private:
@@ -83,6 +94,7 @@ class Skinned {
 
   runtime::BodyPoser poser_;
   const Watched& watched_;
+  const fem::SelfContactFinder& contact_;
   runtime::PosedBody body_;
 };
 
@@ -107,8 +119,10 @@ class Looking {
   explicit Looking(const std::shared_ptr<const Model>& model)
       : model_(*model),
         what_(watched(*model)),
-        plain_(without_corrections(*model), what_),
-        corrected_(model, what_),
+        rest_(model->nodes.cast<double>()),
+        contact_(rest_, model->tets),
+        plain_(without_corrections(*model), what_, contact_),
+        corrected_(model, what_, contact_),
         bones_(*model),
         voxel_(voxel_mm(*model)) {}
 
@@ -139,18 +153,39 @@ class Looking {
       const double turn = n * kSafeStep;
       if (both(range.skinned) && (both(range.corrected) || !both_ways) && range.bones != SafeRange::none)
         break;
-      const Pose pose =
-          correct::turned(model_.rig.skeleton, joint, range.way * turn * Eigen::Vector3d::Unit(range.angle));
+      const Pose pose = turned(range, n);
       plain_.look(pose, turn, range.skinned);
       if (both_ways) corrected_.look(pose, turn, range.corrected);
       if (range.bones == SafeRange::none && bones_.meet(kinematics::forward(model_.rig, pose), voxel_))
         range.bones = turn;
     }
+    range.skinned.contact = contact(plain_, range, steps, context);
+    if (both_ways) range.corrected.contact = contact(corrected_, range, steps, context);
     if (!both_ways) range.corrected = range.skinned;
+  }
+  Pose turned(const SafeRange& range, int step) const {
+    return correct::turned(model_.rig.skeleton, static_cast<std::size_t>(range.joint),
+                           range.way * step * kSafeStep * Eigen::Vector3d::Unit(range.angle));
+  }
+  // The first step at which flesh meets other flesh by a voxel, as a turn.
+  double contact(Skinned& body, const SafeRange& range, int steps, const Context& context) const {
+    int before = 0;
+    for (int n = std::min(kContactStride, steps);; n = std::min(n + kContactStride, steps)) {
+      context.check_stop();
+      if (body.meets_itself(turned(range, n), voxel_)) {
+        int first = before + 1;
+        while (first < n && !body.meets_itself(turned(range, first), voxel_)) ++first;
+        return first * kSafeStep;
+      }
+      if (n == steps) return SafeRange::none;
+      before = n;
+    }
   }
 
   const Model& model_;
   Watched what_;
+  Points rest_;
+  fem::SelfContactFinder contact_;
   Skinned plain_, corrected_;
   BoneOverlap bones_;
   double voxel_;

@@ -19,7 +19,8 @@ inline constexpr double kSafeVolume = 0.10;
 
 /// Every angle of every joint that turns by itself, both ways, the others at rest, with `model`'s corrections
 /// and without; only the joints in `joints` (rows), all where it is empty. Bones overlap where they do by a
-/// voxel of the preparation. `store`, which may be null, keeps each joint's.
+/// voxel of the preparation, and flesh meets itself where it lies deeper than that in other flesh. `store`,
+/// which may be null, keeps each joint's.
 std::vector<SafeRange> measure_safe_ranges(const std::shared_ptr<const Model>& model,
                                            const std::vector<std::size_t>& joints,
                                            preprocess::StageStore* store, const Context& context);

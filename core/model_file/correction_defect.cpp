@@ -79,6 +79,10 @@ std::optional<Defect> defect_of(const Model& model, const SafeRange& range) {
         std::pair{"corrected_volume", range.corrected.volume}, std::pair{"bones", range.bones}})
     if (!good_end(turn, range.looked))
       return Defect{at + name, "is neither infinite nor within what was looked at"};
+  for (const auto& [name, turn] : {std::pair{"skinned_contact", range.skinned.contact},
+                                   std::pair{"corrected_contact", range.corrected.contact}})
+    if (!std::isnan(turn) && !good_end(turn, range.looked))
+      return Defect{at + name, "is neither infinite nor within what was looked at"};
   return std::nullopt;
 }
 
@@ -112,6 +116,11 @@ std::optional<Defect> first_defect_of_corrections(const Model& model) {
   const auto place = [](const SafeRange& r) { return std::tuple(r.joint, r.angle, r.way); };
   for (std::size_t i = 0; i < model.safe_ranges.size(); ++i) {
     if (auto defect = defect_of(model, model.safe_ranges[i])) return defect;
+    const SafeRange::Ends &skinned = model.safe_ranges[i].skinned,
+                          &corrected = model.safe_ranges[i].corrected;
+    const bool looked = !std::isnan(model.safe_ranges[0].skinned.contact);
+    if (std::isnan(skinned.contact) == looked || std::isnan(corrected.contact) == looked)
+      return Defect{"/ecorche/safe_range/skinned_contact", "is there for some ranges alone"};
     if (i > 0 && !(place(model.safe_ranges[i - 1]) < place(model.safe_ranges[i])))
       return Defect{"/ecorche/safe_range/joint", "is not in the order of joints, angles and ways"};
   }

@@ -2,6 +2,7 @@
 #include "core/model_file/layout.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "core/model_file/figures.hpp"
@@ -205,6 +206,11 @@ void add_correction(Layout& out, const JointCorrection& correction, const std::s
   out.view<std::int16_t>(at + "field", correction.field, {modes, rows, 3});
 }
 
+// Ranges of a model before 1.4 do not.
+bool knows_contact(const std::vector<SafeRange>& ranges) {
+  return !ranges.empty() && !std::isnan(ranges[0].skinned.contact);
+}
+
 void add_safe_ranges(Layout& out, const std::vector<SafeRange>& ranges) {
   if (ranges.empty()) return;
   const std::string at = "/ecorche/safe_range/";
@@ -218,6 +224,9 @@ void add_safe_ranges(Layout& out, const std::vector<SafeRange>& ranges) {
            column(ranges, [](const SafeRange& r) { return r.corrected.inverted; }));
   out.copy(at + "corrected_volume", column(ranges, [](const SafeRange& r) { return r.corrected.volume; }));
   out.copy(at + "bones", column(ranges, [](const SafeRange& r) { return r.bones; }));
+  if (!knows_contact(ranges)) return;
+  out.copy(at + "skinned_contact", column(ranges, [](const SafeRange& r) { return r.skinned.contact; }));
+  out.copy(at + "corrected_contact", column(ranges, [](const SafeRange& r) { return r.corrected.contact; }));
 }
 
 void add_provenance(Layout& out, const std::map<std::string, std::string>& provenance) {
@@ -272,7 +281,7 @@ Layout lay_out(const Model& model) {
 }
 
 std::int32_t minor_of(const Model& model) {
-  return !model.materials.empty() ? 4 : 3;
+  return !model.materials.empty() || knows_contact(model.safe_ranges) ? 4 : 3;
 }
 
 Layout lay_out_vtk(const Model& model) {

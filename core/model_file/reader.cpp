@@ -283,6 +283,12 @@ std::vector<SafeRange> read_safe_ranges(const Source& source) {
   fill("corrected_inverted", [](SafeRange& r) -> double& { return r.corrected.inverted; });
   fill("corrected_volume", [](SafeRange& r) -> double& { return r.corrected.volume; });
   fill("bones", [](SafeRange& r) -> double& { return r.bones; });
+  if (source.catalogue().datasets.contains(at + "skinned_contact")) {
+    fill("skinned_contact", [](SafeRange& r) -> double& { return r.skinned.contact; });
+    fill("corrected_contact", [](SafeRange& r) -> double& { return r.corrected.contact; });
+  } else {
+    for (SafeRange& range : ranges) range.skinned.contact = range.corrected.contact = SafeRange::not_looked;
+  }
   return ranges;
 }
 

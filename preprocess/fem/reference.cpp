@@ -145,7 +145,7 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
   }
   out.squeezed = inverted(out.nodes, model.tets, body->between);
   out.to_skinned = distances(body->mesh, start, out.nodes);
-  out.contact = self_contact(model.nodes.cast<double>(), out.nodes, model.tets);
+  out.contact = self_contact(model.nodes.cast<double>(), out.converged() ? out.nodes : start, model.tets);
   context.report(1);
   return out;
 }

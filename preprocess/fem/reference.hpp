@@ -49,7 +49,7 @@ struct Reference {
   int steps = 0, refused = 0;                    ///< of that way
   bool compared = false;                         ///< both starts converged
   double between_starts_mm = 0;                  ///< largest distance of a node
-  SelfContact contact;
+  SelfContact contact;  ///< of the solution, and of the skinned body where none converged
   Distances to_skinned;
   double seconds_build = 0, seconds_skinned = 0, seconds_rest = 0;
 

@@ -17,10 +17,12 @@ using Eigen::Vector3d;
 
 constexpr double kInside = 1e-6;  // of barycentric coordinates: what only touches is not inside
 
-/// Nodes of faces that one tet alone has.
-std::vector<std::int32_t> surface_nodes(const Tets& T) {
+using Faces = std::vector<std::array<std::int32_t, 3>>;
+
+/// Faces that one tet alone has.
+Faces surface_of(const Tets& T) {
   constexpr std::array<std::array<int, 3>, 4> kFaces{{{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}}};
-  std::vector<std::array<std::int32_t, 3>> faces;
+  Faces faces;
   faces.reserve(4 * static_cast<std::size_t>(T.rows()));
   for (Eigen::Index t = 0; t < T.rows(); ++t) {
     for (const auto& face : kFaces) {
@@ -30,13 +32,19 @@ std::vector<std::int32_t> surface_nodes(const Tets& T) {
     }
   }
   tbb::parallel_sort(faces.begin(), faces.end());
-  std::vector<std::int32_t> out;
+  Faces out;
   for (std::size_t i = 0; i < faces.size();) {
     std::size_t end = i + 1;
     while (end < faces.size() && faces[end] == faces[i]) ++end;
-    if (end == i + 1) out.insert(out.end(), faces[i].begin(), faces[i].end());
+    if (end == i + 1) out.push_back(faces[i]);
     i = end;
   }
+  return out;
+}
+
+std::vector<std::int32_t> nodes_of(const Faces& faces) {
+  std::vector<std::int32_t> out;
+  for (const auto& face : faces) out.insert(out.end(), face.begin(), face.end());
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
@@ -74,17 +82,18 @@ class Grid {
     tbb::parallel_sort(entries_.begin(), entries_.end());
   }
 
-  /// Whether a tet that has not `node` as a corner holds its place.
-  bool foreign(std::int32_t node) const {
+  /// The first tet that has not `node` as a corner and holds its place; -1 for none.
+  Eigen::Index foreign(std::int32_t node) const {
     const Vector3d p = x_.row(node);
     const auto [i, j, k] = cell(p);
     const std::int64_t here = key(i, j, k);
     for (auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair{here, Eigen::Index{0}});
          at != entries_.end() && at->first == here; ++at) {
       const auto tet = T_.row(at->second);
-      if (std::find(tet.begin(), tet.end(), node) == tet.end() && holds(x_, T_, at->second, p)) return true;
+      if (std::find(tet.begin(), tet.end(), node) == tet.end() && holds(x_, T_, at->second, p))
+        return at->second;
     }
-    return false;
+    return -1;
   }
 
  private:
@@ -109,27 +118,57 @@ class Grid {
   std::vector<std::pair<std::int64_t, Eigen::Index>> entries_;
 };
 
-std::vector<std::uint8_t> inside(const Points& x, const Tets& T, const std::vector<std::int32_t>& nodes) {
+/// Of each node the foreign tet that holds it, or -1.
+std::vector<Eigen::Index> holders(const Points& x, const Tets& T, const std::vector<std::int32_t>& nodes) {
   const Grid grid(x, T);
-  std::vector<std::uint8_t> out(nodes.size(), 0);
-  tbb::parallel_for(std::size_t{0}, nodes.size(),
-                    [&](std::size_t n) { out[n] = grid.foreign(nodes[n]) ? 1 : 0; });
+  std::vector<Eigen::Index> out(nodes.size());
+  tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) { out[n] = grid.foreign(nodes[n]); });
   return out;
+}
+
+/// Where the flesh at p, which the tet holds, is at rest.
+Vector3d at_rest(const Points& X, const Points& x, const Tets& T, Eigen::Index t, const Vector3d& p) {
+  const Vector3d a = x.row(T(t, 0)), b = x.row(T(t, 1)), c = x.row(T(t, 2)), d = x.row(T(t, 3));
+  const double all = tet_det(a, b, c, d);
+  return (tet_det(p, b, c, d) * X.row(T(t, 0)) + tet_det(a, p, c, d) * X.row(T(t, 1)) +
+          tet_det(a, b, p, d) * X.row(T(t, 2)) + tet_det(a, b, c, p) * X.row(T(t, 3)))
+             .transpose() /
+         all;
 }
 
 }  // namespace
 
-SelfContact self_contact(const Points& X, const Points& x, const Tets& T) {
-  const std::vector<std::int32_t> nodes = surface_nodes(T);
-  const std::vector<std::uint8_t> at_rest = inside(X, T, nodes), posed = inside(x, T, nodes);
+SelfContactFinder::SelfContactFinder(const Points& X, const Tets& T) : X_(X), T_(T) {
+  const Faces faces = surface_of(T);
+  std::vector<geometry::FaceTree::Corners> corners;
+  corners.reserve(faces.size());
+  for (const auto& [a, b, c] : faces) corners.push_back({X.row(a), X.row(b), X.row(c)});
+  surface_ = std::make_unique<const geometry::FaceTree>(corners);
+  const std::vector<std::int32_t> all = nodes_of(faces);
+  const std::vector<Eigen::Index> held = holders(X, T, all);
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (held[n] < 0) nodes_.push_back(all[n]);
+}
+
+SelfContact SelfContactFinder::operator()(const Points& x) const {
+  const std::vector<Eigen::Index> held = holders(x, T_, nodes_);
   SelfContact out;
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (posed[n] == 0 || at_rest[n] != 0) continue;
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    if (held[n] < 0) continue;
+    const Vector3d p = x.row(nodes_[n]).transpose();
     ++out.nodes;
-    out.at += x.row(nodes[n]).transpose();
+    out.at += p;
+    const double depth = std::sqrt(surface_->nearest(at_rest(X_, x, T_, held[n], p)).squared);
+    if (depth <= out.depth_mm) continue;
+    out.depth_mm = depth;
+    out.deepest = p;
   }
   if (out.nodes > 0) out.at /= static_cast<double>(out.nodes);
   return out;
+}
+
+SelfContact self_contact(const Points& X, const Points& x, const Tets& T) {
+  return SelfContactFinder(X, T)(x);
 }
 
 }  // namespace ecorche::fem

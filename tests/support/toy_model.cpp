@@ -351,6 +351,7 @@ Model corrected_toy_model() {
   model.safe_ranges[0].way = -1;
   model.safe_ranges.push_back(range);
   model.safe_ranges[1].bones = 2;
+  model.safe_ranges[1].corrected.contact = 1.75;
   model.materials = {{-1, 4}, {5, 20}, std::vector<std::uint16_t>(model.tet_count(), 0)};
   for (std::size_t t = 0; t < model.tet_count(); t += 3)
     if (model.tet_label[t] == TetMesh::soft) model.materials.of_tet[t] = 1;

@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <ecorche/model_file/model_file.hpp>
@@ -73,6 +74,9 @@ void describe(const SafeRange& range, v1::SafeRange& out) {
   out.set_skinned_volume(range.skinned.volume);
   out.set_corrected_volume(range.corrected.volume);
   out.set_bones(range.bones);
+  if (std::isnan(range.skinned.contact)) return;
+  out.set_skinned_contact(range.skinned.contact);
+  out.set_corrected_contact(range.corrected.contact);
 }
 
 // While it waits for its own loops, the thread must not take up another job: that one could want the same.

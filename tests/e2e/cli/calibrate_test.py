@@ -62,6 +62,29 @@ class Calibrate(unittest.TestCase):
         self.assertEqual(run("verify", self.calibrated).returncode, 0)
         self.assertEqual(json.loads(run("--json", "info", self.model).stdout)["corrections"], [])
 
+    def test_flesh_that_meets_other_flesh_ends_a_range(self):
+        out = self.folder / "knee.hdf"
+        done = run("calibrate", self.model, "-o", out, "--from", self.calibrated)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        ranges = {(row["joint"], row["angle"], row["way"]): row for row in json.loads(run("--json", "info", out).stdout)["safe_ranges"]}
+        # A calf meets its thigh, a forearm its upper arm, well before their limits of 135 and 150, and both sides alike; straightened, nothing does.
+        for joint, low, high in (("knee", 45, 100), ("elbow", 70, 130)):
+            met = [ranges[f"{joint}_{side}", "flexion", 1]["skinned_deg"]["contact"] for side in ("left", "right")]
+            self.assertTrue(all(low < angle < high for angle in met), met)
+            self.assertLess(abs(met[0] - met[1]), 12)
+            self.assertIsNone(ranges[f"{joint}_right", "flexion", -1]["skinned_deg"]["contact"])
+        # No rest pose touches itself, nor one nearly at rest.
+        for row in ranges.values():
+            for ends in (row["skinned_deg"], row["corrected_deg"]):
+                self.assertIn("contact", ends)
+
+        # What is said is so: by finite elements, which see it as skinning left it where they find no balance.
+        angle = ranges["knee_right", "flexion", 1]["skinned_deg"]["contact"]
+        depth = [json.loads((self.pose(self.model, f"knee{turn:.0f}", f"joints: {{knee_right: {{flexion_deg: {turn}}}}}\n",
+                                       "fem", "--one-start") / "fem.json").read_text())["contact_depth_mm"] for turn in (20, angle + 30)]
+        self.assertEqual(depth[0], 0)
+        self.assertGreater(depth[1], 1)
+
     def test_samples_are_kept_and_give_the_same_bytes(self):
         kept = sorted(self.cache.glob("sample-*.stage"))
         self.assertEqual(len(kept), self.made["joints"][0]["samples"])

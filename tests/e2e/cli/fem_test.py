@@ -144,6 +144,14 @@ class Fem(unittest.TestCase):
         self.assertEqual(fem["verdict"], "warn")
         self.assertEqual(json.loads((out / "quality.json").read_text())["verdict"], "warn")
         self.assertIn(fem["warnings"][0]["what"], done.stdout)
+        # By then the calf is well within the thigh: behind the knee.
+        (contact,) = [warning for warning in fem["warnings"] if warning["kind"] == "fem_contact"]
+        self.assertRegex(contact["what"], rf"^the flesh runs through itself at {fem['contact_nodes']} nodes, {fem['contact_depth_mm']:.1f} mm deep: ")
+        self.assertGreater(fem["contact_depth_mm"], 5)
+        knee = next(row for row in json.loads(run("info", self.model, "--json").stdout)["rig"] if row["joint"] == "knee_right")
+        off = np.subtract(contact["at_mm"], knee["center_mm"])
+        self.assertLess(np.linalg.norm(off), 200)
+        self.assertGreater(off[1], 10)  # posterior
         self.assertIn("turn the joints less", fem["warnings"][-1]["mend"])
 
     def test_what_does_not_go_together_is_refused(self):

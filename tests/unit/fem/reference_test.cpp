@@ -161,16 +161,20 @@ TEST(SelfContact, AgreesWithAllPairs) {
     Points x = X;
     x.bottomRows(box.V.rows()).rowwise() += Eigen::RowVector3d(-into, 3.3, -4.1);
     std::size_t count = 0;
+    double deepest = 0;
     for (Eigen::Index n = 0; n < x.rows(); ++n) {
       const Eigen::RowVector3d at = X.row(n) - (n < box.V.rows() ? 0 : 40) * Eigen::RowVector3d::UnitX();
       if ((at.array() > 0.1 && at.array() < 29.9).all()) continue;  // no node of the surface
       const bool first = n < box.V.rows();
       const Eigen::RowVector3d low = x.row(first ? box.V.rows() : 0), p = x.row(n) - low;
-      if ((p.array() > 0 && p.array() < 30).all()) ++count;
+      if (!(p.array() > 0 && p.array() < 30).all()) continue;
+      ++count;
+      deepest = std::max(deepest, std::min(p.minCoeff(), 30 - p.maxCoeff()));
     }
     const SelfContact found = self_contact(X, x, T);
     EXPECT_EQ(found.nodes, count) << into;
     EXPECT_EQ(count > 0, into > 10);
+    EXPECT_NEAR(found.depth_mm, deepest, 1e-9) << into;
   }
   EXPECT_EQ(self_contact(X, X, T).nodes, 0U);
 }

@@ -241,9 +241,10 @@ void expect_same(const Model& a, const Model& b) {
     const SafeRange &p = a.safe_ranges[i], &q = b.safe_ranges[i];
     EXPECT_EQ(std::tie(p.joint, p.angle, p.way, p.looked, p.bones),
               std::tie(q.joint, q.angle, q.way, q.looked, q.bones));
-    EXPECT_EQ(std::tie(p.skinned.inverted, p.skinned.volume), std::tie(q.skinned.inverted, q.skinned.volume));
-    EXPECT_EQ(std::tie(p.corrected.inverted, p.corrected.volume),
-              std::tie(q.corrected.inverted, q.corrected.volume));
+    EXPECT_EQ(std::tie(p.skinned.inverted, p.skinned.volume, p.skinned.contact),
+              std::tie(q.skinned.inverted, q.skinned.volume, q.skinned.contact));
+    EXPECT_EQ(std::tie(p.corrected.inverted, p.corrected.volume, p.corrected.contact),
+              std::tie(q.corrected.inverted, q.corrected.volume, q.corrected.contact));
   }
   expect_same(a.certificate, b.certificate);
   EXPECT_EQ(a.provenance, b.provenance);

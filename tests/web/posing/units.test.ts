@@ -39,6 +39,8 @@ test("a ring shows where the body stays one: up to the first thing that goes wro
   const [hip, knee] = safe.segments.slice(1);
   assert.deepEqual(knee!.joint.sequence[0]!.safe, { from: -0.1, to: 1.4 });
   assert.deepEqual(hip!.joint.sequence[2]!.safe, { from: 0, to: 1.4 });
+  const touching = rigOf(SKELETON, [{ ...range, correctedContact: 1.2 }, { ...range, negative: true, correctedContact: Infinity }]);
+  assert.deepEqual(touching.segments[2]!.joint.sequence[0]!.safe, { from: -1.4, to: 1.2 });
   assert.equal(hip!.joint.sequence[0]!.safe, null);
   assert.equal(rig.segments[2]!.joint.sequence[0]!.safe, null);
 });

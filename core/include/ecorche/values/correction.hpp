@@ -34,10 +34,12 @@ struct JointCorrection {
 /// Radians, positive; infinite where nothing was met up to `looked`.
 struct SafeRange {
   static constexpr double none = std::numeric_limits<double>::infinity();
+  static constexpr double not_looked = std::numeric_limits<double>::quiet_NaN();  ///< of an older model
   /// Where each of these was met first.
   struct Ends {
     double inverted = none;  ///< the first free tet is turned inside out
     double volume = none;    ///< a tissue's volume has changed by a tenth
+    double contact = none;   ///< flesh runs into other flesh of the body; not_looked in older models
   };
 
   std::int32_t joint = 0;  ///< row of the skeleton

@@ -197,6 +197,8 @@ namespace Ecorche.Wire
         public double SkinnedVolume;
         public double CorrectedVolume;
         public double Bones;
+        public bool HasSkinnedContact; public double SkinnedContact;
+        public bool HasCorrectedContact; public double CorrectedContact;
 
         public void Clear()
         {
@@ -209,6 +211,8 @@ namespace Ecorche.Wire
             SkinnedVolume = default;
             CorrectedVolume = default;
             Bones = default;
+            HasSkinnedContact = false; SkinnedContact = default;
+            HasCorrectedContact = false; CorrectedContact = default;
         }
 
         internal void Read(ref WireReader from)
@@ -227,6 +231,8 @@ namespace Ecorche.Wire
                     case 57: SkinnedVolume = from.Double(); break;
                     case 65: CorrectedVolume = from.Double(); break;
                     case 73: Bones = from.Double(); break;
+                    case 81: SkinnedContact = from.Double(); HasSkinnedContact = true; break;
+                    case 89: CorrectedContact = from.Double(); HasCorrectedContact = true; break;
                     default: from.Skip(key); break;
                 }
             }

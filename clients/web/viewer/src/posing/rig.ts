@@ -70,6 +70,8 @@ export interface WireSafeRange {
   readonly correctedInverted: number;
   readonly correctedVolume: number;
   readonly bones: number;
+  /** Not there of older servers and models. */
+  readonly correctedContact?: number;
 }
 
 type Drives = { case: "drivenAngle" | "slideAxis"; value: number } | { case: undefined; value?: undefined };
@@ -104,7 +106,7 @@ function safeOf(ranges: readonly WireSafeRange[], joint: number, angle: number, 
   if (mine.length === 0) return null;
   const far = (negative: boolean) =>
     Math.max(0, ...mine.filter((r) => r.negative === negative)
-      .map((r) => Math.min(r.looked, r.correctedInverted, r.correctedVolume, r.bones)));
+      .map((r) => Math.min(r.looked, r.correctedInverted, r.correctedVolume, r.bones, r.correctedContact ?? Infinity)));
   return { from: rest - far(true), to: rest + far(false) };
 }
 
