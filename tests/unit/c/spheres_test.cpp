@@ -73,9 +73,9 @@ class BySpheres : public OpenedToy {
   }
   static std::vector<std::uint8_t> cube() {
     std::vector<std::uint8_t> out(729, 0);
-    for (int k = 2; k < 7; ++k) {
-      for (int j = 2; j < 7; ++j) {
-        for (int i = 2; i < 7; ++i) out[static_cast<std::size_t>(i + 9 * (j + 9 * k))] = 200;  // not 0
+    for (std::size_t k = 2; k < 7; ++k) {
+      for (std::size_t j = 2; j < 7; ++j) {
+        for (std::size_t i = 2; i < 7; ++i) out[i + 9 * (j + 9 * k)] = 200;  // not 0
       }
     }
     return out;
