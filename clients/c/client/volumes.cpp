@@ -61,7 +61,7 @@ void read_options(const ecorche_volume_options& options, const std::string& name
   out.wanted.set_max_rate(options.max_rate);
 }
 
-VolumeStream* find(ecorche_client& client, std::uint32_t number) {
+const VolumeStream* find(const ecorche_client& client, std::uint32_t number) {
   const auto found = std::find_if(client.volumes.begin(), client.volumes.end(),
                                   [&](const VolumeStream& one) { return one.number == number; });
   return found == client.volumes.end() ? nullptr : &*found;
@@ -171,7 +171,7 @@ ecorche_code ecorche_client_subscribe_volume(ecorche_client* client, uint32_t vo
 
 ecorche_code ecorche_client_unsubscribe_volume(ecorche_client* client, uint32_t stream) {
   return c::with_client(client, true, [&] {
-    c::VolumeStream* const found = c::find(*client, stream);
+    const c::VolumeStream* const found = c::find(*client, stream);
     if (found == nullptr) return c::no_stream(stream);
     const std::optional<std::uint32_t> subscription = found->subscription;
     client->volumes.erase(client->volumes.begin() + (found - client->volumes.data()));
@@ -186,9 +186,8 @@ ecorche_code ecorche_client_unsubscribe_volume(ecorche_client* client, uint32_t 
 ecorche_code ecorche_client_voxels(const ecorche_client* client, uint32_t stream, uint32_t slice,
                                    ecorche_voxels* out) {
   return c::with_client(client, true, [&] {
-    const auto found = std::find_if(client->volumes.begin(), client->volumes.end(),
-                                    [&](const c::VolumeStream& one) { return one.number == stream; });
-    if (found == client->volumes.end()) return c::no_stream(stream);
+    const c::VolumeStream* const found = c::find(*client, stream);
+    if (found == nullptr) return c::no_stream(stream);
     if (!found->sequence)
       return c::fail(ECORCHE_FAILED_PRECONDITION, "stream: no frame of it has come (poll on)");
     if (slice >= std::max<std::size_t>(found->slices.size(), 1))
