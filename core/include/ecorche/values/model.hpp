@@ -54,7 +54,7 @@ struct Materials {
   std::vector<double> young_kpa;      ///< by material, Young's modulus
   std::vector<std::uint16_t> of_tet;  ///< #T, row of the material; 0 for tets of bones, which are rigid
 
-  bool empty() const { return tissue.empty(); }
+  bool empty() const { return tissue.empty(); }  ///< True where no tissue says how stiff it is.
 };
 
 /// A sampled volume that follows the body.
