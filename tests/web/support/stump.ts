@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A limb of two segments whose upper end the border of its scan cuts: a label map written by hand, and the model that ecorche makes of it.
+// A limb of two segments whose upper end the border of its scan cuts, flesh and bone: a label map written by hand, and the model that ecorche makes of it.
 import { spawnSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
@@ -34,7 +34,7 @@ export function makeStump(folder: string): string {
     for (let j = 0; j < SIZE[1]!; ++j) {
       for (let i = 0; i < SIZE[0]!; ++i, ++at) {
         const off = SPACING * Math.hypot(i - MIDDLE, j - MIDDLE);
-        if (off < STUMP.radius) voxels[at] = off < 10 && k > 5 && k < 41 && k !== 22 ? (k > 22 ? 2 : 3) : 1;
+        if (off < STUMP.radius) voxels[at] = off < 10 && k > 5 && k !== 22 ? (k > 22 ? 2 : 3) : 1;
       }
     }
   }

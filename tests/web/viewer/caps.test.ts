@@ -49,6 +49,14 @@ test("a cap is no skin, by its colour and by the pointer", async () => {
   await page.mouse.move(cap.x, cap.y);
   await page.waitForFunction((label) => document.querySelector("#tip")!.textContent!.includes(label), CAP_LABEL);
   assert.match((await page.textContent("#tip"))!, /no skin/);
+  // The bone ends in the same plane, and comes through nowhere; in its middle is the mark of the joint.
+  for (let x = -8; x <= 8; x += 2) {
+    for (let y = -8; y <= 8; y += 2) {
+      if (Math.hypot(x, y) < 5) continue;
+      const there = await colorAt(page, await project(page, [STUMP.axis + x, STUMP.axis + y, STUMP.top]));
+      assert.ok(apart(there, CAP) < 3, `${there} is not ${CAP}, ${x} and ${y} mm off the axis`);
+    }
+  }
 
   await look("front");
   const side = await project(page, ON_SIDE), skin = await colorAt(page, side);

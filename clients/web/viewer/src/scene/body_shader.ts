@@ -36,11 +36,13 @@ float scalar() { return length((bodyPosition() * poseBox.w + poseBox.xyz) - (vec
 #endif
 `;
 
-/** 1 at the vertices of a cap, where the border of the scan cuts the body. Where it is 1 throughout, nothing is tissue. */
+/** 1 at the vertices of a cap, where the border of the scan cuts the body. Where it is 1 throughout, nothing is tissue. What else ends at that
+ *  border lies in the same plane: the cap comes a little nearer along the line of sight, and hides it whole. */
 const CAP = /* glsl */ `
 #ifdef CAP
 attribute float cap;
 centroid varying float vCap;
+vec4 nearer(vec4 mvPosition) { return vec4(mvPosition.xyz * (1.0 - 0.002 * cap), mvPosition.w); }
 #endif
 `;
 const IS_CAP = /* glsl */ `
@@ -70,6 +72,7 @@ void main() {
   #endif
   #ifdef CAP
   vCap = cap;
+  mvPosition = nearer(mvPosition);
   #endif
   gl_Position = projectionMatrix * mvPosition;
   #include <clipping_planes_vertex>
@@ -220,10 +223,11 @@ void main() {
   #ifdef SCALAR
   vScalar = scalar();
   #endif
+  vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
   #ifdef CAP
   vCap = cap;
+  mvPosition = nearer(mvPosition);
   #endif
-  vec4 mvPosition = modelViewMatrix * vec4(bodyPosition(), 1.0);
   gl_Position = projectionMatrix * mvPosition;
   #include <clipping_planes_vertex>
 }
