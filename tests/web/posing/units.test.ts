@@ -13,7 +13,7 @@ import { Poser, typedDegrees } from "../../../clients/web/viewer/src/posing/pose
 import { rigOf, type Rig } from "../../../clients/web/viewer/src/posing/rig.js";
 import { DEGREES, turnAbout } from "../../../clients/web/viewer/src/posing/rotation.js";
 import { SavedPoses } from "../../../clients/web/viewer/src/posing/saved_poses.js";
-import { bodyParts, degreesText, spoken } from "../../../clients/web/viewer/src/posing/words.js";
+import { bodyParts, degreesText, isUnsafe, limitsText, spoken } from "../../../clients/web/viewer/src/posing/words.js";
 import { History } from "../../../clients/web/viewer/src/state/history.js";
 
 const at = (x: number, y: number, z: number) => ({ x, y, z });
@@ -43,6 +43,14 @@ test("a ring shows where the body stays one: up to the first thing that goes wro
   assert.deepEqual(touching.segments[2]!.joint.sequence[0]!.safe, { from: -1.4, to: 1.2 });
   assert.equal(hip!.joint.sequence[0]!.safe, null);
   assert.equal(rig.segments[2]!.joint.sequence[0]!.safe, null);
+
+  // In words, within the limits; and where a value lies beyond.
+  const bend = knee!.joint.sequence[0]!;
+  assert.equal(limitsText(bend), "0° to 138°, safe 0° to 80°");
+  assert.equal(limitsText(rig.segments[2]!.joint.sequence[0]!), "0° to 138°");
+  assert.equal(limitsText({ min: -Infinity, max: Infinity, rest: 0, safe: null }), "no limit");
+  assert.deepEqual([1.39, 1.41, -0.09, -0.11].map((value) => isUnsafe(value, bend)), [false, true, false, true]);
+  assert.equal(isUnsafe(3, rig.segments[2]!.joint.sequence[0]!), false);
 });
 
 function poser(controls = true) {

@@ -8,7 +8,7 @@ import { placeJoint } from "./forward.js";
 import { typedDegrees, type Poser } from "./poser.js";
 import type { Joint } from "./rig.js";
 import { DEGREES, type Vec3 } from "./rotation.js";
-import { angleLabel, degreesText, jointLabel, oppositeOf, spoken } from "./words.js";
+import { angleLabel, isUnsafe, jointLabel, limitsText, oppositeOf, spoken } from "./words.js";
 
 /** A field of numbers: arrows step, with Shift by ten; Enter and leaving it take what is typed. */
 export function numberField(id: string, step: number, unit: string, set: (value: number) => void, parse: (text: string) => number | null) {
@@ -58,7 +58,7 @@ function angleRow(poser: Poser, row: number, joint: Joint, angle: number): Angle
     aria: { hidden: true }, on: { input: () => poser.turn(row, angle, Number(slider.value) / DEGREES) },
   });
   const also = h("span", { class: "also" });
-  const limits = h("span", { class: "limits", id: `${id}-limits` }, limited ? `${degreesText(low, 0)} to ${degreesText(high, 0)}` : "no limit");
+  const limits = h("span", { class: "limits", id: `${id}-limits` }, limitsText(range));
   field.input.setAttribute("aria-describedby", limits.id);
   const stop = h("span", { class: "stop", hidden: true }, icon("warn"), "limit");
   const root = h("div", { class: "angle", data: { axis: "xyz"[range.axis]! } },
@@ -73,6 +73,9 @@ function angleRow(poser: Poser, row: number, joint: Joint, angle: number): Angle
       const atEnd = limited && (value <= low + 1e-6 || value >= high - 1e-6);
       stop.hidden = !atEnd;
       root.classList.toggle("held", held && atEnd);
+      const unsafe = isUnsafe(value, range);
+      root.classList.toggle("unsafe", unsafe);
+      limits.title = unsafe ? "Beyond its safe range the body folds, changes its volume or runs into itself (measured by ecorche calibrate)" : "";
     },
   };
 }

@@ -3,7 +3,7 @@
 
 import { labelOf } from "../state/names.js";
 import { DEGREES } from "./rotation.js";
-import type { Joint, Rig } from "./rig.js";
+import type { AngleAxis, Joint, Rig } from "./rig.js";
 
 // What the negative of an angle is called.
 const OPPOSITES: Readonly<Record<string, string>> = {
@@ -21,6 +21,16 @@ export function degreesText(radians: number, digits = 1): string {
   const rounded = Number((radians * DEGREES).toFixed(digits));
   return `${String(rounded === 0 ? 0 : rounded).replace("-", "\u2212")}°`;
 }
+
+/** Which of a joint's angles the value may be: its limits, and where the model knows, how far the body stays one. */
+export function limitsText({ min, max, rest, safe }: Pick<AngleAxis, "min" | "max" | "rest" | "safe">): string {
+  const low = Math.min(min, rest), high = Math.max(max, rest), between = (from: number, to: number) => `${degreesText(from, 0)} to ${degreesText(to, 0)}`;
+  const limits = Number.isFinite(low) && Number.isFinite(high) ? between(low, high) : "no limit";
+  return safe ? `${limits}, safe ${between(Math.max(low, safe.from), Math.min(high, safe.to))}` : limits;
+}
+
+/** Whether the body does not stay one at this value, as far as the model knows. */
+export const isUnsafe = (value: number, { safe }: Pick<AngleAxis, "safe">): boolean => safe !== null && (value < safe.from - 1e-3 || value > safe.to + 1e-3);
 
 /** A value with the name that fits its sign: adduction of -30 is "Abduction 30°". */
 export function spoken(name: string, radians: number): string {
