@@ -29,10 +29,13 @@ std::string word(const Json& value) {
   return value.is_null() ? "-" : fmt::format("{:.0f}", value.get<double>());
 }
 
-// `?` where an older program did not look.
-std::string words(const Json& ends) {
-  return fmt::format("{:>5} {:>5} {:>5}", word(ends["inverted"]), word(ends["volume"]),
-                     ends.contains("contact") ? word(ends["contact"]) : "?");
+// By skinning alone, and corrected; `?` where an older program did not look.
+std::string both_ends(const Json& row, const char* what) {
+  const auto one = [&](const char* how) {
+    const Json& ends = row[how];
+    return ends.contains(what) ? word(ends[what]) : std::string("?");
+  };
+  return one("skinned_deg") + " / " + one("corrected_deg");
 }
 
 }  // namespace
@@ -77,21 +80,25 @@ Json safe_ranges_json(const Model& model) {
 std::string correction_text(const Json& corrections, const Json& ranges) {
   std::string out;
   if (!corrections.empty()) {
-    out += "\ncorrection towards finite elements: joint, samples, modes, nodes, to (deg), at most (mm)\n";
+    out += "\ncorrection towards finite elements\n";
+    out += fmt::format("  {:<24} {:>7} {:>5} {:>8} {:>7} {:>11}\n", "joint", "samples", "modes", "nodes",
+                       "to deg", "at most mm");
     for (const Json& row : corrections)
-      out += fmt::format("  {:<24} {:>3} {:>3} {:>8} {:>6.0f} {:>6.1f}\n", row["joint"].get<std::string>(),
+      out += fmt::format("  {:<24} {:>7} {:>5} {:>8} {:>7.0f} {:>11.1f}\n", row["joint"].get<std::string>(),
                          row["samples"].get<int>(), row["modes"].get<int>(), row["nodes"].get<int>(),
                          row["largest_turn_deg"].get<double>(), row["largest_mm"].get<double>());
   }
   if (!ranges.empty()) {
     out +=
-        "\nsafe ranges (deg): joint, angle, looked to; first tet inverted, a tissue's volume changed by 10 % "
-        "and flesh runs into\n"
-        "other flesh by a voxel, by skinning and corrected; bones overlap; - where nothing was met\n";
+        "\nsafe ranges: the angles, in degrees, at which something first goes wrong,\n"
+        "by skinning / corrected; - where nothing does\n";
+    out += fmt::format("  {:<24} {:<16} {:>9} {:>12} {:>14} {:>13} {:>13}\n", "joint", "angle", "looked to",
+                       "tet inverted", "tissue by 10 %", "flesh touches", "bones overlap");
     for (const Json& row : ranges)
-      out += fmt::format("  {:<24} {:<16} {:>5}  {}  {}  {:>5}\n", row["joint"].get<std::string>(),
-                         row["angle"].get<std::string>(), word(row["looked_deg"]), words(row["skinned_deg"]),
-                         words(row["corrected_deg"]), word(row["bones_deg"]));
+      out +=
+          fmt::format("  {:<24} {:<16} {:>9} {:>12} {:>14} {:>13} {:>13}\n", row["joint"].get<std::string>(),
+                      row["angle"].get<std::string>(), word(row["looked_deg"]), both_ends(row, "inverted"),
+                      both_ends(row, "volume"), both_ends(row, "contact"), word(row["bones_deg"]));
   }
   return out;
 }
