@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
@@ -22,7 +23,8 @@ class Run:
     def __init__(self, *words):
         master, slave = pty.openpty()
         start = time.monotonic()
-        process = subprocess.Popen([str(word) for word in (programs.ECORCHE, "--json", *words)], stdout=subprocess.PIPE, stderr=slave)
+        printed = tempfile.TemporaryFile()  # no pipe: nobody reads it before the end, and a body of hundreds of tissues fills one
+        process = subprocess.Popen([str(word) for word in (programs.ECORCHE, "--json", *words)], stdout=printed, stderr=slave)
         os.close(slave)
         shown = b""
         while True:
@@ -34,13 +36,14 @@ class Run:
                 break
             shown += some
         os.close(master)
-        printed = process.stdout.read()
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         self.seconds, self.mib, self.cpu = time.monotonic() - start, usage.ru_maxrss / 1024, usage.ru_utime + usage.ru_stime
         self.shown = shown.decode(errors="replace")
         self.ok = process.returncode == 0
-        self.said = json.loads(printed) if self.ok else {}
+        printed.seek(0)
+        self.said = json.loads(printed.read()) if self.ok else {}
+        printed.close()
         lines = [line for line in self.shown.replace("\r", "\n").splitlines() if "error: " in line]
         self.error = re.sub(r"\x1b\[K", "", lines[-1]) if lines else f"ended with {process.returncode}"
         self.bars = {name.strip() for name, _, _ in BAR.findall(self.shown)}
