@@ -11,6 +11,7 @@
 #include "app/correction_report.hpp"
 #include "app/safe_range.hpp"
 #include "app/stage_folder.hpp"
+#include "core/files/atomic_file.hpp"
 #include "preprocess/correct/calibrate.hpp"
 #include "preprocess/correct/transfer.hpp"
 
@@ -94,6 +95,7 @@ Made make(const Program& program, const CalibrateSettings& s, const Model& model
 
 int run(const Program& program, const CalibrateSettings& s) {
   using Clock = std::chrono::steady_clock;
+  { const files::AtomicFile probe(s.output); }  // refused now, not after the hours that solving takes
   const auto model = std::make_shared<Model>(model_file::read(s.model, program.context("reading")));
   model->corrections.clear();
   model->safe_ranges.clear();

@@ -12,6 +12,7 @@
 #include "app/command.hpp"
 #include "app/phantom_scan.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/files/look.hpp"
 #include "io/motion/bvh.hpp"
 
 namespace ecorche::app {
@@ -37,11 +38,11 @@ phantom::Size size_of(const PhantomSettings& settings) {
 /// Refuses what is not ours to overwrite: a file, or a folder of something else.
 void check_target(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
-  if (!fs::exists(folder)) return;
-  if (!fs::is_directory(folder)) {
+  if (!files::is_there(folder)) return;
+  if (!files::is_folder(folder)) {
     throw Error(ErrorKind::cannot_create, folder.string(), "is a file", "name a folder with -o");
   }
-  if (!fs::is_empty(folder) && !fs::exists(folder / "truth.yaml")) {
+  if (!fs::is_empty(folder) && !files::is_there(folder / "truth.yaml")) {
     throw Error(ErrorKind::cannot_create, folder.string(), "holds files, but no phantom",
                 "name a new or empty folder with -o");
   }

@@ -239,7 +239,7 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
   }
   const std::vector<Frame> frames =
       given.empty() ? read_frames(program, settings.frames, model->rig) : std::move(given);
-  if (!frames.front().name.empty()) check_folder_of_frames(settings.output);
+  (frames.front().name.empty() ? check_folder_of_a_body : check_folder_of_frames)(settings.output);
   const std::uint64_t identity = model_file::identity(*model);
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
@@ -307,7 +307,7 @@ int run_pose(const Program& program, PoseSettings& settings) {
   if (!settings.scan.wanted()) return pose_model(program, settings, {}, {{"model", settings.model.string()}});
   // What would fail only after minutes of work is refused first.
   check_frames(settings.frames);
-  if (settings.frames.motion.file.empty()) const PosedFolder target(settings.output);
+  if (settings.frames.motion.file.empty()) check_folder_of_a_body(settings.output);
   if (settings.deformer == "spheres") settings.scan.prepare.spheres_tp = kPaperThinness;
   std::vector<Frame> frames;
   return pose_scan(program, settings.scan,

@@ -7,6 +7,7 @@
 
 #include <ecorche/io/case_file.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/files/look.hpp"
 #include "io/case/digest.hpp"
 #include "io/surface/surface_file.hpp"
 #include "io/surface/tied_surfaces.hpp"
@@ -141,8 +142,8 @@ io::TiedSurfaces tied(const std::vector<const Tissue*>& tissues) {
 
 PosedFolder::PosedFolder(const fs::path& target)
     : staged_(target, std::string(kManifest)),
-      old_(fs::exists(staged_.target()) ? old_files(staged_.target(), staged_.stage())
-                                        : std::vector<fs::path>()) {}
+      old_(files::is_there(staged_.target()) ? old_files(staged_.target(), staged_.stage())
+                                             : std::vector<fs::path>()) {}
 
 std::vector<std::string> PosedFolder::finish(const Model& model, const runtime::PosedBody& body,
                                              const Pose& asked, const PosedAs& as, const Context& context) {
@@ -181,8 +182,12 @@ std::vector<std::string> PosedFolder::finish(const Model& model, const runtime::
   return added;
 }
 
+void check_folder_of_a_body(const fs::path& folder) {
+  const PosedFolder probe(folder);
+}
+
 void check_folder_of_frames(const fs::path& folder) {
-  if (!fs::exists(folder / kManifest)) return;
+  if (!files::is_there(folder / kManifest)) return;
   throw Error(ErrorKind::cannot_create, folder.string(), "is the folder of one posed body, not of frames",
               "name another folder");
 }

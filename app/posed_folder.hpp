@@ -40,6 +40,8 @@ class PosedFolder {
   std::vector<std::filesystem::path> old_;
 };
 
+/// Refuses a folder that no posed body can be written to. Throws Error{cannot_create}.
+void check_folder_of_a_body(const std::filesystem::path& folder);
 /// Refuses a folder of frames that is itself a posed body. Throws Error{cannot_create}.
 void check_folder_of_frames(const std::filesystem::path& folder);
 

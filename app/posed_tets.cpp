@@ -8,6 +8,7 @@
 #include <string>
 
 #include <ecorche/values/error.hpp>
+#include "core/files/look.hpp"
 #include "io/surface/surface_file.hpp"
 
 namespace ecorche::app {
@@ -62,7 +63,7 @@ std::vector<float> segment_of_tets(const Model& model) {
 }
 
 PosedTets read_posed_tets(const fs::path& file) {
-  if (!fs::exists(file))
+  if (!files::is_there(file))
     throw Error(ErrorKind::missing_input, file.string(), "is not there, and the way back is in it",
                 "give a folder that pose wrote with its tets: --tets, or all of it");
   io::TetFile read = io::read_tets(file);

@@ -13,6 +13,7 @@
 #include "app/surfaces_back.hpp"
 #include "app/unpose_report.hpp"
 #include "core/files/atomic_file.hpp"
+#include "core/files/look.hpp"
 #include "core/files/staged_folder.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/image_file.hpp"
@@ -71,10 +72,10 @@ class Source {
   Source(const Program& program, const UnposeSettings& settings)
       : settings_(settings),
         context_(program.context("check")),
-        tets_(fs::is_directory(settings.posed) ? settings.posed / kTets : settings.posed),
+        tets_(files::is_folder(settings.posed) ? settings.posed / kTets : settings.posed),
         root_(tets_.parent_path().empty() ? fs::path(".") : tets_.parent_path()),
         manifest_(read_manifest(root_)) {
-    if (manifest_ && tets_.filename() == kTets && fs::exists(tets_)) check(std::string(kTets));
+    if (manifest_ && tets_.filename() == kTets && files::is_there(tets_)) check(std::string(kTets));
   }
 
   const fs::path& tets() const { return tets_; }

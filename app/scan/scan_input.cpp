@@ -10,6 +10,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/files/look.hpp"
 #include "core/values/text.hpp"
 #include "io/case/structures.hpp"
 #include "io/image/dicom.hpp"
@@ -344,7 +345,7 @@ class Reader {
   void name_labels() {
     std::set<fs::path> used;
     for (ScanLabels& labels : out_.labels) {
-      if (fs::is_directory(labels.path)) continue;
+      if (files::is_folder(labels.path)) continue;
       const auto table = table_for(labels.path);
       if (!table) continue;
       use(labels, *table);

@@ -12,6 +12,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/hidden_beside.hpp"
+#include "core/files/look.hpp"
 #include "core/platform/file.hpp"
 #include "core/platform/process.hpp"
 #include "core/values/text.hpp"
@@ -97,7 +98,7 @@ class Rollback {
 
 AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
   const fs::path folder = folder_of(path_);
-  if (fs::is_directory(path_)) {
+  if (is_folder(path_)) {
     throw Error(ErrorKind::cannot_create, path_.string(), "is a folder", "name a file");
   }
   if (const std::error_code error = platform::cannot_make_in(folder)) cannot_write(path_, error);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/files/look.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/mask_folder.hpp"
@@ -50,7 +51,7 @@ Segmentation read_map(const Value& entry, const Locate& locate, const files::Rea
   std::optional<LabelNames> names;
   if (table) names = read_table(entry, *table, locate);
   const std::filesystem::path path = locate(entry, entry.at("file"), true);
-  const bool folder = std::filesystem::is_directory(path) && !is_dicom(path);
+  const bool folder = files::is_folder(path) && !is_dicom(path);
   if (folder && table) table->fail("does not apply to a folder", "its masks have the names of their files");
   Segmentation read = folder ? read_masks(images_within(path), options, context.quiet())
                              : read_segmentation(path, options, read_choice(entry));

@@ -6,6 +6,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "core/files/atomic_file.hpp"
+#include "core/files/look.hpp"
 #include "core/values/text.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/dicom_image.hpp"
@@ -137,7 +138,7 @@ Image read_stored(const Path& path, const files::ReadOptions& options, ImageChoi
 
 std::string read_head(const Path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
+  if (!file || files::is_folder(path)) {
     throw Error(ErrorKind::missing_input, path.string(), "cannot be opened", "check the path and its rights");
   }
   std::string head(kLargestHeader, '\0');

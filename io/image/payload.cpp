@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/files/look.hpp"
 #include "io/image/header.hpp"
 #include "io/image/header_fields.hpp"
 
@@ -158,7 +159,7 @@ void place_data(ImageHeader& header) {
 }
 
 void check_payload(const ImageHeader& header, const Path& path, const files::ReadLimits& limits) {
-  if (!std::filesystem::is_regular_file(header.data_file)) {
+  if (!files::is_file(header.data_file)) {
     throw Error(ErrorKind::missing_input, header.data_file.string(), "cannot be opened",
                 "the header " + path.string() + " names it");
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "core/files/look.hpp"
 #include "io/motion/asf_parser.hpp"
 #include "io/motion/frame_rows.hpp"
 
@@ -119,14 +120,14 @@ std::unique_ptr<ClipFile> open_amc(const std::filesystem::path& amc, const std::
 }
 
 std::filesystem::path asf_of(const std::filesystem::path& amc) {
-  if (!std::filesystem::is_regular_file(amc)) TextStream::open(amc);  // tells what is wrong with it
+  if (!files::is_file(amc)) TextStream::open(amc);  // tells what is wrong with it
   std::filesystem::path same = amc;
   same.replace_extension(".asf");
-  if (std::filesystem::is_regular_file(same)) return same;
+  if (files::is_file(same)) return same;
   const std::string stem = amc.stem().string();
   const std::filesystem::path folder = amc.has_parent_path() ? amc.parent_path() : ".";
   const std::filesystem::path subject = folder / (stem.substr(0, stem.find('_')) + ".asf");
-  if (std::filesystem::is_regular_file(subject)) return subject;
+  if (files::is_file(subject)) return subject;
   std::vector<std::filesystem::path> found;
   std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include <ecorche/values/error.hpp>
+#include "core/files/look.hpp"
 #include "core/values/text.hpp"
 
 namespace ecorche::io {
@@ -25,7 +26,7 @@ TextStream::TextStream(std::unique_ptr<std::istream> in, std::string where)
 
 TextStream TextStream::open(const std::filesystem::path& path) {
   auto in = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*in || std::filesystem::is_directory(path)) {
+  if (!*in || files::is_folder(path)) {
     throw Error(ErrorKind::missing_input, path.string(), "cannot be opened",
                 "check the path and its permissions");
   }

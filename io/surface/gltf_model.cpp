@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/files/atomic_file.hpp"
+#include "core/files/look.hpp"
 #include "core/values/text.hpp"
 #include "io/surface/byte_reader.hpp"
 
@@ -134,7 +135,7 @@ tinygltf::Model parse(std::string_view file, const std::filesystem::path& path, 
   } folder_files{path.parent_path(), budget};
   tinygltf::FsCallbacks files{};
   files.FileExists = [](const std::string& name, void* base) {
-    return is_plain(name) && std::filesystem::is_regular_file(static_cast<FolderFiles*>(base)->folder / name);
+    return is_plain(name) && files::is_file(static_cast<FolderFiles*>(base)->folder / name);
   };
   files.ExpandFilePath = [](const std::string& name, void*) { return name; };
   files.ReadWholeFile = [](std::vector<unsigned char>* out, std::string* problem, const std::string& name,

@@ -119,6 +119,18 @@ class Cli(unittest.TestCase):
         self.assert_error(run("preprocess", CASE, "-o", self.folder / "absent" / "m.hdf"), 73, "m.hdf")
         self.assertEqual(blocker.read_text(), "in the way")
 
+    def test_names_longer_than_the_system_has(self):
+        long = "n" * 300
+        for words, ending in ((("phantom",), ""), (("preprocess", CASE), ".hdf"), (("pose", MODEL, "--pose", "lib:supine"), ""),
+                              (("export", MODEL), ".glb"), (("fem", MODEL, "--pose", "lib:supine"), ""),
+                              (("calibrate", MODEL), ".hdf")):
+            self.assert_error(run(*words, "-o", self.folder / (long + ending)), 73, "File name too long")
+        for words in (("info", f"{long}.hdf"), ("check", f"{long}.stl"), ("pose", MODEL, "-o", self.folder / "p", "--pose", f"{long}.yaml"),
+                      ("pose", MODEL, "-o", self.folder / "p", "--motion", f"{long}.bvh", "--frames", "0:1"), ("new", f"{long}.nii.gz", "-o", self.folder / "c"),
+                      ("unpose", long, "-o", self.folder / "u")):
+            self.assert_error(run(*words), 66)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_a_wrong_case_names_file_line_and_key(self):
         case = self.folder / "case.yaml"
         text = (CASE / "case.yaml").read_text()
