@@ -126,7 +126,7 @@ std::filesystem::path asf_of(const std::filesystem::path& amc) {
   if (files::is_file(same)) return same;
   const std::string stem = amc.stem().string();
   const std::filesystem::path folder = amc.has_parent_path() ? amc.parent_path() : ".";
-  const std::filesystem::path subject = folder / (stem.substr(0, stem.find('_')) + ".asf");
+  std::filesystem::path subject = folder / (stem.substr(0, stem.find('_')) + ".asf");
   if (files::is_file(subject)) return subject;
   std::vector<std::filesystem::path> found;
   std::error_code ignored;
