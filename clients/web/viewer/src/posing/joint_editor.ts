@@ -8,7 +8,7 @@ import { placeJoint } from "./forward.js";
 import { typedDegrees, type Poser } from "./poser.js";
 import type { Joint } from "./rig.js";
 import { DEGREES, type Vec3 } from "./rotation.js";
-import { angleLabel, isUnsafe, jointLabel, limitsText, oppositeOf, spoken } from "./words.js";
+import { angleLabel, isUnsafe, jointLabel, limitsText, oppositeOf, reachOf, spoken } from "./words.js";
 
 /** A field of numbers: arrows step, with Shift by ten; Enter and leaving it take what is typed. */
 export function numberField(id: string, step: number, unit: string, set: (value: number) => void, parse: (text: string) => number | null) {
@@ -50,8 +50,7 @@ interface AngleRow {
 function angleRow(poser: Poser, row: number, joint: Joint, angle: number): AngleRow {
   const range = joint.sequence[angle]!;
   const id = `angle-${joint.name}-${range.name}`;
-  const low = Math.min(range.min, range.rest), high = Math.max(range.max, range.rest);
-  const limited = Number.isFinite(low) && Number.isFinite(high);
+  const { low, high, limited } = reachOf(range);
   const field = numberField(id, 1, "°", (degrees) => poser.turn(row, angle, degrees / DEGREES), typedNumber);
   const slider = h("input", {
     type: "range", class: "angle-slider", tabIndex: -1, min: String(limited ? low * DEGREES : -180), max: String(limited ? high * DEGREES : 180), step: "0.1",

@@ -22,11 +22,17 @@ export function degreesText(radians: number, digits = 1): string {
   return `${String(rounded === 0 ? 0 : rounded).replace("-", "\u2212")}°`;
 }
 
-/** Which of a joint's angles the value may be: its limits, and where the model knows, how far the body stays one. */
-export function limitsText({ min, max, rest, safe }: Pick<AngleAxis, "min" | "max" | "rest" | "safe">): string {
-  const low = Math.min(min, rest), high = Math.max(max, rest), between = (from: number, to: number) => `${degreesText(from, 0)} to ${degreesText(to, 0)}`;
-  const limits = Number.isFinite(low) && Number.isFinite(high) ? between(low, high) : "no limit";
-  return safe ? `${limits}, safe ${between(Math.max(low, safe.from), Math.min(high, safe.to))}` : limits;
+/** How far an angle goes: its limits and the scan's own value, and whether that is an end either way. */
+export function reachOf({ min, max, rest }: Pick<AngleAxis, "min" | "max" | "rest">): { low: number; high: number; limited: boolean } {
+  const low = Math.min(min, rest), high = Math.max(max, rest);
+  return { low, high, limited: Number.isFinite(low) && Number.isFinite(high) };
+}
+
+/** An angle's limits, and where the model knows, how far the body stays one. */
+export function limitsText(range: Pick<AngleAxis, "min" | "max" | "rest" | "safe">): string {
+  const { low, high, limited } = reachOf(range), between = (from: number, to: number) => `${degreesText(from, 0)} to ${degreesText(to, 0)}`;
+  const limits = limited ? between(low, high) : "no limit";
+  return range.safe ? `${limits}, safe ${between(Math.max(low, range.safe.from), Math.min(high, range.safe.to))}` : limits;
 }
 
 /** Whether the body does not stay one at this value, as far as the model knows. */
