@@ -165,7 +165,7 @@ class CaseReader {
   // The same of an image, which may be a folder of DICOM, or of masks. The names of DICOM files, which may
   // name the patient, stay out of the model.
   fs::path locate_image(const Value& entry, const Value& file, bool masks = false) {
-    const fs::path path = base_of(entry) / file.text();
+    fs::path path = base_of(entry) / file.text();
     std::error_code ignored;
     if (!fs::is_directory(path, ignored)) return locate(entry, file);
     if (!is_dicom(path)) {

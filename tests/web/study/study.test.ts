@@ -5,7 +5,8 @@ import fs from "node:fs";
 import path from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
+import type { Browser, BrowserContext, Page } from "playwright-core";
+import { launch } from "../support/chromium.js";
 
 declare const ROOT: string;
 const FOLDER = path.join(ROOT, "examples/study"), PAGE = pathToFileURL(path.join(FOLDER, "index.html")).href;
@@ -13,7 +14,7 @@ let browser: Browser;
 const faults: string[] = [];
 
 before(async () => {
-  browser = await chromium.launch({ executablePath: process.env["ECORCHE_CHROMIUM"] ?? "/usr/bin/chromium", args: ["--no-sandbox", "--headless=new"], timeout: 60_000 });
+  browser = await launch();
 });
 after(() => browser?.close());
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer in Chromium: its built files behind a server that has the headers of `ecorche serve` and hands /v1 on to a real one. A page
 // that logs an error, breaks its policy or asks another host fails its test.
-import { chromium, type Browser, type BrowserContextOptions, type Page } from "playwright-core";
+import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import fs from "node:fs";
 import http from "node:http";
 import net from "node:net";
@@ -58,13 +58,7 @@ export class Site {
   }
 }
 
-export async function launch(): Promise<Browser> {
-  const executablePath = process.env["ECORCHE_CHROMIUM"] ?? "/usr/bin/chromium";
-  return chromium.launch({
-    executablePath, timeout: 60_000,
-    args: ["--no-sandbox", "--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-  });
-}
+export { launch } from "./chromium.js";
 
 export interface Viewed {
   readonly page: Page;

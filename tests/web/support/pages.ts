@@ -7,7 +7,8 @@ import http from "node:http";
 import type { AddressInfo } from "node:net";
 import os from "node:os";
 import path from "node:path";
-import { chromium, type Browser, type Page } from "playwright-core";
+import type { Page } from "playwright-core";
+import { executable, FLAGS } from "./chromium.js";
 
 declare const ROOT: string;
 const web = () => path.join(ROOT, "clients/web");
@@ -53,20 +54,12 @@ export async function serve(files: Files, { isolated = true, port = 0, posted = 
   };
 }
 
-const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
-
-function executable(): string {
-  const found = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find((file) => fs.existsSync(file));
-  if (!found) throw new Error("no Chromium (run scripts/setup --tests)");
-  return found;
-}
-
-export const launch = (): Promise<Browser> => chromium.launch({ executablePath: executable(), args: FLAGS });
+export { launch } from "./chromium.js";
 
 /** Chromium without the debugging tap, which would look at every message of a WebSocket. Ends what it returns. */
 export function openUntapped(url: string): () => Promise<void> {
   const profile = fs.mkdtempSync(path.join(os.tmpdir(), "ecorche-chromium-"));
-  const child = spawn(executable(), [...FLAGS, "--headless=new", `--user-data-dir=${profile}`, url], { detached: true, stdio: "ignore" });
+  const child = spawn(executable(), [...FLAGS, `--user-data-dir=${profile}`, url], { detached: true, stdio: "ignore" });
   const ended = new Promise((resolve) => child.once("exit", resolve));
   return async () => {
     if (child.exitCode === null) process.kill(-child.pid!, "SIGKILL");
