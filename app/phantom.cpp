@@ -13,6 +13,7 @@
 #include "app/phantom_scan.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/files/look.hpp"
+#include "core/files/staged_folder.hpp"
 #include "io/motion/bvh.hpp"
 
 namespace ecorche::app {
@@ -50,6 +51,7 @@ void check_target(const std::filesystem::path& folder) {
 
 int run(const Program& program, const PhantomSettings& settings) {
   check_target(settings.folder);
+  { const files::StagedFolder probe(settings.folder, "truth.yaml"); }  // refused now, not after the drawing
   const phantom::Variety variety = settings.vary ? phantom::Variety::population : phantom::Variety::plain;
   const phantom::Phantom made = settings.bar
                                     ? phantom::make_bar(size_of(settings), program.context("bar"))

@@ -106,8 +106,9 @@ class Body:
         return q, t
 
     def lbs(self, q, t, points):
-        moved = rotate(q[None], points[:, None]) + t
-        return np.einsum("ns,nsc->nc", self.weights, moved)
+        matrices = np.stack([rotate(q, unit) for unit in np.eye(3)], -1)
+        blended = (self.weights @ matrices.reshape(-1, 9)).reshape(-1, 3, 3)
+        return np.einsum("nij,nj->ni", blended, points) + self.weights @ t
 
     def dqs(self, q, t):
         """Kavan08, algorithm 1."""

@@ -196,6 +196,12 @@ class Unity(unittest.TestCase):
         self.assertEqual([line.removesuffix(" by bricks") for line in out], told)
         self.assertIn(" by bricks", "".join(out))
 
+    def test_slices_are_planes_of_the_volume(self):
+        for words in ((), ("compressed",)):
+            expected = ("0 differ, many are not background", "the stream has 2 slices", "give 1 to 4096 pixels", "no bricks of them", "at most 16 slices")
+            for line, what in zip(check("slices", self.server.address, *words).splitlines(), expected, strict=True):
+                self.assertIn(what, line)
+
     def unpacked(self, *pairs):
         """Lines of the program of (size, frame)."""
         with tempfile.TemporaryDirectory() as folder:

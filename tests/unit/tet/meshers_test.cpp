@@ -97,7 +97,7 @@ TEST_P(EveryMesher, FillsTheBodyAndLabelsItsBones) {
 }
 
 TEST_P(EveryMesher, KeepsTheLimits) {
-  const Prepared p(trunk(), 2.5);
+  const Prepared p(trunk(), 4);
   const TetMesh free = p.mesh(GetParam());
   Options few;
   few.max_tets = free.T.rows() * 3 / 4;

@@ -114,6 +114,8 @@ namespace Ecorche
             return true;
         }
 
+        private static void Set(Vector3 to, Point3 point) => (to.X, to.Y, to.Z) = (point.x, point.y, point.z);
+
         public void Unsubscribe(MeshStream stream)
         {
             if (!_streams.Remove(stream) || _streams.Exists(one => one.Subscription == stream.Subscription)) return;
@@ -128,11 +130,12 @@ namespace Ecorche
         }
 
         /// <summary>Frames of a posed volume, whole or a `region` of the posed space (LPS mm). `changedBricks`: less on the way, all voxels here;
-        /// `compressed`: by zstd, for lines that are slower than its decoder; `spheres`: posed by the balls that the model holds, not by tets.</summary>
+        /// `compressed`: by zstd, for lines that are slower than its decoder; `spheres`: posed by the balls that the model holds, not by tets;
+        /// `slices`: so many planes instead of the volume, at most 16, without `region` and `changedBricks`.</summary>
         public VolumeStream SubscribeVolume(string name, bool nearest = false, bool changedBricks = false, double[] region = null, double maxRate = 0,
-            bool compressed = false, bool spheres = false)
+            bool compressed = false, bool spheres = false, IReadOnlyList<SlicePlane> slices = null)
         {
-            var stream = new VolumeStream(Opened(), name, nearest, changedBricks, region, maxRate, compressed, spheres);
+            var stream = new VolumeStream(Opened(), name, nearest, changedBricks, region, maxRate, compressed, spheres, slices);
             Subscribe(stream);
             _volumes.Add(stream);
             return stream;
@@ -152,6 +155,15 @@ namespace Ecorche
             subscribe.Volume.Compressed = stream.Compressed;
             subscribe.Volume.Deformer = stream.Spheres ? Deformer.Spheres : Deformer.Tets;
             subscribe.Volume.HasRegion = SetBox(subscribe.Volume.Region, stream.Region);
+            foreach (var plane in stream.Slices)
+            {
+                var slice = subscribe.Volume.Slices.Add();
+                slice.HasOrigin = slice.HasU = slice.HasV = true;
+                Set(slice.Origin, plane.Origin);
+                Set(slice.U, plane.U);
+                Set(slice.V, plane.V);
+                (slice.SizeU, slice.SizeV) = ((uint)plane.SizeU, (uint)plane.SizeV);
+            }
             var came = Call(default);
             using (new Returned(_line, came)) stream.Begin(_in.Subscribed.Subscription);
         }

@@ -1,24 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 using System;
+using System.Collections.Generic;
+using System.Linq;
 using System.Runtime.InteropServices;
 using Ecorche.Wire;
 
 namespace Ecorche
 {
-    /// <summary>Frames of a posed volume.</summary>
+    /// <summary>Frames of a posed volume, or of planes through it.</summary>
     public sealed class VolumeStream
     {
         private const int Brick = 32;
         private readonly int _bytesPerVoxel;
         private readonly Volume _volume;
         private readonly ZstdDecoder _zstd;
+        private readonly long _pixels;  // of all slices
         private byte[] _key = System.Array.Empty<byte>(), _voxels = System.Array.Empty<byte>(), _content = System.Array.Empty<byte>();
         private ulong _keyframe;
         private bool _hasKey;
+        private int _size;
 
-        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate, bool compressed, bool spheres)
+        internal VolumeStream(Body body, string name, bool nearest, bool changedBricks, double[] region, double maxRate, bool compressed, bool spheres,
+            IReadOnlyList<SlicePlane> slices)
         {
             (Name, Nearest, ChangedBricks, Region, MaxRate, Spheres) = (name, nearest, changedBricks, region, maxRate, spheres);
+            Slices = slices == null ? System.Array.Empty<SlicePlane>() : slices.ToArray();
+            foreach (var slice in Slices) _pixels += (long)slice.SizeU * slice.SizeV;
             for (int v = 0; v < body.Volumes.Count; ++v)
                 if (body.Volumes[v].Name == name) _volume = body.Volumes[v];
             if (_volume == null) throw new EcorcheException(Code.NotFound, name + ": the model has no such volume");
@@ -31,7 +38,9 @@ namespace Ecorche
         public ScalarType Type => _volume.Type;
         /// <summary>Numbers of a voxel, side by side.</summary>
         public int Components => (int)_volume.Components;
-        /// <summary>Voxels along i, j and k.</summary>
+        /// <summary>The planes that were asked for; none: the volume, or its region.</summary>
+        public IReadOnlyList<SlicePlane> Slices { get; }
+        /// <summary>Voxels along i, j and k; 0 of slices, as `Origin`, `Spacing` and `Direction` are.</summary>
         public int SizeI { get; private set; }
         public int SizeJ { get; private set; }
         public int SizeK { get; private set; }
@@ -41,8 +50,17 @@ namespace Ecorche
         /// <summary>Nine, row by row; its columns are the axes of i, j and k.</summary>
         public double[] Direction { get; } = new double[9];
         public ulong PoseSequence { get; private set; }
-        /// <summary>i fastest, little-endian; until the next frame.</summary>
-        public ReadOnlySpan<byte> Voxels => _voxels.AsSpan(0, SizeI * SizeJ * SizeK * _bytesPerVoxel);
+        /// <summary>i fastest, little-endian; of slices one after another, u fastest. Until the next frame.</summary>
+        public ReadOnlySpan<byte> Voxels => _voxels.AsSpan(0, _size);
+
+        /// <summary>Pixels of a slice, u fastest, little-endian; none before the first frame. Until the next frame.</summary>
+        public ReadOnlySpan<byte> SliceVoxels(int row)
+        {
+            if (row < 0 || row >= Slices.Count) throw new ArgumentOutOfRangeException(nameof(row), row, "the stream has " + Slices.Count + " slices");
+            int before = 0;
+            for (int i = 0; i < row; ++i) before += Bytes(Slices[i]);
+            return _size == 0 ? default : Voxels.Slice(before, Bytes(Slices[row]));
+        }
 
         /// <summary>How many bricks the last frame replaced; 0: it brought all voxels.</summary>
         public int Bricks { get; private set; }
@@ -64,9 +82,9 @@ namespace Ecorche
         internal Code Decode(VolumeFrame told, FrameBytes from)
         {
             if (told.HasStatus && told.Status.Code != 0) return (Code)told.Status.Code;
-            if (told.HasContent != Compressed || !told.HasGrid) throw EcorcheException.Damaged("a volume that was not asked for so");
-            long voxels = (long)told.Grid.SizeI * told.Grid.SizeJ * told.Grid.SizeK;
-            if (told.Grid.SizeI > 65536 || told.Grid.SizeJ > 65536 || told.Grid.SizeK > 65536 || voxels * _bytesPerVoxel > int.MaxValue)
+            if (told.HasContent != Compressed || told.HasGrid != (Slices.Count == 0)) throw EcorcheException.Damaged("a volume that was not asked for so");
+            long voxels = Slices.Count == 0 ? (long)told.Grid.SizeI * told.Grid.SizeJ * told.Grid.SizeK : _pixels;
+            if (Slices.Count == 0 && (told.Grid.SizeI > 65536 || told.Grid.SizeJ > 65536 || told.Grid.SizeK > 65536) || voxels * _bytesPerVoxel > int.MaxValue)
                 throw EcorcheException.Damaged("a volume of " + voxels + " voxels");
             int size = (int)voxels * _bytesPerVoxel;
             var rows = Compressed ? Content(told, from, size) : Bytes(told.Voxels, from);
@@ -75,6 +93,7 @@ namespace Ecorche
                 if (rows.Length != size) throw EcorcheException.Damaged("a volume of " + rows.Length + " bytes of " + size);
                 if (_voxels.Length < size) _voxels = new byte[size];
                 rows.CopyTo(_voxels);
+                _size = size;
                 SetGrid(told);
                 Bricks = 0;
                 if (!ChangedBricks || told.Keyframe != told.Frame) return Code.Ok;
@@ -86,12 +105,15 @@ namespace Ecorche
             if (!_hasKey || told.Keyframe != _keyframe || _key.Length != size)
                 throw EcorcheException.Damaged("a volume is against keyframe " + told.Keyframe + ", which did not come");
             _key.AsSpan().CopyTo(_voxels);
+            _size = size;
             SetGrid(told);
             var bricks = from.Rows<uint>(told.Bricks, ScalarType.U32, 1);
             PutBricks(bricks, rows);
             Bricks = bricks.Length;
             return Code.Ok;
         }
+
+        private int Bytes(SlicePlane slice) => slice.SizeU * slice.SizeV * _bytesPerVoxel;
 
         private ReadOnlySpan<byte> Bytes(Wire.Array array, FrameBytes from)
         {
@@ -118,13 +140,14 @@ namespace Ecorche
 
         private void SetGrid(VolumeFrame told)
         {
+            PoseSequence = told.PoseSequence;
+            if (Slices.Count > 0) return;
             var grid = told.Grid;
             if (grid.Direction.Count != 9) throw EcorcheException.Damaged("a grid without its direction");
             (SizeI, SizeJ, SizeK) = ((int)grid.SizeI, (int)grid.SizeJ, (int)grid.SizeK);
             Origin = new Point3(grid.Origin.X, grid.Origin.Y, grid.Origin.Z);
             Spacing = new Point3(grid.Spacing.X, grid.Spacing.Y, grid.Spacing.Z);
             grid.Direction.Span.CopyTo(Direction);
-            PoseSequence = told.PoseSequence;
         }
 
         /// <summary>docs/reference/protocol.md, "Parts of a body": 32^3 voxels each, the last ones along an axis cut short.</summary>
