@@ -12,7 +12,7 @@ export const FLAGS = ["--no-sandbox", "--headless=new", "--use-angle=swiftshader
 
 /** ECORCHE_CHROMIUM, or the system's. */
 export function executable(): string {
-  const found = [process.env["ECORCHE_CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser"].find((file) => file && fs.existsSync(file));
+  const found = process.env["ECORCHE_CHROMIUM"] ?? ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find((file) => fs.existsSync(file));
   if (!found) throw new Error("no Chromium (run scripts/setup --tests)");
   return found;
 }
