@@ -295,6 +295,7 @@ TEST(Cgal, SmallestAngleIsLifted) {
 
 TEST(Cgal, FindsPartsThatItsOwnFirstPointsWouldMiss) {
   std::vector<SurfaceMesh> bones;
+  bones.reserve(6);
   for (int n = 0; n < 6; ++n)
     bones.push_back(shapes::box({-10.0 + 4 * n, -0.4, -0.4}, {-9.2 + 4 * n, 0.4, 0.4}));
   const Prepared p(shapes::body(shapes::ellipsoid({0, 0, 0}, {16, 16, 16}, 8), bones), 1);
