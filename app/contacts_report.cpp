@@ -2,6 +2,7 @@
 #include "app/contacts_report.hpp"
 
 #include "preprocess/check/touching_limbs.hpp"
+#include "preprocess/parting/cut_contacts.hpp"
 
 namespace ecorche::app {
 
@@ -18,6 +19,28 @@ nlohmann::json contacts_json(const Model& model) {
                    {"text", check::describe(touch, model.rig.skeleton)},
                    {"mend", check::parting_advice(check::cube_mm(model.nodes, model.tets))}});
   }
+  return out;
+}
+
+nlohmann::json cut_contacts_json(const Model& model) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const parting::CutContact& contact : parting::cut_contacts(model)) {
+    out.push_back(
+        {{"limb", contact.limb},
+         {"of", contact.other_limb.empty() ? nlohmann::json(nullptr) : nlohmann::json(contact.other_limb)},
+         {"own", contact.own},
+         {"other", contact.other},
+         {"area_cm2", contact.cm2},
+         {"confidence", contact.confidence},
+         {"at", {contact.at.x(), contact.at.y(), contact.at.z()}},
+         {"text", parting::describe(contact)}});
+  }
+  return out;
+}
+
+std::string cut_contacts_text(const nlohmann::json& contacts) {
+  std::string out;
+  for (const nlohmann::json& contact : contacts) out += contact["text"].get<std::string>() + "\n";
   return out;
 }
 

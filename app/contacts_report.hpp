@@ -15,4 +15,11 @@ nlohmann::json contacts_json(const Model& model);
 /// A line each, the advice last; empty where nothing touches.
 std::string contacts_text(const nlohmann::json& contacts);
 
+/// Where limbs were cut free: `[{limb, of, own, other, area_cm2, confidence, at, text}]`; `of` is null for
+/// the trunk.
+nlohmann::json cut_contacts_json(const Model& model);
+
+/// A line each; empty where none was cut.
+std::string cut_contacts_text(const nlohmann::json& contacts);
+
 }  // namespace ecorche::app

@@ -52,6 +52,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"volumes", Json::array()},
            {"spheres", Json::array()},
            {"contacts", contacts_json(model)},
+           {"cut_contacts", cut_contacts_json(model)},
            {"skin_caps", caps_json(model)},
            {"materials", materials_json(model, soft_tets_by_material(model))},
            {"corrections", corrections_json(model)},
@@ -167,6 +168,7 @@ std::string info_text(const Json& info) {
     out += text_line("  %.0f cm2 about [%.0f, %.0f, %.0f] mm", cap["cm2"].get<double>(), at[0].get<double>(),
                      at[1].get<double>(), at[2].get<double>());
   }
+  if (!info["cut_contacts"].empty()) out += "\n" + printable_lines(cut_contacts_text(info["cut_contacts"]));
   if (!info["contacts"].empty()) out += "\n" + printable_lines(contacts_text(info["contacts"]));
   out += printable_lines(correction_text(info["corrections"], info["safe_ranges"]));
   out += "\ncertificate\n";

@@ -2,6 +2,7 @@
 #include "preprocess/look_ahead.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/check/touching_limbs.hpp"
@@ -51,7 +52,23 @@ Model half_made(const Case& patient, const Context& context) {
   Tissue& skin = model.tissues.emplace_back();
   skin.group = Group::skin;
   skin.V = patient.skin.V.cast<float>();
+  skin.F = patient.skin.F;
   return model;
+}
+
+// As parting::part_limbs will have it.
+bool comes_apart(const check::Touch& touch, const Case& patient, const Skeleton& skeleton) {
+  if (!patient.contacts.cut) return false;
+  const std::vector<int> limb = check::limbs_of(skeleton);
+  const auto limb_named = [&](const std::string& name) {
+    const int row = skeleton.find_segment(name);
+    return row < 0 ? -1 : limb[static_cast<std::size_t>(row)];
+  };
+  const std::pair both = std::minmax(touch.limb, touch.other_limb);
+  return std::none_of(patient.contacts.joined.begin(), patient.contacts.joined.end(), [&](const auto& pair) {
+    const int a = limb_named(pair.first), b = limb_named(pair.second);
+    return std::pair(std::min(a, b), std::max(a, b)) == std::pair<int, int>(both);
+  });
 }
 
 }  // namespace
@@ -65,7 +82,12 @@ std::vector<check::Finding> look_ahead(const Case& patient, const Context& conte
     const std::string advice = check::parting_advice(check::cube_mm(model.nodes, model.tets));
     for (const check::Touch& touch : check::touching_limbs(model)) {
       const std::string& limb = model.rig.skeleton.segments[static_cast<std::size_t>(touch.limb)].name;
-      out.push_back({Severity::warning, limb, check::what(touch, model.rig.skeleton), touch.at, advice});
+      const std::string what = check::what(touch, model.rig.skeleton);
+      if (comes_apart(touch, patient, model.rig.skeleton))
+        out.push_back({Severity::note, limb, what + "; preprocess cuts it free", touch.at,
+                       "where it has grown together, say so in the case under contacts, joined"});
+      else
+        out.push_back({Severity::warning, limb, what, touch.at, advice});
     }
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::data && error.kind() != ErrorKind::config) throw;

@@ -11,7 +11,8 @@
 namespace ecorche::preprocess {
 
 /// Voxels, the default lattice and harmonic weights of the case, as `run` with no option makes them, and what
-/// is found on the way: what would refuse the case, an error; limbs that touch, a warning each. Nothing of a
+/// is found on the way: what would refuse the case, an error; limbs that touch, a note each where
+/// they come apart, else a warning. Nothing of a
 /// case without skin or bones. Throws Error{interrupted} and Error{internal} only.
 std::vector<check::Finding> look_ahead(const Case& patient, const Context& context);
 

@@ -13,14 +13,16 @@
 
 #include <ecorche/model_file/model_file.hpp>
 #include "core/platform/process.hpp"
+#include "preprocess/bind_tissues.hpp"
 #include "preprocess/bounds.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/check/joints.hpp"
 #include "preprocess/check/lost_segments.hpp"
 #include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/cor/centres.hpp"
-#include "preprocess/mapping/bind.hpp"
 #include "preprocess/materials.hpp"
+#include "preprocess/parted_weights.hpp"
+#include "preprocess/parting/cut_contacts.hpp"
 #include "preprocess/provenance.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/skin_caps.hpp"
@@ -32,7 +34,6 @@
 #include "preprocess/thin/body_spheres.hpp"
 #include "preprocess/thin/thinning.hpp"
 #include "preprocess/voxel/voxelize.hpp"
-#include "preprocess/weights/harmonic.hpp"
 #include "preprocess/weights/rigid_bones.hpp"
 
 namespace ecorche::preprocess {
@@ -44,9 +45,6 @@ std::vector<std::string_view> stage_names(const Options& options) {
   if (options.spheres_tp) names.insert(names.begin() + 2, "spheres");
   return names;
 }
-
-// A tissue this many voxels away from the body is probably in another frame.
-constexpr double kFarVoxels = 5;
 
 // Announces, times and measures the stages, in the order of their names.
 class Stages {
@@ -148,73 +146,6 @@ std::vector<std::int32_t> owners(const Case& patient, const Skeleton& skeleton) 
   std::vector<std::int32_t> rows;
   for (const CaseBone& bone : patient.bones) rows.push_back(skeleton.find_segment(bone.segment));
   return rows;
-}
-
-Tissue tissue_of(std::string name, Group group, const SurfaceMesh& surface) {
-  Tissue tissue;
-  tissue.name = std::move(name);
-  tissue.group = group;
-  tissue.V = surface.V.cast<float>();
-  tissue.F = surface.F;
-  return tissue;
-}
-
-// Skin first, then bones, then the others: the order of Model::tissues.
-std::vector<Tissue> gather_tissues(const Case& patient, const std::vector<std::int32_t>& bone_segment) {
-  std::vector<Tissue> tissues;
-  tissues.push_back(tissue_of(patient.skin_name, Group::skin, patient.skin));
-  for (std::size_t b = 0; b < patient.bones.size(); ++b) {
-    tissues.push_back(tissue_of(patient.bones[b].name, Group::bone, patient.bones[b].surface));
-    tissues.back().segment = bone_segment[b];
-  }
-  for (const CaseTissue& t : patient.tissues) tissues.push_back(tissue_of(t.name, t.group, t.surface));
-  return tissues;
-}
-
-void warn_far(const Tissue& tissue, std::span<const float> outside_mm, double voxel_mm,
-              const Context& context) {
-  const auto far = static_cast<float>(kFarVoxels * voxel_mm);
-  const auto count = std::count_if(outside_mm.begin(), outside_mm.end(), [&](float d) { return d > far; });
-  if (count == 0) return;
-  std::ostringstream line;
-  line.precision(3);
-  line << "tissue " << tissue.name << ": " << count << " of " << tissue.V.rows() << " vertices lie more than "
-       << far << " mm outside the body, the farthest "
-       << double{*std::max_element(outside_mm.begin(), outside_mm.end())}
-       << " mm; they follow their nearest tet (is the frame right?)";
-  context.warn(line.str());
-}
-
-// Bones go with their segment; what is not bone is bound to the tets, from the float32 positions that are
-// stored.
-std::vector<Tissue> bind_tissues(std::vector<Tissue> tissues, const Model& model, double voxel_mm,
-                                 const Context& context) {
-  std::vector<Tissue*> bound;
-  Eigen::Index rows = 0;
-  for (Tissue& tissue : tissues) {
-    if (tissue.segment != Tissue::by_tets) continue;
-    bound.push_back(&tissue);
-    rows += tissue.V.rows();
-  }
-  Points points(rows, 3);
-  rows = 0;
-  for (const Tissue* tissue : bound) {
-    points.middleRows(rows, tissue->V.rows()) = tissue->V.cast<double>();
-    rows += tissue->V.rows();
-  }
-  const mapping::Locator locator(model.nodes, model.tets);
-  context.report(0.4);
-  const mapping::Binding all = locator.bind(points, context);
-  context.report(0.9);
-  rows = 0;
-  for (Tissue* tissue : bound) {
-    const Eigen::Index own = tissue->V.rows();
-    tissue->tet.assign(all.tet.begin() + rows, all.tet.begin() + rows + own);
-    tissue->barycentric = all.barycentric.middleRows(rows, own);
-    warn_far(*tissue, {all.outside_mm.data() + rows, static_cast<std::size_t>(own)}, voxel_mm, context);
-    rows += own;
-  }
-  return tissues;
 }
 
 std::vector<ModelVolume> gather_volumes(const Case& patient) {
@@ -336,30 +267,36 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
       },
       patient, *labels, model.bone_segment, mesher_name, max_tets, options.max_nodes);
   TetMesh* const mesh = &made->mesh;
-  labels.reset();  // each value goes when its last reader is done
 
   std::string solver_name;
+  parting::Parting parting;
   {
     weights::Options o;
     o.solver = options.solver;
     o.kind = kind;
-    weights::WeightsResult solved = showing_worst_tets(
+    PartedWeights made_weights = showing_worst_tets(
         hooks,
         [&] {
           return stage.kept(
               [&](const Context& inner) {
-                return weights::solve_weights(*mesh, patient, model.bone_segment, model.segment_count(), o,
-                                              inner);
+                return parted_weights(*mesh, patient, model.rig, model.bone_segment, *labels, o, inner);
               },
-              patient, *mesh, model.bone_segment, model.segment_count(), options.solver, options.weights);
+              patient, *mesh, model.rig, model.bone_segment, *labels, ContactRequest{patient}, options.solver,
+              options.weights);
         },
         [&]() -> const TetMesh& { return *mesh; });
-    model.weights = std::move(solved.weights);
-    model.certificate = solved.certificate;
-    solver_name = solved.solver;
+    model.weights = std::move(made_weights.solved.weights);
+    model.certificate = made_weights.solved.certificate;
+    solver_name = made_weights.solved.solver;
+    parting = std::move(made_weights.parting);
   }
-  model.nodes = mesh->V.cast<float>();
-  model.tets = std::move(mesh->T);
+  labels.reset();  // each value goes when its last reader is done
+  const bool parted = !parting.faces.empty();
+  model.nodes = (parted ? parting.V : mesh->V).cast<float>();
+  if (parted)
+    model.tets = parting.T;
+  else
+    model.tets = std::move(mesh->T);
   model.tet_label = std::move(mesh->label);
   model.contested = std::move(made->contested);
   made.reset();
@@ -375,8 +312,8 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
       model.nodes, model.tets, model.weights, model.segment_count(), options.cor_sigma);
   std::vector<Tissue> tissues = gather_tissues(patient, model.bone_segment);
   model.tissues = stage.kept(
-      [&](const Context& inner) { return bind_tissues(std::move(tissues), model, voxel_mm, inner); }, tissues,
-      model.nodes, model.tets, voxel_mm);
+      [&](const Context& inner) { return bind_tissues(std::move(tissues), model, parting, voxel_mm, inner); },
+      tissues, model.nodes, model.tets, parting, voxel_mm);
   model.materials = materials_of(patient, model, context);
   model.volumes = gather_volumes(patient);
   Options used = options;
@@ -385,6 +322,11 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   if (std::string caps = patient.labels ? caps_text(patient.skin, patient.labels->image.grid) : "";
       !caps.empty())
     model.provenance["skin_caps"] = std::move(caps);
+  if (parted) {
+    model.provenance["cut_contacts"] = parting::cut_contacts_text(parting.contacts, model.rig.skeleton);
+    for (const parting::CutContact& contact : parting::cut_contacts(model))
+      context.info(parting::describe(contact));
+  }
   model.certificate = showing_worst_tets(
       hooks, [&] { return stage([&] { return certify(model, context); }); },
       [&] {

@@ -110,6 +110,32 @@ std::string rig(const Model& model) {
   return out + "</table>\n";
 }
 
+std::string contacts(const Model& model) {
+  const std::vector<parting::CutContact> found = parting::cut_contacts(model);
+  if (found.empty()) return {};
+  std::string out =
+      "<h2>Limbs that touched</h2>\n<p class=soft>Here the scan joined limbs to what they do not hang on; "
+      "they were "
+      "cut free, and no flesh was taken away. Rings are where: green where that is sure (confidence from "
+      "0.8), "
+      "yellow from 0.5. Where flesh has grown together in truth, name both in the case, under contacts, "
+      "joined.</p>\n<div class=row>\n";
+  for (const Place& place : contact_pictures(model, found, kBodyPixels))
+    out += picture(place.picture, place.caption);
+  out +=
+      "</div>\n<table><tr><th>limb<th>cut free of<th>most of<th class=n>cm2<th class=n>x, y, z mm<th class=n>"
+      "confidence</tr>\n";
+  for (const parting::CutContact& contact : found) {
+    out +=
+        text("<tr><td>%s<td>%s<td>%s, %s<td class=n>%.1f<td class=n>%.1f, %.1f, %.1f<td class=n>%.2f</tr>\n",
+             escaped(contact.limb).c_str(),
+             contact.other_limb.empty() ? "the trunk" : escaped(contact.other_limb).c_str(),
+             escaped(contact.own).c_str(), escaped(contact.other).c_str(), contact.cm2, contact.at[0],
+             contact.at[1], contact.at[2], contact.confidence);
+  }
+  return out + "</table>\n";
+}
+
 std::string histograms(const Model& model) {
   std::string out =
       "<h2>Quality</h2>\n<p class=soft>Heights are square roots of shares, so that few stay visible "
@@ -180,8 +206,8 @@ std::string page(const Input& input) {
          "content='width=device-width'>\n<title>" +
          escaped(model.name) + ": how it was prepared</title>\n<style>" + kStyle + "</style>\n<body>\n" +
          header(model) + certificate(model.certificate, preprocess::body_size(model)) + slices(model) +
-         rig(model) + input.more + histograms(model) + warned(model, input.warnings) + times(input.stages) +
-         provenance(model) + "</body></html>\n";
+         rig(model) + contacts(model) + input.more + histograms(model) + warned(model, input.warnings) +
+         times(input.stages) + provenance(model) + "</body></html>\n";
 }
 
 }  // namespace ecorche::app::report

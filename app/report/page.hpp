@@ -18,8 +18,9 @@ struct Input {
 };
 
 /// HTML 5 with style and pictures inside, no script, no link: certificate beside its bounds, slices with
-/// bones and weights, the rig, histograms of the mesh's and the weights' quality, times, warnings with
-/// pictures of where they are, provenance. Without the `times` the same model gives the same page.
+/// bones and weights, the rig, where limbs were cut free, histograms of the mesh's and the weights' quality,
+/// times, warnings with pictures of where they are, provenance. Without the `times` the same model gives the
+/// same page.
 std::string page(const Input& input);
 
 }  // namespace ecorche::app::report

@@ -128,18 +128,42 @@ Place place_of(const Model& model, const WarningGroup& group) {
       scene.picture()};
 }
 
-std::vector<Place> rig_pictures(const Model& model, int pixels) {
+namespace {
+
+struct Ring {
+  Eigen::Vector3d at;
+  double confidence;
+};
+
+// The bones from two sides, with a ring about each place, coloured by its confidence.
+std::vector<Place> ring_pictures(const Model& model, const std::vector<Ring>& rings, double radius,
+                                 int pixels) {
   const Box box = box_of(model);
   std::vector<Place> out;
   for (const auto& [caption, view] :
        {std::pair{"from the front", View::coronal()}, {"from the left", View::sagittal()}}) {
     Scene scene(view.of(box.low, box.high, pixels), kPlaceGround);
     draw_body(scene, model, {});
-    for (std::size_t s = 0; s < model.segment_count(); ++s)
-      scene.mark(model.rig.skeleton.segments[s].joint.center, 5, of_confidence(model.rig.fits[s].confidence));
+    for (const Ring& ring : rings) scene.mark(ring.at, radius, of_confidence(ring.confidence));
     out.push_back({caption, scene.picture()});
   }
   return out;
+}
+
+}  // namespace
+
+std::vector<Place> rig_pictures(const Model& model, int pixels) {
+  std::vector<Ring> rings;
+  for (std::size_t s = 0; s < model.segment_count(); ++s)
+    rings.push_back({model.rig.skeleton.segments[s].joint.center, model.rig.fits[s].confidence});
+  return ring_pictures(model, rings, 5, pixels);
+}
+
+std::vector<Place> contact_pictures(const Model& model, const std::vector<parting::CutContact>& contacts,
+                                    int pixels) {
+  std::vector<Ring> rings;
+  for (const parting::CutContact& contact : contacts) rings.push_back({contact.at, contact.confidence});
+  return ring_pictures(model, rings, 9, pixels);
 }
 
 }  // namespace ecorche::app::report

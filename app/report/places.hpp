@@ -8,6 +8,7 @@
 
 #include <ecorche/values/model.hpp>
 #include "app/report/picture.hpp"
+#include "preprocess/parting/cut_contacts.hpp"
 
 namespace ecorche::app::report {
 
@@ -34,6 +35,10 @@ Place place_of(const Model& model, const WarningGroup& group);
 /// The bones and all joints from the front and from the left; a ring says how sure a joint's centre is: green
 /// from confidence 0.8, yellow from 0.5, red below.
 std::vector<Place> rig_pictures(const Model& model, int pixels);
+
+/// The same with rings where limbs were cut free.
+std::vector<Place> contact_pictures(const Model& model, const std::vector<parting::CutContact>& contacts,
+                                    int pixels);
 
 /// Corners of the box about the tets.
 struct Box {

@@ -7,6 +7,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "io/case/case_rules.hpp"
+#include "io/case/contacts.hpp"
 #include "io/case/digest.hpp"
 #include "io/case/frame.hpp"
 #include "io/case/label_map.hpp"
@@ -27,9 +28,9 @@ namespace fs = std::filesystem;
 using yaml::Kind;
 using yaml::Value;
 
-constexpr std::array<std::string_view, 11> kCaseKeys{"name",   "frame",   "unit",         "skeleton",
-                                                     "skin",   "bones",   "regions",      "tissues",
-                                                     "labels", "volumes", "stiffness_kpa"};
+constexpr std::array<std::string_view, 12> kCaseKeys{"name",   "frame",   "unit",          "skeleton",
+                                                     "skin",   "bones",   "regions",       "tissues",
+                                                     "labels", "volumes", "stiffness_kpa", "contacts"};
 constexpr std::array<std::string_view, 9> kSkinKeys{"file", "name",   "frame",  "unit",    "root",
                                                     "side", "labels", "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment", "frame",  "unit",
@@ -107,6 +108,7 @@ class CaseReader {
       read_rest(*tissues);
     }
     read_stiffness_of_flesh(root_, out_);
+    if (const auto contacts = root_.find("contacts")) out_.contacts = read_contacts(*contacts, out_.skeleton);
     if (const auto volumes = root_.find("volumes")) {
       for (const Value& entry : volumes->items()) read_volume(entry);
     }

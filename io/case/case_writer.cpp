@@ -28,7 +28,7 @@ class CaseWriter {
       files::write_text(folder_ / "skeleton.yaml", skeleton_to_yaml(patient_.skeleton, patient_.size));
     yaml_ = "name: " + write_text(patient_.name) +
             "\nframe: LPS\nunit: mm\nskeleton: " + (patient_.generic ? "generic" : "skeleton.yaml") + "\n" +
-            (patient_.stiffness_kpa ? stiffness("", patient_.stiffness_kpa) + "\n" : "");
+            (patient_.stiffness_kpa ? stiffness("", patient_.stiffness_kpa) + "\n" : "") + contacts();
     surface("skin.stl", patient_.skin);
     yaml_ += patient_.skin_name == "skin"
                  ? "skin: skin.stl\n"
@@ -70,6 +70,13 @@ class CaseWriter {
     if (patient_.regions.empty()) return;
     files::write_text(folder_ / "regions.yaml", regions_to_yaml(patient_.regions));
     yaml_ += "regions: regions.yaml\n";
+  }
+  std::string contacts() const {
+    const CaseContacts& said = patient_.contacts;
+    if (!said.cut) return "contacts: joined\n";
+    std::string pairs;
+    for (const auto& [a, b] : said.joined) pairs += (pairs.empty() ? "[" : ", [") + a + ", " + b + "]";
+    return pairs.empty() ? "" : "contacts: {joined: [" + pairs + "]}\n";
   }
   static std::string stiffness(const std::string& before, const std::optional<double>& kpa) {
     return kpa ? before + "stiffness_kpa: " + yaml::write_number(*kpa) : "";

@@ -9,6 +9,7 @@
 #include <ecorche/values/joint_rule.hpp>
 #include <ecorche/values/model.hpp>
 #include "core/model_file/figures.hpp"
+#include "preprocess/parted_weights.hpp"
 #include "preprocess/weights/harmonic.hpp"
 #include "preprocess/weights/rigid_bones.hpp"
 
@@ -147,6 +148,17 @@ void fields(A& archive, const RigRequest& request) {
   for (const Segment& segment : request.patient.skeleton.segments) archive(segment.joint.how);
 }
 
+/// What is said of limbs that touch, and the labels that may show where: for keys only.
+struct ContactRequest {
+  const Case& patient;
+};
+
+template <class A>
+void fields(A& archive, const ContactRequest& request) {
+  archive(request.patient.contacts.cut, request.patient.contacts.joined, request.patient.labels.has_value());
+  if (request.patient.labels) archive(request.patient.labels->table, request.patient.labels->image);
+}
+
 /// The surfaces of a case: all that the stages behind the rig read of it. For keys only.
 template <class A>
 void fields(A& archive, const Case& patient) {
@@ -169,3 +181,28 @@ void fields(A& archive, T& bones) {
 }
 
 }  // namespace ecorche::weights
+
+namespace ecorche::parting {
+
+template <class A, Some<Contact> T>
+void fields(A& archive, T& contact) {
+  archive(contact.limb, contact.other_limb, contact.own, contact.other, contact.area_mm2, contact.at,
+          contact.confidence);
+}
+
+template <class A, Some<Parting> T>
+void fields(A& archive, T& parting) {
+  archive(parting.V, parting.T, parting.copied, parting.part, parting.contacts, parting.faces,
+          parting.joined);
+}
+
+}  // namespace ecorche::parting
+
+namespace ecorche::preprocess {
+
+template <class A, Some<PartedWeights> T>
+void fields(A& archive, T& made) {
+  archive(made.solved, made.parting);
+}
+
+}  // namespace ecorche::preprocess

@@ -12,8 +12,10 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "preprocess/geometry/nearest_point.hpp"
+#include "preprocess/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
 namespace {
@@ -37,12 +39,12 @@ struct Piece {
 
 class Finder {
  public:
-  Finder(const Model& model) : model_(model), limb_(limbs_of(model.rig.skeleton)) {}
+  explicit Finder(const TouchInput& model) : model_(model), limb_(limbs_of(model.skeleton)) {}
 
   const std::vector<int>& limbs() const { return limb_; }
 
   std::vector<Piece> pieces(int top) const {
-    const auto nodes = static_cast<std::int64_t>(model_.node_count());
+    const auto nodes = static_cast<std::int64_t>(model_.nodes.rows());
     std::vector<float> share(static_cast<std::size_t>(nodes), 0);
     in_pieces(nodes, [&](std::int64_t first, std::int64_t last, std::size_t) {
       for (std::int64_t n = first; n < last; ++n) {
@@ -51,9 +53,9 @@ class Finder {
         });
       }
     });
-    const Vector3d joint = model_.rig.skeleton.segments[static_cast<std::size_t>(top)].joint.center;
+    const Vector3d joint = model_.skeleton.segments[static_cast<std::size_t>(top)].joint.center;
     const double way = to_skin(joint);
-    const auto tets = static_cast<std::int64_t>(model_.tet_count());
+    const auto tets = static_cast<std::int64_t>(model_.tets.rows());
     std::vector<std::vector<Piece>> found(static_cast<std::size_t>((tets + kGrain - 1) / kGrain));
     in_pieces(tets, [&](std::int64_t first, std::int64_t last, std::size_t at) {
       for (std::int64_t t = first; t < last; ++t) {
@@ -87,14 +89,9 @@ class Finder {
   }
 
   double to_skin(const Vector3d& joint) const {
-    double least = std::numeric_limits<double>::infinity();
-    for (const Tissue& tissue : model_.tissues) {
-      if (tissue.group != Group::skin || tissue.V.rows() == 0) continue;
-      least = std::min(
-          least,
-          (tissue.V.rowwise() - joint.transpose().cast<float>()).rowwise().norm().cast<double>().minCoeff());
-    }
-    return least;
+    if (model_.skin.rows() == 0) return std::numeric_limits<double>::infinity();
+    return static_cast<double>(
+        (model_.skin.rowwise() - joint.transpose().cast<float>()).rowwise().norm().minCoeff());
   }
 
   // By marching tets.
@@ -149,7 +146,7 @@ class Finder {
     return most == shares.end() ? -1 : most->first;
   }
 
-  const Model& model_;
+  const TouchInput& model_;
   std::vector<int> limb_;
 };
 
@@ -162,7 +159,7 @@ std::string number(const char* format, double value) {
 // The segments of bones, by the nodes of their tets.
 class Bones {
  public:
-  Bones(const Model& model, const std::vector<int>& limb)
+  Bones(const TouchInput& model, const std::vector<int>& limb)
       : limb_(limb),
         nodes_(model.nodes.cast<double>()),
         segment_(static_cast<std::size_t>(nodes_.rows()), -1) {
@@ -223,6 +220,28 @@ Touch joined(int limb, int other_limb, const std::vector<const Piece*>& pieces) 
 
 }  // namespace
 
+PointsF outer_vertices(const PointsF& V, const Triangles& F) {
+  const geometry::TriangleClasses parts = geometry::parts({V.cast<double>(), F});
+  std::vector<double> volume(static_cast<std::size_t>(parts.count), 0);  // about a vertex of its own
+  std::vector<std::int32_t> first(volume.size(), -1);
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    const auto part = static_cast<std::size_t>(parts.of[static_cast<std::size_t>(f)]);
+    if (first[part] < 0) first[part] = F(f, 0);
+    volume[part] += tet_det(V.row(first[part]), V.row(F(f, 0)), V.row(F(f, 1)), V.row(F(f, 2)));
+  }
+  std::vector<std::uint8_t> outer(static_cast<std::size_t>(V.rows()), 0);
+  for (Eigen::Index f = 0; f < F.rows(); ++f) {
+    if (volume[static_cast<std::size_t>(parts.of[static_cast<std::size_t>(f)])] < 0) continue;
+    for (int c = 0; c < 3; ++c) outer[static_cast<std::size_t>(F(f, c))] = 1;
+  }
+  PointsF out(std::count(outer.begin(), outer.end(), 1), 3);
+  Eigen::Index row = 0;
+  for (Eigen::Index v = 0; v < V.rows(); ++v) {
+    if (outer[static_cast<std::size_t>(v)] != 0) out.row(row++) = V.row(v);
+  }
+  return out;
+}
+
 std::vector<int> limbs_of(const Skeleton& skeleton) {
   std::vector<int> limb(skeleton.segments.size(), -1);
   for (std::size_t s = 0; s < limb.size(); ++s) {  // parents come first
@@ -241,14 +260,14 @@ std::vector<int> limbs_of(const Skeleton& skeleton) {
   return limb;
 }
 
-std::vector<Touch> touching_limbs(const Model& model) {
+std::vector<Touch> touching_limbs(const TouchInput& model) {
   std::vector<Touch> out;
-  if (model.tet_count() == 0) return out;
+  if (model.tets.rows() == 0) return out;
   const Finder finder(model);
   const double length =
       static_cast<double>((model.nodes.colwise().maxCoeff() - model.nodes.colwise().minCoeff()).maxCoeff());
   std::optional<Bones> bones;
-  for (int top = 0; top < static_cast<int>(model.segment_count()); ++top) {
+  for (int top = 0; top < static_cast<int>(model.skeleton.segments.size()); ++top) {
     if (finder.limbs()[static_cast<std::size_t>(top)] != top) continue;
     const std::vector<Piece> pieces = finder.pieces(top);
     std::map<int, std::vector<const Piece*>> by_other;
@@ -274,6 +293,19 @@ std::vector<Touch> touching_limbs(const Model& model) {
     }
   }
   return out;
+}
+
+std::vector<Touch> touching_limbs(const Model& model) {
+  PointsF skin(0, 3);
+  for (const Tissue& tissue : model.tissues) {
+    if (tissue.group != Group::skin) continue;
+    const PointsF outer = outer_vertices(tissue.V, tissue.F);
+    const Eigen::Index before = skin.rows();
+    skin.conservativeResize(before + outer.rows(), 3);
+    skin.bottomRows(outer.rows()) = outer;
+  }
+  return touching_limbs(TouchInput{model.rig.skeleton, model.bone_segment, model.nodes, model.tets,
+                                   model.tet_label, model.weights, std::move(skin)});
 }
 
 std::string what(const Touch& touch, const Skeleton& skeleton) {

@@ -20,6 +20,20 @@ struct Touch {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< on the contact, near its middle, mm
 };
 
+/// What of a body is read: its rig, mesh with labels and weights, and skin.
+struct TouchInput {
+  const Skeleton& skeleton;
+  const std::vector<std::int32_t>& bone_segment;  ///< of each bone
+  const PointsF& nodes;
+  const Tets& tets;
+  const std::vector<std::uint16_t>& tet_label;  ///< as TetMesh::label
+  const Weights& weights;
+  PointsF skin;  ///< outer_vertices of it
+};
+
+/// The vertices of a skin without those of its hollows: parts that turn inwards.
+PointsF outer_vertices(const PointsF& V, const Triangles& F);
+
 /// For every segment the uppermost segment of the limb that it is of; -1: of none. A limb begins at the
 /// uppermost segment of each chain whose joint turns by more than 100 degrees about one of its angles (hips
 /// and shoulders; no joint of the spine).
@@ -29,9 +43,9 @@ std::vector<int> limbs_of(const Skeleton& skeleton);
 /// all its segments, which is harmonic: 1 on its bones, 0 on all others; so weights by whole limbs do as
 /// well. Where u = 1/2 it ends; that lies about its joint, unless something touches: what lies farther from
 /// the joint than 2.5 times the way from there to the skin is contact, where 10 cm2 of a body of 1.7 m (the
-/// like share of others) lie beyond 3.5 times it. By limbs; the larger side of two limbs. Of the model the
-/// rig, the skin, the mesh with its labels and the weights are read. O(limbs * (#nodes + #tets)); the same
-/// for any number of threads.
+/// like share of others) lie beyond 3.5 times it. By limbs; the larger side of two limbs. O(limbs * (#nodes +
+/// #tets)); the same for any number of threads.
+std::vector<Touch> touching_limbs(const TouchInput& body);
 std::vector<Touch> touching_limbs(const Model& model);
 
 /// `touches the trunk: 47 cm2 joined, most of hand_left and pelvis`.

@@ -132,7 +132,7 @@ class Filling {
 
 }  // namespace
 
-Filled fill_holes(Soup& soup, double area, const Context& context) {
+Filled fill_holes(Soup& soup, double area, const Context& context, const ChosenHole& chosen) {
   const auto edges = geometry::sorted_edges(soup.F());
   const auto loops = geometry::boundary_loops(edges);
   Filled out;
@@ -151,6 +151,7 @@ Filled fill_holes(Soup& soup, double area, const Context& context) {
     context.check_stop();
     ++out.left;
     if (!loop.closed || loop.vertices.size() < 3 || !(area > 0)) continue;
+    if (chosen && !chosen(loop.vertices)) continue;
     std::vector<std::int32_t> corners = loop.vertices;
     const Ears ears(soup, corners, kMostEdges, taken, present);
     if (corners.size() > kMostEdges || !(ears.area() <= area)) continue;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <ecorche/values/context.hpp>
@@ -34,7 +35,8 @@ struct Filled {
 
 /// Fills each hole with the triangles of least area (Barequet and Sharir 1995; of more than 800 edges,
 /// corners with the shortest chords go first until that many are left), where that is at most `area` mm^2.
-/// The surface must be split into sheets.
-Filled fill_holes(Soup& soup, double area, const Context& context);
+/// The surface must be split into sheets. Where `chosen` is given, only holes of whose vertices it is true.
+using ChosenHole = std::function<bool(const std::vector<std::int32_t>& vertices)>;
+Filled fill_holes(Soup& soup, double area, const Context& context, const ChosenHole& chosen = {});
 
 }  // namespace ecorche::repair

@@ -52,13 +52,42 @@ TEST_F(CaseRefusals, TheUnchangedCaseIsRead) {
   EXPECT_EQ(read(kCase).bones.size(), 2u);
 }
 
+TEST_F(CaseRefusals, WhatIsSaidOfContacts) {
+  const auto with = [](const std::string& contacts) { return kCase + "contacts: " + contacts + "\n"; };
+  EXPECT_TRUE(read(kCase).contacts.cut);
+  EXPECT_TRUE(read(with("cut")).contacts.cut);
+  EXPECT_FALSE(read(with("joined")).contacts.cut);
+  const CaseContacts some = read(with("{joined: [[pelvis, thigh_right], [thigh_right, pelvis]]}")).contacts;
+  EXPECT_TRUE(some.cut);
+  ASSERT_EQ(some.joined.size(), 2U);
+  EXPECT_EQ(some.joined[0], (std::pair<std::string, std::string>("pelvis", "thigh_right")));
+  Case written = small_case();
+  for (const CaseContacts& contacts : {some, CaseContacts{false, {}}, CaseContacts{}}) {
+    written.contacts = contacts;
+    write_case(scratch_.path(), written, Context{});
+    const CaseContacts back = read_case(scratch_.path() / "case.yaml", {}, Context{}).contacts;
+    EXPECT_EQ(back.cut, contacts.cut);
+    EXPECT_EQ(back.joined, contacts.joined);
+  }
+  const auto said = [&](const std::string& contacts, const std::string& part) {
+    expect_error(ErrorKind::config, "/case.yaml:14:contacts" + part, [&] { read(with(contacts)); });
+  };
+  said("apart", ": 'apart' says nothing of limbs that touch (use cut (they come apart), joined, or joined: ");
+  said("[a, b]", ": must be a plain value, is a list");
+  said("{cut: []}", ".cut: unknown key 'cut' (use joined)");
+  said("{joined: []}", ".joined: lists no pairs, or more than 1000 (list 1 to 1000)");
+  said("{joined: [pelvis]}", ".joined[0]: is no pair (name two segments, such as [hand_left, pelvis])");
+  said("{joined: [[pelvis, pelvis, pelvis]]}", ".joined[0]: is no pair");
+  said("{joined: [[pelvis, thigh_rigth]]}", ".joined[0][1]: unknown segment 'thigh_rigth'");
+}
+
 TEST_F(CaseRefusals, KeysAndTypes) {
   expect_error(ErrorKind::config, "case.yaml: is empty (see docs/reference/case.md)", [&] { read(""); });
   refused("unit: mm", "units: mm", "3:units: unknown key 'units' (did you mean 'unit'?)");
   refused(
       "unit: mm", "atlas: r.yaml",
       "3:atlas: unknown key 'atlas' (use name, frame, unit, skeleton, skin, bones, regions, tissues, labels, "
-      "volumes, stiffness_kpa)");
+      "volumes, stiffness_kpa, contacts)");
   refused("name: small\n", "", "1: lacks the key 'name' (add it)");
   refused("name: small", "name:", "1:name: must be a plain value, is nothing");
   refused("unit: mm", "unit: [mm]", "3:unit: must be a plain value, is a list");

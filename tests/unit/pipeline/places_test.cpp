@@ -8,6 +8,7 @@
 #include "preprocess/look_ahead.hpp"
 #include "preprocess/tet/default_size.hpp"
 #include "preprocess/voxel/voxelize.hpp"
+#include "tests/unit/pipeline/arm_at_side.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"
 
 namespace ecorche::preprocess {
@@ -85,39 +86,6 @@ TEST(Places, a_mouse_is_refused_as_a_man_is) {
   }
 }
 
-// A trunk of 100 x 60 x 300 mm and an arm that hangs from its top, `gap` mm beside it.
-Case with_arm(double gap) {
-  Case patient;
-  patient.name = "arm";
-  patient.skeleton.name = "arm";
-  for (const auto& [name, parent] : {std::pair("trunk", -1), std::pair("arm", 0), std::pair("hand", 1)}) {
-    Segment segment;
-    segment.name = name;
-    segment.parent = parent;
-    segment.joint.name = std::string(name) + "_joint";
-    segment.joint.sequence = {{"flexion", 0}, {"adduction", 1}, {"rotation", 2}};
-    patient.skeleton.segments.push_back(segment);
-  }
-  const double x = 100 + gap;
-  patient.skeleton.segments[0].joint.center = {50, 30, 20};
-  patient.skeleton.segments[1].joint.center = {x + 15, 30, 280};
-  patient.skeleton.segments[2].joint.center = {x + 15, 30, 120};
-  const auto add = [](SurfaceMesh& to, const SurfaceMesh& more) {
-    const Eigen::Index v = to.V.rows(), f = to.F.rows();
-    to.V.conservativeResize(v + more.V.rows(), 3);
-    to.F.conservativeResize(f + more.F.rows(), 3);
-    to.V.bottomRows(more.V.rows()) = more.V;
-    to.F.bottomRows(more.F.rows()) = more.F.array() + static_cast<std::int32_t>(v);
-  };
-  patient.skin = test::box({0, 0, 0}, {100, 60, 300});
-  add(patient.skin, test::box({x, 15, 50}, {x + 30, 45, 300}));
-  add(patient.skin, test::box({90, 15, 260}, {x + 1, 45, 300}));
-  patient.bones = {{"spine", "trunk", test::box({70, 20, 20}, {90, 40, 280})},
-                   {"humerus", "arm", test::box({x + 10, 25, 130}, {x + 20, 35, 275})},
-                   {"fist", "hand", test::box({x + 10, 25, 60}, {x + 20, 35, 115})}};
-  return patient;
-}
-
 TEST(TouchingLimbs, an_arm_at_the_side_is_told_with_its_place_and_one_that_hangs_free_is_not) {
   Options options;
   options.mesher = "lattice";
@@ -127,9 +95,11 @@ TEST(TouchingLimbs, an_arm_at_the_side_is_told_with_its_place_and_one_that_hangs
   context.log = [&](LogLevel level, std::string_view line) {
     if (level == LogLevel::warning) said.emplace_back(line);
   };
-  EXPECT_TRUE(check::touching_limbs(run(with_arm(30), options, context, {}).model).empty());
+  EXPECT_TRUE(check::touching_limbs(run(test::arm_at_side(30), options, context, {}).model).empty());
   EXPECT_TRUE(said.empty()) << said[0];
-  const Model touching = run(with_arm(0), options, context, {}).model;
+  Case patient = test::arm_at_side(0);
+  patient.contacts.cut = false;
+  const Model touching = run(patient, options, context, {}).model;
   const std::vector<check::Touch> found = check::touching_limbs(touching);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].limb, 1);
@@ -144,14 +114,16 @@ TEST(TouchingLimbs, an_arm_at_the_side_is_told_with_its_place_and_one_that_hangs
   EXPECT_NE(said[0].find("more of them (--max-tets) or a smaller --voxel may part them"), std::string::npos);
   // A gap that the tets bridge is one more contact.
   options.max_tets = 2000;
-  EXPECT_EQ(check::touching_limbs(run(with_arm(12), options, {}, {}).model).size(), 1U);
+  Case bridged = test::arm_at_side(12);
+  bridged.contacts.cut = false;
+  EXPECT_EQ(check::touching_limbs(run(bridged, options, {}, {}).model).size(), 1U);
   options.max_tets = 100'000;
   options.voxel_mm = 3;
-  EXPECT_TRUE(check::touching_limbs(run(with_arm(12), options, {}, {}).model).empty());
+  EXPECT_TRUE(check::touching_limbs(run(test::arm_at_side(12), options, {}, {}).model).empty());
 }
 
 TEST(TouchingLimbs, a_gap_narrower_than_the_tets_is_told) {
-  Case patient = with_arm(30);
+  Case patient = test::arm_at_side(30);
   patient.labels = CaseLabels{Image(ImageGrid{}, ScalarType::u8), {}};
   patient.labels->apart = HeldApart{22, {}, "case.yaml:9:labels.apart"};
   Options options;
@@ -169,10 +141,16 @@ TEST(TouchingLimbs, a_gap_narrower_than_the_tets_is_told) {
 
 TEST(LookAhead, tells_what_a_preparation_would) {
   EXPECT_TRUE(look_ahead(test::two_bones(), {}).empty());
-  const std::vector<check::Finding> arm = look_ahead(with_arm(0), {});
+  Case patient = test::arm_at_side(0);
+  const std::vector<check::Finding> arm = look_ahead(patient, {});
   ASSERT_EQ(arm.size(), 1U);
   EXPECT_EQ(arm[0].where, "arm");
-  EXPECT_EQ(arm[0].severity, check::Severity::warning);
+  EXPECT_EQ(arm[0].severity, check::Severity::note);
+  EXPECT_NE(arm[0].what.find("; preprocess cuts it free"), std::string::npos) << arm[0].what;
+  patient.contacts.joined = {{"trunk", "hand"}};
+  EXPECT_EQ(look_ahead(patient, {})[0].severity, check::Severity::warning);
+  patient.contacts = {false, {}};
+  EXPECT_EQ(look_ahead(patient, {})[0].severity, check::Severity::warning);
   Case hollow = test::two_bones();
   hollow.skin.F.conservativeResize(hollow.skin.F.rows() * 5 / 6, 3);
   const std::vector<check::Finding> open = look_ahead(hollow, {});

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ecorche/values/image.hpp>
@@ -84,6 +85,12 @@ struct CaseLabels {
   std::optional<HeldApart> apart = {};        ///< `label_surfaces::resolve` takes that out of the images
 };
 
+/// What becomes of limbs that touch in the scan what they do not hang on (preprocess/parting).
+struct CaseContacts {
+  bool cut = true;                                          ///< they come apart
+  std::vector<std::pair<std::string, std::string>> joined;  ///< segments whose limbs stay joined all the same
+};
+
 /// One patient as scanned, read whole: LPS, mm.
 struct Case {
   std::string name;
@@ -98,6 +105,7 @@ struct Case {
   std::vector<CaseTissue> tissues;  ///< without skin and bones
   std::vector<CaseVolume> volumes;
   std::optional<CaseLabels> labels;
+  CaseContacts contacts = {};
   /// Young's modulus of flesh in no tissue that says its own; there wherever a tissue does.
   std::optional<double> stiffness_kpa = {};
   /// XXH64 of every file that was read, by path as written in the case: provenance of the model.

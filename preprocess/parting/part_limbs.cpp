@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "preprocess/parting/part_limbs.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "preprocess/check/touching_limbs.hpp"
+#include "preprocess/parting/split_nodes.hpp"
+
+namespace ecorche::parting {
+namespace {
+
+constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared: 10 cm2 of 1.7 m
+
+constexpr int kRounds = 8;  // a loose piece may fall to another
+
+std::vector<LimbRoot> roots_of(const PartingInput& input, const std::vector<int>& limb) {
+  const Points skin =
+      check::outer_vertices(input.patient.skin.V.cast<float>(), input.patient.skin.F).cast<double>();
+  std::vector<LimbRoot> out(limb.size());
+  for (std::size_t s = 0; s < limb.size(); ++s) {
+    if (limb[s] != static_cast<int>(s)) continue;
+    out[s].joint = input.skeleton.segments[s].joint.center;
+    out[s].way = (skin.rowwise() - out[s].joint.transpose()).rowwise().norm().minCoeff();
+  }
+  return out;
+}
+
+std::array<std::int32_t, 3> nodes_of(const Tets& T, const Face& face) {
+  return {node_of(T, face, 0), node_of(T, face, 1), node_of(T, face, 2)};
+}
+
+// Segments of the case's names; those without bones have none here.
+Joined joined_of(const PartingInput& input) {
+  Joined out;
+  for (const auto& [a, b] : input.patient.contacts.joined) {
+    const int first = input.skeleton.find_segment(a), second = input.skeleton.find_segment(b);
+    if (first >= 0 && second >= 0) out.emplace_back(first, second);
+  }
+  return out;
+}
+
+// The same face's corners on both sides: in each the order of its own tet.
+std::array<std::int32_t, 3> in_order(const std::array<std::int32_t, 3>& places,
+                                     const std::array<std::int32_t, 3>& nodes, const Points& V) {
+  std::array<std::int32_t, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (const std::int32_t node : nodes) {
+      if (V.row(node) == V.row(places[c])) out[c] = node;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<Parting> part_limbs(const PartingInput& input, const Context& context) {
+  const std::vector<int> limb = check::limbs_of(input.skeleton);
+  const FaceNeighbours across(input.mesh.T, input.mesh.V.rows());
+  const Flesh flesh{input.mesh, across, input.weights, input.bone_segment, limb};
+  const SolidFaces solid(input.voxels, input.patient.labels);
+  Parting out;
+  out.part = limb_parts(flesh, solid, context);
+  const double length = (input.mesh.V.colwise().maxCoeff() - input.mesh.V.colwise().minCoeff()).maxCoeff();
+  const std::vector<LimbRoot> roots = roots_of(input, limb);
+  const Joined joined = joined_of(input);
+  Contacts found;
+  for (int round = 0; round < kRounds; ++round) {
+    found = find_contacts(flesh, out.part, solid, roots, kPatch * length * length, joined);
+    if (!give_loose_pieces(input.mesh, across, found.faces, out.part)) break;
+  }
+  if (found.faces.empty()) return std::nullopt;
+  const std::vector<Face>& cut = found.faces;
+  TetMesh mesh = input.mesh;
+  split_nodes(mesh, across, cut);
+
+  const Eigen::Index before = input.mesh.V.rows();
+  out.copied.assign(static_cast<std::size_t>(mesh.V.rows() - before), -1);
+  for (Eigen::Index t = 0; t < mesh.T.rows(); ++t) {
+    for (int c = 0; c < 4; ++c) {
+      if (mesh.T(t, c) >= before)
+        out.copied[static_cast<std::size_t>(mesh.T(t, c) - before)] = input.mesh.T(t, c);
+    }
+  }
+  for (std::size_t f = 0; f < cut.size(); ++f) {
+    OpenFace face;
+    face.inner = nodes_of(mesh.T, cut[f]);
+    face.outer = in_order(face.inner, nodes_of(mesh.T, across.other(cut[f])), mesh.V);
+    face.contact = found.contact_of[f];
+    std::array<Eigen::Vector3d, 3> p;
+    for (std::size_t c = 0; c < 3; ++c) p[c] = mesh.V.row(face.inner[c]).transpose();
+    face.solid = static_cast<float>(solid.share(p));
+    out.faces.push_back(face);
+  }
+  const auto part = [&](std::int32_t t) { return out.part[static_cast<std::size_t>(t)]; };
+  std::vector<std::int64_t> open;
+  for (const Face& face : cut) {
+    open.push_back(4 * std::int64_t{face.tet} + face.corner);
+    const Face other = across.other(face);
+    open.push_back(4 * std::int64_t{other.tet} + other.corner);
+  }
+  std::sort(open.begin(), open.end());
+  for (std::int32_t t = 0; t < static_cast<std::int32_t>(mesh.T.rows()); ++t) {
+    for (int c = 0; c < 4; ++c) {
+      const std::int32_t next = across.behind({t, c});
+      if (next <= t || part(next) == part(t)) continue;
+      if (!std::binary_search(open.begin(), open.end(), 4 * std::int64_t{t} + c))
+        out.joined.push_back({nodes_of(mesh.T, {t, c}), part(t), part(next)});
+    }
+  }
+  out.contacts = std::move(found.contacts);
+  out.V = std::move(mesh.V);
+  out.T = std::move(mesh.T);
+  return out;
+}
+
+}  // namespace ecorche::parting

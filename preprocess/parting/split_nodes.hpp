@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// A mesh cut along faces.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <ecorche/values/mesh.hpp>
+#include "preprocess/parting/face_neighbours.hpp"
+
+namespace ecorche::parting {
+
+/// Tets that no bone would hold once the faces are opened, where they touch one: each piece of them goes to
+/// the part that it has most area in common with across `cut`. True where `part` (#T) changed. What hangs on
+/// no bone before is let be.
+bool give_loose_pieces(const TetMesh& mesh, const FaceNeighbours& across, const std::vector<Face>& cut,
+                       std::vector<std::int16_t>& part);
+
+/// Opens the faces: a node about which its tets no longer hang together by faces becomes as many. Tets keep
+/// their rows, places and labels; the first of them keep the node, the others' nodes come last. What the mesh
+/// holds stays the same. O(#T + #cut).
+void split_nodes(TetMesh& mesh, const FaceNeighbours& across, const std::vector<Face>& cut);
+
+}  // namespace ecorche::parting
