@@ -18,10 +18,10 @@ struct Seam {
   std::vector<std::array<std::int32_t, 2>> edges;
 };
 
-/// Lets each triangle of a bound tissue go with one side of the cuts. Vertices within 2.5 cubes of a cut are
-/// given a side anew, so that borders are short, run along creases, and do not follow the tets' corners: the
-/// cheapest cut of the surface. Vertices that both sides need are doubled, the copies last, bound to tets of
-/// their own side. Returns what borders came of it; nothing changes where no triangle crosses a cut.
+/// Lets each triangle of a bound tissue go with one side of the cuts (SurfaceSides): those across a border
+/// are split there, with vertices for each side, which come last, and one for both where the border ends. Its
+/// own vertices stay, bound to tets of their side. Returns the borders; nothing changes where no triangle
+/// crosses.
 std::vector<Seam> part_surface(Tissue& tissue, const PartedTets& tets, const Context& context);
 
 /// Closes both sides of the cuts where they lie in the body, with the cut itself, smoothed, between the seams

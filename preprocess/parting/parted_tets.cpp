@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 using geometry::FaceTree;
 
-constexpr double kNearJoined = 1.5;  // cubes
+constexpr double kNearJoined = 2;  // cubes
 
 FaceTree::Corners corners_of(const Points& V, const std::array<std::int32_t, 3>& face) {
   FaceTree::Corners out;
@@ -83,10 +83,14 @@ bool PartedTets::are_cut(int part, int other, const Vector3d& point) const {
 }
 
 bool PartedTets::near_joined(int part, int other, const Vector3d& point) const {
-  const auto border = borders_.find(std::minmax(part, other));
   const double most = kNearJoined * cube_;
-  return border != borders_.end() && border->second.closed &&
-         border->second.closed->nearest(point).squared <= most * most;
+  const auto near = [&](int a, int b) {
+    const auto border = borders_.find(std::minmax(a, b));
+    return border != borders_.end() && border->second.closed &&
+           border->second.closed->nearest(point).squared <= most * most;
+  };
+  // Two thighs hang together by the trunk alone.
+  return near(part, other) || (near(part, -1) && near(other, -1));
 }
 
 bool PartedTets::may_reach(const Vector3d& point) const {

@@ -32,7 +32,7 @@ class PartedTets {
   std::pair<const OpenFace*, double> nearest_cut(const Eigen::Vector3d& point) const;
   /// Whether between two parts no face stayed closed, or a cut is nearer than those.
   bool are_cut(int part, int other, const Eigen::Vector3d& point) const;
-  /// Whether two parts hang together within 1.5 cubes.
+  /// Whether two parts hang together within 2 cubes, directly or both on the rest of the body.
   bool near_joined(int part, int other, const Eigen::Vector3d& point) const;
   /// True of all points within kReach cubes of a cut, and of some beyond.
   bool may_reach(const Eigen::Vector3d& point) const;

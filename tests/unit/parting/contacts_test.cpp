@@ -187,9 +187,9 @@ TEST(Contacts, raised_it_drags_nothing_along_and_the_skin_is_whole) {
     EXPECT_GT(was, 1000);
     EXPECT_LT(is, 0.1 * was);
   }
-  // The muscle across both went apart: each triangle is of one side.
+  // The muscle across both went apart: its triangles are of one side each.
   const Tissue& muscle = cut.tissues.back();
-  EXPECT_EQ(muscle.F.rows(), joined.tissues.back().F.rows());
+  EXPECT_GT(muscle.F.rows(), joined.tissues.back().F.rows());
   EXPECT_GT(muscle.V.rows(), joined.tissues.back().V.rows());
 }
 
