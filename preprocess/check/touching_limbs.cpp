@@ -28,6 +28,8 @@ constexpr double kSwing = 100 * std::numbers::pi / 180;
 constexpr double kFar = 2.5, kSure = 3.5;
 constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared
 constexpr std::int64_t kGrain = 1 << 14;
+constexpr int kSquares = 8;  // along the side of a face of a cube of directions
+constexpr double kNearestShare = 0.05;
 
 // A piece of the surface u = 1/2 within a tet.
 struct Piece {
@@ -54,7 +56,7 @@ class Finder {
       }
     });
     const Vector3d joint = model_.skeleton.segments[static_cast<std::size_t>(top)].joint.center;
-    const double way = to_skin(joint);
+    const double way = way_to_skin(model_.skin, joint);
     const auto tets = static_cast<std::int64_t>(model_.tets.rows());
     std::vector<std::vector<Piece>> found(static_cast<std::size_t>((tets + kGrain - 1) / kGrain));
     in_pieces(tets, [&](std::int64_t first, std::int64_t last, std::size_t at) {
@@ -86,12 +88,6 @@ class Finder {
     for (std::uint64_t i = w.offsets[static_cast<std::size_t>(node)];
          i < w.offsets[static_cast<std::size_t>(node) + 1]; ++i)
       visit(static_cast<int>(w.segment[i]), w.weight[i]);
-  }
-
-  double to_skin(const Vector3d& joint) const {
-    if (model_.skin.rows() == 0) return std::numeric_limits<double>::infinity();
-    return static_cast<double>(
-        (model_.skin.rowwise() - joint.transpose().cast<float>()).rowwise().norm().minCoeff());
   }
 
   // By marching tets.
@@ -240,6 +236,28 @@ PointsF outer_vertices(const PointsF& V, const Triangles& F) {
     if (outer[static_cast<std::size_t>(v)] != 0) out.row(row++) = V.row(v);
   }
   return out;
+}
+
+double way_to_skin(const PointsF& skin, const Vector3d& joint) {
+  // Directions by the squares of a cube's six faces.
+  std::array<double, 6 * kSquares * kSquares> nearest;
+  nearest.fill(std::numeric_limits<double>::infinity());
+  for (Eigen::Index v = 0; v < skin.rows(); ++v) {
+    const Vector3d way = skin.row(v).cast<double>().transpose() - joint;
+    Eigen::Index axis = 0;
+    const double most = way.cwiseAbs().maxCoeff(&axis);
+    if (!(most > 0)) return 0;
+    const auto square = [&](Eigen::Index other) {
+      return std::min(kSquares - 1, static_cast<int>((way[other] / most + 1) / 2 * kSquares));
+    };
+    const int face = 2 * static_cast<int>(axis) + (way[axis] > 0 ? 1 : 0);
+    const int at = (face * kSquares + square((axis + 1) % 3)) * kSquares + square((axis + 2) % 3);
+    double& least = nearest[static_cast<std::size_t>(at)];
+    least = std::min(least, way.norm());
+  }
+  std::sort(nearest.begin(), nearest.end());
+  const auto seen = std::count_if(nearest.begin(), nearest.end(), [](double d) { return std::isfinite(d); });
+  return nearest[static_cast<std::size_t>(static_cast<double>(seen) * kNearestShare)];
 }
 
 std::vector<int> limbs_of(const Skeleton& skeleton) {

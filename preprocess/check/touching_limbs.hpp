@@ -34,6 +34,11 @@ struct TouchInput {
 /// The vertices of a skin without those of its hollows: parts that turn inwards.
 PointsF outer_vertices(const PointsF& V, const Triangles& F);
 
+/// How far the skin is from a joint, mm: the distance that it has in the nearest twentieth of the directions
+/// in which there is skin, so that a fold or the gap beside a hand does not count. Infinite without skin.
+/// O(#V).
+double way_to_skin(const PointsF& skin, const Eigen::Vector3d& joint);
+
 /// For every segment the uppermost segment of the limb that it is of; -1: of none. A limb begins at the
 /// uppermost segment of each chain whose joint turns by more than 100 degrees about one of its angles (hips
 /// and shoulders; no joint of the spine).

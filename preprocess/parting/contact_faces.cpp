@@ -39,7 +39,8 @@ class Finder {
     for (std::int32_t t = 0; t < static_cast<std::int32_t>(part_.size()); ++t) {
       for (int c = 0; c < 4; ++c) {
         const std::int32_t next = flesh_.across.behind({t, c});
-        if (next < 0 || !comes_first(part(t), part(next))) continue;
+        if (next < 0 || !comes_first(part(t), part(next)) || flesh_.boned[static_cast<std::size_t>(t)] == 0)
+          continue;
         const Seen one = look({t, c}, part(next), solid);
         if (part(next) >= 0 || one.ratio > kContact) out[{part(t), part(next)}].push_back(one);
       }
@@ -168,6 +169,8 @@ Contacts find_contacts(const Flesh& flesh, const std::vector<std::int16_t>& part
   cut.erase(-1);
   Contacts out;
   for (auto& [pair, faces] : pairs) {
+    const Contact contact = finder.contact(pair, faces);
+    if (contact.own < 0 || contact.other < 0) continue;  // no bone moves the one or the other there
     if (sure_area(pair, faces) < least_mm2) {
       if (cut.count(pair.first) == 0 && cut.count(pair.second) == 0) continue;
       std::erase_if(faces, [](const Seen& one) { return one.ratio <= kSure; });

@@ -11,6 +11,7 @@ namespace ecorche::parting {
 namespace {
 
 constexpr std::string_view kTrunk = "-";
+constexpr double kLeastTold = 50;  // mm2: below it only tets bridged air
 
 }  // namespace
 
@@ -20,6 +21,7 @@ std::string cut_contacts_text(const std::vector<Contact>& contacts, const Skelet
   };
   std::string out;
   for (const Contact& contact : contacts) {
+    if (contact.area_mm2 < kLeastTold) continue;
     out += out.empty() ? "" : ";";
     for (const int s : {contact.limb, contact.other_limb, contact.own, contact.other}) out += name(s) + " ";
     out += text::number(contact.area_mm2 / 100, 4) + " " + text::number(contact.confidence, 3);

@@ -22,7 +22,8 @@ struct CutContact {
 };
 
 /// What a model's provenance says under `cut_contacts`: for each contact `limb other_limb own other cm2
-/// confidence x y z`, parted by `;`, `-` for the rest of the body. Empty where there is none.
+/// confidence x y z`, parted by `;`, `-` for the rest of the body. Without those below half a cm2. Empty
+/// where there is none.
 std::string cut_contacts_text(const std::vector<Contact>& contacts, const Skeleton& skeleton);
 
 /// As the model's provenance has them; empty where no limb was cut free, or where it says something else.

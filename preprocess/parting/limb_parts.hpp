@@ -20,6 +20,7 @@ struct Flesh {
   const Weights& weights;                         ///< harmonic, of the mesh's nodes
   const std::vector<std::int32_t>& bone_segment;  ///< of each bone
   const std::vector<int>& limb;                   ///< of each segment: check::limbs_of
+  const std::vector<std::uint8_t>& boned;         ///< #T: of a piece of the mesh with tets of bones
 };
 
 /// For every tet the uppermost segment of its limb, or -1: the rest of the body. A limb's share u of a tet is

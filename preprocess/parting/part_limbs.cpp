@@ -15,13 +15,12 @@ constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squa
 constexpr int kRounds = 8;  // a loose piece may fall to another
 
 std::vector<LimbRoot> roots_of(const PartingInput& input, const std::vector<int>& limb) {
-  const Points skin =
-      check::outer_vertices(input.patient.skin.V.cast<float>(), input.patient.skin.F).cast<double>();
+  const PointsF skin = check::outer_vertices(input.patient.skin.V.cast<float>(), input.patient.skin.F);
   std::vector<LimbRoot> out(limb.size());
   for (std::size_t s = 0; s < limb.size(); ++s) {
     if (limb[s] != static_cast<int>(s)) continue;
     out[s].joint = input.skeleton.segments[s].joint.center;
-    out[s].way = (skin.rowwise() - out[s].joint.transpose()).rowwise().norm().minCoeff();
+    out[s].way = check::way_to_skin(skin, out[s].joint);
   }
   return out;
 }
@@ -57,7 +56,8 @@ std::array<std::int32_t, 3> in_order(const std::array<std::int32_t, 3>& places,
 std::optional<Parting> part_limbs(const PartingInput& input, const Context& context) {
   const std::vector<int> limb = check::limbs_of(input.skeleton);
   const FaceNeighbours across(input.mesh.T, input.mesh.V.rows());
-  const Flesh flesh{input.mesh, across, input.weights, input.bone_segment, limb};
+  const std::vector<std::uint8_t> boned = on_bones(input.mesh, across);
+  const Flesh flesh{input.mesh, across, input.weights, input.bone_segment, limb, boned};
   const SolidFaces solid(input.voxels, input.patient.labels);
   Parting out;
   out.part = limb_parts(flesh, solid, context);

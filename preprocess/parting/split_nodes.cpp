@@ -62,6 +62,16 @@ Sets pieces_without(const Tets& T, const FaceNeighbours& across, const std::vect
   return pieces;
 }
 
+// Which pieces hold a tet of a bone, by the piece's lowest tet.
+std::vector<std::uint8_t> boned_pieces(const TetMesh& mesh, Sets& pieces) {
+  std::vector<std::uint8_t> out(mesh.label.size(), 0);
+  for (std::size_t t = 0; t < mesh.label.size(); ++t) {
+    if (mesh.label[t] != TetMesh::soft)
+      out[static_cast<std::size_t>(pieces.find(static_cast<std::int32_t>(t)))] = 1;
+  }
+  return out;
+}
+
 double area_of(const TetMesh& mesh, const Face& face) {
   const auto at = [&](int c) -> Vector3d { return mesh.V.row(node_of(mesh.T, face, c)).transpose(); };
   return 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
@@ -69,14 +79,19 @@ double area_of(const TetMesh& mesh, const Face& face) {
 
 }  // namespace
 
+std::vector<std::uint8_t> on_bones(const TetMesh& mesh, const FaceNeighbours& across) {
+  Sets pieces = pieces_without(mesh.T, across, {});
+  const std::vector<std::uint8_t> boned = boned_pieces(mesh, pieces);
+  std::vector<std::uint8_t> out(mesh.label.size());
+  for (std::size_t t = 0; t < out.size(); ++t)
+    out[t] = boned[static_cast<std::size_t>(pieces.find(static_cast<std::int32_t>(t)))];
+  return out;
+}
+
 bool give_loose_pieces(const TetMesh& mesh, const FaceNeighbours& across, const std::vector<Face>& cut,
                        std::vector<std::int16_t>& part) {
   Sets pieces = pieces_without(mesh.T, across, cut);
-  std::vector<std::uint8_t> boned(part.size(), 0);  // by the piece's lowest tet
-  for (std::size_t t = 0; t < mesh.label.size(); ++t) {
-    if (mesh.label[t] != TetMesh::soft)
-      boned[static_cast<std::size_t>(pieces.find(static_cast<std::int32_t>(t)))] = 1;
-  }
+  const std::vector<std::uint8_t> boned = boned_pieces(mesh, pieces);
   // Of each piece without bone what it has in common with the parts beside.
   std::map<std::int32_t, std::map<std::int16_t, double>> shared;
   for (const Face& face : cut) {

@@ -10,6 +10,9 @@
 
 namespace ecorche::parting {
 
+/// #T: 1 for tets that hang together with a tet of a bone by faces.
+std::vector<std::uint8_t> on_bones(const TetMesh& mesh, const FaceNeighbours& across);
+
 /// Tets that no bone would hold once the faces are opened, where they touch one: each piece of them goes to
 /// the part that it has most area in common with across `cut`. True where `part` (#T) changed. What hangs on
 /// no bone before is let be.

@@ -217,6 +217,21 @@ TEST(Contacts, a_case_may_say_that_two_stay_joined) {
   EXPECT_EQ(cut_contacts(made(patient)).size(), 1U);
 }
 
+// It hangs on no bone, and its nodes follow whatever is nearest: no border within it is a contact.
+TEST(Contacts, a_body_beside_without_bones_is_not_cut) {
+  Case patient = test::arm_at_side(30);
+  const SurfaceMesh beside = test::box({300, 0, 0}, {400, 60, 300});
+  const Eigen::Index v = patient.skin.V.rows(), f = patient.skin.F.rows();
+  patient.skin.V.conservativeResize(v + beside.V.rows(), 3);
+  patient.skin.F.conservativeResize(f + beside.F.rows(), 3);
+  patient.skin.V.bottomRows(beside.V.rows()) = beside.V;
+  patient.skin.F.bottomRows(beside.F.rows()) = beside.F.array() + static_cast<std::int32_t>(v);
+  const preprocess::Result made = preprocess::run(patient, coarse(), {});
+  EXPECT_TRUE(cut_contacts(made.model).empty());
+  ASSERT_FALSE(made.warnings.empty());
+  EXPECT_NE(made.warnings[0].find("touches no bone"), std::string::npos) << made.warnings[0];
+}
+
 TEST(Contacts, what_provenance_says_is_read_back_and_nonsense_is_not) {
   Model model;
   Contact contact;
