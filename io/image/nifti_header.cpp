@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <span>
+#include <string_view>
 
 #include "core/values/text.hpp"
 #include "io/image/header.hpp"
@@ -126,10 +128,22 @@ double apart(const ImageGrid& a, const ImageGrid& b) {
   return most;
 }
 
+// ITK ends the program at an affine that is no number.
+void check_finite(const NiftiFields& f, const Path& path) {
+  const auto check = [&](std::string_view name, const auto& values) {
+    if (std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) return;
+    refuse(path, "its " + std::string(name) + " has a NaN or an infinite number", "write its header anew");
+  };
+  check("pixdim", std::span(f.pixdim).first(4));
+  if (f.qform > 0) check("qform", f.quaternion);
+  if (f.sform > 0) check("sform", f.rows);
+}
+
 // Where both forms stand and agree, the qform: it is right-angled, and ITK takes it too. A NaN does not
 // agree.
 ImageGrid placed(const NiftiFields& f, const std::array<std::int32_t, 3>& size, NiftiForm form,
                  const Path& path) {
+  check_finite(f, path);
   const ImageGrid one = grid_of(f, size, f.qform > 0 && form != NiftiForm::sform);
   if (form != NiftiForm::either || f.qform <= 0 || f.sform <= 0) return one;
   const double mm = apart(one, grid_of(f, size, false));

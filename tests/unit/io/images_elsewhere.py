@@ -70,6 +70,16 @@ class Nifti(Described):
             self.assert_ras_frame(self.describe(path)[0], oblique())
             path = self.save(array, oblique(), "a.nii", lambda image: image.set_sform(None, code=0), version)
             self.refused(path, "has no sform: its code is 0 (leave out form: sform)", form=("sform",))
+        for name, fields in (("pixdim", ("pixdim",)), ("qform", ("quatern_b", "qoffset_y")), ("sform", ("srow_x", "srow_z"))):
+            for field in fields:
+                for value in (numpy.nan, -numpy.inf):
+                    path = self.save(array, oblique(), "nan.nii", lambda image: (image.set_qform(oblique(), 1), image.set_sform(oblique(), 1)))
+                    offset = {"pixdim": 84, "quatern_b": 256, "qoffset_y": 272, "srow_x": 284, "srow_z": 320}[field]
+                    spoilt = bytearray(path.read_bytes())
+                    spoilt[offset : offset + 4] = numpy.float32(value).tobytes()
+                    path.write_bytes(spoilt)
+                    for form in ((), ("qform",), ("sform",)):
+                        self.refused(path, f"its {name} has a NaN or an infinite number (write its header anew)", form=form)
         self.refused(self.save(array, numpy.diag([2e6, 1, 1, 1]), "far.nii"), "its spacing is 2000000.000000 (it must be positive, mm)")
         self.save(array, TURN, "a.nii").rename(self.folder / "b.nii")
         (self.folder / "c.nii").write_bytes(self.save(array, TURN, "c.nii.gz").read_bytes())
