@@ -162,6 +162,7 @@ std::vector<Place> rig_pictures(const Model& model, int pixels) {
 std::vector<Place> contact_pictures(const Model& model, const std::vector<parting::CutContact>& contacts,
                                     int pixels) {
   std::vector<Ring> rings;
+  rings.reserve(contacts.size());
   for (const parting::CutContact& contact : contacts) rings.push_back({contact.at, contact.confidence});
   return ring_pictures(model, rings, 9, pixels);
 }

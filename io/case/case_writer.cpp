@@ -75,7 +75,8 @@ class CaseWriter {
     const CaseContacts& said = patient_.contacts;
     if (!said.cut) return "contacts: joined\n";
     std::string pairs;
-    for (const auto& [a, b] : said.joined) pairs += (pairs.empty() ? "[" : ", [") + a + ", " + b + "]";
+    for (const auto& [a, b] : said.joined)
+      pairs.append(pairs.empty() ? "[" : ", [").append(a).append(", ").append(b).append("]");
     return pairs.empty() ? "" : "contacts: {joined: [" + pairs + "]}\n";
   }
   static std::string stiffness(const std::string& before, const std::optional<double>& kpa) {

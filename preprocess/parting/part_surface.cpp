@@ -148,16 +148,7 @@ void bind_anew(Tissue& tissue, const PartedTets& tets, const SurfaceSides& sides
     if (own != part && tets.are_cut(own, part, tissue.V.row(v).cast<double>().transpose()))
       by_part[part].push_back(v);
   }
-  for (const auto& [part, rows] : by_part) {
-    Points points(static_cast<Eigen::Index>(rows.size()), 3);
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      points.row(static_cast<Eigen::Index>(i)) = tissue.V.row(rows[i]).cast<double>();
-    const PartedTets::Bound bound = tets.bind(part, points, context);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      tissue.tet[static_cast<std::size_t>(rows[i])] = bound.tet[i];
-      tissue.barycentric.row(rows[i]) = bound.barycentric.row(static_cast<Eigen::Index>(i));
-    }
-  }
+  for (const auto& [part, rows] : by_part) bind_rows(tissue, rows, part, tets, context);
 }
 
 }  // namespace

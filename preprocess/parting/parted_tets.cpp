@@ -112,29 +112,31 @@ PartedTets::Bound PartedTets::bind(int part, const Points& points, const Context
   return out;
 }
 
+void bind_rows(Tissue& tissue, const std::vector<std::int32_t>& rows, int part, const PartedTets& tets,
+               const Context& context) {
+  Points points(static_cast<Eigen::Index>(rows.size()), 3);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    points.row(static_cast<Eigen::Index>(i)) = tissue.V.row(rows[i]).cast<double>();  // as it is stored
+  const PartedTets::Bound bound = tets.bind(part, points, context);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    tissue.tet[static_cast<std::size_t>(rows[i])] = bound.tet[i];
+    tissue.barycentric.row(rows[i]) = bound.barycentric.row(static_cast<Eigen::Index>(i));
+  }
+}
+
 void append_vertices(Tissue& tissue, const std::vector<NewVertex>& added, const PartedTets& tets,
                      const Context& context) {
+  auto row = static_cast<std::int32_t>(tissue.V.rows());
+  const Eigen::Index count = tissue.V.rows() + static_cast<Eigen::Index>(added.size());
+  tissue.V.conservativeResize(count, 3);
+  tissue.barycentric.conservativeResize(count, 4);
+  tissue.tet.resize(static_cast<std::size_t>(count));
   std::map<int, std::vector<std::int32_t>> by_part;
-  for (std::size_t i = 0; i < added.size(); ++i)
-    by_part[added[i].part].push_back(static_cast<std::int32_t>(i));
-  const auto first = static_cast<std::int32_t>(tissue.V.rows());
-  const auto count = static_cast<Eigen::Index>(added.size());
-  tissue.V.conservativeResize(first + count, 3);
-  tissue.barycentric.conservativeResize(first + count, 4);
-  tissue.tet.resize(static_cast<std::size_t>(first + count));
-  for (const auto& [part, rows] : by_part) {
-    Points points(static_cast<Eigen::Index>(rows.size()), 3);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      tissue.V.row(first + rows[i]) = added[static_cast<std::size_t>(rows[i])].at.cast<float>().transpose();
-      points.row(static_cast<Eigen::Index>(i)) =
-          tissue.V.row(first + rows[i]).cast<double>();  // as it is stored
-    }
-    const PartedTets::Bound bound = tets.bind(part, points, context);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      tissue.tet[static_cast<std::size_t>(first + rows[i])] = bound.tet[i];
-      tissue.barycentric.row(first + rows[i]) = bound.barycentric.row(static_cast<Eigen::Index>(i));
-    }
+  for (const NewVertex& vertex : added) {
+    tissue.V.row(row) = vertex.at.cast<float>().transpose();
+    by_part[vertex.part].push_back(row++);
   }
+  for (const auto& [part, rows] : by_part) bind_rows(tissue, rows, part, tets, context);
 }
 
 }  // namespace ecorche::parting

@@ -66,6 +66,10 @@ struct NewVertex {
   int part = -1;
 };
 
+/// Binds vertices of a tissue to one part's tets.
+void bind_rows(Tissue& tissue, const std::vector<std::int32_t>& rows, int part, const PartedTets& tets,
+               const Context& context);
+
 /// Puts them behind the tissue's own, each bound on its side.
 void append_vertices(Tissue& tissue, const std::vector<NewVertex>& added, const PartedTets& tets,
                      const Context& context);
