@@ -23,9 +23,11 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kSwing = 100 * std::numbers::pi / 180;
-// From the joint, in ways from there to the skin. Of a body that stands free no contact reaches kSure
-// (armpits of the built-in patient 3.3, its legs 2.3); where there is one it is counted from kFar on.
+// From the joint, in ways from there to the skin. Of a body that stands free no contact reaches kSure, and
+// none between two limbs kSureOfTwo (armpits of the built-in patient 3.3, its legs less than 1.8); where
+// there is one it is counted from kFar or kFarOfTwo on.
 constexpr double kFar = 2.5, kSure = 3.5;
+constexpr double kFarOfTwo = 1.75, kSureOfTwo = 2.2;
 constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared
 constexpr std::int64_t kGrain = 1 << 14;
 constexpr int kSquares = 8;  // along the side of a face of a cube of directions
@@ -63,9 +65,10 @@ class Finder {
       for (std::int64_t t = first; t < last; ++t) {
         Piece piece = cut(t, share);
         const double from = (piece.middle - joint).norm();
-        if (!(piece.area > 0) || from <= kFar * way) continue;
-        piece.sure = from > kSure * way;
+        if (!(piece.area > 0) || from <= kFarOfTwo * way) continue;
         piece.other_limb = beside(t, top);
+        if (piece.other_limb < 0 && from <= kFar * way) continue;
+        piece.sure = from > (piece.other_limb < 0 ? kSure : kSureOfTwo) * way;
         found[at].push_back(piece);
       }
     });

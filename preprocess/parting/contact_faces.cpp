@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 // From the joint, in ways from there to the skin. Of ICRP's woman 1.75 tells contact from flesh that hangs on
 // the joint with precision 0.90 and recall 0.92; of a body that stands free nothing reaches kSure.
-constexpr double kContact = 1.75, kSure = 3.5, kSureOfTwo = 2.5;
+constexpr double kContact = 1.75, kSure = 3.5, kSureOfTwo = 2.2;
 constexpr int kFlattenings = 3;
 constexpr double kBetweenLimbs = 0.9,
                  kMost = 0.97;  // confidence: at most as often as skin deep in a body is contact

@@ -40,7 +40,7 @@ using Joined = std::vector<std::pair<int, int>>;
 
 /// A face between tets of two parts is contact where it lies farther from the limb's joint than 1.75 times
 /// the way from there to the skin, and between two limbs anywhere; they are told, and cut, where at least
-/// `least_mm2` of theirs lie beyond 3.5 times it (between two limbs: 2.5 times, of either), and what else
+/// `least_mm2` of theirs lie beyond 3.5 times it (between two limbs: 2.2 times, of either), and what else
 /// such a limb touches beyond 3.5 times it. Confidence: 0.97 beyond 3.5 times that way, falling to 1/2
 /// at 1.75 times; 0.9 at least between two limbs. Pairs in `joined` are left out.
 Contacts find_contacts(const Flesh& flesh, const std::vector<std::int16_t>& part, const SolidFaces& solid,
