@@ -6,6 +6,7 @@
 
 #include <ecorche/preprocess/pipeline.hpp>
 #include "preprocess/check/touching_limbs.hpp"
+#include "preprocess/parting/part_limbs.hpp"
 #include "preprocess/rig/fit_rig.hpp"
 #include "preprocess/tet/default_size.hpp"
 #include "preprocess/tet/mesher.hpp"
@@ -57,18 +58,11 @@ Model half_made(const Case& patient, const Context& context) {
 }
 
 // As parting::part_limbs will have it.
-bool comes_apart(const check::Touch& touch, const Case& patient, const Skeleton& skeleton) {
-  if (!patient.contacts.cut) return false;
-  const std::vector<int> limb = check::limbs_of(skeleton);
-  const auto limb_named = [&](const std::string& name) {
-    const int row = skeleton.find_segment(name);
-    return row < 0 ? -1 : limb[static_cast<std::size_t>(row)];
-  };
-  const std::pair both = std::minmax(touch.limb, touch.other_limb);
-  return std::none_of(patient.contacts.joined.begin(), patient.contacts.joined.end(), [&](const auto& pair) {
-    const int a = limb_named(pair.first), b = limb_named(pair.second);
-    return std::pair(std::min(a, b), std::max(a, b)) == std::pair<int, int>(both);
-  });
+bool comes_apart(const check::Touch& touch, const CaseContacts& contacts, const parting::Joined& joined) {
+  return contacts.cut && std::none_of(joined.begin(), joined.end(), [&](const auto& pair) {
+           return pair == std::pair(touch.limb, touch.other_limb) ||
+                  pair == std::pair(touch.other_limb, touch.limb);
+         });
 }
 
 }  // namespace
@@ -80,10 +74,11 @@ std::vector<check::Finding> look_ahead(const Case& patient, const Context& conte
   try {
     const Model model = half_made(patient, context);
     const std::string advice = check::parting_advice(check::cube_mm(model.nodes, model.tets));
+    const parting::Joined joined = parting::joined_limbs(patient.contacts, model.rig.skeleton);
     for (const check::Touch& touch : check::touching_limbs(model)) {
       const std::string& limb = model.rig.skeleton.segments[static_cast<std::size_t>(touch.limb)].name;
       const std::string what = check::what(touch, model.rig.skeleton);
-      if (comes_apart(touch, patient, model.rig.skeleton))
+      if (comes_apart(touch, patient.contacts, joined))
         out.push_back({Severity::note, limb, what + "; preprocess cuts it free", touch.at,
                        "where it has grown together, say so in the case under contacts, joined"});
       else

@@ -23,11 +23,10 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kSwing = 100 * std::numbers::pi / 180;
-// From the joint, in ways from there to the skin. Of a body that stands free no contact reaches kSure, and
-// none between two limbs kSureOfTwo (armpits of the built-in patient 3.3, its legs less than 1.8); where
+// From the joint, in ways from there to the skin. What is free reaches less than sure_ways
+// and sure_ways_of_two (armpits of the built-in patient 3.3, its legs less than 1.8); where
 // there is one it is counted from kFar or kFarOfTwo on.
-constexpr double kFar = 2.5, kSure = 3.5;
-constexpr double kFarOfTwo = 1.75, kSureOfTwo = 2.2;
+constexpr double kFar = 2.5, kFarOfTwo = 1.75;
 constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared
 constexpr std::int64_t kGrain = 1 << 14;
 constexpr int kSquares = 8;  // along the side of a face of a cube of directions
@@ -68,7 +67,7 @@ class Finder {
         if (!(piece.area > 0) || from <= kFarOfTwo * way) continue;
         piece.other_limb = beside(t, top);
         if (piece.other_limb < 0 && from <= kFar * way) continue;
-        piece.sure = from > (piece.other_limb < 0 ? kSure : kSureOfTwo) * way;
+        piece.sure = from > (piece.other_limb < 0 ? sure_ways : sure_ways_of_two) * way;
         found[at].push_back(piece);
       }
     });
@@ -241,6 +240,10 @@ PointsF outer_vertices(const PointsF& V, const Triangles& F) {
   return out;
 }
 
+double least_contact_mm2(double body_length_mm) {
+  return kPatch * body_length_mm * body_length_mm;
+}
+
 double way_to_skin(const PointsF& skin, const Vector3d& joint) {
   // Directions by the squares of a cube's six faces.
   std::array<double, 6 * kSquares * kSquares> nearest;
@@ -297,7 +300,7 @@ std::vector<Touch> touching_limbs(const TouchInput& model) {
       const int other = beside;  // clang 14 takes no structured binding into a lambda
       double sure = 0;
       for (const Piece* piece : some) sure += piece->sure ? piece->area : 0;
-      if (sure < kPatch * length * length) continue;
+      if (sure < least_contact_mm2(length)) continue;
       if (!bones) bones.emplace(model, finder.limbs());
       Touch touch = joined(top, other, some);
       touch.own = bones->nearest_to(some, top);

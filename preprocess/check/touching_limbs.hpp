@@ -34,6 +34,12 @@ struct TouchInput {
 /// The vertices of a skin without those of its hollows: parts that turn inwards.
 PointsF outer_vertices(const PointsF& V, const Triangles& F);
 
+/// From a limb's joint, in ways from there to the skin (way_to_skin): of a body that stands free no contact
+/// with the trunk, and none of two limbs, reaches so far.
+inline constexpr double sure_ways = 3.5, sure_ways_of_two = 2.2;
+/// So much must lie beyond, mm2: 10 cm2 of a body of 1.7 m.
+double least_contact_mm2(double body_length_mm);
+
 /// How far the skin is from a joint, mm: the distance that it has in the nearest twentieth of the directions
 /// in which there is skin, so that a fold or the gap beside a hand does not count. Infinite without skin.
 /// O(#V).

@@ -8,6 +8,8 @@
 #include <set>
 #include <utility>
 
+#include "preprocess/check/touching_limbs.hpp"
+
 namespace ecorche::parting {
 namespace {
 
@@ -15,7 +17,8 @@ using Eigen::Vector3d;
 
 // From the joint, in ways from there to the skin. Of ICRP's woman 1.75 tells contact from flesh that hangs on
 // the joint with precision 0.90 and recall 0.92; of a body that stands free nothing reaches kSure.
-constexpr double kContact = 1.75, kSure = 3.5, kSureOfTwo = 2.2;
+constexpr double kContact = 1.75;
+constexpr double kSure = check::sure_ways, kSureOfTwo = check::sure_ways_of_two;
 constexpr int kFlattenings = 3;
 constexpr double kBetweenLimbs = 0.9,
                  kMost = 0.97;  // confidence: at most as often as skin deep in a body is contact
@@ -89,9 +92,7 @@ class Finder {
   }
 
   Seen look(const Face& face, int other, const SolidFaces& solid) const {
-    std::array<Vector3d, 3> p;
-    for (int c = 0; c < 3; ++c)
-      p[static_cast<std::size_t>(c)] = flesh_.mesh.V.row(node_of(flesh_.mesh.T, face, c)).transpose();
+    const std::array<Vector3d, 3> p = corners_of(flesh_.mesh, face);
     Seen out;
     out.face = face;
     out.middle = (p[0] + p[1] + p[2]) / 3;
@@ -157,10 +158,9 @@ Contacts find_contacts(const Flesh& flesh, const std::vector<std::int16_t>& part
                        const std::vector<LimbRoot>& roots, double least_mm2, const Joined& joined) {
   const Finder finder(flesh, part, roots);
   std::map<Pair, std::vector<Seen>> pairs = finder.seen(solid);
-  const auto limb = [&](int segment) { return flesh.limb[static_cast<std::size_t>(segment)]; };
   for (const auto& [a, b] : joined) {
-    pairs.erase({limb(a), limb(b)});
-    pairs.erase({limb(b), limb(a)});
+    pairs.erase({a, b});
+    pairs.erase({b, a});
   }
   std::set<int> cut;  // limbs
   for (const auto& [pair, faces] : pairs) {
@@ -169,18 +169,18 @@ Contacts find_contacts(const Flesh& flesh, const std::vector<std::int16_t>& part
   cut.erase(-1);
   Contacts out;
   for (auto& [pair, faces] : pairs) {
-    const Contact contact = finder.contact(pair, faces);
-    if (contact.own < 0 || contact.other < 0) continue;  // no bone moves the one or the other there
     if (sure_area(pair, faces) < least_mm2) {
       if (cut.count(pair.first) == 0 && cut.count(pair.second) == 0) continue;
       std::erase_if(faces, [](const Seen& one) { return one.ratio <= kSure; });
       if (faces.empty()) continue;
     }
+    const Contact contact = finder.contact(pair, faces);
+    if (contact.own < 0 || contact.other < 0) continue;  // no bone moves the one or the other there
     for (const Seen& one : faces) {
       out.faces.push_back(one.face);
       out.contact_of.push_back(static_cast<std::int32_t>(out.contacts.size()));
     }
-    out.contacts.push_back(finder.contact(pair, faces));
+    out.contacts.push_back(contact);
   }
   return out;
 }

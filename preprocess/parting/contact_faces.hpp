@@ -35,7 +35,7 @@ struct Contacts {
   std::vector<std::int32_t> contact_of;  ///< #faces
 };
 
-/// Two segments whose limbs are to stay joined where they touch.
+/// Two limbs that stay joined where they touch, by their uppermost segments; -1: the rest of the body.
 using Joined = std::vector<std::pair<int, int>>;
 
 /// A face between tets of two parts is contact where it lies farther from the limb's joint than 1.75 times

@@ -25,6 +25,14 @@ inline std::int32_t node_of(const Tets& T, const Face& face, int c) {
   return T(face.tet, face_corners[static_cast<std::size_t>(face.corner)][static_cast<std::size_t>(c)]);
 }
 
+/// Where a face's corners are.
+inline std::array<Eigen::Vector3d, 3> corners_of(const TetMesh& mesh, const Face& face) {
+  std::array<Eigen::Vector3d, 3> out;
+  for (int c = 0; c < 3; ++c)
+    out[static_cast<std::size_t>(c)] = mesh.V.row(node_of(mesh.T, face, c)).transpose();
+  return out;
+}
+
 /// For each face the tet behind it, -1 at the boundary.
 class FaceNeighbours {
  public:

@@ -101,21 +101,7 @@ void fill_gaps(Tissue& skin, const std::set<std::int32_t>& rim, Eigen::Index own
       });
   drop_lone_triangles(soup, own);
   soup.triangles.insert(soup.triangles.end(), given.others.begin(), given.others.end());
-  // Copies that nothing uses go.
-  std::vector<std::int32_t> row(added.size(), -1);
-  std::vector<NewVertex> used;
-  for (Corners& triangle : soup.triangles) {
-    for (std::int32_t& v : triangle) {
-      if (v < before) continue;
-      std::int32_t& to = row[static_cast<std::size_t>(v - before)];
-      if (to < 0) {
-        to = before + static_cast<std::int32_t>(used.size());
-        used.push_back(added[static_cast<std::size_t>(v - before)]);
-      }
-      v = to;
-    }
-  }
-  append_vertices(skin, used, tets, context);
+  append_vertices(skin, added, tets, context);
   skin.F = soup.F();
 }
 

@@ -82,9 +82,7 @@ class OneLimb {
   }
 
   double price(const Face& face, const SolidFaces& solid) const {
-    std::array<Vector3d, 3> p;
-    for (int c = 0; c < 3; ++c)
-      p[static_cast<std::size_t>(c)] = flesh_.mesh.V.row(node_of(flesh_.mesh.T, face, c)).transpose();
+    const std::array<Vector3d, 3> p = corners_of(flesh_.mesh, face);
     const double area = 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
     return area * (kBridge + (1 - kBridge) * solid.price(p));
   }

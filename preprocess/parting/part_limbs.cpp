@@ -10,8 +10,6 @@
 namespace ecorche::parting {
 namespace {
 
-constexpr double kPatch = 1e3 / (1700.0 * 1700.0);  // of the body's length squared: 10 cm2 of 1.7 m
-
 constexpr int kRounds = 8;  // a loose piece may fall to another
 
 std::vector<LimbRoot> roots_of(const PartingInput& input, const std::vector<int>& limb) {
@@ -29,16 +27,6 @@ std::array<std::int32_t, 3> nodes_of(const Tets& T, const Face& face) {
   return {node_of(T, face, 0), node_of(T, face, 1), node_of(T, face, 2)};
 }
 
-// Segments of the case's names; those without bones have none here.
-Joined joined_of(const PartingInput& input) {
-  Joined out;
-  for (const auto& [a, b] : input.patient.contacts.joined) {
-    const int first = input.skeleton.find_segment(a), second = input.skeleton.find_segment(b);
-    if (first >= 0 && second >= 0) out.emplace_back(first, second);
-  }
-  return out;
-}
-
 // The same face's corners on both sides: in each the order of its own tet.
 std::array<std::int32_t, 3> in_order(const std::array<std::int32_t, 3>& places,
                                      const std::array<std::int32_t, 3>& nodes, const Points& V) {
@@ -51,7 +39,33 @@ std::array<std::int32_t, 3> in_order(const std::array<std::int32_t, 3>& places,
   return out;
 }
 
+// What stays closed between parts.
+std::vector<JoinedFace> joined_faces(const Tets& T, const FaceNeighbours& across, const FaceSet& open,
+                                     const std::vector<std::int16_t>& parts) {
+  std::vector<JoinedFace> out;
+  const auto part = [&](std::int32_t t) { return parts[static_cast<std::size_t>(t)]; };
+  for (std::int32_t t = 0; t < static_cast<std::int32_t>(T.rows()); ++t) {
+    for (int c = 0; c < 4; ++c) {
+      const std::int32_t next = across.behind({t, c});
+      if (next > t && part(next) != part(t) && !open.has({t, c}))
+        out.push_back({nodes_of(T, {t, c}), part(t), part(next)});
+    }
+  }
+  return out;
+}
+
 }  // namespace
+
+Joined joined_limbs(const CaseContacts& contacts, const Skeleton& skeleton) {
+  const std::vector<int> limb = check::limbs_of(skeleton);
+  Joined out;
+  for (const auto& [a, b] : contacts.joined) {
+    const int first = skeleton.find_segment(a), second = skeleton.find_segment(b);
+    if (first < 0 || second < 0) continue;  // it has no bones, and is not in the rig
+    out.emplace_back(limb[static_cast<std::size_t>(first)], limb[static_cast<std::size_t>(second)]);
+  }
+  return out;
+}
 
 std::optional<Parting> part_limbs(const PartingInput& input, const Context& context) {
   const std::vector<int> limb = check::limbs_of(input.skeleton);
@@ -63,11 +77,12 @@ std::optional<Parting> part_limbs(const PartingInput& input, const Context& cont
   out.part = limb_parts(flesh, solid, context);
   const double length = (input.mesh.V.colwise().maxCoeff() - input.mesh.V.colwise().minCoeff()).maxCoeff();
   const std::vector<LimbRoot> roots = roots_of(input, limb);
-  const Joined joined = joined_of(input);
+  const Joined joined = joined_limbs(input.patient.contacts, input.skeleton);
   Contacts found;
   for (int round = 0; round < kRounds; ++round) {
-    found = find_contacts(flesh, out.part, solid, roots, kPatch * length * length, joined);
-    if (!give_loose_pieces(input.mesh, across, found.faces, out.part)) break;
+    found = find_contacts(flesh, out.part, solid, roots, check::least_contact_mm2(length), joined);
+    const bool last = round + 1 == kRounds;  // weights::attachments has what is loose even then
+    if (last || !give_loose_pieces(input.mesh, across, found.faces, out.part)) break;
   }
   if (found.faces.empty()) return std::nullopt;
   const std::vector<Face>& cut = found.faces;
@@ -87,27 +102,10 @@ std::optional<Parting> part_limbs(const PartingInput& input, const Context& cont
     face.inner = nodes_of(mesh.T, cut[f]);
     face.outer = in_order(face.inner, nodes_of(mesh.T, across.other(cut[f])), mesh.V);
     face.contact = found.contact_of[f];
-    std::array<Eigen::Vector3d, 3> p;
-    for (std::size_t c = 0; c < 3; ++c) p[c] = mesh.V.row(face.inner[c]).transpose();
-    face.solid = static_cast<float>(solid.share(p));
+    face.solid = static_cast<float>(solid.share(corners_of(mesh, cut[f])));
     out.faces.push_back(face);
   }
-  const auto part = [&](std::int32_t t) { return out.part[static_cast<std::size_t>(t)]; };
-  std::vector<std::int64_t> open;
-  for (const Face& face : cut) {
-    open.push_back(4 * std::int64_t{face.tet} + face.corner);
-    const Face other = across.other(face);
-    open.push_back(4 * std::int64_t{other.tet} + other.corner);
-  }
-  std::sort(open.begin(), open.end());
-  for (std::int32_t t = 0; t < static_cast<std::int32_t>(mesh.T.rows()); ++t) {
-    for (int c = 0; c < 4; ++c) {
-      const std::int32_t next = across.behind({t, c});
-      if (next <= t || part(next) == part(t)) continue;
-      if (!std::binary_search(open.begin(), open.end(), 4 * std::int64_t{t} + c))
-        out.joined.push_back({nodes_of(mesh.T, {t, c}), part(t), part(next)});
-    }
-  }
+  out.joined = joined_faces(mesh.T, across, FaceSet(across, cut), out.part);
   out.contacts = std::move(found.contacts);
   out.V = std::move(mesh.V);
   out.T = std::move(mesh.T);

@@ -51,6 +51,9 @@ struct PartingInput {
   const Case& patient;                            ///< skin, labels, and which contacts stay
 };
 
+/// The limbs that the case says stay joined; those without bones are not in the rig's skeleton.
+Joined joined_limbs(const CaseContacts& contacts, const Skeleton& skeleton);
+
 /// Finds contacts (limb_parts.hpp, contact_faces.hpp) and opens the mesh there (split_nodes.hpp); nothing
 /// where none is found. Deterministic.
 std::optional<Parting> part_limbs(const PartingInput& input, const Context& context);

@@ -5,29 +5,10 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
-#include <unordered_set>
 #include <utility>
 
 namespace ecorche::parting {
 namespace {
-
-using Eigen::Vector3d;
-
-// Faces by both of their tets.
-class OpenFaces {
- public:
-  OpenFaces(const FaceNeighbours& across, const std::vector<Face>& cut) {
-    for (const Face& face : cut) {
-      faces_.insert(key(face));
-      faces_.insert(key(across.other(face)));
-    }
-  }
-  bool has(const Face& face) const { return faces_.count(key(face)) != 0; }
-
- private:
-  static std::int64_t key(const Face& face) { return 4 * std::int64_t{face.tet} + face.corner; }
-  std::unordered_set<std::int64_t> faces_;
-};
 
 // Sets that are joined; each is known by its lowest.
 class Sets {
@@ -51,7 +32,7 @@ class Sets {
 };
 
 Sets pieces_without(const Tets& T, const FaceNeighbours& across, const std::vector<Face>& cut) {
-  const OpenFaces open(across, cut);
+  const FaceSet open(across, cut);
   Sets pieces(static_cast<std::size_t>(T.rows()));
   for (std::int32_t t = 0; t < static_cast<std::int32_t>(T.rows()); ++t) {
     for (int c = 0; c < 4; ++c) {
@@ -73,11 +54,15 @@ std::vector<std::uint8_t> boned_pieces(const TetMesh& mesh, Sets& pieces) {
 }
 
 double area_of(const TetMesh& mesh, const Face& face) {
-  const auto at = [&](int c) -> Vector3d { return mesh.V.row(node_of(mesh.T, face, c)).transpose(); };
-  return 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+  const std::array<Eigen::Vector3d, 3> p = corners_of(mesh, face);
+  return 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
 }
 
 }  // namespace
+
+FaceSet::FaceSet(const FaceNeighbours& across, const std::vector<Face>& faces) {
+  for (const Face& face : faces) keys_.insert({key(face), key(across.other(face))});
+}
 
 std::vector<std::uint8_t> on_bones(const TetMesh& mesh, const FaceNeighbours& across) {
   Sets pieces = pieces_without(mesh.T, across, {});
@@ -116,7 +101,7 @@ bool give_loose_pieces(const TetMesh& mesh, const FaceNeighbours& across, const 
 }
 
 void split_nodes(TetMesh& mesh, const FaceNeighbours& across, const std::vector<Face>& cut) {
-  const OpenFaces open(across, cut);
+  const FaceSet open(across, cut);
   std::vector<std::int32_t> touched(static_cast<std::size_t>(mesh.V.rows()), -1);  // row of `nodes`
   std::vector<std::int32_t> nodes;
   for (const Face& face : cut) {

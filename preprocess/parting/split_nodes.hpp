@@ -3,12 +3,24 @@
 #pragma once
 
 #include <cstdint>
+#include <unordered_set>
 #include <vector>
 
 #include <ecorche/values/mesh.hpp>
 #include "preprocess/parting/face_neighbours.hpp"
 
 namespace ecorche::parting {
+
+/// Faces as a set: each is found from both of its tets.
+class FaceSet {
+ public:
+  FaceSet(const FaceNeighbours& across, const std::vector<Face>& faces);
+  bool has(const Face& face) const { return keys_.count(key(face)) != 0; }
+
+ private:
+  static std::int64_t key(const Face& face) { return 4 * std::int64_t{face.tet} + face.corner; }
+  std::unordered_set<std::int64_t> keys_;
+};
 
 /// #T: 1 for tets that hang together with a tet of a bone by faces.
 std::vector<std::uint8_t> on_bones(const TetMesh& mesh, const FaceNeighbours& across);
