@@ -31,7 +31,10 @@ PartedWeights parted_weights(const TetMesh& mesh, const Case& patient, const Rig
   if (!parting) return out;
   out.parting = std::move(*parting);
   out.solved = {};  // goes before the next comes
-  out.solved = solve({out.parting.V, out.parting.T, mesh.label});
+  TetMesh parted{std::move(out.parting.V), std::move(out.parting.T), mesh.label};  // lent, not copied
+  out.solved = solve(parted);
+  out.parting.V = std::move(parted.V);
+  out.parting.T = std::move(parted.T);
   return out;
 }
 

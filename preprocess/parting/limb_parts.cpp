@@ -2,9 +2,13 @@
 #include "preprocess/parting/limb_parts.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include "preprocess/parting/minimum_cut.hpp"
 
@@ -33,6 +37,7 @@ class OneLimb {
     });
   }
 
+  int top() const { return top_; }
   float share(std::size_t tet) const { return share_[tet]; }
 
   std::vector<std::uint8_t> tets_of(const SolidFaces& solid) const {
@@ -92,42 +97,81 @@ class OneLimb {
   std::vector<float> share_;  // of each tet
 };
 
-}  // namespace
+// What limbs claim of each tet, one limb after the other.
+class Claims {
+ public:
+  explicit Claims(std::size_t tets) : claims_(tets), part_(tets, -1) {}
 
-std::vector<std::int16_t> limb_parts(const Flesh& flesh, const SolidFaces& solid, const Context& context) {
-  // Of each tet the two limbs with the largest shares, and what no limb has.
-  struct Claim {
-    float most = 0, second = 0, rest = 1;
-    std::int16_t limb = -1;
-  };
-  const auto tets = static_cast<std::size_t>(flesh.mesh.T.rows());
-  std::vector<std::int16_t> part(tets, -1);
-  std::vector<float> claimed(tets, 0);
-  std::vector<Claim> claims(tets);
-  for (int top = 0; top < static_cast<int>(flesh.limb.size()); ++top) {
-    if (flesh.limb[static_cast<std::size_t>(top)] != top) continue;
-    context.check_stop();
-    const OneLimb limb(flesh, top);
-    const std::vector<std::uint8_t> own = limb.tets_of(solid);
-    for (std::size_t t = 0; t < tets; ++t) {
+  void take(const OneLimb& limb, const std::vector<std::uint8_t>& own) {
+    tbb::parallel_for(std::size_t{0}, claims_.size(), [&](std::size_t t) {
       const float share = limb.share(t);
-      Claim& claim = claims[t];
+      Claim& claim = claims_[t];
       claim.rest -= share;
       claim.second = std::max(claim.second, std::min(claim.most, share));
       if (share > claim.most) {
         claim.most = share;
-        claim.limb = static_cast<std::int16_t>(top);
+        claim.limb = static_cast<std::int16_t>(limb.top());
       }
-      if (own[t] == 0 || share <= claimed[t]) continue;
-      claimed[t] = share;
-      part[t] = static_cast<std::int16_t>(top);
-    }
+      if (own[t] == 0 || share <= claim.owned) return;
+      claim.owned = share;
+      part_[t] = static_cast<std::int16_t>(limb.top());
+    });
   }
-  for (std::size_t t = 0; t < tets; ++t) {
-    if (part[t] < 0 && flesh.mesh.label[t] == TetMesh::soft && claims[t].second > claims[t].rest)
-      part[t] = claims[t].limb;
+
+  std::vector<std::int16_t> parts(const std::vector<std::uint16_t>& label) && {
+    tbb::parallel_for(std::size_t{0}, claims_.size(), [&](std::size_t t) {
+      if (part_[t] < 0 && label[t] == TetMesh::soft && claims_[t].second > claims_[t].rest)
+        part_[t] = claims_[t].limb;
+    });
+    return std::move(part_);
   }
-  return part;
+
+ private:
+  struct Claim {
+    float most = 0, second = 0;  // of the two limbs with the largest shares
+    float rest = 1;              // what no limb has
+    float owned = 0;             // the share of the limb that has it
+    std::int16_t limb = -1;      // with the largest share
+  };
+  std::vector<Claim> claims_;
+  std::vector<std::int16_t> part_;
+};
+
+}  // namespace
+
+std::vector<std::int16_t> limb_parts(const Flesh& flesh, const SolidFaces& solid, const Context& context) {
+  std::vector<int> tops;
+  for (std::size_t s = 0; s < flesh.limb.size(); ++s) {
+    if (flesh.limb[s] == static_cast<int>(s)) tops.push_back(flesh.limb[s]);
+  }
+  struct Cut {
+    OneLimb limb;
+    std::vector<std::uint8_t> own;
+  };
+  Claims claims(static_cast<std::size_t>(flesh.mesh.T.rows()));
+  // Limbs are cut side by side, since a cut takes one thread, and claim in turn: sums do not depend on who is
+  // first.
+  std::size_t next = 0;
+  const auto limb =
+      tbb::make_filter<void, int>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) {
+        if (next == tops.size()) {
+          flow.stop();
+          return -1;
+        }
+        return tops[next++];
+      });
+  const auto cut = tbb::make_filter<int, std::shared_ptr<Cut>>(tbb::filter_mode::parallel, [&](int top) {
+    context.check_stop();
+    auto out = std::make_shared<Cut>(Cut{OneLimb(flesh, top), {}});
+    out->own = out->limb.tets_of(solid);
+    return out;
+  });
+  const auto claim = tbb::make_filter<std::shared_ptr<Cut>, void>(
+      tbb::filter_mode::serial_in_order,
+      [&](const std::shared_ptr<Cut>& of) { claims.take(of->limb, of->own); });
+  tbb::parallel_pipeline(static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()),
+                         limb & cut & claim);
+  return std::move(claims).parts(flesh.mesh.label);
 }
 
 }  // namespace ecorche::parting
