@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Line integrals through scans, against what is known of spheres and slabs, and against two slow twins.
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <random>
 #include <stop_token>
 
+#include "tests/support/instruction_sets.hpp"
 #include "tests/support/siddon.hpp"
 #include "tests/unit/radiograph/shapes.hpp"
 
@@ -180,19 +180,17 @@ TEST(RadiographOfNoise, AgreesWithItsSlowTwinOnEveryInstructionSet) {
     if (round >= 10) setup.source = about + Vector3d(0.3, 0.2, 0.4);  // rays to all sides from within
     if (round == 11) setup.detector.centre = about + 8 * setup.detector.right.cross(setup.detector.down);
     const AttenuationMap map = attenuation_map(hu, kUsual);
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      hwy::SetSupportedTargetsForTest(target);
+    test::for_instruction_sets([&] {
       const std::vector<float> integrals = line_integrals(map, setup);
-      hwy::SetSupportedTargetsForTest(0);
       double most = 0;
       each_pixel(setup, integrals, [&](const Vector3d& pixel, double integral) {
         const double known = slow_joseph(hu, kUsual, setup.source, pixel);
         most = std::max(most, known);
         // Float32 places a ray to 1e-4 voxels, and the map has 16 bits.
-        ASSERT_NEAR(integral, known, 1e-3) << hwy::TargetName(target) << ", round " << round;
+        ASSERT_NEAR(integral, known, 1e-3) << "round " << round;
       });
       EXPECT_GT(most, 0.5);
-    }
+    });
   }
 }
 

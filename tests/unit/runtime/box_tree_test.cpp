@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The tree of boxes that is fitted where points come to, against one that is fitted whole.
-#define HWY_WANT_AVX3_DL  // the probe has kernels of its own for it
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -15,6 +13,8 @@
 #include <thread>
 
 #include <ecorche/runtime/probe.hpp>
+
+#include "tests/support/instruction_sets.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -118,9 +118,7 @@ TEST_F(BoxTreeTest, BlocksAreBoundedByTheirTets) {
   // The same boxes from the mesh, tet by tet, at every level above the blocks.
   ASSERT_EQ(runs.blocks(), (6 * 14 * 14 * 60 + kTetsOfBlock - 1) / kTetsOfBlock);
   ASSERT_EQ(runs.levels(), 4U);
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     const std::vector<float> nodes = posed(1.5);
     Probe::PosedTree tree;
     probe.follow(nodes, tree);
@@ -148,14 +146,11 @@ TEST_F(BoxTreeTest, BlocksAreBoundedByTheirTets) {
       }
     }
     EXPECT_EQ(fitted(tree), 0U);
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(BoxTreeTest, PointsSeeTheSameWhicheverBlockIsFittedWhen) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     const std::vector<float> nodes = posed(1.0), points = points_about(nodes, 400);
     const Probed whole = ask_fitted(nodes, points);
     ASSERT_GT(std::count_if(whole.tet.begin(), whole.tet.end(), [](auto t) { return t >= 0; }), 200);
@@ -173,8 +168,7 @@ TEST_F(BoxTreeTest, PointsSeeTheSameWhicheverBlockIsFittedWhen) {
       ASSERT_EQ(out.tet[0], whole.tet[i]);
     }
     EXPECT_GT(fitted(one_by_one), runs.blocks() / 2);
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(BoxTreeTest, ItsSizeIsKnownBeforeItIsMade) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Posed volumes of which only the moved bricks are made again, against volumes made whole.
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <tbb/task_arena.h>
 
 #include <Eigen/Geometry>
@@ -12,6 +11,7 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
 #include "runtime/volume/draw_tets.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -87,9 +87,7 @@ class BricksTest : public testing::Test {
 };
 
 TEST_F(BricksTest, TheSameBytesAsAWholeVolumeOnEveryInstructionSet) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     for (const Sampling sampling : {Sampling::nearest, Sampling::trilinear}) {
       kept = {};
       EXPECT_EQ(follow(bend(0.3, 0), sampling), 1) << "the first is whole";
@@ -105,8 +103,7 @@ TEST_F(BricksTest, TheSameBytesAsAWholeVolumeOnEveryInstructionSet) {
       for (const double flexion : {2.5, 2.8}) EXPECT_GT(follow(folded(flexion), sampling), 0);
       follow(bend(0, 0), sampling);
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(BricksTest, OneNodeMovesTheBricksOfItsTets) {

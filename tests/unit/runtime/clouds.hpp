@@ -3,7 +3,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <Eigen/Geometry>
 #include <bit>
@@ -139,17 +138,6 @@ inline std::size_t skinned(const PosedBody& body) {
   for (const std::uint64_t bits : body.scratch.mask)
     clusters += static_cast<std::size_t>(std::popcount(bits));
   return clusters;
-}
-
-// Calls `check` under each instruction set that this machine offers, the best one first.
-template <class Check>
-inline void for_instruction_sets(Check check) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    SCOPED_TRACE(hwy::TargetName(target));
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
 }
 
 }  // namespace ecorche::runtime

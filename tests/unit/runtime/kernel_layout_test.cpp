@@ -11,6 +11,7 @@
 
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/unit/runtime/clouds.hpp"
 #include "tests/unit/runtime/reference_skinning.hpp"
 
@@ -129,7 +130,7 @@ TEST(Kernels, QuantisedPositionsAndNormals) {
   Model model = cloud({900, 6, 3, 200}, 12);
   const BodyParts parts(model);
   const auto segments = random_segments(6, 0.3, 13);
-  for_instruction_sets([&] {
+  test::for_instruction_sets([&] {
     PosedBody body = frame_of(parts, model, segments);
     pose(parts, model, Skinning::cor, body);
     const Tissue& tissue = model.tissues[0];

@@ -2,7 +2,6 @@
 // The vector kernels against double precision and against every other instruction set of this machine, on
 // bodies made to hurt: tails, clusters of one segment, 65 535 segments, full palettes.
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -15,6 +14,7 @@
 #include <ecorche/kinematics/forward.hpp>
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/unit/runtime/clouds.hpp"
 #include "tests/unit/runtime/reference_skinning.hpp"
 
@@ -43,7 +43,7 @@ void expect_right(const Shape& shape, double turn) {
     const auto nodes = test::reference_nodes(kept, segments, skinning, 0);
     const auto vertices = test::reference_tissue(kept, kept.tissues[0], segments, nodes);
     std::vector<float> first_nodes, first_vertices;
-    for_instruction_sets([&] {
+    test::for_instruction_sets([&] {
       PosedBody body = frame_of(parts, model, segments);
       pose(parts, model, skinning, body);
       EXPECT_LT(test::farthest(body.nodes, nodes), 0.05);
@@ -60,9 +60,7 @@ void expect_right(const Shape& shape, double turn) {
 
 TEST(Kernels, TheInstructionSetsOfThisMachine) {
   std::string names;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    names += std::string(" ") + hwy::TargetName(target);
-  }
+  for (const std::string& name : test::instruction_sets()) names += " " + name;
   std::printf("instruction sets:%s\n", names.c_str());
   EXPECT_FALSE(names.empty());
 }
@@ -142,7 +140,7 @@ TEST(Kernels, VanishedBlendsFollowTheHeaviestSegment) {
   segments[2].q.coeffs() *= -1;
   const BodyParts parts(model);
   for (const Skinning skinning : kEverySkinning) {
-    for_instruction_sets([&] {
+    test::for_instruction_sets([&] {
       PosedBody body = frame_of(parts, model, segments);
       pose(parts, model, skinning, body);
       std::vector<Vector3d> expected = test::points_of(model.nodes);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which tet holds a point, against a search of all.
-#define HWY_WANT_AVX3_DL  // the probe has kernels of its own for it
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +9,7 @@
 #include <map>
 #include <memory>
 
+#include "tests/support/instruction_sets.hpp"
 #include "tests/unit/runtime/probe_stage.hpp"
 
 namespace ecorche::runtime {
@@ -19,9 +18,7 @@ namespace {
 using Eigen::Vector3d;
 
 TEST_F(ProbeTest, FindsTheTetsOfAnExhaustiveSearchOnEveryInstructionSet) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     for (const double flexion : {0.0, 1.2, 2.7}) {
       SCOPED_TRACE(flexion);
       bend(flexion);
@@ -33,8 +30,7 @@ TEST_F(ProbeTest, FindsTheTetsOfAnExhaustiveSearchOnEveryInstructionSet) {
     const std::vector<float> rest = rest_nodes(*model), points = random_points(rest, 1500);
     probe.rest_to_posed(tree, points, {}, out);
     expect_exhaustive(rest, points);
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(ProbeTest, FindsThemWhereEveryPointLiesInThousandsOfBoxes) {
@@ -63,13 +59,10 @@ TEST_F(ProbeTest, FindsThemWhereEveryPointLiesInThousandsOfBoxes) {
   }
   EXPECT_GT(twice, 1000U);
   EXPECT_GT(outside, 5U);
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     of.posed_to_rest(tree, points, {}, out);
     for (std::size_t i = 0; i < slow.size(); ++i) EXPECT_TRUE(slow[i] == -2 || out.tet[i] == slow[i]) << i;
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(ProbeTest, NodesAndFacesAreHeldByTheLowestTet) {
@@ -160,9 +153,7 @@ TEST_F(ProbeTest, HugeTinyAndFlatBodiesAreSearchedTheSame) {
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::ldexp(x[i], by[i % 3]);
     return x;
   };
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     for (const int by : {-112, -60, -20, 20, 60, 119, 120}) {
       probe.follow(scaled(body, {by, by, by}), tree);
       probe.posed_to_rest(tree, scaled(points, {by, by, by}), {}, out);
@@ -176,8 +167,7 @@ TEST_F(ProbeTest, HugeTinyAndFlatBodiesAreSearchedTheSame) {
       probe.posed_to_rest(tree, there, {}, out);
       expect_exhaustive(nodes, there, true);
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(ProbeTest, WhatIsNoNumberOrEndlessLiesOutside) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a probe is made of: orders of points and tets, palettes of tets, columns of tissues.
-#define HWY_WANT_AVX3_DL  // the probe has kernels of its own for it
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +15,7 @@
 #include "runtime/probe/tissue_cells.hpp"
 #include "runtime/probe/tissue_columns.hpp"
 #include "runtime/volume/tet_palettes.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -116,9 +115,7 @@ TEST(TetRuns, StepsAreTheNearestToTheNodes) {
   std::vector<float> nodes(model.nodes.data(), model.nodes.data() + model.nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i] += 3 * std::sin(0.1F * static_cast<float>(i));
   const TetRuns runs(model.tets, model.nodes);
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     PaddedNodes padded;
     BoxTree boxes;
     follow(runs, nodes, padded, boxes);
@@ -139,8 +136,7 @@ TEST(TetRuns, StepsAreTheNearestToTheNodes) {
                   (steps - in.low[a][r % 16]) * static_cast<double>(boxes.runs[r].finer), 0.501);
     }
     EXPECT_GT(packed, 1000U);
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST(TetPalettes, BytesFindTheCornersOfEveryTet) {

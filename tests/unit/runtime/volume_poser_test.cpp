@@ -2,7 +2,6 @@
 // Volumes posed in one pass against locate() and resample(), and the latter against exhaustive search
 // (volume_test).
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <tbb/task_arena.h>
 
 #include <Eigen/Geometry>
@@ -16,6 +15,7 @@
 #include "runtime/volume/fixed_points.hpp"
 #include "runtime/volume/sample_batch.hpp"
 #include "runtime/volume/sampler.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -86,16 +86,6 @@ double differing(const Model& model, std::span<const float> nodes, const ModelVo
 }
 
 // Runs `check` once per instruction set of this machine.
-template <class Check>
-void on_every_target(Check check) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
-
 class PosedInOnePass : public testing::Test {
  protected:
   PosedInOnePass() : model(std::make_shared<const Model>(test::toy_model())), poser(model) {}
@@ -118,7 +108,7 @@ class PosedInOnePass : public testing::Test {
 };
 
 TEST_F(PosedInOnePass, AgreesWithTheSlowTwinOnEveryInstructionSet) {
-  on_every_target([&] {
+  test::for_instruction_sets([&] {
     for (const bool left_handed : {false, true}) {
       const ImageGrid grid = skewed_grid(left_handed);
       expect_slow_twin<std::uint8_t>(smooth_volume<std::uint8_t>(grid), Sampling::nearest, grid, 0);
@@ -190,7 +180,7 @@ TEST_F(PosedInOnePass, RestGivesEveryVoxelBack) {
   const std::vector<float> nodes = nodes_at_rest(*model);
   InverseMap map;
   locate(*model, nodes, grid, map);
-  on_every_target([&] {
+  test::for_instruction_sets([&] {
     for (const Sampling sampling : {Sampling::nearest, Sampling::trilinear}) {
       poser.pose(nodes, volume, sampling, grid, out, scratch);
       std::size_t wrong = 0, held = 0;
@@ -254,8 +244,7 @@ TEST_F(PosedInOnePass, WhereManyTetsPileUpTheLowestPositiveOneWins) {
   pile.tet_label.assign(count, 1);
   const VolumePoser of(std::make_shared<const Model>(pile));
   const ImageGrid grid{{9, 9, 9}};
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+  test::for_instruction_sets([&] {
     for (const std::size_t positive : {0U, 3U, 19U, 70U, 129U}) {
       std::vector<float> nodes = nodes_at_rest(pile);
       for (std::size_t n = 0; n < 4 * count; ++n) nodes[3 * n] -= static_cast<float>(10 * (n / 4));
@@ -266,11 +255,10 @@ TEST_F(PosedInOnePass, WhereManyTetsPileUpTheLowestPositiveOneWins) {
       of.pose(nodes, volume, Sampling::nearest, grid, posed, own);
       const std::span<const std::int16_t> got = std::as_const(posed).scalars<std::int16_t>();
       const auto held = std::count(got.begin(), got.end(), static_cast<std::int16_t>(positive + 1));
-      EXPECT_GT(held, 100) << hwy::TargetName(target) << " " << positive;
+      EXPECT_GT(held, 100) << positive;
       EXPECT_EQ(held + std::count(got.begin(), got.end(), std::int16_t{0}), 729) << positive;
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_F(PosedInOnePass, ACrumpledBodyInBoxesOfAllSizes) {
@@ -279,7 +267,7 @@ TEST_F(PosedInOnePass, ACrumpledBodyInBoxesOfAllSizes) {
   std::mt19937 random(5);
   for (float& x : nodes) x += static_cast<float>(random() % 4001) * 0.01F - 20;
   const ModelVolume volume = smooth_volume<std::uint8_t>(skewed_grid(false));
-  on_every_target([&] {
+  test::for_instruction_sets([&] {
     for (const bool left_handed : {false, true}) {
       for (const int finer : {1, 2, 4}) {
         SCOPED_TRACE(finer);
@@ -360,7 +348,7 @@ void expect_samplers_nearest(std::size_t count) {
 }
 
 TEST(NearestSamples, AreTheSamplersToTheByteOnEveryInstructionSet) {
-  on_every_target([] {
+  test::for_instruction_sets([] {
     for (const std::size_t count : {std::size_t{1}, std::size_t{3}, std::size_t{16}, std::size_t{17},
                                     std::size_t{100}, VoxelBatch::capacity}) {
       expect_samplers_nearest<std::uint8_t>(count);

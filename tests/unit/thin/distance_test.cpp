@@ -2,11 +2,11 @@
 #include "preprocess/thin/distance.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <tbb/task_arena.h>
 
 #include "preprocess/thin/euclidean.hpp"
 #include "preprocess/thin/window_minimum.hpp"
+#include "tests/support/instruction_sets.hpp"
 #include "tests/unit/thin/brute_force.hpp"
 #include "tests/unit/thin/itk_maurer.hpp"
 
@@ -116,14 +116,11 @@ TEST(Distance, TheSameForAnyNumberOfThreadsAndAnyInstructionSet) {
   const Field<double> mm = squared_distance_mm(mask, {});
   tbb::task_arena(1).execute(
       [&] { EXPECT_EQ(values_of(distance_map(mask, DistanceMetric::euclidean, {})), plain); });
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    SCOPED_TRACE(hwy::TargetName(target));
+  test::for_instruction_sets([&] {
     EXPECT_EQ(values_of(distance_map(mask, DistanceMetric::euclidean, {})), plain);
     const Field<double> again = squared_distance_mm(mask, {});
     EXPECT_TRUE(std::equal(mm.data(), mm.data() + mm.size(), again.data()));
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 template <class T>
