@@ -50,6 +50,44 @@ std::vector<std::int32_t> nodes_of(const Faces& faces) {
   return out;
 }
 
+/// Of the faces those that lie on another one.
+Faces lying_on_others(const Faces& faces, const Points& X) {
+  // Nodes at one place go by the lowest of them.
+  std::vector<std::int32_t> nodes = nodes_of(faces);
+  const auto place = [&](std::int32_t n) { return std::array<double, 3>{X(n, 0), X(n, 1), X(n, 2)}; };
+  tbb::parallel_sort(nodes.begin(), nodes.end(), [&](std::int32_t a, std::int32_t b) {
+    return std::pair{place(a), a} < std::pair{place(b), b};
+  });
+  std::vector<std::int32_t> lowest(static_cast<std::size_t>(X.rows()), -1);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const bool same = i > 0 && place(nodes[i]) == place(nodes[i - 1]);
+    lowest[static_cast<std::size_t>(nodes[i])] =
+        same ? lowest[static_cast<std::size_t>(nodes[i - 1])] : nodes[i];
+  }
+  std::vector<std::pair<std::array<std::int32_t, 3>, std::size_t>> placed(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    std::array<std::int32_t, 3> at = faces[f];
+    for (std::int32_t& node : at) node = lowest[static_cast<std::size_t>(node)];
+    std::sort(at.begin(), at.end());
+    placed[f] = {at, f};
+  }
+  tbb::parallel_sort(placed.begin(), placed.end());
+  Faces out;
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const bool before = i > 0 && placed[i].first == placed[i - 1].first;
+    const bool after = i + 1 < placed.size() && placed[i].first == placed[i + 1].first;
+    if (before || after) out.push_back(faces[placed[i].second]);
+  }
+  return out;
+}
+
+geometry::FaceTree tree_of(const Faces& faces, const Points& X) {
+  std::vector<geometry::FaceTree::Corners> corners;
+  corners.reserve(faces.size());
+  for (const auto& [a, b, c] : faces) corners.push_back({X.row(a), X.row(b), X.row(c)});
+  return geometry::FaceTree(corners);
+}
+
 bool holds(const Points& x, const Tets& T, Eigen::Index t, const Vector3d& p) {
   const Vector3d a = x.row(T(t, 0)), b = x.row(T(t, 1)), c = x.row(T(t, 2)), d = x.row(T(t, 3));
   const double all = tet_det(a, b, c, d);
@@ -140,14 +178,23 @@ Vector3d at_rest(const Points& X, const Points& x, const Tets& T, Eigen::Index t
 
 SelfContactFinder::SelfContactFinder(const Points& X, const Tets& T) : X_(X), T_(T) {
   const Faces faces = surface_of(T);
-  std::vector<geometry::FaceTree::Corners> corners;
-  corners.reserve(faces.size());
-  for (const auto& [a, b, c] : faces) corners.push_back({X.row(a), X.row(b), X.row(c)});
-  surface_ = std::make_unique<const geometry::FaceTree>(corners);
+  surface_ = std::make_unique<const geometry::FaceTree>(tree_of(faces, X));
+  if (const Faces cut = lying_on_others(faces, X); !cut.empty()) {
+    cut_ = std::make_unique<const geometry::FaceTree>(tree_of(cut, X));
+    for (const auto& [a, b, c] : cut)
+      step_.push_back(std::max({(X.row(a) - X.row(b)).squaredNorm(), (X.row(b) - X.row(c)).squaredNorm(),
+                                (X.row(c) - X.row(a)).squaredNorm()}));
+  }
   const std::vector<std::int32_t> all = nodes_of(faces);
   const std::vector<Eigen::Index> held = holders(X, T, all);
   for (std::size_t n = 0; n < all.size(); ++n)
     if (held[n] < 0) nodes_.push_back(all[n]);
+}
+
+bool SelfContactFinder::in_steps(const Vector3d& at) const {
+  if (!cut_) return false;
+  const geometry::FaceTree::Hit near = cut_->nearest(at);
+  return near.squared <= step_[static_cast<std::size_t>(near.face)];
 }
 
 SelfContact SelfContactFinder::operator()(const Points& x) const {
@@ -156,9 +203,11 @@ SelfContact SelfContactFinder::operator()(const Points& x) const {
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
     if (held[n] < 0) continue;
     const Vector3d p = x.row(nodes_[n]).transpose();
+    const Vector3d rest = at_rest(X_, x, T_, held[n], p);
+    if (in_steps(rest)) continue;
     ++out.nodes;
     out.at += p;
-    const double depth = std::sqrt(surface_->nearest(at_rest(X_, x, T_, held[n], p)).squared);
+    const double depth = std::sqrt(surface_->nearest(rest).squared);
     if (depth <= out.depth_mm) continue;
     out.depth_mm = depth;
     out.deepest = p;

@@ -22,8 +22,11 @@ struct SelfContact {
   Eigen::Vector3d deepest = Eigen::Vector3d::Zero();
 };
 
-/// Nodes of the surface against all tets; what already overlaps at rest does not count. Made once for a body;
-/// then a pose costs O(#tets) for tets of like size. Parallel, the same for any number of threads.
+/// Nodes of the surface against all tets; what already overlaps at rest does not count. Nor does flesh along
+/// faces that lie on each other at rest, where limbs that touched were cut free (preprocess/parting), as deep
+/// as the longest edge of the nearest of them: such a cut has steps, which run into each other wherever one
+/// side slides along the other. Made once for a body; then a pose costs O(#tets) for tets of like size.
+/// Parallel, the same for any number of threads.
 class SelfContactFinder {
  public:
   /// `X`: at rest, #V by 3. Both must outlive it.
@@ -35,8 +38,14 @@ class SelfContactFinder {
  private:
   const Points& X_;
   const Tets& T_;
+  /// Of a place at rest: whether it lies in the steps of a cut.
+  bool in_steps(const Eigen::Vector3d& at) const;
+
   std::vector<std::int32_t> nodes_;                    // of the surface that lie in no foreign tet at rest
   std::unique_ptr<const geometry::FaceTree> surface_;  // at rest
+  std::unique_ptr<const geometry::FaceTree>
+      cut_;                   // of that what lies on another face; none where nothing does
+  std::vector<double> step_;  // of each of its faces the longest edge, squared
 };
 
 /// Of one pose.

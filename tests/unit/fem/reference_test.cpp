@@ -179,5 +179,28 @@ TEST(SelfContact, AgreesWithAllPairs) {
   EXPECT_EQ(self_contact(X, X, T).nodes, 0U);
 }
 
+/// Two boxes side by side, as limbs that were cut free: along their common wall edges are up to 14.1 mm long.
+TEST(SelfContact, StepsOfACutDoNotCount) {
+  const TetMesh box = test::box_mesh({3, 3, 3}, 10);
+  Points X(2 * box.V.rows(), 3);
+  X.topRows(box.V.rows()) = box.V;
+  X.bottomRows(box.V.rows()) = box.V.rowwise() + Eigen::RowVector3d(30, 0, 0);
+  Tets T(2 * box.T.rows(), 4);
+  T.topRows(box.T.rows()) = box.T;
+  T.bottomRows(box.T.rows()) = box.T.array() + static_cast<std::int32_t>(box.V.rows());
+  const auto shifted = [&](double into, double along) {
+    Points x = X;
+    x.bottomRows(box.V.rows()).rowwise() += Eigen::RowVector3d(-into, along, -1.2 * along);
+    return self_contact(X, x, T);
+  };
+  for (const double into : {0.0, 3.0, 9.9, 14.1}) EXPECT_EQ(shifted(into, 3.3).nodes, 0U) << into;
+  const SelfContact deep = shifted(16, 3.3);
+  EXPECT_GT(deep.nodes, 0U);
+  EXPECT_GT(deep.depth_mm, 3.2);  // the sides that the boxes are shifted along are no cut
+  // With a gap between them, however small, nothing was cut.
+  X.bottomRows(box.V.rows()).col(0).array() += 1e-3;
+  EXPECT_GT(shifted(3, 3.3).nodes, 0U);
+}
+
 }  // namespace
 }  // namespace ecorche::fem
