@@ -96,6 +96,12 @@ function(ecorche_script_test name)
   ecorche_test_properties(${name} TIMEOUT ${A_TIMEOUT} LABELS ${A_LABELS} FIXTURES ${A_FIXTURES})
 endfunction()
 
+# Where no earlier run told ctest what tests take: the longest ones, half a minute to one, longest first. Begun late, each would keep one
+# processor after all others are done.
+set(ecorche_longest_tests unit_server e2e_new property_mapping e2e_outside unit_server_memory e2e_cohort e2e_unity e2e_pose_scan
+  e2e_label_body e2e_ct_alone e2e_determinism unit_rig e2e_way_back e2e_stream_test e2e_cache e2e_nameless e2e_calibrate unit_pipeline
+  unit_io_images_elsewhere unit_tet e2e_odd_surfaces e2e_fem e2e_cohort_samples e2e_stops)
+
 # Bodies of tests/fixtures reach a test by environment, so that the same executable runs by hand on any other body.
 function(ecorche_test_properties name)
   cmake_parse_arguments(A "" "TIMEOUT" "LABELS;FIXTURES" ${ARGN})
@@ -103,6 +109,11 @@ function(ecorche_test_properties name)
     math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}")
+  list(FIND ecorche_longest_tests ${name} place)
+  if(NOT place EQUAL -1)
+    math(EXPR cost "500 - ${place}")
+    set_tests_properties(${name} PROPERTIES COST ${cost})
+  endif()
   if(NOT A_FIXTURES)
     return()
   endif()
