@@ -267,7 +267,7 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
     const std::vector<float> det_f = runtime::tet_det_f(*model, posed.still().nodes);
     json quality =
         quality_json(*model, body, runtime::measure(*model, posed.still(), poser.all_tissues(), {}, closed),
-                     det_f, {skinning, settings.unfold || settings.settle, settings.by_fem()});
+                     det_f, {skinning, settings.settle || settings.by_fem(), settings.deformer == "tets"});
     add_relaxed(relaxed, quality);
     if (!frame.missed.empty()) {
       quality["verdict"] = "warn";

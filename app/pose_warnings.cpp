@@ -38,23 +38,23 @@ class Wording {
     json out{{"value", breach.value}, {"threshold", breach.threshold}};
     switch (breach.figure) {
       case Figure::inverted_share:
-        return at(quality_.places.inverted.at, folds(), "inverted_share",
+        return at(quality_.places.inverted.at, "inverted_share",
                   fmt::format("{:.2f} % of the body is inverted, more than {:.2f} %", 100 * breach.value,
                               100 * breach.threshold),
                   std::move(out));
       case Figure::place_inverted:
-        return at(quality_.places.inverted.at, folds(), "place_inverted",
+        return at(quality_.places.inverted.at, "place_inverted",
                   fmt::format("{:.1f} % of a cube of {:.0f} mm is inverted, more than {:.0f} %",
                               100 * breach.value, quality_.places.edge_mm, 100 * breach.threshold),
                   std::move(out));
       case Figure::place_change:
-        return at(quality_.places.changed.at, {}, "place_change",
+        return at(quality_.places.changed.at, "place_change",
                   fmt::format("the tets of a cube of {:.0f} mm change their volume by {:.0f} %, more than "
                               "{:.0f} %",
                               quality_.places.edge_mm, 100 * breach.value, 100 * breach.threshold),
                   std::move(out));
       case Figure::volume_change:
-        return at(quality_.places.changed.at, {}, "volume_change",
+        return at(quality_.places.changed.at, "volume_change",
                   fmt::format("the body's tets change their volume by {:.1f} %, more than {:.0f} %",
                               100 * breach.value, 100 * breach.threshold),
                   std::move(out));
@@ -72,13 +72,11 @@ class Wording {
   }
 
  private:
-  // What helps against folds besides turning less.
-  std::string folds() const {
-    std::string out;
-    if (how_.finite_elements) return out;
-    if (!how_.unfolded) out = "add --unfold, or ";
-    if (how_.skinning == runtime::Skinning::cor) out += "use --skinning dqs, which folds less, or ";
-    return out;
+  // What helps besides turning less: for one pose, and for all.
+  std::string relax() const {
+    if (how_.settled || !how_.by_tets) return {};
+    const bool can_be_corrected = how_.skinning == runtime::Skinning::cor && model_.corrections.empty();
+    return can_be_corrected ? "use --settle, or calibrate the model, or " : "use --settle, or ";
   }
 
   json tissue(const Breach& breach, json out) const {
@@ -90,7 +88,7 @@ class Wording {
         static_cast<std::size_t>(std::find_if(model_.tissues.begin(), model_.tissues.end(),
                                               [&](const Tissue& t) { return t.name == change.name; }) -
                                  model_.tissues.begin());
-    return at(place_of(model_.tissues[row], change.share < 0), {}, "tissue_change",
+    return at(place_of(model_.tissues[row], change.share < 0), "tissue_change",
               fmt::format("{} ({}) changes its volume by {:+.1f} %, more than {:.1f} %", change.name,
                           group_name(change.group), 100 * change.share, 100 * breach.threshold),
               std::move(out));
@@ -112,20 +110,19 @@ class Wording {
     return out;
   }
 
-  json at(const Vector3d& place, const std::string& try_first, const char* kind, const std::string& what,
-          json out) const {
+  json at(const Vector3d& place, const char* kind, const std::string& what, json out) const {
     const std::optional<std::size_t> joint = joint_to_blame(place);
     out["kind"] = kind;
     out["what"] = what;
     out["at_mm"] = {place.x(), place.y(), place.z()};
     if (!joint) {
-      out["mend"] =
-          try_first + "pose with another --skinning, or prepare the case again with --weights quasi-harmonic";
+      out["mend"] = relax() + (how_.settled ? "prepare the case again with more tets (--max-tets)"
+                                            : "prepare the case again with --weights quasi-harmonic");
       return out;
     }
     const std::string& name = model_.rig.skeleton.segments[*joint].joint.name;
     out["joint"] = name;
-    out["mend"] = fmt::format("{}turn {} less than its {:.0f} degrees", try_first, name,
+    out["mend"] = fmt::format("{}turn {} less than its {:.0f} degrees", relax(), name,
                               turn_of(body_.pose, *joint) * degrees_per_radian);
     return out;
   }

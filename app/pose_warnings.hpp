@@ -14,8 +14,8 @@ namespace ecorche::app {
 /// How the body was posed, which decides what there is left to try.
 struct HowPosed {
   runtime::Skinning skinning = runtime::Skinning::cor;
-  bool unfolded = false;
-  bool finite_elements = false;  ///< from that skinning on
+  bool settled = false;  ///< by --settle, or to the end by finite elements
+  bool by_tets = true;   ///< else by spheres, which nothing settles
 };
 
 /// `warnings` of quality.json, one object for each breach of a threshold, the worst tissues first. `det_f`:

@@ -5,6 +5,7 @@
 // usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|server|both
 // The last word: whose thread is on the kernel's real-time class, the server's as under --real-time, or that
 // of who probes as well, as a haptic device's loop would be.
+#include <spdlog/spdlog.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -58,6 +59,7 @@ v1::ModelOpened open(client::Client& client) {
 int main(int argc, char** argv) {
   if (argc != 5)
     return std::fprintf(stderr, "usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|server|both\n"), 64;
+  spdlog::set_level(spdlog::level::warn);  // standard output is for one JSON object
   const double seconds = std::atof(argv[2]);
   const auto model = std::make_shared<const Model>(model_file::read(argv[1], Context{}));
   tbb::task_arena arena;
