@@ -44,7 +44,7 @@ struct Settings {
 
 constexpr double kWarmUp = 4;  // until the levels of detail are made
 constexpr double kComing = 1;  // so long peers that have just come are counted by themselves
-const std::vector<std::string> kRoomy{"--max-connections", "4000", "--max-sessions", "200"};
+const std::vector<std::string> kRoomy{"--max-connections", "4000", "--max-sessions", "400"};
 
 // All clients together; the slowest one's rate.
 struct Sum {
@@ -122,6 +122,7 @@ void add(Loads& loads, const std::string& load, const Sum& sum, const Served& se
                    fixed(spent.server_ms, 3),
                    fixed(spent.clients_ms, 3)});
   if (!all.error.empty()) loads.notes.push_back("ERROR: " + load + ": " + all.error);
+  if (sum.slowest == 0) loads.notes.push_back("ERROR: " + load + ": a client had no frame");
 }
 
 // The clients [first, end) for the row's time, after a warm-up; warm already beside `peers`, as long as some
