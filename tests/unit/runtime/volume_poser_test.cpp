@@ -60,7 +60,8 @@ ModelVolume smooth_volume(const ImageGrid& grid, int components = 1) {
   for (std::size_t v = 0; v < values.size(); ++v) {
     const std::size_t voxel = v / static_cast<std::size_t>(components),
                       nx = static_cast<std::size_t>(grid.size[0]);
-    const double i = static_cast<double>(voxel % nx), rest = static_cast<double>(voxel / nx);
+    const auto row = voxel / nx;
+    const double i = static_cast<double>(voxel % nx), rest = static_cast<double>(row);
     values[v] = static_cast<T>(60 + 30 * std::sin(0.2 * i) + 20 * std::cos(0.003 * rest) +
                                static_cast<double>(v % static_cast<std::size_t>(components)));
   }
@@ -85,7 +86,6 @@ double differing(const Model& model, std::span<const float> nodes, const ModelVo
   return static_cast<double>(differ) / static_cast<double>(held);
 }
 
-// Runs `check` once per instruction set of this machine.
 class PosedInOnePass : public testing::Test {
  protected:
   PosedInOnePass() : model(std::make_shared<const Model>(test::toy_model())), poser(model) {}
@@ -205,7 +205,10 @@ TEST_F(PosedInOnePass, WhereTetsFoldTheLowestPositiveOneWins) {
   folded.tets.resize(3, 4);
   folded.tets << 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11;
   std::vector<float> nodes = nodes_at_rest(folded);
-  for (std::size_t n = 0; n < 12; ++n) nodes[3 * n] -= 100 * static_cast<float>(n / 4);
+  for (std::size_t n = 0; n < 12; ++n) {
+    const std::size_t tet = n / 4;
+    nodes[3 * n] -= 100 * static_cast<float>(tet);
+  }
   for (std::size_t c = 0; c < 3; ++c)
     std::swap(nodes[3 + c], nodes[6 + c]);  // tet 0 lies the wrong way round
   ModelVolume volume;
@@ -247,7 +250,10 @@ TEST_F(PosedInOnePass, WhereManyTetsPileUpTheLowestPositiveOneWins) {
   test::for_instruction_sets([&] {
     for (const std::size_t positive : {0U, 3U, 19U, 70U, 129U}) {
       std::vector<float> nodes = nodes_at_rest(pile);
-      for (std::size_t n = 0; n < 4 * count; ++n) nodes[3 * n] -= static_cast<float>(10 * (n / 4));
+      for (std::size_t n = 0; n < 4 * count; ++n) {
+        const std::size_t tet = n / 4;
+        nodes[3 * n] -= static_cast<float>(10 * tet);
+      }
       for (std::size_t t = 0; t < positive; ++t)
         std::swap_ranges(&nodes[12 * t], &nodes[12 * t + 3], &nodes[12 * t + 3]);
       Image posed;
