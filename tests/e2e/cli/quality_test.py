@@ -109,6 +109,18 @@ class Quality(unittest.TestCase):
             if was["volume_change"] is not None:
                 self.assertLessEqual(abs(now["volume_change"]), abs(was["volume_change"]) + 1e-3, now["name"])
 
+    def test_the_advice_is_what_is_left_to_try_and_helps(self):
+        joints = "hip_left: {flexion_deg: 85}, knee_left: {flexion_deg: 90}"
+        left = {}
+        for words, advice in (((), "use --settle, or calibrate the model, or "), (("--skinning", "dqs"), "use --settle, or (?!cal)"),
+                              (("--settle",), "(turn|prepare the case again with more tets)")):
+            _, quality = self.pose(joints, *words, name="posed" + "".join(words))
+            for warning in quality["warnings"]:
+                self.assertRegex(warning["mend"], f"^{advice}")
+            left[words] = [warning["kind"] for warning in quality["warnings"]]
+        self.assertGreater(left[()].count("tissue_change"), 0)
+        self.assertEqual(left["--settle",].count("tissue_change"), 0)
+
     def test_the_page_explains_every_key_and_has_the_limits_of_the_code(self):
         _, quality = self.pose(ARM + ", knee_left: {flexion_deg: 160}", "--unfold")
         said = set()
