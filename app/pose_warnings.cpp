@@ -116,7 +116,7 @@ class Wording {
     out["what"] = what;
     out["at_mm"] = {place.x(), place.y(), place.z()};
     if (!joint) {
-      out["mend"] = relax() + (how_.settled ? "prepare the case again with more tets (--max-tets)"
+      out["mend"] = relax() + (how_.settled ? "turn the joints around that place less"
                                             : "prepare the case again with --weights quasi-harmonic");
       return out;
     }

@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include <set>
+#include <utility>
 
 #include <ecorche/values/error.hpp>
 #include "preprocess/fem/reference.hpp"
@@ -148,15 +149,18 @@ TEST(Assembly, CountsWhatIsInvertedAndCrushed) {
   EXPECT_EQ(total(-1).inverted, std::vector<std::uint8_t>(6, 1));
 }
 
+/// The box, and again so far along x.
+std::pair<Points, Tets> two_boxes(const TetMesh& box, double apart) {
+  std::pair<Points, Tets> out{Points(2 * box.V.rows(), 3), Tets(2 * box.T.rows(), 4)};
+  out.first << box.V, box.V.rowwise() + Eigen::RowVector3d(apart, 0, 0);
+  out.second << box.T, box.T.array() + static_cast<std::int32_t>(box.V.rows());
+  return out;
+}
+
 /// A node of the surface in a tet that is not its own, asked of all pairs.
 TEST(SelfContact, AgreesWithAllPairs) {
   const TetMesh box = test::box_mesh({3, 3, 3}, 10);
-  Points X(2 * box.V.rows(), 3);
-  X.topRows(box.V.rows()) = box.V;
-  X.bottomRows(box.V.rows()) = box.V.rowwise() + Eigen::RowVector3d(40, 0, 0);
-  Tets T(2 * box.T.rows(), 4);
-  T.topRows(box.T.rows()) = box.T;
-  T.bottomRows(box.T.rows()) = box.T.array() + static_cast<std::int32_t>(box.V.rows());
+  const auto [X, T] = two_boxes(box, 40);
   for (const double into : {5.0, 13.0, 22.7}) {
     Points x = X;
     x.bottomRows(box.V.rows()).rowwise() += Eigen::RowVector3d(-into, 3.3, -4.1);
@@ -182,16 +186,12 @@ TEST(SelfContact, AgreesWithAllPairs) {
 /// Two boxes side by side, as limbs that were cut free: along their common wall edges are up to 14.1 mm long.
 TEST(SelfContact, StepsOfACutDoNotCount) {
   const TetMesh box = test::box_mesh({3, 3, 3}, 10);
-  Points X(2 * box.V.rows(), 3);
-  X.topRows(box.V.rows()) = box.V;
-  X.bottomRows(box.V.rows()) = box.V.rowwise() + Eigen::RowVector3d(30, 0, 0);
-  Tets T(2 * box.T.rows(), 4);
-  T.topRows(box.T.rows()) = box.T;
-  T.bottomRows(box.T.rows()) = box.T.array() + static_cast<std::int32_t>(box.V.rows());
+  auto boxes = two_boxes(box, 30);
+  Points& X = boxes.first;
   const auto shifted = [&](double into, double along) {
     Points x = X;
     x.bottomRows(box.V.rows()).rowwise() += Eigen::RowVector3d(-into, along, -1.2 * along);
-    return self_contact(X, x, T);
+    return self_contact(X, x, boxes.second);
   };
   for (const double into : {0.0, 3.0, 9.9, 14.1}) EXPECT_EQ(shifted(into, 3.3).nodes, 0U) << into;
   const SelfContact deep = shifted(16, 3.3);
