@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image/image_file.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -14,6 +15,7 @@
 #include "io/image/header_fields.hpp"
 #include "io/image/itk_images.hpp"
 #include "io/image/non_finite.hpp"
+#include "io/image/packed_nifti.hpp"
 #include "io/image/packed_nrrd.hpp"
 #include "io/image/right_angles.hpp"
 #include "io/image/whole_labels.hpp"
@@ -183,8 +185,12 @@ void write_image(const Path& path, const Image& image, bool compress) {
   }
   files::AtomicFile file(path);
   try {
-    if (format == Format::nrrd && compress && image.components == 1) {
+    const auto& size = image.grid.size;
+    const bool solid = std::all_of(size.begin(), size.end(), [](int n) { return n > 1 && n < 1 << 15; });
+    if (format == Format::nrrd && compress) {
       write_packed_nrrd(file.temporary(), image);
+    } else if (ends_with(path, ".nii.gz") && compress && solid) {
+      write_packed_nifti(file.temporary(), image);
     } else {
       itk_images::write(file.temporary(), format, image, compress);
     }

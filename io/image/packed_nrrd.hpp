@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Packed NRRDs, by all threads: a CT of hundreds of megabytes takes one thread longer than anything else.
+// Packed NRRDs, by all threads.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +8,8 @@
 
 namespace ecorche::io {
 
-/// Writes an image of one component as `.nrrd` with one gzip stream, in pieces that are packed beside each
-/// other; the same bytes for any number of threads. Throws Error{io}.
+/// Writes an image as `.nrrd` with one gzip stream; the same bytes for any number of threads. Throws
+/// Error{io}.
 void write_packed_nrrd(const std::filesystem::path& path, const Image& image);
 
 }  // namespace ecorche::io

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <zlib.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <random>
+#include <string>
 
 #include "io/image/equal_run.hpp"
 #include "io/image/header.hpp"
 #include "io/image/image_file.hpp"
+#include "io/image/packed_nifti.hpp"
 #include "io/image/packed_nrrd.hpp"
 #include "tests/unit/io/itk_reading.hpp"
 #include "tests/unit/io/scratch.hpp"
@@ -300,6 +305,37 @@ TEST(Image, PackedInPieces) {
   expect_same(read_image(scratch / "a.nrrd"), image, 0);
   expect_error(ErrorKind::io, "/dev/full: writing failed (check the disk's free space)",
                [&] { write_packed_nrrd("/dev/full", image); });
+}
+
+std::string unpacked(const std::filesystem::path& path) {
+  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
+  std::string out(std::size_t{1} << 25, '\0');
+  const int read = gzread(file.get(), out.data(), static_cast<unsigned>(out.size()));
+  out.resize(read < 0 ? 0 : static_cast<std::size_t>(read));
+  return out;
+}
+
+// ITK writes the plain file: the packed one is the same, header and vectors and all, over the ends of pieces.
+TEST(Image, PackedNiftiIsThePlainOne) {
+  const Scratch scratch;
+  for (const auto& size : {std::array<std::int32_t, 3>{5, 4, 3}, {128, 96, 50}, {5, 1, 3}, {5, 4, 1}}) {
+    for (const ScalarType type : {ScalarType::u8, ScalarType::i16, ScalarType::f32, ScalarType::f64}) {
+      for (const int components : {1, 3}) {
+        ImageGrid grid = oblique_grid();
+        grid.size = size;
+        Image image(grid, type, components);
+        std::mt19937 random(7);
+        for (std::byte& byte : image.bytes) byte = static_cast<std::byte>(random() % 120);
+        write_image(scratch / "plain.nii", image);
+        write_image(scratch / "packed.nii.gz", image);
+        ASSERT_EQ(unpacked(scratch / "packed.nii.gz"), unpacked(scratch / "plain.nii"))
+            << size[0] << " " << size[2] << " " << scalar_name(type) << " x " << components;
+      }
+    }
+  }
+  std::filesystem::create_symlink("/dev/full", scratch / "full.nii.gz");
+  expect_error(ErrorKind::io, "full.nii.gz: writing failed (check the disk's free space)",
+               [&] { write_packed_nifti(scratch / "full.nii.gz", Image(oblique_grid(), ScalarType::u8)); });
 }
 
 // A run by bytes, wherever it begins and ends, beside one looked at value by value.
