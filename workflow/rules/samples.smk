@@ -6,7 +6,7 @@ rule sample:
     output: "{participant}/steps/sample.json"
     params: given=lambda wc: plan.given["sample"]()
     priority: 5
-    threads: plan.threads
+    threads: plan.sample_threads
     resources: **plan.resources("sample")
     group: "participant"
     shell: STEP

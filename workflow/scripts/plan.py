@@ -17,6 +17,7 @@ from snakemake.utils import validate
 import law
 import participants
 import record
+import samples
 
 ATTEMPTS = 3  # of a step that its machine failed
 
@@ -43,6 +44,9 @@ class Plan:
         people = participants.read(bids, lambda row: self.against("participants", row), labels)
         self.people = {one.id: one for one in people}
         self.threads = self.config["threads"]
+        # Samples of few participants are made side by side by all processors of this machine.
+        cores = self.workflow.global_resources["_cores"] or 1
+        self.sample_threads = self.threads if self.config.get("cluster") else max(self.threads, cores // max(1, len(self.people)))
         self.ecorche = self.config["ecorche"]
         self.program = {"version": self.version(), "sha256": record.sha256(self.ecorche)}
         self.python, self.scripts = shlex.quote(sys.executable), shlex.quote(str(self.base / "scripts"))
@@ -112,7 +116,7 @@ class Plan:
             "verify": lambda who: {"after": ["preprocess"]},
             "pose": lambda pose: {"words": self.pose_words(pose), "after": ["verify"]},
             "sample": lambda: {"count": self.config["sample"], "seed": self.config["seed"], "reach": self.config["reach"], "views": self.config["views"],
-                               "words": ["--tissues", "none", "--volumes", "all", "--field", "--volume-format", "nii.gz"], "after": ["verify"]},
+                               "words": samples.WORDS, "after": ["verify"]},
             "subject": lambda who: {"options": self.options(who), "after": self.told(who)},
             "group": lambda: {"names": self.group_names(), "unfinished": self.unfinished()},
             "description": lambda: {"source": self.root},
@@ -175,8 +179,9 @@ class Plan:
     def resources(self, step):
         size = (lambda wc: self.size_of(wc.participant)) if step != "group" else (lambda wc: (0, 0))
         hold = self.config["hold_memory"]
+        side_by_side = self.sample_threads if step == "sample" else 1
         beside = self.law["job"]["mib"] if self.config.get("cluster") else 0  # a Snakemake of its own
-        return {"mem_mb": lambda wc, attempt: law.mib(self.law, step, size(wc), attempt, beside),
+        return {"mem_mb": lambda wc, attempt: side_by_side * law.mib(self.law, step, size(wc), attempt, beside),
                 "hold_mib": lambda wc, attempt: law.mib(self.law, step, size(wc), attempt) if hold else 0,
                 "runtime": lambda wc, attempt: law.minutes(self.law, step, size(wc), attempt, self.config["sample"] if step == "sample" else 1),
                 "attempt": lambda wc, attempt: attempt, "attempts": ATTEMPTS, "at_once": 1}

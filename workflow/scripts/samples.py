@@ -4,6 +4,7 @@
 Sample i of a participant depends on the seed, the participant and i alone: more samples leave those before as they are, and a run that was
 killed goes on where it was. A sample's folder appears whole.
 """
+import concurrent.futures
 import json
 import math
 import os
@@ -13,6 +14,7 @@ import shutil
 import record
 
 DEGREES = 2  # decimals
+WORDS = ["--tissues", "none", "--volumes", "all", "--field", "--volume-format", "nii.gz"]  # of `ecorche pose`
 
 
 def draw(rig, seed, participant, index, reach):
@@ -45,10 +47,18 @@ def make(step):
     folder.mkdir(exist_ok=True)
     record.write_text(folder / "joints.csv", "joint,x,y,z\n" + "".join(
         f"{joint['joint']},{','.join(format(mm, '.6g') for mm in joint['center_mm'])}\n" for joint in info["rig"]))
-    rows = []
-    for index in range(given["count"]):
+    def drawn(index):
         pose = draw(info["rig"], given["seed"], step.options.participant, index, given["reach"])
-        rows.append(one(step, folder, f"{index:05d}", {**key, "index": index}, info["skeleton"], pose, given))
+        return one(step, folder, f"{index:05d}", {**key, "index": index}, info["skeleton"], pose, given)
+
+    # Side by side: one sample has too little to do for several threads.
+    with concurrent.futures.ThreadPoolExecutor(step.options.threads) as pool:
+        making = [pool.submit(drawn, index) for index in range(given["count"])]
+        try:
+            rows = [one.result() for one in making]
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     names = {row["sample"] for row in rows}
     for path in folder.iterdir():
         if path.is_dir() and path.name not in names:
@@ -70,11 +80,11 @@ def one(step, folder, name, key, skeleton, pose, given):
         shutil.rmtree(path, ignore_errors=True)
     drawn = folder / f".{name}.yaml"
     record.write_text(drawn, as_yaml(skeleton, pose))
-    step.call("pose", "model.hdf", "-o", part, "--pose", drawn, *given["words"])
+    step.call("pose", "model.hdf", "-o", part, "--pose", drawn, *given["words"], threads=1)
     step.call("probe", "model.hdf", "--points", folder / "joints.csv", "-o", part / "joints.csv", "--pose", drawn, "--direction", "rest-to-posed",
-              "--volumes", "none")
+              "--volumes", "none", threads=1)
     for view in given["views"]:
-        step.call("radiograph", "model.hdf", "-o", part / f"{view}.png", "--pose", drawn, "--view", view)
+        step.call("radiograph", "model.hdf", "-o", part / f"{view}.png", "--pose", drawn, "--view", view, threads=1)
     quality = json.loads((part / "quality.json").read_text())
     row = {"sample": name, "angles_deg": pose, "verdict": quality["verdict"], "inverted_share": quality["inverted_share"],
            "volume_change": quality["volume_change"]}

@@ -29,8 +29,11 @@ DATA_FAULTS = {64, 65, 66, 77, 78}
 STOPPED = {130, 143}  # somebody wants an end: neither tried again at once nor written down
 
 
+LIBC = ctypes.CDLL(None)  # before any fork: other threads may hold the loader's lock then
+
+
 def end_with_parent():
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+    LIBC.prctl(1, signal.SIGTERM)
 
 
 class Fault(Exception):
@@ -45,6 +48,15 @@ class Step:
         self.log = self.folder / "log" / f"{self.name}.log"
         self.before = [json.loads((self.folder / "steps" / f"{name}.json").read_text()) for name in self.given.get("after", [])]
         self.seconds, self.peak_mib = 0.0, 0.0
+        self.children, self.stopped = set(), False  # process ids
+        signal.signal(signal.SIGTERM, self.stop)
+
+    def stop(self, *_):
+        """No further command is called, and those that run end."""
+        self.stopped = True
+        for child in list(self.children):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(child, signal.SIGTERM)
 
     def fact(self, name):
         return next(before["facts"][name] for before in reversed(self.before) if name in before["facts"])
@@ -90,17 +102,23 @@ class Step:
             {"seconds": round(self.seconds, 3), "peak_mib": round(self.peak_mib, 1), "attempt": self.options.attempt}) + "\n")
 
     def call(self, *words, threads=None):
-        """The JSON that a command prints. Throws Fault where it ends with anything but 0; `said` is then its one clear error."""
+        """The JSON that a command prints. Throws Fault where it ends with anything but 0; `said` is then its one clear error. Threads may
+        call side by side."""
+        if self.stopped:
+            raise Fault(143, {"kind": "internal", "where": self.name, "what": "stopped", "mend": "run again: it goes on where it was"})
         command = [self.options.ecorche, "--json", "--threads", str(threads or self.options.threads), *map(str, words)]
         with open(self.log, "a") as log:
             print("$ " + " ".join(command[:1] + command[4:]), file=log, flush=True)
             start = time.monotonic()
             child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, preexec_fn=end_with_parent, cwd=self.folder)
-            signal.signal(signal.SIGTERM, lambda *_: child.terminate())
+            self.children.add(child.pid)
+            if self.stopped:
+                child.terminate()
             threading.Thread(target=self.hold, args=(child.pid,), daemon=True).start()
-            printed = child.stdout.read()
+            with child.stdout:
+                printed = child.stdout.read()
             _, status, usage = os.wait4(child.pid, 0)
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            self.children.discard(child.pid)
         self.seconds += time.monotonic() - start
         self.peak_mib = max(self.peak_mib, usage.ru_maxrss / 1024)
         code = os.waitstatus_to_exitcode(status)
