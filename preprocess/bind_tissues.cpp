@@ -42,8 +42,8 @@ void part_tissues(const std::vector<Tissue*>& tissues, const parting::PartedTets
                   const Context& context) {
   for (Tissue* tissue : tissues) {
     const Eigen::Index given = tissue->V.rows();
-    const std::vector<parting::Seam> seams = parting::part_surface(*tissue, tets, context);
-    if (tissue->group == Group::skin) parting::close_seams(*tissue, seams, given, tets, context);
+    const std::vector<parting::CutRim> cuts = parting::part_surface(*tissue, tets, context);
+    if (tissue->group == Group::skin) parting::close_cuts(*tissue, cuts, given, tets, context);
   }
 }
 

@@ -92,9 +92,9 @@ std::size_t Crowd::tissues_of(std::size_t vertices, v1::MeshSelection& mesh) con
   return total;
 }
 
-std::size_t Crowd::join(const Asked& asked) {
+std::size_t Crowd::join(const ClientOptions& options) {
   auto member = std::make_unique<Member>();
-  member->asked = asked;
+  member->options = options;
   member->fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in to{};
   to.sin_family = AF_INET;
@@ -112,22 +112,22 @@ std::size_t Crowd::join(const Asked& asked) {
   for (const v1::Encoding encoding : {v1::ENCODING_F32, v1::ENCODING_U16, v1::ENCODING_U16_DELTA})
     hello.mutable_client_hello()->add_encodings(encoding);
   open.set_request_id(2);
-  open.mutable_open_model()->set_session(asked.session);
+  open.mutable_open_model()->set_session(options.session);
   open.mutable_open_model()->set_without_triangles(true);
   subscribe.set_request_id(3);
   v1::MeshSelection& mesh = *subscribe.mutable_subscribe()->mutable_mesh();
-  mesh.set_encoding(asked.encoding);
-  member->vertices = tissues_of(asked.vertices, mesh);
+  mesh.set_encoding(options.encoding);
+  member->vertices = tissues_of(options.vertices, mesh);
   member->say(wire::encode(hello).head + wire::encode(open).head + wire::encode(subscribe).head);
 
   // Who watches knows when the session's poses were sent.
   for (const auto& other : members_) {
-    if (other && !asked.session.empty() && other->asked.session == asked.session)
+    if (other && !options.session.empty() && other->options.session == options.session)
       member->times = other->times;
   }
   if (!member->times) member->times = std::make_shared<PoseTimes>();
   // Clients do not all pose at the same moment.
-  const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / std::max(asked.rate, 1.0)));
+  const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / std::max(options.rate, 1.0)));
   member->due = Clock::now() + std::chrono::milliseconds(200) +
                 period * static_cast<int>(members_.size() * 31 % 97) / 97;
   const auto free = std::find(members_.begin(), members_.end(), nullptr);
@@ -164,7 +164,7 @@ const Arrived& Crowd::arrived(std::size_t client) const {
 double Crowd::posed() const {
   double fewest = 1e9;
   for (const auto& member : members_) {
-    if (member && member->asked.rate > 0)
+    if (member && member->options.rate > 0)
       fewest = std::min(fewest, static_cast<double>(member->arrived.sent) / seconds());
   }
   return fewest;
@@ -197,7 +197,7 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
     }
     auto until = tick ? std::min(end, next_tick) : end;
     for (const auto& member : members_) {
-      if (!member || member->fd < 0 || member->asked.rate <= 0) continue;
+      if (!member || member->fd < 0 || member->options.rate <= 0) continue;
       if (member->due <= now) pose(*member);
       until = std::min(until, member->due);
     }
@@ -211,22 +211,22 @@ void Crowd::run(double seconds, const std::function<void()>& tick) {
 }
 
 // Where the walk has come to.
-Eigen::Vector3d Crowd::place_of(const Asked& asked, std::uint64_t sequence) const {
+Eigen::Vector3d Crowd::place_of(const ClientOptions& options, std::uint64_t sequence) const {
   Eigen::Vector3d place = walking(rig_, static_cast<double>(sequence) / kStride).root_translation;
-  if (asked.on_the_spot) place[1] = 0;
+  if (options.on_the_spot) place[1] = 0;
   return place;
 }
 
 // The whole pose: the turns as they were encoded once, then what differs, which Protobuf merges.
 void Crowd::pose(Member& member) {
   const auto now = Clock::now();
-  const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / member.asked.rate));
+  const auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / member.options.rate));
   member.due += period;
   // Who is late keeps its place between the others: else all would pose at one moment after a pause.
   if (member.due < now) member.due += period * ((now - member.due) / period + 1);
   v1::PoseUpdate rest;
   rest.set_sequence(++member.sequence);
-  const Eigen::Vector3d place = place_of(member.asked, member.sequence);
+  const Eigen::Vector3d place = place_of(member.options, member.sequence);
   rest.mutable_root_translation()->set_x(place[0]);
   rest.mutable_root_translation()->set_y(place[1]);
   rest.mutable_root_translation()->set_z(place[2]);

@@ -17,7 +17,7 @@ namespace ecorche::bench {
 
 using client::Clock;
 
-struct Asked {
+struct ClientOptions {
   std::size_t vertices = 0;  ///< about so many, of whole tissues; 0: all
   v1::Encoding encoding = v1::ENCODING_U16_DELTA;
   std::string session;       ///< empty: one's own
@@ -51,7 +51,7 @@ class Crowd {
   ~Crowd();
 
   /// Joins; returns its number. Throws Error{temporary} where it cannot connect.
-  std::size_t join(const Asked& asked);
+  std::size_t join(const ClientOptions& options);
   /// Hangs up, wherever its stream is, and is forgotten.
   void leave(std::size_t client);
   std::size_t vertices(std::size_t client) const;  ///< of a frame
@@ -70,7 +70,7 @@ class Crowd {
   struct Member;
   void take(Member& member);
   void pose(Member& member);
-  Eigen::Vector3d place_of(const Asked& asked, std::uint64_t sequence) const;
+  Eigen::Vector3d place_of(const ClientOptions& options, std::uint64_t sequence) const;
   void finish_head(Member& member);
   void arrive(Member& member);
   struct Held;

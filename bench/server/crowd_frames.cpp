@@ -71,7 +71,7 @@ void Crowd::finish_head(Member& member) {
   member.keeps = false;
   if (envelope.has_mesh_frame()) {
     const v1::MeshFrame& frame = envelope.mesh_frame();
-    const std::uint64_t each = member.asked.check_each;
+    const std::uint64_t each = member.options.check_each;
     ++member.seen;
     member.keeps = poser_ && each > 0 && (member.seen % each == 0 || frame.keyframe() == frame.frame());
     member.payload.clear();
@@ -120,7 +120,7 @@ void Crowd::check(Member& member, const Held& held) {
   Pose pose = Pose::rest(rig_.skeleton.segments.size());
   if (frame.pose_sequence() > 0) {
     pose = walking(rig_, static_cast<double>(frame.pose_sequence() % kStride) / kStride);
-    pose.root_translation = place_of(member.asked, frame.pose_sequence());
+    pose.root_translation = place_of(member.options, frame.pose_sequence());
   }
   bool right = poser_->run(pose, runtime::Skinning::cor, rows, body_, runtime::NodesOf::tissues).ok();
   const double bound = frame.encoding() == v1::ENCODING_F32 ? 0 : frame.box().step() / 2 + kKernelRounding;

@@ -39,7 +39,7 @@ struct Crowd::Held {
 };
 
 struct Crowd::Member {
-  Asked asked;
+  ClientOptions options;
   int fd = -1;
   std::size_t vertices = 0;
   std::uint64_t sequence = 0;

@@ -151,30 +151,30 @@ void posing(const Settings& settings, Loads& loads, const std::string& load, std
             v1::Encoding encoding, int count, const std::string& wanted) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
-  const Asked asked{.vertices = vertices,
-                    .encoding = encoding,
-                    .session = {},
-                    .rate = 90,
-                    .check_each = settings.check_each};
-  for (int i = 0; i < count; ++i) crowd.join(asked);
+  const ClientOptions options{.vertices = vertices,
+                              .encoding = encoding,
+                              .session = {},
+                              .rate = 90,
+                              .check_each = settings.check_each};
+  for (int i = 0; i < count; ++i) crowd.join(options);
   measure(settings, loads, served, load, crowd, 0, static_cast<std::size_t>(count), wanted);
 }
 
 void observers(const Settings& settings, Loads& loads) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
-  Asked asked{.vertices = 100'000,
-              .encoding = v1::ENCODING_U16_DELTA,
-              .session = "shared",
-              .rate = 90,
-              .check_each = settings.check_each};
-  crowd.join(asked);
+  ClientOptions options{.vertices = 100'000,
+                        .encoding = v1::ENCODING_U16_DELTA,
+                        .session = "shared",
+                        .rate = 90,
+                        .check_each = settings.check_each};
+  crowd.join(options);
   crowd.run(0.3);
-  asked.rate = 0;
+  options.rate = 0;
   for (int i = 0; i < 64; ++i) {
     // Keeping keyframes of all, which come at one moment, would take as long as serving them.
-    asked.check_each = i % 8 == 0 ? settings.check_each : 0;
-    crowd.join(asked);
+    options.check_each = i % 8 == 0 ? settings.check_each : 0;
+    crowd.join(options);
   }
   measure(settings, loads, served, "64 observers of one pose, 100 k vertices, delta u16", crowd, 1, 65,
           "at least 90, encoded once");
@@ -185,12 +185,12 @@ void beside(const Settings& settings, Loads& loads, const std::string& what,
             const std::function<std::unique_ptr<Peers>(const Served&)>& others, const std::string& wanted) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
-  const Asked asked{.vertices = 100'000,
-                    .encoding = v1::ENCODING_U16_DELTA,
-                    .session = {},
-                    .rate = 90,
-                    .check_each = settings.check_each};
-  for (int i = 0; i < 4; ++i) crowd.join(asked);
+  const ClientOptions options{.vertices = 100'000,
+                              .encoding = v1::ENCODING_U16_DELTA,
+                              .session = {},
+                              .rate = 90,
+                              .check_each = settings.check_each};
+  for (int i = 0; i < 4; ++i) crowd.join(options);
   const Sum alone = measure(settings, loads, served, "4 clients, 100 k vertices, alone", crowd, 0, 4, "");
   const double before = served.rss_mib();
   const std::unique_ptr<Peers> peers = others(served);

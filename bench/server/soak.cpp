@@ -22,7 +22,7 @@ double slope_of(const std::vector<std::pair<double, double>>& memory) {
   return 60 * (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-Asked guest_of(std::mt19937& random) {
+ClientOptions guest_of(std::mt19937& random) {
   if (random() % 3 == 0)
     return {.vertices = 100'000,
             .encoding = v1::ENCODING_U16_DELTA,

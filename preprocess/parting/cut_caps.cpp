@@ -17,9 +17,9 @@ using Eigen::Vector3d;
 using Corners = std::array<std::int32_t, 3>;
 
 constexpr float kSolid = 0.5F;  // of a face that closes the skin
-constexpr double kSnap = 1.5;   // cubes from a cap's border to the seam
+constexpr double kSnap = 1.5;   // cubes from a cap's border to the rim
 constexpr int kSmoothings = 10;
-constexpr std::size_t kDetour = 24;  // edges of a seam along one of a cap
+constexpr std::size_t kDetour = 24;  // edges of a rim along one of a cap
 
 // A cut as a surface: corners are nodes of the mesh before it was cut.
 class Sheet {
@@ -50,12 +50,12 @@ class Sheet {
   const Vector3d& at(std::int32_t place) const { return at_.at(place); }
   bool is_border(std::int32_t a, std::int32_t b) const { return border_.count(std::minmax(a, b)) != 0; }
 
-  // Towards the seam where it is near, before the inside is smoothed.
-  void snap(const Points& seam) {
-    if (seam.rows() == 0) return;
-    std::vector<std::int32_t> all(static_cast<std::size_t>(seam.rows()));
+  // Towards the rim where it is near, before the inside is smoothed.
+  void snap(const Points& rim) {
+    if (rim.rows() == 0) return;
+    std::vector<std::int32_t> all(static_cast<std::size_t>(rim.rows()));
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::int32_t>(i);
-    const geometry::NearestPoint nearest(seam, all);
+    const geometry::NearestPoint nearest(rim, all);
     const double most = kSnap * tets_.cube_mm();
     for (const auto& [a, b] : border_) {
       for (const std::int32_t node : {a, b}) {
@@ -66,9 +66,9 @@ class Sheet {
         snapped_[node] = row;
       }
     }
-    for (const auto& [node, row] : snapped_) at_[node] = seam.row(row).transpose();
+    for (const auto& [node, row] : snapped_) at_[node] = rim.row(row).transpose();
   }
-  /// The row of the seam that a border's node was snapped to, or -1.
+  /// The row of the rim that a border's node was snapped to, or -1.
   std::int32_t snapped(std::int32_t place) const {
     const auto found = snapped_.find(place);
     return found == snapped_.end() ? -1 : found->second;
@@ -99,11 +99,11 @@ class Sheet {
   std::map<std::int32_t, std::int32_t> snapped_;
 };
 
-// The vertices along a seam from one to another, without the first; empty where that leads too far about.
-class SeamWalk {
+// The vertices along a rim from one to another, without the first; empty where that leads too far about.
+class RimWalk {
  public:
-  explicit SeamWalk(const Seam& seam) {
-    for (const auto& [a, b] : seam.edges) {
+  explicit RimWalk(const CutRim& cut) {
+    for (const auto& [a, b] : cut.edges) {
       beside_[a].insert(b);
       beside_[b].insert(a);
     }
@@ -132,13 +132,13 @@ class SeamWalk {
   std::map<std::int32_t, std::set<std::int32_t>> beside_;
 };
 
-// The vertices of a seam, and those that lie at the same place.
-class SeamVertices {
+// The vertices of a cut, and those that lie at the same place.
+class RimVertices {
  public:
-  SeamVertices(const Tissue& skin, const std::vector<Seam>& seams) {
-    for (const Seam& seam : seams) {
-      for (const auto& edge : seam.edges) {
-        for (const std::int32_t v : edge) rows_[key(skin, v)][seam.part] = v;
+  RimVertices(const Tissue& skin, const std::vector<CutRim>& cuts) {
+    for (const CutRim& cut : cuts) {
+      for (const auto& edge : cut.edges) {
+        for (const std::int32_t v : edge) rows_[key(skin, v)][cut.part] = v;
       }
     }
     points_.resize(static_cast<Eigen::Index>(rows_.size()), 3);
@@ -191,11 +191,11 @@ void drop_unused(Tissue& skin, std::int32_t first) {
 
 }  // namespace
 
-void close_seams(Tissue& skin, const std::vector<Seam>& seams, Eigen::Index given, const PartedTets& tets,
-                 const Context& context) {
-  if (seams.empty()) return;
+void close_cuts(Tissue& skin, const std::vector<CutRim>& cuts, Eigen::Index given, const PartedTets& tets,
+                const Context& context) {
+  if (cuts.empty()) return;
   const Parting& parting = tets.parting();
-  const SeamVertices rim(skin, seams);
+  const RimVertices rim(skin, cuts);
   Sheet sheet(tets);
   sheet.snap(rim.points());
   sheet.smooth();
@@ -212,8 +212,8 @@ void close_seams(Tissue& skin, const std::vector<Seam>& seams, Eigen::Index give
     if (fresh) added.push_back({sheet.at(place), part});
     return entry->second;
   };
-  std::map<int, SeamWalk> walks;
-  for (const Seam& seam : seams) walks.emplace(seam.part, SeamWalk(seam));
+  std::map<int, RimWalk> walks;
+  for (const CutRim& cut : cuts) walks.emplace(cut.part, RimWalk(cut));
   std::vector<Corners> triangles;
   const auto close = [&](const Corners& nodes, int part) {
     Corners v{};
@@ -224,7 +224,7 @@ void close_seams(Tissue& skin, const std::vector<Seam>& seams, Eigen::Index give
       const bool on_rim =
           sheet.is_border(sheet.place(nodes[c]), sheet.place(nodes[d])) && v[c] < first && v[d] < first;
       if (!on_rim || walks.count(part) == 0) continue;
-      // The corner across fans out over the seam.
+      // The corner across fans out over the cut.
       std::int32_t from = v[c];
       const std::vector<std::int32_t> way = walks.at(part).way(v[c], v[d]);
       if (way.size() < 2 || std::find(way.begin(), way.end(), v[e]) != way.end()) continue;
@@ -250,8 +250,8 @@ void close_seams(Tissue& skin, const std::vector<Seam>& seams, Eigen::Index give
     skin.F.row(before + static_cast<Eigen::Index>(f)) << triangles[f][0], triangles[f][1], triangles[f][2];
   }
   std::set<std::int32_t> rim_vertices;
-  for (const Seam& seam : seams) {
-    for (const auto& edge : seam.edges) rim_vertices.insert({edge[0], edge[1]});
+  for (const CutRim& cut : cuts) {
+    for (const auto& edge : cut.edges) rim_vertices.insert({edge[0], edge[1]});
   }
   for (std::int32_t v = first; v < static_cast<std::int32_t>(skin.V.rows()); ++v) rim_vertices.insert(v);
   fill_gaps(skin, rim_vertices, given, tets, context);

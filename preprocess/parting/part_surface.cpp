@@ -31,7 +31,7 @@ class Splitter {
 
   bool changes() const { return !crossings_.empty(); }
   const std::vector<NewVertex>& added() const { return added_; }
-  const std::vector<Seam>& seams() const { return seams_; }
+  const std::vector<CutRim>& cuts() const { return cuts_; }
   Triangles triangles() const {
     Triangles F(static_cast<Eigen::Index>(triangles_.size()), 3);
     for (std::size_t f = 0; f < triangles_.size(); ++f)
@@ -79,9 +79,9 @@ class Splitter {
 
   void emit(std::int32_t a, std::int32_t b, std::int32_t c) { triangles_.push_back({a, b, c}); }
   void border(int part, std::int32_t from, std::int32_t to) {
-    auto seam = std::find_if(seams_.begin(), seams_.end(), [&](const Seam& s) { return s.part == part; });
-    if (seam == seams_.end()) seam = seams_.insert(seams_.end(), Seam{part, {}});
-    seam->edges.push_back({from, to});
+    auto cut = std::find_if(cuts_.begin(), cuts_.end(), [&](const CutRim& s) { return s.part == part; });
+    if (cut == cuts_.end()) cut = cuts_.insert(cuts_.end(), CutRim{part, {}});
+    cut->edges.push_back({from, to});
   }
 
   void split(Eigen::Index f) {
@@ -137,7 +137,7 @@ class Splitter {
   std::map<std::pair<std::int32_t, std::int32_t>, Crossing> crossings_;  // of edges, the lower vertex first
   std::vector<NewVertex> added_;
   std::vector<Corners> triangles_;
-  std::vector<Seam> seams_;
+  std::vector<CutRim> cuts_;
 };
 
 // Vertices that lie in a tet of another side than their own.
@@ -153,7 +153,7 @@ void bind_anew(Tissue& tissue, const PartedTets& tets, const SurfaceSides& sides
 
 }  // namespace
 
-std::vector<Seam> part_surface(Tissue& tissue, const PartedTets& tets, const Context& context) {
+std::vector<CutRim> part_surface(Tissue& tissue, const PartedTets& tets, const Context& context) {
   if (tissue.segment != Tissue::by_tets || tissue.F.rows() == 0) return {};
   SurfaceSides sides(tissue, tets);
   if (!sides.any_crosses()) return {};
@@ -164,7 +164,7 @@ std::vector<Seam> part_surface(Tissue& tissue, const PartedTets& tets, const Con
   const Triangles F = splitter.triangles();
   append_vertices(tissue, splitter.added(), tets, context);
   tissue.F = F;
-  return splitter.seams();
+  return splitter.cuts();
 }
 
 }  // namespace ecorche::parting

@@ -27,7 +27,7 @@ namespace Ecorche
         private readonly StreamOptions _stream;
         private readonly Thread _thread;
         private readonly object _lock = new object();
-        private readonly Queue<Asked> _asked = new Queue<Asked>();
+        private readonly Queue<Request> _requests = new Queue<Request>();
         private readonly Random _random = new Random();
         private Client _client;
         private Pose _next, _sending;
@@ -84,7 +84,7 @@ namespace Ecorche
                     answer.SetException(new EcorcheException(Code.Unavailable, "the client is not connected"));
                     return answer.Task;
                 }
-                _asked.Enqueue(new Asked { Run = () => answer.TrySetResult(request(_client)), Fail = error => answer.TrySetException(error) });
+                _requests.Enqueue(new Request { Run = () => answer.TrySetResult(request(_client)), Fail = error => answer.TrySetException(error) });
                 _client.Wake();
             }
             return answer.Task;
@@ -121,7 +121,7 @@ namespace Ecorche
                 }
             }
             _client?.Dispose();
-            FailAsked(Error ?? new EcorcheException(Code.Cancelled, "the client was closed"));
+            FailRequests(Error ?? new EcorcheException(Code.Cancelled, "the client was closed"));
         }
 
         private void OpenAnew()
@@ -160,7 +160,7 @@ namespace Ecorche
         private void Serve()
         {
             bool send;
-            Asked asked = null;
+            Request request = null;
             lock (_lock)
             {
                 send = _hasNext;
@@ -171,12 +171,12 @@ namespace Ecorche
                     (_sending.Root, _sending.Skinning) = (_next.Root, _next.Skinning);
                     _shownPose = true;
                 }
-                if (_asked.Count > 0) asked = _asked.Dequeue();
+                if (_requests.Count > 0) request = _requests.Dequeue();
             }
             if (send) _client.SendPose(_sending);
-            if (asked != null) Answer(asked);
+            if (request != null) Answer(request);
             bool more;
-            lock (_lock) more = _hasNext || _asked.Count > 0;
+            lock (_lock) more = _hasNext || _requests.Count > 0;
             var came = _client.Poll(more ? 0 : 100);
             Controls = _client.Controls;
             if (came.Kind != EventKind.ModelChanged) return;
@@ -192,29 +192,29 @@ namespace Ecorche
                 (_client, _next) = (null, null);
                 _state = LinkState.Connecting;
             }
-            FailAsked(new EcorcheException(Code.Aborted, "the model was replaced"));
+            FailRequests(new EcorcheException(Code.Aborted, "the model was replaced"));
         }
 
-        private static void Answer(Asked asked)
+        private static void Answer(Request request)
         {
             try
             {
-                asked.Run();
+                request.Run();
             }
             catch (Exception error)
             {
-                asked.Fail(error);
+                request.Fail(error);
                 if (error is EcorcheException known && known.Code == Code.Unavailable) throw;
             }
         }
 
-        private void FailAsked(EcorcheException why)
+        private void FailRequests(EcorcheException why)
         {
             lock (_lock)
-                while (_asked.Count > 0) _asked.Dequeue().Fail(why);
+                while (_requests.Count > 0) _requests.Dequeue().Fail(why);
         }
 
-        private sealed class Asked
+        private sealed class Request
         {
             public Action Run;
             public Action<Exception> Fail;
