@@ -22,9 +22,9 @@ if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   endif()
 endif()
 # A CGAL mesh unit takes about 4 GB to compile: one at a time.
-set_property(GLOBAL PROPERTY JOB_POOLS cgal_pool=1)
+set_property(GLOBAL APPEND PROPERTY JOB_POOLS ecorche_cgal=1)
 
-# There are a hundred executables to link, and lld links them in a tenth of the time.
+# There are dozens of executables to link, and lld links them in a tenth of the time.
 find_program(LLD ld.lld)
 if(LLD AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CROSSCOMPILING)
   add_link_options(-fuse-ld=lld)

@@ -39,7 +39,7 @@ function(ecorche_library name)
     ecorche_list_objects(${name})
   endif()
   if(A_CGAL)
-    set_property(TARGET ${name} PROPERTY JOB_POOL_COMPILE cgal_pool)
+    set_property(TARGET ${name} PROPERTY JOB_POOL_COMPILE ecorche_cgal)
   endif()
 endfunction()
 
@@ -50,7 +50,9 @@ function(ecorche_unity name)
 endfunction()
 
 # What the sanitizers build.
-add_custom_target(unit_tests)
+if(ECORCHE_TESTS)
+  add_custom_target(unit_tests)
+endif()
 
 # ecorche_test(NAME [SANITIZED] SOURCES ... [LIBS ...] [ARGS ...] [PRECOMPILED kind] [TIMEOUT seconds] [LABELS ...]
 #   [FIXTURES ...])

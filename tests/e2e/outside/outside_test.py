@@ -96,6 +96,14 @@ class Outside(unittest.TestCase):
             self.assertRegex(self.served(program, *arm, env=paths), wide)
         self.shows_only_the_c_abi(prefix, "ecorche_client", r"(?i)cgal|gmp|mpfr|cholmod|tetgen|ITK|vtk|hdf5")
 
+    def each_component_alone(self, prefix):
+        """Each finds what it needs, whatever else is asked for; those in C need nothing."""
+        nothing = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("Eigen3", "PkgConfig", "hwy", "TBB", "OpenSSL", "Protobuf")]
+        for component in ("c", "c_client", "runtime", "client", "preprocess"):
+            with self.subTest(component):
+                run("cmake", "-S", HERE / "component", "-B", self.folder / f"only_{component}", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}",
+                    f"-DCOMPONENT={component}", "-Wno-dev", *(nothing if component in ("c", "c_client") else []))
+
     def test_installed(self):
         first, prefix, build = self.folder / "first", self.folder / "moved", self.folder / "build"
         run("cmake", "--install", BUILD, "--prefix", first)
@@ -114,6 +122,7 @@ class Outside(unittest.TestCase):
         self.assertRegex(said, r"^ecorche \d+\.\d+\.\d+: [2-9]\d\d\.\d mm, (pass|warn)$")
         self.by_the_c_abi(prefix, build, model, said)
         self.nobody_answers(build / "connect")
+        self.each_component_alone(prefix)
 
         self.first_client(build / "first_client")
 
