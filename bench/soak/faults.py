@@ -39,9 +39,10 @@ class Place:
     """The folder of a soak: the model that is served, a small disk for recordings, and what steps the server's clock. `link`: where the
     system lets us, two network namespaces with a line between that loses packets; the server is at its near end."""
 
-    def __init__(self, folder, model):
+    def __init__(self, folder, model, others):
         self.folder = pathlib.Path(folder)
         self.model, self.good = self.folder / "served.hdf", model
+        self.other, self.others = self.folder / "other.hdf", others  # two bodies that take turns under one name
         self.records, self.clock = self.folder / "records", self.folder / "clock"
         self.program = self.folder / "ecorche"
         self.sequence = self.folder / "sequence.yaml"
@@ -50,6 +51,7 @@ class Place:
 
     def __enter__(self):
         shutil.copy(self.good, self.model)
+        shutil.copy(self.others[0], self.other)
         self.records.mkdir()
         self.step_clock(0)
         self.program.write_text(f'#!/bin/sh\nexec env LD_PRELOAD={CLOCK} STEPPED_CLOCK={self.clock} {programs.ECORCHE} "$@"\n')
@@ -77,13 +79,28 @@ class Place:
             file.write(struct.pack("<q", seconds))
 
     def put_model(self, data):
-        beside = self.model.with_suffix(".new")
-        beside.write_bytes(data)
-        beside.replace(self.model)
+        put(self.model, data)
+
+    def put_other(self):
+        """The other of the two bodies in place of the one that is served; its file."""
+        self.others = self.others[::-1]
+        put(self.other, self.others[0].read_bytes())
+        return self.others[0]
+
+    def where(self):
+        """Sockets that the calling thread makes, and programs that it starts, are where the server is."""
+        return self.link.at(self.link.near) if self.link else contextlib.nullcontext()
 
     def within(self, words):
         """The words, run where the server is."""
         return ["ip", "netns", "exec", self.link.near, *words] if self.link else list(words)
+
+
+def put(path, data):
+    """Whole or not at all, as whoever replaces a model should."""
+    beside = path.with_suffix(".new")
+    beside.write_bytes(data)
+    beside.replace(path)
 
 
 def call(*words):
@@ -99,6 +116,7 @@ class Faults:
             self.cut: Fault("clients cut amid a frame", "all others' frames right"),
             self.fill_disk: Fault(f"a disk of {DISK_KIB} KiB full while recording", "it is told, the next is whole", lacks=place.no_disk),
             self.replace_model: Fault("the model replaced by a damaged one, then by a good one", "refused, then read"),
+            self.replace_body: Fault("a model replaced by another body that a client poses", "it is told, frames of both right"),
             self.step_clock: Fault("the clock stepped by an hour, on and back", "nobody dropped"),
             self.lose_packets: Fault(f"a network that loses {LOSS:.0%}", "frames right", lacks=place.no_link)}
         self._done = threading.Event()
@@ -113,8 +131,7 @@ class Faults:
         self._thread.join()
 
     def _work(self):
-        # Sockets of this thread are where the server is.
-        with self.place.link.at(self.place.link.near) if self.place.link else contextlib.nullcontext():
+        with self.place.where():
             while not self._done.is_set():
                 for do, fault in self.plan.items():
                     if fault.lacks or self._done.wait(5):
@@ -126,10 +143,10 @@ class Faults:
                     except Exception as error:  # noqa: BLE001: whatever it is, it is told
                         fault.bad.append(f"{type(error).__name__}: {error}")
 
-    def check_frames(self, address, within, seconds=2, *more):
+    def check_frames(self, address, within, seconds=2, *more, model=None):
         """Plays poses, and holds every frame against offline posing."""
         words = within([programs.ECORCHE, "--json", "stream", address, "--motion", self.place.sequence, "--rate", 20,
-                        "--seconds", seconds, "--model", self.place.good, *more])
+                        "--seconds", seconds, "--model", model or self.place.good, *more])
         done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120)
         if done.returncode != 0:
             raise RuntimeError(f"stream ended with {done.returncode}: {done.stderr.strip()[-300:]}")
@@ -138,10 +155,10 @@ class Faults:
             raise RuntimeError(f"{told['mismatches']} of {told['checked']} frames are wrong")
 
     @contextlib.contextmanager
-    def posing(self):
+    def posing(self, model=""):
         """A client with the body open, and a way to have it posed."""
         with Client("127.0.0.1", self.port) as client:
-            body = client.open()
+            body = client.open(model)
 
             def pose(times):
                 for _ in range(times):
@@ -202,6 +219,21 @@ class Faults:
                 self.place.put_model(good)
             pose(3)
             client.reload(self.place.model.stem)
+
+    def replace_body(self):
+        def right(model):
+            self.check_frames(f"127.0.0.1:{self.port}", self.place.within, 1, "--open", self.place.other.stem, model=model)
+
+        with self.posing(self.place.other.stem) as (client, pose):
+            client.subscribe_mesh()
+            pose(3)
+            right(self.place.others[0])
+            now = self.place.put_other()
+            client.reload(self.place.other.stem)
+            pose(3)
+            if not client.model_changed:
+                raise RuntimeError("nobody told the client that its model was replaced")
+        right(now)
 
     def step_clock(self):
         with self.posing() as (client, pose):
