@@ -20,4 +20,4 @@ if(ECORCHE_MANUAL_PYTHON AND NOT ECORCHE_SANITIZE)
   install(FILES ${_manual}/fish/ecorche.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT command)
 endif()
 # Without a path in them: systemd looks in /usr/local/bin and /usr/bin.
-install(FILES packaging/systemd/ecorche.service packaging/systemd/ecorche.socket DESTINATION lib/systemd/system COMPONENT command)
+install(FILES deploy/systemd/ecorche.service deploy/systemd/ecorche.socket DESTINATION lib/systemd/system COMPONENT command)

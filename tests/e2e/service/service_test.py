@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`ecorche serve` under a service manager: what it tells, the ports that it is passed, SIGHUP; and the unit files of packaging/systemd.
+"""`ecorche serve` under a service manager: what it tells, the ports that it is passed, SIGHUP; and the unit files of deploy/systemd.
 
 usage: service_test.py SOURCE; the environment is that of the fixtures
 """
@@ -21,7 +21,7 @@ import urllib.request
 from ecorche_client import Client
 
 SOURCE = pathlib.Path(sys.argv[1])
-UNITS = SOURCE / "packaging" / "systemd"
+UNITS = SOURCE / "deploy" / "systemd"
 ECORCHE, MODEL = os.environ["ECORCHE_BIN"], os.environ["ECORCHE_MODEL"]
 OTHER_MODEL = os.environ["ECORCHE_MODELS"].split(":")[-1]
 
