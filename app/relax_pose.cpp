@@ -15,10 +15,9 @@ void add_relaxing(CLI::App& command, PoseSettings& settings) {
   command.add_flag("--unfold", settings.unfold,
                    "relax around inverted tets, as far as no tissue loses volume for it; those squeezed by "
                    "bones remain");
-  command.add_flag(
-      "--settle", settings.settle,
-      "bring the flesh near to the balance that ecorche fem solves for, in about a second; bones "
-      "stay");
+  command.add_flag("--settle", settings.settle,
+                   "bring the flesh near to the balance that ecorche fem solves for, in seconds (3 million "
+                   "tets: about a minute); bones stay");
 }
 
 void check_relaxing(const PoseSettings& settings) {

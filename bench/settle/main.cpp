@@ -2,7 +2,7 @@
 // How soon a body settles: bench_settle MODEL... --pose FILE... prints, for every model and pose, what is
 // left of the distance between skinning and the converged solution of finite elements after so many steps,
 // and the seconds that they took. "Left" is the root mean square over the free nodes of flesh, over that of
-// skinning. The factor of the Laplacian is made once for a model and told by itself.
+// skinning. The multigrid of the Laplacian is made once for a model and told by itself.
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -37,7 +37,7 @@ double distance(const runtime::FleshSettler& settler, const std::vector<float>& 
   return std::sqrt(sum / static_cast<double>(settler.free_nodes().size()));
 }
 
-void settle(const runtime::FleshSettler& settler, double factor_s, const runtime::BodyPoser& poser,
+void settle(const runtime::FleshSettler& settler, double multigrid_s, const runtime::BodyPoser& poser,
             const std::string& pose_file, const Table& table) {
   const Model& model = poser.model();
   runtime::PosedBody skinned = poser.make_frame();
@@ -59,7 +59,7 @@ void settle(const runtime::FleshSettler& settler, double factor_s, const runtime
     const auto start = Clock::now();
     const runtime::Settled done = settler.run(body, {.most_steps = steps}, {});
     const double spent = seconds_since(start);
-    table.row({std::to_string(model.tet_count()), name, fixed(factor_s, 1), std::to_string(done.steps),
+    table.row({std::to_string(model.tet_count()), name, fixed(multigrid_s, 1), std::to_string(done.steps),
                fixed(spent, 2), fixed(distance(settler, body.nodes, solved.nodes) / before, 3),
                fixed(distance(settler, body.nodes, solved.nodes), 3), fixed(before, 3)});
   }
@@ -77,7 +77,7 @@ int run(const std::vector<std::string>& words) {
   }
   const Table table({{"tets", 8},
                      {"pose", -20},
-                     {"factor, s", 9},
+                     {"multigrid, s", 9},
                      {"steps", 5},
                      {"s", 6},
                      {"left", 6},
@@ -88,8 +88,8 @@ int run(const std::vector<std::string>& words) {
     const runtime::BodyPoser poser(model);
     const auto start = Clock::now();
     const runtime::FleshSettler settler(*model, {});
-    const double factor_s = seconds_since(start);
-    for (const std::string& one : poses) settle(settler, factor_s, poser, one, table);
+    const double multigrid_s = seconds_since(start);
+    for (const std::string& one : poses) settle(settler, multigrid_s, poser, one, table);
   }
   return 0;
 }

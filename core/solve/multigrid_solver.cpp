@@ -50,6 +50,8 @@ using Columns = std::array<double, kMostColumns>;
 
 class MultigridSolver final : public SpdSolver {
  public:
+  explicit MultigridSolver(double tolerance) : tolerance_(tolerance) {}
+
   std::string_view name() const override { return "amg"; }
 
   void factor(const SparseMatrix& A, const Context& context) override {
@@ -289,7 +291,7 @@ class MultigridSolver final : public SpdSolver {
       std::fill(r.begin() + static_cast<std::ptrdiff_t>(first * width),
                 r.begin() + static_cast<std::ptrdiff_t>(past * width), 0.0F);
     });
-    const double tolerance = A_.rows <= kSmall ? kSmallTolerance : kTolerance;
+    const double tolerance = tolerance_ > 0 ? tolerance_ : A_.rows <= kSmall ? kSmallTolerance : kTolerance;
     Columns asked{}, last{};
     for (int correction = 0;; ++correction) {
       context.check_stop();
@@ -328,6 +330,7 @@ class MultigridSolver final : public SpdSolver {
     }
   }
 
+  const double tolerance_;  // 0: its own
   Csr<double> A_;
   std::vector<double> own_;  // the diagonal
   std::vector<NarrowLevel> levels_;
@@ -337,8 +340,8 @@ class MultigridSolver final : public SpdSolver {
 
 }  // namespace
 
-std::unique_ptr<SpdSolver> make_multigrid_solver() {
-  return std::make_unique<MultigridSolver>();
+std::unique_ptr<SpdSolver> make_multigrid_solver(double tolerance) {
+  return std::make_unique<MultigridSolver>(tolerance);
 }
 
 }  // namespace ecorche::solve

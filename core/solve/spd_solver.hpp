@@ -40,8 +40,9 @@ std::unique_ptr<SpdSolver> make_eigen_solver();
 /// Conjugate gradients with smoothed-aggregation multigrid, all right-hand sides as blocks, to a relative
 /// residual of 2e-11 (5e-13 up to 100 000 unknowns): for large meshes. O(unknowns) memory and about
 /// O(unknowns) time; the same bits for any number of threads on one kind of processor. `solve` throws
-/// Error{data} as well where the matrix turns out not to be positive definite.
-std::unique_ptr<SpdSolver> make_multigrid_solver();
+/// Error{data} as well where the matrix turns out not to be positive definite. `tolerance`: another relative
+/// residual to be content with, as where the system is an estimate itself; 0: these.
+std::unique_ptr<SpdSolver> make_multigrid_solver(double tolerance = 0);
 
 /// Largest over the columns of |A x - b| / |b|, A symmetric from its lower triangle.
 double relative_residual(const SparseMatrix& A, const Block& X, const Block& B);

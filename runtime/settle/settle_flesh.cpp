@@ -15,6 +15,8 @@ using Eigen::Matrix3d;
 
 constexpr double kPoisson = 0.45;   // of linear tets: nearer to 0.5 they lock
 constexpr double kRounding = 1e-6;  // mm: what a body at rest moves by
+// The Laplacian is an estimate itself: solved no better than this, it takes as many steps as solved exactly.
+constexpr double kLaplacianTolerance = 0.01;
 
 /// Rows of the model's nodes that the flesh's tets have: the free ones first, each part ascending; how many
 /// are free.
@@ -87,7 +89,7 @@ void FleshSettler::factor(const Context& context) {
   }
   matrix_.resize(free, free);
   matrix_.setFromTriplets(entries.begin(), entries.end());
-  laplacian_ = solve::make_eigen_solver();
+  laplacian_ = solve::make_multigrid_solver(kLaplacianTolerance);
   laplacian_->factor(matrix_, context);
 }
 

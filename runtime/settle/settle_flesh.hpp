@@ -31,12 +31,12 @@ struct Settled {
 
 /// Moves free nodes of flesh (elastic::flesh_of) so that the stable neo-Hookean energy of linear tets falls,
 /// Poisson's ratio 0.45: preprocess/fem's own for its element p1. By L-BFGS, whose first estimate of the
-/// Hessian is the tets' Laplacian (Liu17): factored once, it takes each step to where forces reach
-/// through the whole body. Made once for a model, which must outlive it; any number of threads may settle
-/// different bodies. The same bits for any number of threads.
+/// Hessian is the tets' Laplacian (Liu17), solved by multigrid: it takes each step to where forces reach
+/// through the whole body, in time in proportion to the tets. Made once for a model, which must outlive it;
+/// any number of threads may settle different bodies. The same bits for any number of threads.
 class FleshSettler {
  public:
-  /// Factors. Throws Error{data} where no soft tet hangs on a bone.
+  /// Makes the hierarchy. Throws Error{data} where no soft tet hangs on a bone.
   FleshSettler(const Model& model, const Context& context);
   FleshSettler(const FleshSettler&) = delete;
   FleshSettler& operator=(const FleshSettler&) = delete;
@@ -61,7 +61,7 @@ class FleshSettler {
   TetPatch patch_;
   std::unique_ptr<TetSum> sum_;
   std::unique_ptr<solve::SpdSolver> laplacian_;
-  solve::SparseMatrix matrix_;  // what is factored, its lower triangle
+  solve::SparseMatrix matrix_;  // the Laplacian's lower triangle
 };
 
 }  // namespace ecorche::runtime

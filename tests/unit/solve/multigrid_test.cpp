@@ -147,6 +147,16 @@ TEST(MultigridSolver, ManyUnknownsAndTheSameBitsForAnyThreads) {
   EXPECT_TRUE(one == four);
 }
 
+TEST(MultigridSolver, IsContentWithTheToleranceThatIsGiven) {
+  const SparseMatrix A = cube(20, 3);
+  const Block B = Block::Random(A.rows(), 3);
+  const auto solver = make_multigrid_solver(0.01);
+  solver->factor(A, {});
+  const double residual = relative_residual(A, solver->solve(B, {}), B);
+  EXPECT_LT(residual, 0.02);
+  EXPECT_GT(residual, 1e-5) << "more work than asked for";
+}
+
 TEST(MultigridSolver, RefusesAnIndefiniteMatrix) {
   SparseMatrix A = cube(5);
   A.coeffRef(4, 4) = -1;
