@@ -27,6 +27,8 @@
 
 namespace {
 
+constexpr std::size_t kThinNamed = 3;
+
 using namespace ecorche;
 
 constexpr std::size_t kSamples = 40'000;  // a surface and direction
@@ -110,16 +112,23 @@ void add_fits(const std::vector<bench::SurfaceFit>& all, const std::string& mesh
                  {fixed(of_bones[of_bones.size() / 2], 2),
                   std::to_string(within) + " of " + std::to_string(all.size() - 1),
                   fixed(worst(*last), 2) + " " + last->name, fixed(100 * volumes[volumes.size() / 2], 1)});
-  std::string none, thin;
+  std::string none;
+  std::vector<const bench::SurfaceFit*> thin;
   for (const bench::SurfaceFit& f : all) {
     if (!f.there) none += (none.empty() ? "" : ", ") + f.name;
-    if (f.there && f.thin_share > 0.1)
-      thin += (thin.empty() ? "" : "; ") + f.name + " " + fixed(100 * f.thin_share, 0) + " %, " +
-              fixed(f.thin_p99, 2);
+    if (f.there && f.thin_share > 0.1) thin.push_back(&f);
   }
   if (!none.empty()) notes.push_back(mesher + ": no tet of " + none);
-  if (!thin.empty())
-    notes.push_back(mesher + ": share that is thinner than a voxel, distance there in voxels: " + thin);
+  if (thin.empty()) return;
+  std::stable_sort(thin.begin(), thin.end(),
+                   [](const auto* a, const auto* b) { return a->thin_share > b->thin_share; });
+  std::string said =
+      mesher + ": " + std::to_string(thin.size()) +
+      " bones are thinner than a voxel over a tenth and more, most of all (share, distance there in voxels)";
+  for (std::size_t i = 0; i < std::min(kThinNamed, thin.size()); ++i)
+    said += (i == 0 ? " " : "; ") + thin[i]->name + " " + fixed(100 * thin[i]->thin_share, 0) + " %, " +
+            fixed(thin[i]->thin_p99, 2);
+  notes.push_back(said);
 }
 
 int run(const Settings& s) {
