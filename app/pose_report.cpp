@@ -10,6 +10,7 @@
 #include "app/fem_pose.hpp"
 #include "app/inverted_tets.hpp"
 #include "app/relax_pose.hpp"
+#include "app/report/warning_lines.hpp"
 #include "runtime/quality/bone_tets.hpp"
 #include "runtime/quality/tissue_limits.hpp"
 
@@ -96,19 +97,6 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
 
 namespace {
 
-constexpr std::size_t kMostWarnings = 4;  // warnings of a frame; the others stand in quality.json
-
-std::string warning_line(const json& warning) {
-  std::string out = "  warning: " + warning["what"].get<std::string>();
-  if (warning.contains("at_mm")) {
-    const json& at = warning["at_mm"];
-    out += fmt::format(", at [{:.0f}, {:.0f}, {:.0f}] mm of the scan", at[0].get<double>(),
-                       at[1].get<double>(), at[2].get<double>());
-    if (warning.contains("joint")) out += " by " + warning["joint"].get<std::string>();
-  }
-  return out + " (" + warning["mend"].get<std::string>() + ")\n";
-}
-
 std::string clamped_line(const json& clamped) {
   std::string limits;
   for (const json& limit : clamped["limits"])
@@ -131,10 +119,7 @@ std::string line_of(const json& frame) {
       frame["files"].size());
   if (quality.contains("fem")) out += fem_line(quality["fem"]);
   out += settled_line(quality);
-  const json& warnings = quality["warnings"];
-  for (std::size_t w = 0; w < std::min(kMostWarnings, warnings.size()); ++w) out += warning_line(warnings[w]);
-  if (warnings.size() > kMostWarnings)
-    out += fmt::format("  and {} more warnings, in quality.json\n", warnings.size() - kMostWarnings);
+  out += warning_lines(quality["warnings"]);
   for (const json& clamped : quality["clamped"]) out += clamped_line(clamped);
   return out;
 }

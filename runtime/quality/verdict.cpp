@@ -15,6 +15,9 @@ std::vector<Breach> breaches(const PoseQuality& quality) {
   const auto hold = [&](Figure figure, double value, double threshold, std::size_t row = 0) {
     if (!(value <= threshold)) out.push_back(Breach{figure, row, value, threshold});
   };
+  // First: a joint that is not where it should be brings all the rest with it.
+  for (std::size_t j = 0; j < quality.doubtful.size(); ++j)
+    hold(Figure::doubtful_joint, quality.doubtful[j].turned, most.max_doubtful_turn, j);
   hold(Figure::inverted_share, quality.inverted_share, most.max_inverted_share);
   hold(Figure::place_inverted, quality.places.inverted.share, most.max_place_inverted);
   hold(Figure::place_change, quality.places.changed.share, most.max_place_change);
@@ -25,8 +28,6 @@ std::vector<Breach> breaches(const PoseQuality& quality) {
   std::stable_sort(
       out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
       [](const Breach& a, const Breach& b) { return a.value * b.threshold > b.value * a.threshold; });
-  for (std::size_t j = 0; j < quality.doubtful.size(); ++j)
-    hold(Figure::doubtful_joint, quality.doubtful[j].turned, most.max_doubtful_turn, j);
   hold(Figure::bone_rigidity, quality.bone_rigidity_mm, most.max_bone_rigidity_mm);
   return out;
 }

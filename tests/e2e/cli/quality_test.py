@@ -59,7 +59,7 @@ class Quality(unittest.TestCase):
             self.assertLess(abs(quality["volume_change"]), 0.1, "the whole body would not have told")
             self.assertLessEqual(abs(quality["volume_change"]), quality["unsigned_volume_change"])
             worst = quality["warnings"][0]
-            self.assertRegex(done.stdout, rf"(?m)^  warning: {re.escape(worst['what'])}, at \[-?\d+, -?\d+, -?\d+\] mm of the scan by "
+            self.assertRegex(done.stdout, rf"(?m)^  warning: {re.escape(worst['what'])}(; .*)?, at \[-?\d+, -?\d+, -?\d+\] mm of the scan by "
                                           rf"{worst['joint']} \({re.escape(worst['mend'])}\)$")
 
     def test_a_warning_fails_where_that_is_asked_after_all_is_written(self):

@@ -181,6 +181,7 @@ TEST(Verdict, AJointThatWasFoundBadlyMayNotTurn) {
         EXPECT_EQ(q.doubtful.size(), doubtful ? 1u : 0u);
         if (!doubtful) continue;
         EXPECT_EQ(q.doubtful[0].joint, 1);
+        EXPECT_EQ(breaches(q).front().figure, Figure::doubtful_joint) << "what brings the rest comes first";
         EXPECT_EQ(q.doubtful[0].confidence, confidence);
         EXPECT_NEAR(q.doubtful[0].turned * 180 / std::numbers::pi, turned, 1e-6);
         EXPECT_FALSE(q.pass);
