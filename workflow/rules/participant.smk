@@ -3,10 +3,8 @@
 
 # Later steps come first, so that participants are done one by one.
 #
-# What every step's command line holds. `given` is all that a step depends on besides its input files: when it changes, the step is made
-# again. Threads, memory and attempts change no result, so they are none of it.
-STEP = (f"{plan.python} {plan.scripts}/step.py {{rule}} {{wildcards.participant}} --out {plan.out_q} --ecorche {plan.ecorche_q} "
-        "--threads {threads} --mib {resources.hold_mib} --attempt {resources.attempt} --attempts {resources.attempts} --given {params.given:q}")
+# `given` is all that a step depends on besides its input files: when it changes, the step is made again. Threads, memory and attempts change
+# no result, so they are none of it.
 
 wildcard_constraints:
     participant="sub-[0-9A-Za-z]+",
@@ -19,7 +17,7 @@ rule new:
     threads: plan.threads
     resources: **plan.resources("new")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)
 
 rule check:
     input: lambda wc: plan.files(wc.participant) if plan.is_case(wc.participant) else f"{wc.participant}/steps/new.json"
@@ -29,7 +27,7 @@ rule check:
     threads: plan.threads
     resources: **plan.resources("check")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)
 
 rule repair:
     input: "{participant}/steps/check.json"
@@ -39,7 +37,7 @@ rule repair:
     threads: plan.threads
     resources: **plan.resources("repair")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)
 
 rule preprocess:
     input: "{participant}/steps/repair.json"
@@ -49,7 +47,7 @@ rule preprocess:
     threads: plan.threads
     resources: **plan.resources("preprocess")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)
 
 rule verify:
     input: "{participant}/steps/preprocess.json"
@@ -59,7 +57,7 @@ rule verify:
     threads: plan.threads
     resources: **plan.resources("verify")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)
 
 rule subject:
     input:
@@ -70,4 +68,4 @@ rule subject:
     threads: plan.threads
     resources: **plan.resources("subject")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)

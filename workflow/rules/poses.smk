@@ -11,4 +11,4 @@ rule pose:
     threads: plan.threads
     resources: **plan.resources("pose")
     group: "participant"
-    shell: STEP.replace("{rule}", "pose-{wildcards.pose}")
+    run: plan.run(f"pose-{wildcards.pose}", wildcards.participant, params.given, threads, resources)

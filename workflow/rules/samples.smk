@@ -4,9 +4,9 @@
 rule sample:
     input: "{participant}/steps/verify.json"
     output: "{participant}/steps/sample.json"
-    params: given=lambda wc: plan.given["sample"]()
+    params: given=lambda wc: plan.given["sample"](wc.participant)
     priority: 5
     threads: plan.sample_threads
     resources: **plan.resources("sample")
     group: "participant"
-    shell: STEP
+    run: plan.run(rule, wildcards.participant, params.given, threads, resources)

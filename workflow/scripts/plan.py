@@ -18,6 +18,7 @@ import law
 import participants
 import record
 import samples
+import step_forks
 
 ATTEMPTS = 3  # of a step that its machine failed
 
@@ -50,7 +51,7 @@ class Plan:
         self.ecorche = self.config["ecorche"]
         self.program = {"version": self.version(), "sha256": record.sha256(self.ecorche)}
         self.python, self.scripts = shlex.quote(sys.executable), shlex.quote(str(self.base / "scripts"))
-        self.out_q, self.ecorche_q = shlex.quote(str(self.out)), shlex.quote(self.ecorche)
+        self.ecorche_q, self.forks = shlex.quote(self.ecorche), step_forks.StepForks()
         self.levels = self.config.get("levels", "participant,group").split(",")
         self.law = yaml.safe_load((self.base / "resources.yaml").read_text())
         for step, line in self.config.get("law", {}).items():
@@ -62,6 +63,9 @@ class Plan:
             for path in self.pose_files(name):
                 if not os.path.isfile(path):
                     raise participants.Refused(f"configuration: poses.{name}", f"no file {path}", "give its path from the folder where you are, or lib:NAME", 66)
+        for name in self.people if self.config["landmarks"] and self.config["sample"] else []:
+            if not os.path.isfile(self.landmark_file(name)):
+                raise participants.Refused("configuration: landmarks", f"no file {self.landmark_file(name)}", "give its path from the folder where you are", 66)
         if self.main:
             self.lock()
             record.take_back(self.out, self.people)
@@ -115,8 +119,8 @@ class Plan:
             "preprocess": lambda who: {"words": self.preprocess_words(who), "cache_gib": self.config["cache_gib"], "after": ["repair"]},
             "verify": lambda who: {"after": ["preprocess"]},
             "pose": lambda pose: {"words": self.pose_words(pose), "after": ["verify"]},
-            "sample": lambda: {"count": self.config["sample"], "seed": self.config["seed"], "reach": self.config["reach"], "views": self.config["views"],
-                               "words": samples.WORDS, "after": ["verify"]},
+            "sample": lambda who: {"count": self.config["sample"], "seed": self.config["seed"], "reach": self.config["reach"], "views": self.config["views"],
+                                   "words": samples.WORDS, "landmarks": self.landmarks(who), "after": ["verify"]},
             "subject": lambda who: {"options": self.options(who), "after": self.told(who)},
             "group": lambda: {"names": self.group_names(), "unfinished": self.unfinished()},
             "description": lambda: {"source": self.root},
@@ -162,6 +166,16 @@ class Plan:
         given = self.poses[pose]
         return [self.absolute(name, given[name]) for name in ("pose", "motion") if name in given and not given[name].startswith("lib:")]
 
+    def landmark_file(self, participant):
+        return os.path.join(self.config.get("from", os.getcwd()), self.config["landmarks"].replace("{participant}", participant))
+
+    def landmarks(self, participant):
+        """With its digest: other points at the same place are other landmarks."""
+        if not self.config["landmarks"]:
+            return None
+        path = self.landmark_file(participant)
+        return {"file": path, "sha256": record.sha256(path)}
+
     def told(self, participant):
         """The steps that a participant's page tells of."""
         scan = [] if self.is_case(participant) else ["new"]
@@ -170,6 +184,15 @@ class Plan:
     def options(self, participant):
         return {"preprocess": self.preprocess_words(participant), "repair": self.config["repair"] if self.config["repair"] is False else self.repair_words(),
                 "poses": {name: self.pose_words(name) for name in self.poses}}
+
+    # How it is made.
+
+    def run(self, step, participant, given, threads, resources):
+        """A step's job, on a thread of Snakemake's."""
+        code = self.forks.run(step=step, participant=participant, out=str(self.out), ecorche=self.ecorche, given=given, threads=threads,
+                              mib=resources.hold_mib, attempt=resources.attempt, attempts=resources.attempts)
+        if code != 0:
+            raise RuntimeError(f"{step} of {participant} ended with {code} (see {participant}/log/{step}.log)")
 
     # What it is planned with.
 

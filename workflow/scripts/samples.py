@@ -5,9 +5,11 @@ Sample i of a participant depends on the seed, the participant and i alone: more
 killed goes on where it was. A sample's folder appears whole.
 """
 import concurrent.futures
+import csv
 import json
 import math
 import os
+import pathlib
 import random
 import shutil
 
@@ -39,11 +41,27 @@ def as_yaml(skeleton, pose):
     return "\n".join(lines) + "\n"
 
 
+def landmark_names(path):
+    """Of its points, in their order, as `ecorche probe` reads the file; none where no column is called name."""
+    lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    rows = list(csv.reader([line for line in lines if line and line[0] != "#"], skipinitialspace=True))
+    head = [cell.strip() for cell in rows[0]] if rows else []
+    at = head.index("name") if "name" in head else None
+    return [] if at is None else [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+
+
+def put_names(path, names):
+    """In front of what `ecorche probe` wrote, which has none."""
+    rows = list(csv.reader(path.read_text().splitlines()))
+    with open(path, "w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([name, *row] for name, row in zip(["name", *names], rows, strict=True))
+
+
 def make(step):
     given, folder = step.given, step.folder / "samples"
     info = step.call("info", "model.hdf")
     key = {"model": info["identity"], "program": given["program"], "seed": given["seed"], "reach": given["reach"], "views": given["views"],
-           "words": given["words"]}
+           "words": given["words"], "landmarks": given["landmarks"] and given["landmarks"]["sha256"]}
     folder.mkdir(exist_ok=True)
     record.write_text(folder / "joints.csv", "joint,x,y,z\n" + "".join(
         f"{joint['joint']},{','.join(format(mm, '.6g') for mm in joint['center_mm'])}\n" for joint in info["rig"]))
@@ -83,6 +101,12 @@ def one(step, folder, name, key, skeleton, pose, given):
     step.call("pose", "model.hdf", "-o", part, "--pose", drawn, *given["words"], threads=1)
     step.call("probe", "model.hdf", "--points", folder / "joints.csv", "-o", part / "joints.csv", "--pose", drawn, "--direction", "rest-to-posed",
               "--volumes", "none", threads=1)
+    if given["landmarks"]:
+        points = pathlib.Path(given["landmarks"]["file"])
+        step.call("probe", "model.hdf", "--points", points, "-o", part / "landmarks.csv", "--pose", drawn, "--direction", "rest-to-posed",
+                  "--volumes", "none", threads=1)
+        if names := landmark_names(points):
+            put_names(part / "landmarks.csv", names)
     for view in given["views"]:
         step.call("radiograph", "model.hdf", "-o", part / f"{view}.png", "--pose", drawn, "--view", view, threads=1)
     quality = json.loads((part / "quality.json").read_text())

@@ -23,8 +23,6 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import record  # noqa: E402
 
-# What one step alone needs is imported by it: a participant has seven, each a Python of its own, and half of their time went there.
-
 DATA_FAULTS = {64, 65, 66, 77, 78}
 STOPPED = {130, 143}  # somebody wants an end: neither tried again at once nor written down
 
@@ -50,11 +48,13 @@ class Step:
         self.seconds, self.peak_mib = 0.0, 0.0
         self.children, self.stopped = set(), False  # process ids
         signal.signal(signal.SIGTERM, self.stop)
+        signal.signal(signal.SIGINT, self.stop)
 
-    def stop(self, *_):
+    def stop(self, which, _):
         """No further command is called, and those that run end."""
         self.stopped = True
-        for child in list(self.children):
+        # An interrupt comes to all of a process group: those that run have it, and would take a second one for haste.
+        for child in list(self.children) if which == signal.SIGTERM else []:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(child, signal.SIGTERM)
 
@@ -145,7 +145,7 @@ class Step:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
                 return
-            time.sleep(0.02)
+            time.sleep(0.05)
 
     def said(self, code, found):
         if "error" in found:

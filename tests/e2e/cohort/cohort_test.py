@@ -15,9 +15,10 @@ import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "tests/support"))
+sys.path[:0] = [str(ROOT / "tests/support"), str(pathlib.Path(__file__).resolve().parent)]
 sys.dont_write_bytecode = True
 import phantom_cohort  # noqa: E402
+from processes import alive, below, kill_all  # noqa: E402
 
 ECORCHE = os.environ["ECORCHE_BIN"]
 CONFIG = """
@@ -209,10 +210,8 @@ document.body.innerHTML='<pre>'+JSON.stringify(found)+'</pre>'</script>"""
         shutil.copytree(self.base / "bids", self.folder / "bids")
         bids, out = self.folder / "bids", self.folder / "out"
         # Planned with a third of what it holds, each step is killed twice; that of sub-02 always, as the kernel would.
-        asked = self.folder / "asked"
         program = self.folder / "program"
         program.write_text(f"""#!/bin/sh
-case "$*" in *" preprocess "*) tr '\\0' ' ' < /proc/$PPID/cmdline | sed 's/ --given.*//; s/.*preprocess //' >> {asked}; echo >> {asked} ;; esac
 case "$*" in *" preprocess "*sub-02*) [ -e {self.folder}/mended ] || kill -9 $$ ;; esac
 exec {ECORCHE} "$@"
 """)
@@ -221,8 +220,9 @@ exec {ECORCHE} "$@"
         config.write_text(CONFIG + "law: {preprocess: {mib: 35, mib_per_mtet: 0, mib_per_mvoxel: 0}}\n")
         words = ("--config", config, "--snakemake", f"--config bids={bids} out={out} ecorche={program} from={self.base}")
         said = self.call(bids, out, *words)
-        planned = {name: re.findall(rf"{name} .*--mib (\d+) ", asked.read_text()) for name in self.expected}
-        self.assertEqual(planned, {"sub-01": ["35", "70", "140"], "sub-02": ["35", "70", "140"], "sub-03": ["35", "70", "140"], "sub-04": []})
+        planned = {name: re.findall(rf"rule preprocess:\n(?:    .*\n)*?    wildcards: participant={name}\n(?:    .*\n)*?    resources: .*hold_mib=(\d+)", said.stderr)
+                   for name in self.expected}
+        self.assertEqual(planned, {**dict.fromkeys(("sub-01", "sub-02", "sub-03"), ["35", "70", "140"]), "sub-04": ["35"]})  # which only passes on a fault
         rows = group(out)
         self.assertNotEqual(rows["sub-01"]["status"], "failed")
         self.assertNotEqual(rows["sub-03"]["status"], "failed")
@@ -346,29 +346,37 @@ exec {ECORCHE} "$@"
     def test_a_stop_ends_it_and_all_that_it_started(self):
         process = subprocess.Popen(list(map(str, self.words(self.base / "bids", self.folder / "out"))), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, cwd=self.base)
-        time.sleep(1.5)
+        out = self.folder / "out"
+        while process.poll() is None and not list(out.glob("sub-*/log/preprocess.log")):
+            time.sleep(0.02)
+        started = below(process.pid)
+        self.assertGreaterEqual(len(started), 4)  # it, Snakemake, the Python of steps, a step
         process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=20)
         self.assertEqual(process.returncode, 130, said)
         self.assertIn("error: cohort: stopped (run it again: what is done is kept)", said)
+        end = time.monotonic() + 5
+        while time.monotonic() < end and any(alive(one) for one in started):
+            time.sleep(0.05)
+        self.assertEqual([one for one in started if alive(one)], [])
+        self.assertEqual([path for path in out.glob("sub-*/steps/*.json") if json.loads(path.read_text())["fault"] == "machine"], [])
 
-
-def kill_all(root):
-    """A process and all below it, at once."""
-    below, found = [root], []
-    while below:
-        parent = below.pop()
-        found.append(parent)
-        for task in pathlib.Path(f"/proc/{parent}/task").glob("*/children"):
-            try:
-                below += [int(word) for word in task.read_text().split()]
-            except OSError:
-                pass
-    for one in found:
-        try:
-            os.kill(one, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
+    def test_what_it_started_ends_with_a_snakemake_that_was_killed(self):
+        bids, out, program = self.base / "bids", self.folder / "out", self.folder / "program"
+        program.write_text(f'#!/bin/sh\ncase "$*" in *" preprocess "*) exec sleep 100 ;; esac\nexec {ECORCHE} "$@"\n')
+        program.chmod(0o755)
+        words = self.words(bids, out, "--snakemake", f"--config bids={bids} out={out} ecorche={program} from={self.base}")
+        process = subprocess.Popen(list(map(str, words)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.base)
+        names = lambda: [pathlib.Path(f"/proc/{one}/comm").read_text().strip() for one in below(process.pid) if alive(one)]  # noqa: E731
+        while process.poll() is None and "sleep" not in names():
+            time.sleep(0.02)
+        started = below(process.pid)
+        os.kill(started[1], signal.SIGKILL)
+        self.assertEqual(process.wait(20), 137)
+        end = time.monotonic() + 10
+        while time.monotonic() < end and any(alive(one) for one in started):
+            time.sleep(0.05)
+        self.assertEqual([one for one in started if alive(one)], [])
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import os
 import pathlib
 import shutil
 import struct
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -109,6 +110,22 @@ class Records(InFolder):
             self.write("verify")
             (self.folder / "sub-01/steps/verify.json").write_text(text)
             self.assertNotIn("verify", self.left(), text)
+
+
+class Stop(InFolder):
+    def test_a_step_that_is_stopped_between_two_commands_calls_no_other_and_writes_nothing_down(self):
+        program = self.folder / "program"
+        given = {"after": ["check"], "repair": True, "words": []}
+        for which in ("INT", "TERM"):
+            with self.subTest(which):
+                record.write(self.folder / "sub-01", "check", {"ok": True, "fault": None, "facts": {"sound": False, "case": "case"}})
+                program.write_text(f'#!/bin/sh\ncase "$*" in *" check "*) touch {self.folder}/called ;; *) trap "" TERM; kill -{which} $PPID; sleep 0.2 ;; esac\necho "{{}}"\n')
+                program.chmod(0o755)
+                done = subprocess.run([sys.executable, ROOT / "workflow/scripts/step.py", "repair", "sub-01", "--out", self.folder, "--ecorche", program,
+                                       "--given", json.dumps(given)], capture_output=True, text=True)
+                self.assertEqual((done.returncode, "stopped" in done.stderr), (143, True), done.stderr)
+                self.assertFalse((self.folder / "called").exists())
+                self.assertFalse((self.folder / "sub-01/steps/repair.json").exists())
 
 
 class Law(InFolder):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""ecorche cohort --sample: poses drawn by seed within the limits of joints, and what was drawn already."""
+"""ecorche cohort --sample: poses drawn by seed within the limits of joints, landmarks that follow, and what was drawn already."""
 import csv
 import json
 import pathlib
@@ -48,7 +48,11 @@ class Samples(unittest.TestCase):
         folder = out / "sub-01/samples"
         words = ("--participant-label", "01", "--config", self.folder / "cohort.yaml", "--seed", "5", "--sample")
         cohort_test.phantom_cohort.make(ECORCHE, self.folder / "bids", 1, broken=())
-        (self.folder / "cohort.yaml").write_text(CONFIG)
+        (self.folder / "cohort.yaml").write_text(CONFIG + "landmarks: 'marks/{participant}.csv'\n")
+        (self.folder / "marks").mkdir()
+        # Within the trunk, in the left femur, and in the air.
+        marks = self.folder / "marks/sub-01.csv"
+        marks.write_text("# by hand\nname,x,y,z\nnavel,0,0,1000\nknee left,88,0,600\noutside,900,0,0\n")
         self.call(self.folder / "bids", out, *words, "2", levels=("participant",))
         first = json.loads((folder / "manifest.json").read_text())
         self.assertEqual([row["sample"] for row in first["samples"]], ["00000", "00001"])
@@ -63,6 +67,15 @@ class Samples(unittest.TestCase):
                               "pose.yaml"}, files)
         posed = list(csv.DictReader((folder / "00000/joints.csv").read_text().splitlines()))
         self.assertEqual(len(posed), len(rig))
+        first_marks = self.landmarks(folder / "00000")
+        self.assertEqual(list(first_marks), ["navel", "knee left", "outside"])
+        self.assertEqual([first_marks["navel"][axis] for axis in "xyz"], ["0.0", "0.0", "1000.0"])
+        went = subprocess.run([ECORCHE, "probe", out / "sub-01/model.hdf", "--points", marks, "--pose", folder / "00000/pose.yaml", "--direction",
+                               "rest-to-posed", "--volumes", "none"], capture_output=True, text=True, check=True).stdout
+        asked = list(csv.DictReader(went.splitlines()))
+        self.assertEqual([[row[f"to_{axis}"] for axis in "xyz"] for row in first_marks.values()], [[row[f"to_{axis}"] for axis in "xyz"] for row in asked])
+        self.assertNotEqual(first_marks["knee left"]["to_z"], "")
+        self.assertEqual(first_marks["outside"]["to_x"], "")
         # One is lost, one was cut short, a third is wanted: the others stay as they are.
         whole = {path.relative_to(folder): path.read_bytes() for path in folder.glob("0*/*")}
         shutil.rmtree(folder / "00001")
@@ -72,6 +85,24 @@ class Samples(unittest.TestCase):
         again = {path.relative_to(folder): path.read_bytes() for path in folder.glob("0*/*")}
         self.assertEqual([str(name) for name, data in whole.items() if again.get(name) != data], [])
         self.assertEqual(len(json.loads((folder / "manifest.json").read_text())["samples"]), 3)
+        # Other points under the same name are other landmarks.
+        marks.write_text("x,y,z\n0,0,900\n")
+        self.call(self.folder / "bids", out, *words, "3", levels=("participant",))
+        self.assertEqual((folder / "00000/landmarks.csv").read_text().splitlines()[0].split(",")[:3], ["x", "y", "z"])
+        marks.unlink()
+        refused = subprocess.run(list(map(str, [ECORCHE, "cohort", self.folder / "bids", out, "participant", *words, "3"])), capture_output=True, text=True,
+                                 cwd=self.folder)
+        self.assertEqual(refused.returncode, 66)
+        self.assertRegex(refused.stderr, r"error: configuration: landmarks: no file .*marks/sub-01\.csv \(give its path")
+
+    def landmarks(self, sample):
+        return {row["name"]: row for row in csv.DictReader((sample / "landmarks.csv").read_text().splitlines())}
+
+    def test_names_of_landmarks_are_read_as_their_points_are(self):
+        table = self.folder / "points.csv"
+        for text, names in (("x,y,z\n1,2,3\n", []), ("1,2,3\n", []), ("\n# a\n x , name,y,z\n1,b c,2,3\n\n#\n4, d ,5,6\n", ["b c", "d"])):
+            table.write_text(text)
+            self.assertEqual(samples.landmark_names(table), names)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 
     slurm_node.py FOLDER [CPUS]     starts it, prints SLURM_CONF=..., and stops it at the end of its input
 
-It needs neither cgroups nor a database: processes are tracked by linuxproc, and a job that takes more memory than it asked for is killed
-by slurmd, which looks every second.
+It needs neither cgroups nor a database: processes are tracked by linuxproc and bound to a job's cores by task/affinity, and a job that takes
+more memory than it asked for is killed by slurmd, which looks every second.
 """
 import os
 import pathlib
@@ -95,7 +95,7 @@ SlurmdSpoolDir={self.folder}/spool
 SlurmctldPidFile={self.folder}/slurmctld.pid
 SlurmdPidFile={self.folder}/slurmd.pid
 ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
+TaskPlugin=task/affinity
 JobAcctGatherType=jobacct_gather/linux
 JobAcctGatherFrequency=1
 JobAcctGatherParams=OverMemoryKill

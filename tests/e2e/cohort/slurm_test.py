@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The cohort on real Slurm, one node of it: the same bytes as on this machine alone; one job cancelled, one out of memory, all of it resumed."""
+"""The cohort on real Slurm, one node of it: the same bytes as on this machine alone, each job on its core; one cancelled, one out of memory, all of it
+resumed."""
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +19,18 @@ from cohort_test import CONFIG, group, kept  # noqa: E402
 
 # With the 150 MiB of a job itself every participant is planned with 260 MiB: too little, twice that as well, for two million tets.
 LAW = "law: {" + ", ".join(f"{step}: {{mib: 110, mib_per_mtet: 0, mib_per_mvoxel: 0}}" for step in ("check", "repair", "preprocess", "verify", "pose", "subject")) + "}\n"
+
+
+def cores_of_steps(out):
+    """Where each `ecorche` at work in a participant's folder may run, as the system lists processors."""
+    found = []
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            if (process / "comm").read_text().strip() == "ecorche" and (process / "cwd").resolve().parent == out.resolve():
+                found.append(re.search(r"Cpus_allowed_list:\s*(\S+)", (process / "status").read_text())[1])
+        except OSError:
+            pass
+    return found
 
 
 class OnSlurm(unittest.TestCase):
@@ -46,7 +60,9 @@ class OnSlurm(unittest.TestCase):
             # The first run is killed together with its jobs, when some participant is at work.
             first = self.start(node, out)
             self.until(lambda: any(job["JobState"] == "RUNNING" for job in node.jobs().values()), first)
-            time.sleep(2)
+            cores = self.until(lambda: cores_of_steps(out), first)
+            self.assertEqual([where for where in cores if not where.isdigit()], [], "each job has the one core that it asked for")
+            time.sleep(1)
             cohort_test.kill_all(first.pid)
             first.communicate()
             node.ask("scancel", *node.jobs())
@@ -71,6 +87,8 @@ class OnSlurm(unittest.TestCase):
             self.assertRegex(said_there, r"(?i)exceed\w+ .*memory limit|oom")
             self.assertEqual(of("sub-02")[-1]["JobState"], "COMPLETED")
             self.assertLessEqual(max(len(of(name)) for name in ("sub-01", "sub-03")), 1, "one job a participant")
+            done = (out / f".cohort/slurm/{of('sub-02')[-1]['JobId']}.log").read_text()
+            self.assertEqual(done.count("Building DAG of jobs"), 1, "one Snakemake a job, none around each step")
         self.assertEqual([row["status"] == "failed" for row in group(out).values()], [False, False, False, True])
         whole, found = kept(alone), kept(out)
         # Only the options of the workflow differ, which the law is none of.
