@@ -82,11 +82,45 @@ void write_evidence(const std::filesystem::path& file, const Rig& rig,
   files::write_text(file, joints.dump());
 }
 
+// A warning's line, taken apart: `joint NAME: what (how to mend)`, `segment NAME what: ... (how to mend)`.
+check::Finding finding_of(std::string_view line) {
+  check::Finding out{check::Severity::warning, "", "", {}, ""};
+  const std::string advice = " (" + std::string(rig::joint_advice) + ")";
+  if (line.ends_with(advice)) {
+    out.mend = rig::joint_advice;
+    line.remove_suffix(advice.size());
+  } else if (const std::size_t open = line.rfind(" ("); line.ends_with(")") && open != line.npos) {
+    out.mend = line.substr(open + 2, line.size() - open - 3);
+    line = line.substr(0, open);
+  }
+  const bool segment = line.starts_with("segment ");
+  const std::size_t end = segment ? line.find(' ', std::string_view("segment ").size()) : line.find(": ");
+  out.where = line.substr(0, end);
+  out.what = end == line.npos ? line : line.substr(end + (segment ? 1 : 2));
+  return out;
+}
+
+// A stage's context whose warnings are kept as findings, too: JSON tells all that stderr does.
+Context keeping(const Program& program, std::string label, std::vector<check::Finding>& kept) {
+  Context context = program.context(std::move(label));
+  context.log = [log = context.log, &kept](LogLevel level, std::string_view line) {
+    if (level == LogLevel::warning) kept.push_back(finding_of(line));
+    log(level, line);
+  };
+  return context;
+}
+
+nlohmann::json finding_json(const check::Finding& f) {
+  return {
+      {"severity", check::severity_name(f.severity)}, {"where", f.where}, {"what", f.what}, {"mend", f.mend}};
+}
+
 int run(const Program& program, const RigSettings& settings) {
-  Case patient = io::read_case(settings.case_path, settings.input, program.context("read"));
-  label_surfaces::resolve(patient, program.context("surfaces"));
+  std::vector<check::Finding> warned;
+  Case patient = io::read_case(settings.case_path, settings.input, keeping(program, "read", warned));
+  label_surfaces::resolve(patient, keeping(program, "surfaces", warned));
   std::vector<rig::JointEvidence> evidence;
-  const Rig rig = rig::fit(patient, program.context("rig"), &evidence);
+  const Rig rig = rig::fit(patient, keeping(program, "rig", warned), &evidence);
   if (!settings.evidence.empty()) write_evidence(settings.evidence, rig, evidence);
   if (!settings.bones.empty()) write_bones(settings.bones, patient, rig.skeleton);
   if (!settings.output.empty()) {
@@ -95,18 +129,20 @@ int run(const Program& program, const RigSettings& settings) {
     files::write_text(settings.output, io::skeleton_to_yaml(given));
   }
   nlohmann::json joints = nlohmann::json::array();
-  for (std::size_t row = 0; row < rig.skeleton.segments.size(); ++row) joints.push_back(joint_json(rig, row));
+  for (std::size_t row = 0; row < rig.skeleton.segments.size(); ++row) {
+    joints.push_back(joint_json(rig, row));
+    joints.back()["fit"]["center_confidence"] = evidence[row].center_confidence;
+    joints.back()["fit"]["axes_confidence"] = evidence[row].axes_confidence;
+  }
   std::vector<check::Finding> findings = check::size_findings(patient);
-  for (check::Finding& finding : check::joint_findings(patient, rig, program.context("joints")))
+  for (check::Finding& finding : check::joint_findings(patient, rig, keeping(program, "joints", warned)))
     findings.push_back(std::move(finding));
   nlohmann::json told = nlohmann::json::array();
+  for (const check::Finding& f : warned) told.push_back(finding_json(f));
   std::string text;
   bool possible = true;
   for (const check::Finding& f : findings) {
-    told.push_back({{"severity", check::severity_name(f.severity)},
-                    {"where", f.where},
-                    {"what", f.what},
-                    {"mend", f.mend}});
+    told.push_back(finding_json(f));
     possible = possible && f.severity != check::Severity::error;
     if (f.severity == check::Severity::warning) program.warn();
     text += std::string(check::severity_name(f.severity)) + ": " + f.where + ": " + f.what + " (" + f.mend +

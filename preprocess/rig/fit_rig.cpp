@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include <ecorche/kinematics/angles.hpp>
 #include "core/values/degrees.hpp"
 #include "preprocess/rig/body_frame.hpp"
 #include "preprocess/rig/bridged_joints.hpp"
+#include "preprocess/rig/exchanged_sides.hpp"
 #include "preprocess/rig/generic_tree.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/lone_side.hpp"
@@ -25,6 +27,7 @@ constexpr double kBadResidual = 0.10;  // of the radius
 constexpr double kFewInliers = 0.5;
 constexpr double kRounding = 1e-9;  // radians
 constexpr double kHalfSure = 10;    // degrees beyond a limit
+constexpr double kExchanged = 0.4;  // the most that a joint of exchanged sides is sure: as what is mirrored
 
 std::string percent(double share) {
   return std::to_string(static_cast<int>(std::lround(100 * share))) + " %";
@@ -66,8 +69,13 @@ void warn_rule(const JointFit& fit, double of_axes, const Context& context) {
     context.warn("joint " + fit.joint + ": its axes have confidence " + percent(of_axes));
 }
 
-JointEvidence evidence_of(const FoundPoint& found) {
-  JointEvidence out{found.fit.rule, found.at, found.axis, found.fit.radius_mm, {}};
+// How sure a joint's centre is, and its axes.
+struct Sure {
+  double center = 1, axes = 1;
+};
+
+JointEvidence evidence_of(const FoundPoint& found, const Sure& sure) {
+  JointEvidence out{found.fit.rule, sure.center, sure.axes, found.at, found.axis, found.fit.radius_mm, {}};
   for (const SurfacePoints* on : found.on) {
     for (Eigen::Index p = 0; p < on->at.rows(); ++p) out.vertices.push_back(on->at.row(p).transpose());
   }
@@ -105,7 +113,8 @@ void warn_beyond(const Joint& joint, const AngleAxis& angle, double limit, const
 // The rest angles that lead from the parent's axes to the joint's. Limits that leave them out reach to them,
 // and the joint is as much less sure: by half where that is 10 degrees. Turns that the joint does not make
 // (those of a hinge about its second axis) have none.
-void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, JointFit& fit, const Context& context) {
+void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, JointFit& fit, Sure& sure,
+                  const Context& context) {
   for (AngleAxis& angle : joint.sequence) angle.rest = 0;
   const std::array<double, 3> rest = kinematics::angles_from_rotation(
       joint, Eigen::Quaterniond(Eigen::Matrix3d(parent.transpose() * joint.axes)));
@@ -117,6 +126,7 @@ void measure_rest(const Eigen::Matrix3d& parent, Joint& joint, JointFit& fit, co
     warn_beyond(joint, angle, limit, context);
     const double beyond = (angle.rest - limit) * degrees_per_radian / kHalfSure;
     fit.confidence /= 1 + beyond * beyond;
+    sure.axes /= 1 + beyond * beyond;
     limit = angle.rest;
   }
 }
@@ -134,7 +144,7 @@ FoundPoint of_kind(const Joint& joint, const FoundPoint& found, const Eigen::Mat
   return out;
 }
 
-void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig& rig,
+Sure fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig& rig,
                const Context& context) {
   Joint& joint = rig.skeleton.segments[row].joint;
   const auto [axes, of_axes] = sources.axes(row);
@@ -150,9 +160,15 @@ void fit_joint(const Case& patient, JointSources& sources, std::size_t row, Rig&
   } else {
     warn_rule(found.fit, of_axes, context);
   }
-  rig.fits.back().confidence = std::min(found.fit.confidence, of_axes) * off * tilted;
-  if (is_parted(rig.skeleton))
-    rig.fits.back().confidence = std::min(rig.fits.back().confidence, parted_confidence(joint.name));
+  const double most = is_parted(rig.skeleton) ? parted_confidence(joint.name) : 1;
+  rig.fits.back().confidence = std::min(std::min(found.fit.confidence, of_axes) * off * tilted, most);
+  // A hinge whose centre is off was fitted to no joint: its axis, too.
+  return {std::min(found.fit.confidence * off, most), std::min(of_axes * off * tilted, most)};
+}
+
+void hold(double most, JointFit& fit, Sure& sure) {
+  fit.confidence = std::min(fit.confidence, most);
+  sure = {std::min(sure.center, most), std::min(sure.axes, most)};
 }
 
 // `outer`, whose warnings of joints end with what to do.
@@ -169,20 +185,24 @@ Context advising(const Context& outer) {
 }
 
 // The joints of a body that lies straight along LPS, or as its scan has it.
-Rig fit_straight(const Case& patient, const Context& context, std::vector<JointEvidence>* evidence) {
+Rig fit_straight(const Case& patient, const std::set<std::string>& exchanged, const Context& context,
+                 std::vector<JointEvidence>* evidence) {
   Rig rig;
   const Skeleton asked = patient.generic ? generic_tree(patient, context) : present_part(patient, context);
   rig.skeleton = asked;
   JointSources sources(patient, asked);
+  sources.exchange(exchanged);
   take_other_sides(asked, sources, context);
   keep_rest_possible(asked, sources, context);
   if (!patient.generic) {
     keep_bridged_near(patient, asked, sources);
     keep_lone_in_middle(asked, sources, context);
   }
+  std::vector<Sure> sure;
+  const std::vector<bool> held = resting_on(patient, asked, exchanged);
   for (std::size_t row = 0; row < asked.segments.size(); ++row) {
     context.check_stop();
-    fit_joint(patient, sources, row, rig, context);
+    sure.push_back(fit_joint(patient, sources, row, rig, context));
     context.report(static_cast<double>(row + 1) / static_cast<double>(asked.segments.size()));
   }
   for (std::size_t row = 0; row < asked.segments.size(); ++row) {
@@ -193,11 +213,12 @@ Rig fit_straight(const Case& patient, const Context& context, std::vector<JointE
     joint.rule = rig.fits[row].rule;
     joint.how.reset();
     const bool measured = from.joint.how && from.joint.how->measured_rest && from.parent >= 0;
-    if (evidence != nullptr) evidence->push_back(evidence_of(sources.center(row)));
     if (measured) {
       const Eigen::Matrix3d parent = sources.axes(static_cast<std::size_t>(from.parent)).first;
-      measure_rest(parent, joint, rig.fits[row], context);
+      measure_rest(parent, joint, rig.fits[row], sure[row], context);
     }
+    if (held[row]) hold(kExchanged, rig.fits[row], sure[row]);
+    if (evidence != nullptr) evidence->push_back(evidence_of(sources.center(row), sure[row]));
   }
   return rig;
 }
@@ -223,12 +244,16 @@ void turn_back(const Skeleton& asked, const Eigen::Matrix3d& frame, Rig& rig,
 
 Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* evidence) {
   const Context context = advising(outer);
-  const Eigen::Matrix3d frame = body_frame(patient);
+  const std::set<std::string> exchanged = exchanged_sides(patient);
+  warn_exchanged(exchanged, context);
+  // Exchanged girdles would turn the body about its length.
+  const Eigen::Matrix3d frame =
+      exchanged.contains("girdle_left") ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : body_frame(patient);
   Rig rig;
   if (frame.isIdentity(0)) {
-    rig = fit_straight(patient, context, evidence);
+    rig = fit_straight(patient, exchanged, context, evidence);
   } else {
-    rig = fit_straight(turned(patient, frame.transpose()), context, evidence);
+    rig = fit_straight(turned(patient, frame.transpose()), exchanged, context, evidence);
     turn_back(patient.skeleton, frame, rig, evidence);
   }
   // Its poses and clips are those of the same joints.

@@ -15,13 +15,14 @@ namespace ecorche::rig {
 inline constexpr std::string_view joint_advice =
     "give its center and axes in the skeleton, or mend the bones that it was found on";
 
-/// What a joint's centre was found on, for pictures.
+/// What a joint's centre was found on, for pictures, and how sure centre and axes are by themselves.
 struct JointEvidence {
   CenterRule rule = CenterRule::given;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();    ///< LPS mm
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< unit: of a cylinder, or a plane's normal; else zero
-  double radius = 0;                               ///< mm, of a sphere, a cylinder or an ellipse; else 0
-  std::vector<Eigen::Vector3d> vertices;           ///< LPS mm
+  double center_confidence = 1, axes_confidence = 1;  ///< `JointFit::confidence` is at most the least of both
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();       ///< LPS mm
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();     ///< unit: of a cylinder, or a plane's normal; else zero
+  double radius = 0;                                  ///< mm, of a sphere, a cylinder or an ellipse; else 0
+  std::vector<Eigen::Vector3d> vertices;              ///< LPS mm
 };
 
 /// Keeps given centres and axes, and finds the others by their rules (joint_sources.hpp), on the vertices of

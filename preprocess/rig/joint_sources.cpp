@@ -6,6 +6,7 @@
 
 #include <ecorche/values/error.hpp>
 #include "preprocess/rig/axle_fit.hpp"
+#include "preprocess/rig/body_scale.hpp"
 #include "preprocess/rig/ellipse_fit.hpp"
 #include "preprocess/rig/facing.hpp"
 #include "preprocess/rig/plane_fit.hpp"
@@ -93,6 +94,7 @@ JointSources::JointSources(const Case& patient, const Skeleton& skeleton)
       settled_(skeleton.segments.size()),
       settled_axes_(skeleton.segments.size()),
       notes_(skeleton.segments.size()),
+      scale_(body_scale(patient)),
       open_center_(skeleton.segments.size()),
       open_axes_(skeleton.segments.size()) {}
 
@@ -100,17 +102,13 @@ const JointRule* JointSources::rule_of(int row) const {
   return row < 0 ? nullptr : skeleton_.segments[static_cast<std::size_t>(row)].joint.how.get();
 }
 
-namespace {
-
-const DirectionSource* first_fit(const DirectionSource& source) {
+const DirectionSource* JointSources::first_fit(const DirectionSource& source) {
   if (source.kind == DirectionSource::Kind::fit) return &source;
   for (const DirectionSource& choice : source.choices) {
     if (const DirectionSource* fit = first_fit(choice)) return fit;
   }
   return nullptr;
 }
-
-}  // namespace
 
 std::optional<FoundDirection> JointSources::shown_axis(std::size_t row, int axis) {
   const JointRule* how = rule_of(static_cast<int>(row));
@@ -146,6 +144,7 @@ std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse&
       if (const auto& fit = cylinder(surface); fit && crosses_shaft(fit->axis)) {
         found = fitted_point(rule, *fit, fit->radius, surface);
         found->axis = fit->axis;
+        found->fit.confidence = std::min(found->fit.confidence, most_of_fit());
       }
       return found;
     case CenterRule::plane_fit:
@@ -266,7 +265,7 @@ std::optional<FoundDirection> JointSources::fitted_axis(const DirectionSource& s
   if (source.from.rule == CenterRule::cylinder_fit) {
     const auto& fit = cylinder(surface);
     if (!fit || !crosses_shaft(fit->axis)) return std::nullopt;
-    out = {fit->axis, fit->confidence};
+    out = {fit->axis, std::min(fit->confidence, most_of_fit())};
   } else if (source.from.rule == CenterRule::plane_fit) {
     const auto fit = fit_plane(points);
     if (!fit) return std::nullopt;
@@ -316,7 +315,8 @@ std::optional<FoundDirection> JointSources::direction(const DirectionSource& sou
   const auto from = point(source.from), to = point(source.to);
   if (!from || !to || (to->at - from->at).norm() < 1e-6) return std::nullopt;
   const double length = (to->at - from->at).norm();
-  const Eigen::Vector3d along = (to->at - from->at) / length;
+  Eigen::Vector3d along = (to->at - from->at) / length;
+  if (leads_across_exchanged(source)) along = -along;
   const double off = off_across(*from, along) + off_across(*to, along);
   return FoundDirection{along, angle_confidence(off / length)};
 }

@@ -4,6 +4,9 @@
 
 #include <map>
 #include <optional>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/rig/bone_points.hpp"
@@ -21,6 +24,10 @@ class JointSources {
 
   /// Both must outlive this; `skeleton` is the part of the patient's that has bones.
   JointSources(const Case& patient, const Skeleton& skeleton);
+
+  /// Segments whose bones lie on the other side of the body than their names say: what leads from a joint of
+  /// one side to that of the other leads the other way.
+  void exchange(std::set<std::string> segments) { exchanged_ = std::move(segments); }
 
   /// The joint's centre by its rule; where that cannot be followed (bones that the case lacks, points that
   /// lie on no such shape), midway between the surfaces of segment and parent that face each other, and,
@@ -53,12 +60,23 @@ class JointSources {
 
  private:
   const JointRule* rule_of(int row) const;
+  // Where a rule first fits an axis to bones; null where it does not.
+  static const DirectionSource* first_fit(const DirectionSource& source);
   bool possible_radius(double radius);
   // Whether the joint that is being found may turn about it.
   bool crosses_shaft(const Eigen::Vector3d& axis);
+  // On a bone without a shaft, whose end a cylinder fits every way: whether the axis is about the one that
+  // the rule says.
+  bool near_said(const JointRule& how, const Eigen::Vector3d& axis);
   // A direction that is only said, perpendicular to the shaft that it should cross.
   Eigen::Vector3d across_shaft(const Eigen::Vector3d& said);
   std::optional<Eigen::Vector3d> shaft(int row);
+  std::optional<Eigen::Vector3d> shaft_of(const std::string& segment);
+  // Of the joint that is being found: the shaft that its axis crosses, its parent's, else its own segment's.
+  std::optional<Eigen::Vector3d> crossed_shaft();
+  // The most that what was fitted to its bones is sure.
+  double most_of_fit();
+  bool leads_across_exchanged(const DirectionSource& source) const;
   void note(std::string line);
   void forget();
   std::vector<PointSource> without_ends(const std::vector<PointSource>& parts) const;
@@ -85,6 +103,8 @@ class JointSources {
   std::vector<std::optional<std::pair<Eigen::Matrix3d, double>>> settled_axes_;
   std::map<std::pair<std::size_t, int>, FoundDirection> settled_axis_;
   std::vector<std::vector<std::string>> notes_;
+  std::set<std::string> exchanged_;
+  double scale_ = 1;  // of the body, over an adult's
   int bounded_ = -1;  // the joint that is being found: its bounds hold
   /// By the points' own place: centre and axis of a joint ask alike.
   std::map<const SurfacePoints*, std::optional<CylinderFit>> cylinders_;

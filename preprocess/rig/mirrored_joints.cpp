@@ -154,6 +154,7 @@ class Pairs {
         ends ? left_ends == (&shorter == &left) : is_cut || shorter.confidence <= longer.confidence;
     const Shown& worse = shorter_is_worse ? shorter : longer;
     const Shown& better = shorter_is_worse ? longer : shorter;
+    if (sources_.lacks_shaft(better.row)) return;  // what a stump shows is no better
     const bool surer = better.confidence >= kSurer * worse.confidence;
     const double enough = surer ? kLeastShown : JointSources::least_confidence;
     if (ends ? better.confidence <= 0 : better.confidence < enough) return;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "core/values/degrees.hpp"
 
@@ -15,6 +16,9 @@ using Kind = DirectionSource::Kind;
 constexpr double kNearOwnBones = 0.12, kHalfOff = 0.08;  // of the size of the segment's bones
 constexpr double kUsualSlope = 8, kHalfTilt = 8;         // degrees
 constexpr double kToldBelow = 0.5;
+// A point of less confidence does not say how the body lies; the neck's, at the end of a long trunk, may be
+// off by more.
+constexpr double kBelieved = 0.5, kNeckBelieved = 0.2;
 
 double falling(double beyond, double half) {
   return beyond <= 0 ? 1 : 1 / (1 + (beyond / half) * (beyond / half));
@@ -67,25 +71,31 @@ struct Place {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
 };
 
-Place place_of(JointSources& sources, const Skeleton& skeleton, const char* joint) {
+Place place_of(JointSources& sources, const Skeleton& skeleton, const char* joint, double least) {
   const int row = skeleton.find_joint(joint);
   if (row < 0 || !ruled(skeleton.segments[static_cast<std::size_t>(row)].joint)) return {};
-  return {true, sources.center(static_cast<std::size_t>(row)).at};
+  const FoundPoint& found = sources.center(static_cast<std::size_t>(row));
+  return {found.fit.confidence >= least, found.at};
 }
 
 Place amid(const Place& one, const Place& other) {
   return {one.there && other.there, 0.5 * (one.at + other.at)};
 }
 
-// Up, as the body lies: from the hips to the neck, else from the knees to the hips; zero where neither is.
+// Up, as the body lies: from the hips to the neck, else along the thighs, else along the shanks; zero where
+// none of them is known. A hip at the edge of the image is none.
 Eigen::Vector3d up_of(JointSources& sources, const Skeleton& skeleton) {
-  const auto at = [&](const char* joint) { return place_of(sources, skeleton, joint); };
-  const Place hips = amid(at("hip_left"), at("hip_right")), neck = at("cervicothoracic");
-  const Place from = neck.there ? hips : amid(at("knee_left"), at("knee_right"));
-  const Place to = neck.there ? neck : hips;
-  const Eigen::Vector3d along = to.at - from.at;
-  if (!from.there || !to.there || along.norm() < 1e-6) return Eigen::Vector3d::Zero();
-  return along.normalized();
+  const auto both = [&](const char* left, const char* right) {
+    return amid(place_of(sources, skeleton, left, kBelieved), place_of(sources, skeleton, right, kBelieved));
+  };
+  const Place hips = both("hip_left", "hip_right"), knees = both("knee_left", "knee_right");
+  const Place neck = place_of(sources, skeleton, "cervicothoracic", kNeckBelieved);
+  const Place ankles = both("ankle_left", "ankle_right");
+  for (const auto& [from, to] : {std::pair(hips, neck), std::pair(knees, hips), std::pair(ankles, knees)}) {
+    const Eigen::Vector3d along = to.at - from.at;
+    if (from.there && to.there && along.norm() > 1e-6) return along.normalized();
+  }
+  return Eigen::Vector3d::Zero();
 }
 
 }  // namespace

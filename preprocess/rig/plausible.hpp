@@ -15,8 +15,9 @@ double far_off(JointSources& sources, const Skeleton& skeleton, std::size_t row,
                const Eigen::Vector3d& center, const Context& context);
 
 /// 1, or less where axes that the rule takes from the scan's own, [1, 0, 0] for left or [0, 0, 1] for up, are
-/// those of a body that lies askew in it: by half where the trunk (else the middle of the hips to that of the
-/// feet's joints) is 12 degrees beyond a lying person's usual slope. Warns where it is under a half.
+/// those of a body that lies askew in it: by half where the trunk (else the thighs, else the shanks, from
+/// what has confidence 0.5 or more, the neck 0.2) is 12 degrees beyond a lying person's usual slope. Warns
+/// where it is under a half.
 double tilted_by(JointSources& sources, const Skeleton& skeleton, std::size_t row, const Context& context);
 
 }  // namespace ecorche::rig

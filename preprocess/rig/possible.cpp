@@ -7,11 +7,14 @@
 
 #include "core/linear/decompositions.hpp"
 #include "preprocess/rig/joint_sources.hpp"
+#include "preprocess/rig/other_side.hpp"
 
 namespace ecorche::rig {
 namespace {
 
 constexpr double kLongShaft = 4;  // a shaft's variance, in variances across it
+constexpr double kStump = 0.45;   // the most that a fit to a bone without a shaft is sure
+constexpr double kStumpOff = 20;  // degrees, and off the direction that the rule says: a leg turns by less
 
 // The first place that a source looks at; nothing where it looks at none.
 const RegionUse* first_use(const PointSource& source) {
@@ -27,11 +30,12 @@ const RegionUse* first_use(const PointSource& source) {
 
 bool JointSources::possible_radius(double radius) {
   const JointRule* how = rule_of(bounded_);
-  if (how == nullptr || how->possible.radius_mm.holds(radius)) return true;
+  if (how == nullptr || how->possible.radius_mm.holds(radius / scale_)) return true;
   std::ostringstream line;
   line.precision(3);
   line << "a sphere of radius " << radius << " mm on its bones is not used: possible are "
-       << how->possible.radius_mm.least << " to " << how->possible.radius_mm.most;
+       << scale_ * how->possible.radius_mm.least << " to " << scale_ * how->possible.radius_mm.most;
+  if (scale_ != 1) line << " in a body of " << std::lround(100 * scale_) << " % of an adult's size";
   note(line.str());
   return false;
 }
@@ -40,7 +44,11 @@ std::optional<Eigen::Vector3d> JointSources::shaft(int row) {
   if (row < 0) return std::nullopt;
   const int parent = skeleton_.segments[static_cast<std::size_t>(row)].parent;
   if (parent < 0) return std::nullopt;
-  const Points& V = bones_.segment(skeleton_.segments[static_cast<std::size_t>(parent)].name).V;
+  return shaft_of(skeleton_.segments[static_cast<std::size_t>(parent)].name);
+}
+
+std::optional<Eigen::Vector3d> JointSources::shaft_of(const std::string& segment) {
+  const Points& V = bones_.segment(segment).V;
   if (V.rows() < 4) return std::nullopt;
   const Points from = V.rowwise() - V.colwise().mean();
   const linear::SymmetricEigen axes = linear::symmetric_eigen(from.transpose() * from);
@@ -48,15 +56,46 @@ std::optional<Eigen::Vector3d> JointSources::shaft(int row) {
   return Eigen::Vector3d(axes.vectors.col(2));
 }
 
+std::optional<Eigen::Vector3d> JointSources::crossed_shaft() {
+  const auto parents = shaft(bounded_);
+  if (parents || bounded_ < 0) return parents;
+  return shaft_of(skeleton_.segments[static_cast<std::size_t>(bounded_)].name);
+}
+
+double JointSources::most_of_fit() {
+  if (bounded_ < 0 || !lacks_shaft(static_cast<std::size_t>(bounded_))) return 1;
+  note(
+      "its bone is too short to show a shaft that the axis crosses: what is fitted to it has confidence 45 % "
+      "at most");
+  return kStump;
+}
+
 bool JointSources::lacks_shaft(std::size_t row) {
   const JointRule* how = rule_of(static_cast<int>(row));
   return how != nullptr && !how->possible.axis_to_shaft.any() && !shaft(static_cast<int>(row));
 }
 
+bool JointSources::near_said(const JointRule& how, const Eigen::Vector3d& axis) {
+  const DirectionSource* fit = nullptr;
+  for (const auto& [letter, source] : how.axes) {
+    if (fit == nullptr) fit = first_fit(source);
+  }
+  if (fit == nullptr || fit->direction.isZero()) return true;
+  const double cosine = std::abs(fit->direction.normalized().dot(axis));
+  const double off = std::acos(std::min(1.0, cosine)) * 180 / std::numbers::pi;
+  if (off <= kStumpOff) return true;
+  std::ostringstream line;
+  line << "an axis " << std::lround(off) << " degrees off the one that its rule says, on a bone too short to "
+       << "show its shaft, is not used: possible are " << kStumpOff;
+  note(line.str());
+  return false;
+}
+
 bool JointSources::crosses_shaft(const Eigen::Vector3d& axis) {
   const JointRule* how = rule_of(bounded_);
   if (how == nullptr || how->possible.axis_to_shaft.any()) return true;
-  const auto along = shaft(bounded_);
+  if (!shaft(bounded_) && !near_said(*how, axis)) return false;
+  const auto along = crossed_shaft();
   if (!along) return true;
   // Neither has a side: what is possible is so from either.
   const double angle = std::acos(std::clamp(along->dot(axis), -1.0, 1.0));
@@ -73,10 +112,17 @@ bool JointSources::crosses_shaft(const Eigen::Vector3d& axis) {
 
 Eigen::Vector3d JointSources::across_shaft(const Eigen::Vector3d& said) {
   const JointRule* how = rule_of(bounded_);
-  const auto along = how == nullptr || how->possible.axis_to_shaft.any() ? std::nullopt : shaft(bounded_);
+  const auto along = how == nullptr || how->possible.axis_to_shaft.any() ? std::nullopt : crossed_shaft();
   if (!along) return said;
   const Eigen::Vector3d across = said - *along * along->dot(said);
   return across.norm() > 0.5 ? Eigen::Vector3d(across.normalized()) : said;
+}
+
+bool JointSources::leads_across_exchanged(const DirectionSource& source) const {
+  if (exchanged_.empty() || source.from.joint.empty()) return false;
+  if (other_side(source.from.joint) != source.to.joint) return false;
+  const int row = skeleton_.find_joint(source.from.joint);
+  return row >= 0 && exchanged_.contains(skeleton_.segments[static_cast<std::size_t>(row)].name);
 }
 
 void JointSources::note(std::string line) {

@@ -127,6 +127,20 @@ class Rig(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, r"hip_left +sphere_fit +.* \d\.\d\d")
 
+    def test_json_tells_every_warning_and_centre_and_axes_apart(self):
+        done = run("--json", "rig", self.case("human"))
+        told, said = json.loads(done.stdout), [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+        self.assertTrue(said)
+        warned = [f"warning: {one['where']}{' ' if one['where'].startswith('segment ') else ': '}{one['what']} ({one['mend']})"
+                  for one in told["findings"] if one["severity"] == "warning"]
+        self.assertEqual(sorted(warned), sorted(said))
+        self.assertTrue(all(re.match(r"(joint|segment) [a-z_]+$", one["where"]) for one in told["findings"]), told["findings"])
+        for row in told["rig"]:
+            fit = row["fit"]
+            self.assertLessEqual(fit["confidence"], min(fit["center_confidence"], fit["axes_confidence"]) + 1e-12, row["joint"])
+        apart = {row["joint"]: row["fit"] for row in told["rig"]}["wrist_left"]
+        self.assertNotEqual(apart["center_confidence"], apart["axes_confidence"])
+
     def test_mistakes(self):
         self.refused(78, "no skeleton template is named 'horse'", self.case("horse"))
         folder = self.case("human")

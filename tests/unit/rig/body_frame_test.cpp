@@ -79,6 +79,21 @@ TEST(BodyFrame, is_that_of_the_scan_where_the_trunk_is_not_whole_or_somebody_mar
   EXPECT_TRUE(body_frame(marked).isIdentity(0));
 }
 
+TEST(BodyFrame, a_girdle_without_its_scapula_turns_nothing) {
+  for (const std::string side : {"left", "right"}) {
+    for (const double degrees : {0.0, 30.0}) {
+      const Matrix3d turn = turn_by(degrees, {1, 2, -0.5});
+      Case patient = test::human_case(askew(turn));
+      std::erase_if(patient.bones, [&](const CaseBone& bone) { return bone.name == "scapula_" + side; });
+      ASSERT_EQ(patient.bones.size(), body().size() - 1);
+      EXPECT_LT(degrees_of(body_frame(patient).transpose() * turn), 5) << side << " at " << degrees;
+    }
+  }
+  Case neither = test::human_case(body());
+  std::erase_if(neither.bones, [](const CaseBone& bone) { return bone.name.starts_with("scapula"); });
+  EXPECT_TRUE(body_frame(neither).isIdentity(0)) << "pelvis and thorax alone leave it free to turn";
+}
+
 TEST(BodyFrame, what_is_given_stays_to_the_last_digit) {
   const Matrix3d turn = turn_by(20, {1, 1, 0});
   Case patient = test::human_case(askew(turn));

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "phantom/bones.hpp"
+#include "preprocess/rig/body_scale.hpp"
 #include "preprocess/rig/joint_sources.hpp"
 #include "preprocess/rig/other_side.hpp"
 #include "tests/unit/rig/human_bodies.hpp"
@@ -153,6 +154,88 @@ TEST(Damage, axes_of_a_body_that_lies_askew_are_not_called_sure) {
     EXPECT_NE(now.said("pelvis", "its axes are the scan's, in which the body lies askew by"), sure)
         << degrees;
   }
+}
+
+// Thighs up to `above` mm over the knee, shanks and feet: what a scan of knees shows.
+std::vector<CaseBone> from_the_knees_down(double above) {
+  const double top = whole().joint("knee_right").center.z() + above;
+  std::vector<CaseBone> bones;
+  for (const CaseBone& bone : legs()) {
+    if (bone.segment == "pelvis") continue;
+    bones.push_back(bone);
+    if (bone.segment.starts_with("thigh"))
+      bones.back().surface = test::part_of(bone.surface, [&](const Vector3d& p) { return p.z() < top; });
+  }
+  return bones;
+}
+
+TEST(Damage, hips_at_the_edge_of_a_scan_do_not_say_how_the_body_lies) {
+  for (const double above : {10.0, 30.0, 80.0}) {
+    const Found now = found(from_the_knees_down(above));
+    for (const std::string joint : {"pelvis", "ankle_left", "ankle_right"})
+      EXPECT_FALSE(now.said(joint, "askew")) << joint << " " << above;
+    EXPECT_GT(now.confidence("ankle_left"), 0.9 * whole().confidence("ankle_left")) << above;
+  }
+}
+
+TEST(Damage, a_stump_of_a_femur_does_not_turn_its_knee) {
+  for (const double above : {5.0, 10.0, 20.0, 40.0}) {
+    const Found now = found(from_the_knees_down(above));
+    for (const std::string joint : {"knee_left", "knee_right"}) {
+      EXPECT_LT(degrees_apart(now.joint(joint).axes.col(0), whole().joint(joint).axes.col(0)), 25)
+          << joint << " " << above;
+      EXPECT_LT(now.confidence(joint), JointSources::least_confidence) << joint << " " << above;
+      EXPECT_TRUE(now.said(joint, "too short to show") || now.said(joint, "its axes have confidence"))
+          << joint << " " << above;
+    }
+  }
+}
+
+TEST(Damage, nothing_is_mirrored_from_a_stump) {
+  const double knee = whole().joint("knee_right").center.z();
+  std::vector<CaseBone> bones = from_the_knees_down(40);
+  for (CaseBone& bone : bones) {
+    if (bone.segment == "thigh_right")
+      bone.surface = test::part_of(bone.surface, [&](const Vector3d& p) { return p.z() < knee + 5; });
+  }
+  const Found now = found(bones);
+  EXPECT_FALSE(now.said("knee_right", "off the mirror image of knee_left"));
+  EXPECT_FALSE(now.said("knee_left", "off the mirror image of knee_right"));
+}
+
+TEST(Damage, a_child_has_an_adults_joints_scaled) {
+  for (const double scale : {0.4, 0.5, 0.6}) {
+    std::vector<CaseBone> bones = legs();
+    for (CaseBone& bone : bones) bone.surface.V *= scale;
+    const Found now = found(bones);
+    for (const std::string joint : {"pelvis", "hip_left", "hip_right"}) {
+      EXPECT_LT((now.joint(joint).center - scale * whole().joint(joint).center).norm(), 0.5)
+          << joint << " " << scale;
+      EXPECT_GT(now.confidence(joint), whole().confidence(joint) - 0.05) << joint << " " << scale;
+    }
+  }
+}
+
+TEST(Damage, a_cut_femur_is_not_a_childs) {
+  const double top = whole().joint("hip_right").center.z(), knee = whole().joint("knee_right").center.z();
+  EXPECT_EQ(body_scale(test::human_case(legs())), 1);
+  for (const auto& [from, to] : {std::pair(0.0, 0.5), std::pair(0.5, 1.2), std::pair(0.3, 0.7)}) {
+    std::vector<CaseBone> bones;
+    for (const CaseBone& bone : legs()) {
+      if (!bone.segment.starts_with("thigh")) continue;
+      bones.push_back(bone);
+      bones.back().surface = test::part_of(bone.surface, [&, from = from, to = to](const Vector3d& p) {
+        const double share = (p.z() - knee) / (top - knee);
+        return share > from - (from > 0 ? 0 : 1) && share < to;
+      });
+    }
+    EXPECT_EQ(body_scale(test::human_case(bones)), 1) << from << " to " << to;
+  }
+  Case own = test::human_case(legs());
+  for (CaseBone& bone : own.bones) bone.surface.V *= 0.5;
+  EXPECT_NEAR(body_scale(own), 0.5, 0.1);
+  own.skeleton.name = "my_own";
+  EXPECT_EQ(body_scale(own), 1) << "what its bones are like is not known";
 }
 
 TEST(Damage, a_hinge_on_the_cut_end_of_a_stub_is_not_called_sure) {
