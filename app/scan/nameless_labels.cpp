@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include "app/scan/dense_labels.hpp"
 #include "app/scan/phantom_template.hpp"
 #include "core/values/text.hpp"
 #include "preprocess/scan/cut_bones.hpp"
@@ -20,6 +22,8 @@ constexpr double kLeastScore = 0.4;     // else it is no part of a body
 constexpr double kSurestByPlace = 0.9;  // a template is no eye
 constexpr double kPart = 0.2;           // of a piece on the lesser side: it has bones of both
 constexpr double kDoubtfulByPlace = 0.65;
+constexpr double kAskedMl = 4;         // of a label that is no bone, and looks like one in the CT
+constexpr std::size_t kAskedMost = 6;  // that are told with their places
 constexpr const char* kGiveTable =
     "give a table with it: .json, .tsv, .ctbl or .txt (docs/reference/case.md, Labels)";
 
@@ -33,8 +37,10 @@ std::string share_in_words(double share) {
 
 class Namer {
  public:
-  Namer(ScanLabels& labels, const ScanOptions& options, ScanCase& out, const Context& context)
+  Namer(ScanLabels& labels, const ScanImage* ct, const ScanOptions& options, ScanCase& out,
+        const Context& context)
       : labels_(labels),
+        ct_(ct),
         layer_(labels.map.layers.front()),
         options_(options),
         out_(out),
@@ -63,6 +69,7 @@ class Namer {
       if (meaning.kind == Kind::bone && two_sided(meaning)) to_side[found[l].id] = bone_name(meaning);
       say(found[l], meaning);
     }
+    ask(found, meant);
     out_.notes.push_back(
         name_ + " has no names: " + std::to_string(bones) + " of its " + std::to_string(found.size()) +
         " labels are bones by shape and place, beside a template of " + text::number(meant.placed.scale, 2) +
@@ -97,10 +104,10 @@ class Namer {
         break;
       }
       case Kind::ambiguous:
-        out_.doubts.push_back("label " + number + " at " + point_in_words(meaning.centre) +
-                              " may be a bone (" + bone_name(meaning) + ", " +
-                              text::number(kSurestByPlace * meaning.confidence, 2) +
-                              "): it is taken for a tissue");
+        out_.doubts.push_back(
+            "label " + number + " at " + point_in_words(meaning.centre) + " may be a bone (" +
+            bone_name(meaning) + ", " + text::number(kSurestByPlace * meaning.confidence, 2) +
+            (meaning.too_short ? ", but it is far shorter than that" : "") + "): it is taken for a tissue");
         how = "by shape and place it may be a bone (" + bone_name(meaning) + ")";
         break;
       case Kind::bones:
@@ -109,6 +116,34 @@ class Namer {
     }
     labels_.map.names[label.id] = name;
     labels_.guesses[label.id] = {how, sure};
+  }
+
+  // Large ones that are called no bone, yet look like one in the CT.
+  void ask(const std::vector<scan::NamelessLabel>& found, const scan::LabelMeanings& meant) {
+    if (ct_ == nullptr) return;
+    const std::array<double, 3>& mm = layer_.grid.spacing;
+    std::map<std::int64_t, std::size_t> row;
+    std::set<std::int64_t> asked;
+    for (std::size_t l = 0; l < found.size(); ++l) {
+      const double ml = 1e-3 * mm[0] * mm[1] * mm[2] * static_cast<double>(found[l].voxels);
+      if (meant.of[l].kind != Kind::other || ml < kAskedMl) continue;
+      asked.insert(found[l].id);
+      row[found[l].id] = l;
+    }
+    std::vector<std::int64_t> like = labels_like_bone(layer_, asked, *ct_);
+    if (like.empty()) return;
+    std::sort(like.begin(), like.end(),
+              [&](auto a, auto b) { return found[row[a]].voxels > found[row[b]].voxels; });
+    std::vector<std::string> told;
+    for (std::size_t i = 0; i < std::min(like.size(), kAskedMost); ++i)
+      told.push_back(std::to_string(like[i]) + " at " + point_in_words(meant.of[row[like[i]]].centre));
+    const std::size_t more = like.size() - told.size();
+    out_.doubts.push_back(name_ + ": " + (like.size() == 1 ? "label " : "labels ") + text::joined(told) +
+                          (more > 0 ? " and " + std::to_string(more) + " more" : "") +
+                          (like.size() == 1 ? " looks" : " look") + " like bone in " +
+                          ct_->path.filename().string() + ", but by shape and place " +
+                          (like.size() == 1 ? "it is none and is" : "they are none and are") +
+                          " taken for tissues: name what is bone in a table of names");
   }
 
   std::string bone_name(const scan::LabelMeaning& meaning) const {
@@ -248,6 +283,7 @@ class Namer {
   }
 
   ScanLabels& labels_;
+  const ScanImage* ct_;  // null where there is none
   Image& layer_;
   const ScanOptions& options_;
   ScanCase& out_;
@@ -265,7 +301,9 @@ void name_nameless(Scan& scan, const ScanOptions& options, ScanCase& out, const 
     if (scan.labels.size() > 1)
       throw Error(ErrorKind::data, labels.path.string(),
                   "does not say what its labels mean, beside label maps that do", kGiveTable);
-    Namer(labels, options, out, context).run();
+    const auto ct =
+        std::find_if(scan.images.begin(), scan.images.end(), [](const ScanImage& i) { return i.ct; });
+    Namer(labels, ct == scan.images.end() ? nullptr : &*ct, options, out, context).run();
   }
 }
 

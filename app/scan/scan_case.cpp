@@ -8,8 +8,10 @@
 #include "app/scan/ct_bones.hpp"
 #include "app/scan/label_names.hpp"
 #include "app/scan/nameless_labels.hpp"
+#include "app/scan/scan_bodies.hpp"
 #include "app/scan/scan_borders.hpp"
 #include "app/scan/scan_doubts.hpp"
+#include "app/scan/scan_refusals.hpp"
 #include "app/scan/scan_sides.hpp"
 #include "app/scan/scan_specks.hpp"
 #include "core/values/text.hpp"
@@ -88,6 +90,8 @@ class Decider {
       out_.doubts.push_back(labels.path.filename().string() + " has a grid of its own, " +
                             io::described(own) + ": it is resampled by nearest neighbour to that of " +
                             finest->path.filename().string());
+      whole_[static_cast<std::size_t>(&labels - scan_.labels.data())] =
+          bounds_above(labels.map.layers.front(), 0);
       for (Image& layer : labels.map.layers) layer = io::resampled_nearest(layer, grid_);
     }
   }
@@ -192,7 +196,7 @@ class Decider {
 
   void find_skin() {
     const double bare = bare_share([&](std::size_t v) { return body_[v] != 0; });
-    if (!has(Role::bone)) refuse_without_bones();
+    if (!has(Role::bone)) refuse_without_bones(scan_, names_, original_);
     bool body = false, shell = false;
     for (std::size_t e = 0; e < out_.entries.size(); ++e) {
       if (out_.entries[e].role != Role::body || original_[e] == 0) continue;
@@ -225,11 +229,35 @@ class Decider {
           "round all that is labelled, with gaps up to 10 mm closed, as --skin-from-labels asks", 0.3, {}, 5};
       return;
     }
-    throw Error(ErrorKind::data, scan_.labels.front().path.string(),
-                "nothing says where the skin is: " + percent_of(exposed) +
-                    " of the outside of all that is labelled is bone" + images_without_hu(scan_.images),
-                "give the CT too, or a label of the whole body (TotalSegmentator -ta body), before or after "
-                "these files");
+    refuse_without_skin(scan_, exposed, bones(), tried(1 - bare));
+  }
+
+  Bounds bones() const {
+    const auto labels = out_.labels.scalars<std::uint16_t>();
+    return bounds_where(grid_, [&](std::size_t v) {
+      return labels[v] != 0 && out_.entries[labels[v] - 1U].role == Role::bone;
+    });
+  }
+
+  // What of all that was given might have been the skin.
+  std::vector<SkinPlace> tried(double body_covers) const {
+    std::vector<SkinPlace> out;
+    for (std::size_t m = 0; m < names_.of_map.size(); ++m) {
+      bool body = false;
+      for (const auto& [id, e] : names_.of_map[m])
+        body = body || (e != LabelNames::no_entry && out_.entries[e].role == Role::body);
+      if (!body) continue;
+      // A map that was resampled may lie outside of this grid.
+      const Bounds own = whole_.contains(m)
+                             ? whole_.at(m)
+                             : bounds_where(grid_, [&](std::size_t v) { return body_[v] != 0; });
+      out.push_back({"the body of " + scan_.labels[m].path.filename().string() + " lies", own, body_covers});
+    }
+    if (const ScanImage* const ct = this->ct())
+      out.push_back({"what is denser than " + ct->value(options_.skin_hu) + " in " +
+                         ct->path.filename().string() + " lies",
+                     bounds_above(ct->image, options_.skin_hu), ct_covers_});
+    return out;
   }
 
   bool has(Role role) const {
@@ -250,20 +278,6 @@ class Decider {
       bare += within(v) ? 0 : 1;
     }
     return bone == 0 ? 0 : static_cast<double>(bare) / static_cast<double>(bone);
-  }
-
-  // Bones that are known, but of which none found its side.
-  [[noreturn]] void refuse_without_bones() const {
-    for (std::size_t e = 0; e < names_.named.size(); ++e) {
-      if (!sides_given(e) || original_[e] == 0) continue;
-      throw Error(
-          ErrorKind::data, scan_.labels.front().path.string(),
-          names_.named[e].name + " is known, but not its side, nor that of any other bone",
-          "say it where one limb alone was scanned (--side left or --side right), or give labels that "
-          "have sides with it");
-    }
-    throw Error(ErrorKind::data, scan_.labels.front().path.string(), "no label of a bone is known",
-                "see the names that are known in docs/reference/structures.md, or write the case by hand");
   }
 
   // Null where the scan has none.
@@ -288,6 +302,7 @@ class Decider {
     const scan::CtBody body =
         scan::find_body(*image, options_.skin_hu, options_.bridge_mm, known, context_.quiet());
     const double bare = bare_share([&](std::size_t v) { return body.inside[v] != 0; });
+    ct_covers_ = 1 - bare;
     if (bare > kBare) {
       out_.doubts.push_back("what is denser than " + text::number(options_.skin_hu) + " HU in " +
                             ct->path.filename().string() + " leaves " + percent_of(bare) +
@@ -300,9 +315,8 @@ class Decider {
     entry.drawn = false;
     entry.how = "denser than " + ct->value(options_.skin_hu) + " in the CT";
     entry.confidence = 0.8;
-    for (int number = 2; std::any_of(out_.entries.begin(), out_.entries.end(),
-                                     [&](const ScanEntry& e) { return e.name == entry.name; });
-         ++number)
+    const auto taken = [&](const ScanEntry& e) { return e.name == entry.name; };
+    for (int number = 2; std::any_of(out_.entries.begin(), out_.entries.end(), taken); ++number)
       entry.name = "body_" + std::to_string(number);
     out_.entries.push_back(entry);
     const auto id = static_cast<std::uint16_t>(out_.entries.size());
@@ -334,19 +348,21 @@ class Decider {
                            " voxels of it are there: it is left out");
     }
     erase(gone);
-    for (std::size_t e = 0; e < gone.size(); ++e) {
-      if (gone[e] != 0) out_.entries[e].drawn = false;
-    }
+    for (std::size_t e = 0; e < gone.size(); ++e)
+      out_.entries[e].drawn = out_.entries[e].drawn && gone[e] == 0;
     recount();
     tell_borders(out_, context_.quiet());
     tell_missing(out_);
     tell_contradictions(out_, scan_.images);
+    tell_bodies(out_, context_.quiet());
     out_.fates = std::move(names_.fates);
     for (std::size_t m = 0; m < names_.of_map.size(); ++m) {
       for (const auto& [id, e] : names_.of_map[m]) {
         if (e == LabelNames::no_entry) continue;
         LabelFate& fate = out_.fates[names_.fate_of[m].at(id)];
-        fate.became = left_out_.contains(e) ? "left out: " + left_out_.at(e) : became(e);
+        const auto why = left_out_.find(e);
+        fate.became =
+            why != left_out_.end() ? "left out: " + why->second : fate_in_words(out_, e, sides_given(e));
       }
     }
     if (std::none_of(out_.entries.begin(), out_.entries.end(),
@@ -361,23 +377,6 @@ class Decider {
            names_.named[e].structure->sided && names_.named[e].side == Side::both;
   }
 
-  std::string became(std::size_t e) const {
-    const ScanEntry& entry = out_.entries[e];
-    if (entry.role == Role::body) return "the body, for the skin";
-    if (sides_given(e)) {
-      std::string out;
-      for (const char* side : {"_left", "_right"}) {
-        const auto found = std::find_if(out_.entries.begin(), out_.entries.end(), [&](const ScanEntry& o) {
-          return o.name == entry.name + side && o.drawn && o.voxels > 0;
-        });
-        if (found != out_.entries.end()) out += (out.empty() ? "" : " and ") + found->name;
-      }
-      return out.empty() ? "left out: its side cannot be told" : out + ", bones";
-    }
-    if (entry.role == Role::bone) return entry.name + ", bone of " + entry.segment;
-    return entry.name + ", " + std::string(group_name(entry.group));
-  }
-
   Scan& scan_;
   const ScanOptions& options_;
   const Context& context_;
@@ -388,6 +387,8 @@ class Decider {
   std::vector<std::uint8_t> body_;     // of each voxel: a label of the body covers it
   std::vector<std::size_t> original_;  // voxels of each entry before others were put over it
   std::map<std::size_t, std::string> left_out_;
+  std::map<std::size_t, Bounds> whole_;  // of maps that were resampled, before
+  double ct_covers_ = 0;                 // share of the bones
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "app/scan/scan_handedness.hpp"
 #include "core/values/text.hpp"
 
 namespace ecorche::app {
@@ -76,9 +77,8 @@ struct BonePair {
   bool of_trunk = false;  // whose sides no posture exchanges
 };
 
-std::vector<BonePair> pairs_of(const ScanCase& scan) {
+std::vector<BonePair> pairs_of(const ScanCase& scan, const std::vector<Point>& middle) {
   const auto shown = [](const ScanEntry& e) { return e.role == Role::bone && e.drawn && e.voxels > 0; };
-  const std::vector<Point> middle = middles(scan);
   std::vector<BonePair> out;
   for (std::size_t e = 0; e < scan.entries.size(); ++e) {
     const ScanEntry& left = scan.entries[e];
@@ -129,8 +129,33 @@ void tell_odd_pairs(ScanCase& out, const std::vector<BonePair>& pairs) {
                        std::to_string(count - odd.size()) + " other pairs of bones" + like + ": " + said);
 }
 
+// The mean of all pairs of the trunk, thighs and upper arms.
+Point mean_to_left(const std::vector<BonePair>& pairs) {
+  Point out{};
+  double count = 0;
+  for (const BonePair& pair : pairs) {
+    if (!pair.of_trunk) continue;
+    for (std::size_t k = 0; k < 3; ++k) out[k] += pair.to_left[k];
+    ++count;
+  }
+  for (double& v : out) v /= std::max(1.0, count);
+  return out;
+}
+
+// Why left is where right should be.
+std::string exchanged_by(const ScanCase& scan, const std::vector<Point>& middle, const Point& to_left) {
+  const int organs = organs_agree(scan, middle, to_left);
+  if (organs > 0)
+    return "organs lie on the sides that the names say: the image's axes show the body as in a mirror; write "
+           "them as the scanner did";
+  const std::string names = "left and right are exchanged in the labels' names";
+  if (organs < 0) return names + ", as the organs tell, too: exchange them in the table of names";
+  return names + ", or the image's axes are mirrored: see which, and mend the table of names or the header";
+}
+
 void tell_exchanged(ScanCase& out) {
-  const std::vector<BonePair> pairs = pairs_of(out);
+  const std::vector<Point> middle = middles(out);
+  const std::vector<BonePair> pairs = pairs_of(out, middle);
   std::size_t right = 0, exchanged = 0;
   std::string first;
   for (const BonePair& pair : pairs) {
@@ -139,11 +164,28 @@ void tell_exchanged(ScanCase& out) {
     ++(x > 0 ? right : exchanged);
     if (x < 0 && first.empty()) first = pair.name + "_left lies to the right of " + pair.name + "_right";
   }
-  if (exchanged <= right) return tell_odd_pairs(out, pairs);
-  out.doubts.push_back(
-      first + ", and so do " + std::to_string(exchanged) + " of " + std::to_string(exchanged + right) +
-      " pairs of bones: left and right are exchanged in the labels' names, or the image's axes "
-      "are wrong");
+  const bool odd = exchanged > right;
+  const Point to_left = mean_to_left(pairs);
+  const Handedness hand = handedness(out, middle, to_left);
+  if (hand == Handedness::body || (hand == Handedness::unknown && !odd)) {
+    if (odd)
+      out.notes.push_back(first +
+                          ", but front and back agree with the names: the body lies turned in the image, "
+                          "such as on its belly, and nothing is wrong");
+    return tell_odd_pairs(out, pairs);
+  }
+  const std::string counted = odd ? first + ", and so do " + std::to_string(exchanged) + " of " +
+                                        std::to_string(exchanged + right) + " pairs of bones"
+                                  : "the body's front lies where its back should, beside its head and " +
+                                        std::to_string(right) + " pairs of left and right bones";
+  if (hand == Handedness::unknown) {
+    out.doubts.push_back(counted +
+                         ": left and right are exchanged in the labels' names, or the image's axes "
+                         "are mirrored, or the body lies turned, such as on its belly: nothing here "
+                         "tells its front");
+    return;
+  }
+  out.doubts.push_back(counted + ": " + exchanged_by(out, middle, to_left));
 }
 
 }  // namespace

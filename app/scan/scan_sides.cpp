@@ -117,4 +117,21 @@ void give_sides(ScanCase& out, const std::vector<Named>& named, const scan::Piec
   Splitter(out, named, pieces).split(only);
 }
 
+std::string fate_in_words(const ScanCase& scan, std::size_t e, bool sides_given) {
+  const ScanEntry& entry = scan.entries[e];
+  if (entry.role == ScanEntry::Role::body) return "the body, for the skin";
+  if (!sides_given)
+    return entry.name + ", " +
+           (entry.role == ScanEntry::Role::bone ? "bone of " + entry.segment
+                                                : std::string(group_name(entry.group)));
+  std::string out;
+  for (const char* side : {"_left", "_right"}) {
+    const auto found = std::find_if(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& o) {
+      return o.name == entry.name + side && o.drawn && o.voxels > 0;
+    });
+    if (found != scan.entries.end()) out += (out.empty() ? "" : " and ") + found->name;
+  }
+  return out.empty() ? "left out: its side cannot be told" : out + ", bones";
+}
+
 }  // namespace ecorche::app

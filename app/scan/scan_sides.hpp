@@ -13,4 +13,8 @@ namespace ecorche::app {
 /// are gone from it already). Pieces whose side cannot be told become nothing, and a doubt with their place.
 void give_sides(ScanCase& out, const std::vector<Named>& named, const scan::Pieces& pieces, Side only);
 
+/// What the label of entry `e` became: `femur_left, bone of thigh_left`; where its pieces went to entries
+/// with sides, both of those.
+std::string fate_in_words(const ScanCase& scan, std::size_t e, bool sides_given);
+
 }  // namespace ecorche::app

@@ -6,14 +6,13 @@
 #include <numeric>
 
 #include "preprocess/scan/fit_segments.hpp"
+#include "preprocess/scan/label_shape.hpp"
 #include "preprocess/scan/template_cloud.hpp"
 #include "preprocess/scan/views.hpp"
 
 namespace ecorche::scan {
 namespace {
 
-constexpr double kOutside = 0.5;    // share of all that is outside: the body's
-constexpr double kThin = 2.5;       // voxels a face of its outside: a shell
 constexpr double kAtTemplate = 14;  // mm: at a bone of the template
 constexpr double kBone = 0.7;
 constexpr double kClaim = 0.08;  // bones' points that are its own, over those that its size lets one expect
@@ -50,13 +49,15 @@ constexpr double kTemplateSpacing = 9;  // mm, of the template's points
 class LabelClassifier {
  public:
   LabelClassifier(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, const ImageGrid& grid,
-                  const Placed& placed)
+                  const Placed& placed, const TooShort& too_short)
       : body_(body),
         labels_(labels),
         grid_(grid),
         placed_(placed),
+        too_short_(too_short),
         clouds_(segment_clouds(body, placed.in_play)),
         on_(labels.size()),
+        short_on_(labels.size()),
         sum_(labels.size(), 0),
         all_(labels.size(), 0),
         claim_(labels.size(), 0) {}
@@ -73,11 +74,12 @@ class LabelClassifier {
     // What bone encloses is of it; what only lies at it may be.
     std::vector<std::size_t> marrow;
     for (std::size_t l = 0; l < labels_.size(); ++l) {
-      if (!free(out[l]) || bone(out[l]) || out[l].on_bones < kMarrow) continue;
+      if (!free(out[l]) || bone(out[l]) || out[l].on_bones + short_share(l) < kMarrow) continue;
       const double at = enclosed(l, out);
       if (at >= kEnclosed || (last_ && at >= kAtBone && out[l].on_bones >= kSureOn)) marrow.push_back(l);
     }
     for (const std::size_t l : marrow) {
+      take_short(l, out[l]);  // a part of a bone is no longer than it is
       decide(l, out[l]);
       if (out[l].kind == LabelMeaning::Kind::bones) out[l].kind = LabelMeaning::Kind::other;  // a cord
     }
@@ -88,6 +90,12 @@ class LabelClassifier {
         decide(l, meaning);
         if (!bone(meaning)) continue;
         meaning.kind = LabelMeaning::Kind::ambiguous;
+        meaning.confidence *= 0.5;
+      } else if (last_ && meaning.on_bones + short_share(l) >= kBone && claim_[l] >= kClaim) {
+        take_short(l, meaning);
+        decide(l, meaning);
+        meaning.kind = bone(meaning) ? LabelMeaning::Kind::ambiguous : LabelMeaning::Kind::other;
+        meaning.too_short = true;
         meaning.confidence *= 0.5;
       }
     }
@@ -130,7 +138,7 @@ class LabelClassifier {
         if (one.segment < 0) continue;
         const auto b = static_cast<std::size_t>(
             clouds_[static_cast<std::size_t>(one.segment)].bone[static_cast<std::size_t>(one.point)]);
-        if (missing[b] != 0) at[b] += 1, near += 1;
+        if (missing[b] != 0 && !too_short(l, static_cast<int>(b))) at[b] += 1, near += 1;
       }
       if (near * static_cast<double>(step) < kNearFar * static_cast<double>(points.rows())) continue;
       double size = 0;
@@ -160,12 +168,35 @@ class LabelClassifier {
       asked += 1;
       const NearestBone found = nearest_bone(clouds_, placed_.segments, points.row(p).transpose(), near_);
       if (found.segment < 0) continue;
-      near += 1;
-      ++on_[l][clouds_[static_cast<std::size_t>(found.segment)].bone[static_cast<std::size_t>(found.point)]];
+      const int b =
+          clouds_[static_cast<std::size_t>(found.segment)].bone[static_cast<std::size_t>(found.point)];
+      const bool other = too_short(l, b);
+      near += other ? 0 : 1;
+      ++(other ? short_on_ : on_)[l][b];
     }
+    out.too_short = false;
     out.on_bones = near / asked;
     sum_[l] = near;
     all_[l] = asked;
+  }
+
+  bool too_short(std::size_t l, int b) const { return too_short_(l, b, placed_.scale); }
+
+  // Of a label, what lies at bones for which it is too short.
+  double short_share(std::size_t l) const {
+    double sum = 0;
+    for (const auto& [b, count] : short_on_[l]) sum += count;
+    return sum / std::max(1.0, all_[l]);
+  }
+
+  // Even a bone for which it is too short is no other label's where it lies nearer.
+  bool vies(std::size_t l, const LabelMeaning& m) const { return m.on_bones + short_share(l) >= kCandidate; }
+
+  // That counts, too.
+  void take_short(std::size_t l, LabelMeaning& out) {
+    for (const auto& [b, count] : short_on_[l]) on_[l][b] += count, sum_[l] += count;
+    short_on_[l].clear();
+    out.on_bones = sum_[l] / std::max(1.0, all_[l]);
   }
 
   // Which of the candidates is nearest to each of the template's points.
@@ -173,12 +204,12 @@ class LabelClassifier {
     std::vector<std::size_t> of;
     Eigen::Index count = 0;
     for (std::size_t l = 0; l < labels_.size(); ++l)
-      count += free(out[l]) && out[l].on_bones >= kCandidate ? labels_[l].points.rows() : 0;
+      count += free(out[l]) && vies(l, out[l]) ? labels_[l].points.rows() : 0;
     if (count == 0) return;
     Points all(count, 3);
     Eigen::Index row = 0;
     for (std::size_t l = 0; l < labels_.size(); ++l) {
-      if (!free(out[l]) || out[l].on_bones < kCandidate) continue;
+      if (!free(out[l]) || !vies(l, out[l])) continue;
       const Points& points = labels_[l].points;
       all.middleRows(row, points.rows()) = points;
       row += points.rows();
@@ -202,6 +233,7 @@ class LabelClassifier {
         seen_[b] += 1;
         if (square >= near_ * near_) continue;
         claim_[l] += 1;
+        if (too_short(l, static_cast<int>(b))) continue;
         covered += out[l].on_bones >= kBone ? 1 : 0;
         there_[b] += out[l].on_bones >= kBone ? 1 : 0;
       }
@@ -267,42 +299,16 @@ class LabelClassifier {
   const std::vector<NamelessLabel>& labels_;
   const ImageGrid& grid_;
   const Placed& placed_;
+  const TooShort& too_short_;
   std::vector<SegmentCloud> clouds_;
-  std::vector<std::map<int, int>> on_;  // of each label: points at each of the template's bones
-  std::vector<double> sum_, all_;       // ... at any, and of all that were asked
+  // Of each label: points at each of the template's bones, and at those for which it is too short.
+  std::vector<std::map<int, int>> on_, short_on_;
+  std::vector<double> sum_, all_;  // ... at any, and of all that were asked
   std::vector<double> claim_, claims_;
   std::vector<double> seen_, there_;  // of each of the template's bones: its points in view, at a label
   double covered_ = 0, near_ = kAtTemplate;
   bool last_ = false;  // the template lies where it will
 };
-
-// What holds the outside of all that is labelled.
-void find_bodies(const std::vector<NamelessLabel>& labels, std::vector<LabelMeaning>& out) {
-  std::size_t all = 0;
-  for (const NamelessLabel& label : labels) all += label.outside;
-  for (std::size_t l = 0; l < labels.size(); ++l) {
-    const double share =
-        static_cast<double>(labels[l].outside) / static_cast<double>(std::max<std::size_t>(1, all));
-    if (share < kOutside || labels.size() < 2) continue;
-    const bool thin = static_cast<double>(labels[l].voxels) < kThin * static_cast<double>(labels[l].outside);
-    out[l].kind = thin ? LabelMeaning::Kind::shell : LabelMeaning::Kind::body;
-    out[l].confidence = share;
-  }
-}
-
-// About `most` of them, evenly.
-Points points_of(const std::vector<NamelessLabel>& labels, const std::vector<std::size_t>& which,
-                 Eigen::Index most) {
-  Eigen::Index count = 0, at = 0;
-  for (const std::size_t l : which) count += labels[l].points.rows();
-  const Eigen::Index step = std::max<Eigen::Index>(1, count / most);
-  Points out(count / step + static_cast<Eigen::Index>(which.size()), 3);
-  for (const std::size_t l : which) {
-    for (Eigen::Index p = 0; p < labels[l].points.rows(); p += step) out.row(at++) = labels[l].points.row(p);
-  }
-  out.conservativeResize(at, 3);
-  return out;
-}
 
 std::vector<std::size_t> bones_of(const std::vector<LabelMeaning>& of) {
   std::vector<std::size_t> out;
@@ -312,19 +318,22 @@ std::vector<std::size_t> bones_of(const std::vector<LabelMeaning>& of) {
   return out;
 }
 
-// Classified and fitted in turn, until the bones stay the same.
+// Of a body as a whole no upper arm was found.
+bool no_upper_arm(const BodyTemplate& body, const LabelMeanings& found) {
+  return !one_limb(found.placed.view) &&
+         std::none_of(found.of.begin(), found.of.end(), [&](const LabelMeaning& m) {
+           return LabelClassifier::bone(m) && m.bone >= 0 &&
+                  of_upper_arm(body, body.bones[static_cast<std::size_t>(m.bone)]);
+         });
+}
+
+// Classified and fitted in turn, until the bones stay the same; the best of all rounds' becomes `out`.
 void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, const ImageGrid& grid,
-            const RoughPlace& rough, View view, LabelMeanings& out, const Context& context) {
-  Placed placed;
-  placed.view = view;
-  placed.scale = rough.place.scale;
-  for (const Similarity& held : held_by(body, view)) placed.segments.push_back(rough.place.after(held));
-  for (const TemplateSegment& segment : body.segments)
-    placed.in_play.push_back(view_has(view, segment.name) ? 1 : 0);
+            const TooShort& too_short, Placed placed, LabelMeanings& out, const Context& context) {
   const std::vector<SegmentCloud> clouds = segment_clouds(body, placed.in_play);
   std::vector<std::size_t> last;
   for (int round = 0; round <= kRefineRounds; ++round) {
-    LabelClassifier classifier(body, labels, grid, placed);
+    LabelClassifier classifier(body, labels, grid, placed, too_short);
     LabelMeanings now{placed, 0, out.of};
     classifier.run(now.of,
                    kSteps[std::min<std::size_t>(static_cast<std::size_t>(round), std::size(kSteps) - 1)]);
@@ -362,6 +371,7 @@ LabelMeanings know_labels(const BodyTemplate& body, const std::vector<NamelessLa
   const ImageGrid grid = part_with_labels(within, whole);
   std::vector<RoughPlace> places = rough_places(body, within, grid, side, context.quiet());
   context.report(0.4);
+  const TooShort too_short(body, labels, whole);
   for (std::size_t i = 0; i < places.size() && out.score < kGood; ++i) {
     RoughPlace& rough = places[i];
     for (std::size_t& l : rough.likely) l = row[l];
@@ -369,7 +379,15 @@ LabelMeanings know_labels(const BodyTemplate& body, const std::vector<NamelessLa
       if (view != rough.view && (rough.view != View::body || i > 0)) continue;
       LabelMeanings from;
       from.of = out.of;
-      refine(body, labels, grid, rough, view, from, context);
+      refine(body, labels, grid, too_short, laid(body, rough.place, view), from, context);
+      if (from.score > out.score) out = std::move(from);
+    }
+    // The trunk lies well, and arms held the other way may, too.
+    const Placed other = with_other_arms(body, out.placed);
+    if (no_upper_arm(body, out) && upper_arm_in_view(body, other, grid)) {
+      LabelMeanings from;
+      from.of = out.of;
+      refine(body, labels, grid, too_short, other, from, context);
       if (from.score > out.score) out = std::move(from);
     }
     context.report(0.4 + 0.6 * static_cast<double>(i + 1) / static_cast<double>(places.size()));

@@ -42,6 +42,7 @@ struct LabelMeaning {
   bool both_sides = false;  ///< that bone of the left, and of the right
   double on_bones = 0;      ///< share of it that lies at the template's bones
   double claim = 0;  ///< of the points that its size lets one expect, how many of the template are its own
+  bool too_short = false;                            ///< for `bone`, a long one
   double confidence = 0;                             ///< 0 to 1
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< LPS mm
 };
@@ -57,6 +58,7 @@ struct LabelMeanings {
 /// labels that lie on its bones with most of what they are cover as much of it as they can. To those it is
 /// fitted (place_template), and they are classified anew, until nothing changes. What lies at a bone, but is
 /// nearer to it nowhere than another label, is none (muscles, cords), except where bone encloses it (marrow).
+/// What is far shorter than a long bone at which it lies is not that bone.
 /// `score` is 0 where no label may be bone.
 LabelMeanings know_labels(const BodyTemplate& body, const std::vector<NamelessLabel>& labels,
                           const ImageGrid& grid, Side side, const Context& context);

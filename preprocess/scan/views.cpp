@@ -2,10 +2,12 @@
 #include "preprocess/scan/views.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "core/linear/decompositions.hpp"
+#include "preprocess/scan/fit_segments.hpp"
 
 namespace ecorche::scan {
 namespace {
@@ -65,6 +67,43 @@ std::vector<Similarity> held_by(const BodyTemplate& body, View view) {
     out[s].shift = segment.joint - out[s].rotation * segment.joint;
   }
   return out;
+}
+
+Placed laid(const BodyTemplate& body, const Similarity& place, View view) {
+  Placed out;
+  out.view = view;
+  out.scale = place.scale;
+  for (const Similarity& held : held_by(body, view)) out.segments.push_back(place.after(held));
+  for (const TemplateSegment& segment : body.segments)
+    out.in_play.push_back(view_has(view, segment.name) ? 1 : 0);
+  return out;
+}
+
+Placed with_other_arms(const BodyTemplate& body, Placed placed) {
+  if (one_limb(placed.view) || placed.segments.size() != body.segments.size()) return placed;
+  placed.view = placed.view == View::body ? View::arms_up : View::body;
+  const std::vector<Similarity> held = held_by(body, placed.view);
+  std::vector<std::size_t> carrier(body.segments.size());  // of an arm's segment: what the arm hangs on
+  for (std::size_t s = 0; s < carrier.size(); ++s) {
+    carrier[s] = s;
+    const int parent = body.segments[s].parent;
+    if (!of_arm(body.segments[s].name) || parent < 0) continue;
+    carrier[s] = carrier[static_cast<std::size_t>(parent)];
+    placed.segments[s] = placed.segments[carrier[s]].after(held[s]);
+  }
+  return placed;
+}
+
+bool of_upper_arm(const BodyTemplate& body, const TemplateBone& bone) {
+  return starts(body.segments[static_cast<std::size_t>(bone.segment)].name, "upper_arm");
+}
+
+bool upper_arm_in_view(const BodyTemplate& body, const Placed& placed, const ImageGrid& grid) {
+  if (placed.segments.size() != body.segments.size()) return false;
+  return std::any_of(body.bones.begin(), body.bones.end(), [&](const TemplateBone& bone) {
+    const Similarity& at = placed.segments[static_cast<std::size_t>(bone.segment)];
+    return of_upper_arm(body, bone) && in_view(grid, at(bone.points.colwise().mean().transpose()));
+  });
 }
 
 std::vector<std::pair<Eigen::Matrix3d, Eigen::Vector3d>> turns_of(View view, const Points& own_points,

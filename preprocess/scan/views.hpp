@@ -19,6 +19,16 @@ bool view_has(View view, const std::string& segment);
 /// shoulder.
 std::vector<Similarity> held_by(const BodyTemplate& body, View view);
 
+/// The template, held as `view` has it, where it is roughly laid.
+Placed laid(const BodyTemplate& body, const Similarity& place, View view);
+/// The same place of the trunk, with arms raised that hung, or hanging that were raised. One of a limb alone
+/// stays what it is.
+Placed with_other_arms(const BodyTemplate& body, Placed placed);
+
+bool of_upper_arm(const BodyTemplate& body, const TemplateBone& bone);
+/// Whether the middle of any of its bones is.
+bool upper_arm_in_view(const BodyTemplate& body, const Placed& placed, const ImageGrid& grid);
+
 /// The turns that are tried to lay `own` over `theirs`, each with the way along which it is then slid.
 std::vector<std::pair<Eigen::Matrix3d, Eigen::Vector3d>> turns_of(View view, const Points& own,
                                                                   const Points& theirs);

@@ -133,6 +133,41 @@ class Nameless(unittest.TestCase):
         self.assertGreater(right, 0.9)
         self.assertTrue(any("covers bones of several segments: they are parted by a template" in doubt for doubt in made["doubts"]), made["doubts"])
 
+    def test_what_is_far_too_short_for_its_bone(self):
+        """A piece as long as a vertebra is high, where the humerus would be, is none; it is told."""
+        voxels = self.only_bones(self.truth.voxels)
+        number = next(label for label, name in self.truth.bone.items() if name == "humerus_left")
+        at = np.argwhere(voxels == number)
+        far = at[abs(at[:, 2] - at[:, 2].mean()) * np.linalg.norm(self.truth.affine[:3, 2]) > 30]
+        voxels[tuple(far.T)] = self.truth.body
+        made, _, _ = self.known("short", voxels)
+        names = [bone["name"] for bone in made["bones"]]
+        self.assertNotIn("humerus_left", names)
+        self.assertIn("humerus_right", names)
+        self.assertTrue(any("may be a bone (humerus_left, " in doubt and "but it is far shorter than that): it is taken for a tissue" in doubt for doubt in made["doubts"]), made["doubts"])
+
+    def test_what_looks_like_bone_is_asked_about(self):
+        """A large label with a shell and marrow in the CT that no bone of the template lies at; of flesh nothing is asked."""
+        voxels = self.only_bones(self.truth.voxels)
+        image = nibabel.load(self.folder / "scan" / "ct.nii.gz")
+        self.assertTrue(np.allclose(image.affine, self.truth.affine))
+        ct = np.asarray(image.dataobj).astype("i2").copy()
+        i, j = 4, 4  # in the air beside the head, far from all bones
+        low, high = (int(share * voxels.shape[2]) for share in (0.8, 0.97))
+        flesh = voxels.max() + 2
+        for label, shift in ((flesh - 1, 0), (flesh, 5)):
+            rod = (slice(i - 2, i + 3), slice(j - 2 + shift, j + 3 + shift), slice(low, high))
+            self.assertFalse(voxels[rod].any())
+            voxels[rod] = label
+            ct[rod] = 40 if label == flesh else 900
+            if label != flesh:
+                ct[i - 1:i + 2, j - 1 + shift:j + 2 + shift, low:high] = 300
+        nibabel.save(nibabel.Nifti1Image(ct, image.affine), self.folder / "asked_ct.nii.gz")
+        made, _, _ = self.known("asked", voxels, self.folder / "asked_ct.nii.gz")
+        said = [doubt for doubt in made["doubts"] if "like bone in asked_ct.nii.gz" in doubt]
+        self.assertEqual(len(said), 1, made["doubts"])
+        self.assertRegex(said[0], r"asked.nii.gz: label \d+ at \[.*\] looks like bone in asked_ct.nii.gz, but by shape and place it is none and is taken for tissues: name what is bone")
+
     def test_what_is_no_body_is_refused(self):
         voxels = np.zeros((60, 60, 60), "u1")
         at, random = np.stack(np.meshgrid(*map(np.arange, voxels.shape), indexing="ij"), -1), np.random.default_rng(0)
