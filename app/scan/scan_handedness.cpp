@@ -111,12 +111,12 @@ int organs_agree(const ScanCase& scan, const std::vector<Vec>& middle, const Vec
   if (!spine) return 0;
   const double wide = std::sqrt(dot(to_left, to_left));
   int votes = 0;
-  for (const auto& [name, left] :
+  for (const std::pair<const char*, bool>& organ :
        {std::pair("liver", false), std::pair("spleen", true), std::pair("stomach", true)}) {
-    const auto at = middle_of(scan, middle, [&](const ScanEntry& e) { return e.name == name; });
+    const auto at = middle_of(scan, middle, [&](const ScanEntry& e) { return e.name == organ.first; });
     if (!at || wide == 0) continue;
     const double by = dot(minus(*at, *spine), to_left) / wide;
-    if (std::abs(by) >= kBeforeMm) votes += (by > 0) == left ? 1 : -1;
+    if (std::abs(by) >= kBeforeMm) votes += (by > 0) == organ.second ? 1 : -1;
   }
   return votes > 0 ? 1 : votes < 0 ? -1 : 0;
 }

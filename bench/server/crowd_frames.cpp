@@ -100,7 +100,7 @@ void Crowd::arrive(Member& member) {
       static_cast<double>(frame.pose_sequence() - frame.quality().pose_sequence()));
   if (const Clock::time_point* sent = member.times->find(frame.pose_sequence()))
     member.arrived.ms.push_back(std::chrono::duration<double, std::milli>(now - *sent).count());
-  if (member.keeps) member.held.push_back({frame, std::move(member.payload)});
+  if (member.keeps) member.held.push_back({frame, std::exchange(member.payload, {})});
 }
 
 void Crowd::check() {

@@ -32,6 +32,7 @@ double slope_of(const std::vector<std::pair<double, double>>& memory) {
   std::map<int, std::vector<double>> minutes;
   for (const auto& [minute, mib] : memory) minutes[static_cast<int>(minute)].push_back(mib);
   std::vector<std::pair<int, double>> at;
+  at.reserve(minutes.size());
   for (auto& [minute, mib] : minutes) at.emplace_back(minute, median(std::move(mib)));
   std::vector<double> slopes;
   for (std::size_t i = 0; i < at.size(); ++i)

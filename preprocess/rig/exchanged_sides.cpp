@@ -51,8 +51,8 @@ class Body {
 
   // Of a segment without a side, or midway between those of both.
   std::optional<Vector3d> amid(const std::string& name) const {
-    const auto one = of(name), left = of(name + "_left"), right = of(name + "_right");
-    if (one) return one;
+    if (auto one = of(name)) return one;
+    const auto left = of(name + "_left"), right = of(name + "_right");
     if (!left || !right) return std::nullopt;
     return Vector3d(0.5 * (*left + *right));
   }

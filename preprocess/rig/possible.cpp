@@ -57,7 +57,7 @@ std::optional<Eigen::Vector3d> JointSources::shaft_of(const std::string& segment
 }
 
 std::optional<Eigen::Vector3d> JointSources::crossed_shaft() {
-  const auto parents = shaft(bounded_);
+  auto parents = shaft(bounded_);
   if (parents || bounded_ < 0) return parents;
   return shaft_of(skeleton_.segments[static_cast<std::size_t>(bounded_)].name);
 }

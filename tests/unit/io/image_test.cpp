@@ -2,12 +2,13 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <random>
+#include <span>
 #include <string>
 
 #include "io/image/equal_run.hpp"
@@ -341,7 +342,9 @@ TEST(Image, PackedNiftiIsThePlainOne) {
 // A run by bytes, wherever it begins and ends, beside one looked at value by value.
 template <class T>
 void runs_end_where_values_change(const std::vector<T>& values) {
-  const auto same = [](const T& a, const T& b) { return std::memcmp(&a, &b, sizeof(T)) == 0; };
+  const auto same = [](const T& a, const T& b) {
+    return std::ranges::equal(std::as_bytes(std::span(&a, 1)), std::as_bytes(std::span(&b, 1)));
+  };
   std::uint32_t state = 3;
   std::vector<T> row;
   while (row.size() < 500) {

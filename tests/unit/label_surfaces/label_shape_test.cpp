@@ -11,9 +11,9 @@ namespace {
 // Points every 5 mm along x, three by three beside each other.
 Points rod(double length, const Eigen::Vector3d& from = Eigen::Vector3d::Zero()) {
   std::vector<Eigen::Vector3d> all;
-  for (double x = 0; x <= length; x += 5) {
-    for (int side = 0; side < 9; ++side)
-      all.push_back(from + Eigen::Vector3d(x, 10.0 * (side % 3 - 1), 10.0 * (side / 3 - 1)));
+  for (int step = 0; 5 * step <= length; ++step) {
+    for (const double y : {-10, 0, 10})
+      for (const double z : {-10, 0, 10}) all.push_back(from + Eigen::Vector3d(5 * step, y, z));
   }
   Points out(static_cast<Eigen::Index>(all.size()), 3);
   for (std::size_t p = 0; p < all.size(); ++p) out.row(static_cast<Eigen::Index>(p)) = all[p];
