@@ -174,6 +174,7 @@ std::vector<Twice> of_second_body(const ScanCase& scan, const std::vector<Twice>
                [](const Twice& t) { return t.share >= kSecondPiece; });
   if (all.size() < kFewestOfChild || two_bodies(scan, out)) return out;
   std::vector<double> shares;
+  shares.reserve(all.size());
   for (const Twice& t : all) shares.push_back(t.share);
   std::nth_element(shares.begin(), shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2),
                    shares.end());
