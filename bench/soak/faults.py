@@ -15,6 +15,7 @@ import threading
 import time
 
 import programs
+from beside import Beside
 
 sys.path[:0] = [str(programs.ROOT / "build/release/proto/python"), str(programs.ROOT / "clients/python"),
                 str(programs.ROOT / "tests/e2e/stream")]
@@ -45,7 +46,8 @@ class Place:
         self.other, self.others = self.folder / "other.hdf", others  # two bodies that take turns under one name
         self.records, self.clock = self.folder / "records", self.folder / "clock"
         self.program = self.folder / "ecorche"
-        self.sequence = self.folder / "sequence.yaml"
+        self.clips = self.folder / "clips"
+        self.sequence = self.clips / "sequence.yaml"
         self._cleanup = contextlib.ExitStack()
         self.link, self.no_link, self.no_disk = None, "", ""
 
@@ -53,6 +55,7 @@ class Place:
         shutil.copy(self.good, self.model)
         shutil.copy(self.others[0], self.other)
         self.records.mkdir()
+        self.clips.mkdir()
         self.step_clock(0)
         self.program.write_text(f'#!/bin/sh\nexec env LD_PRELOAD={CLOCK} STEPPED_CLOCK={self.clock} {programs.ECORCHE} "$@"\n')
         self.program.chmod(0o755)
@@ -107,11 +110,11 @@ def call(*words):
     subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True)
 
 
-class Faults:
-    """Works off the plan again and again on a thread of its own, from when the server serves."""
+class Faults(Beside):
+    """The plan, from when the server serves."""
 
     def __init__(self, place, port):
-        self.place, self.port = place, port
+        self.port = port
         self.plan = {
             self.cut: Fault("clients cut amid a frame", "all others' frames right"),
             self.fill_disk: Fault(f"a disk of {DISK_KIB} KiB full while recording", "it is told, the next is whole", lacks=place.no_disk),
@@ -119,29 +122,18 @@ class Faults:
             self.replace_body: Fault("a model replaced by another body that a client poses", "it is told, frames of both right"),
             self.step_clock: Fault("the clock stepped by an hour, on and back", "nobody dropped"),
             self.lose_packets: Fault(f"a network that loses {LOSS:.0%}", "frames right", lacks=place.no_link)}
-        self._done = threading.Event()
-        self._thread = threading.Thread(target=self._work)
+        super().__init__(place, 5, self.plan)
 
-    def __enter__(self):
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._done.set()
-        self._thread.join()
-
-    def _work(self):
-        with self.place.where():
-            while not self._done.is_set():
-                for do, fault in self.plan.items():
-                    if fault.lacks or self._done.wait(5):
-                        continue
-                    fault.times += 1
-                    try:
-                        do()
-                        self.check_frames(f"127.0.0.1:{self.port}", self.place.within)
-                    except Exception as error:  # noqa: BLE001: whatever it is, it is told
-                        fault.bad.append(f"{type(error).__name__}: {error}")
+    def do(self, one):
+        fault = self.plan[one]
+        if fault.lacks:
+            return
+        fault.times += 1
+        try:
+            one()
+            self.check_frames(f"127.0.0.1:{self.port}", self.place.within)
+        except Exception as error:  # noqa: BLE001: whatever it is, it is told
+            fault.bad.append(f"{type(error).__name__}: {error}")
 
     def check_frames(self, address, within, seconds=2, *more, model=None):
         """Plays poses, and holds every frame against offline posing."""

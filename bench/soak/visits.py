@@ -6,10 +6,10 @@ import json
 import pathlib
 import subprocess
 import tempfile
-import threading
 
 import numpy as np
 import programs
+from beside import Beside
 from ecorche_client import Client
 
 BROWSER = programs.ROOT / "tests/e2e/stream/websocket_client.mjs"
@@ -23,37 +23,24 @@ def bent(body):
     return pose
 
 
-class Visits:
+class Visits(Beside):
     """One thing after the other, each by a client of its own. `told`: {what: (what is wanted, how often, what was wrong)}."""
 
-    WANTED = {"volume": "the same voxels", "probe": "points come back", "radiograph": "the same picture", "clip": "frames come",
+    WANTED = {"volume": "the same voxels", "probe": "points come back", "radiograph": "the same picture", "clip": "poses come",
               "browser": "positions as over TCP"}
 
     def __init__(self, place, port, http_port):
-        self.place, self.port, self.http_port, self.first = place, port, http_port, {}
+        self.port, self.http_port, self.first = port, http_port, {}
         self.told = {name: (wanted, [0], []) for name, wanted in self.WANTED.items()}
-        self._done = threading.Event()
-        self._thread = threading.Thread(target=self._work)
+        super().__init__(place, 1, self.told)
 
-    def __enter__(self):
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._done.set()
-        self._thread.join()
-
-    def _work(self):
-        with self.place.where():
-            while not self._done.is_set():
-                for name, (_, times, bad) in self.told.items():
-                    if self._done.wait(1):
-                        return
-                    times[0] += 1
-                    try:
-                        getattr(self, name)()
-                    except Exception as error:  # noqa: BLE001: whatever it is, it is told
-                        bad.append(f"{type(error).__name__}: {error}")
+    def do(self, one):
+        _, times, bad = self.told[one]
+        times[0] += 1
+        try:
+            getattr(self, one)()
+        except Exception as error:  # noqa: BLE001: whatever it is, it is told
+            bad.append(f"{type(error).__name__}: {error}")
 
     def same(self, name, data):
         found = hashlib.sha256(bytes(data)).hexdigest()
@@ -100,13 +87,12 @@ class Visits:
     def clip(self):
         with Client("127.0.0.1", self.port) as client:
             client.open()
-            clips = client.clips()
             client.subscribe_mesh(max_rate=20)
-            if clips:
-                client.play(clips[0].name, loop=True)
-                if sum(1 for _ in client.frames(seconds=1)) < 3:
-                    raise RuntimeError("a clip that plays gives no frames")
-                client.play("")
+            client.play(self.place.sequence.stem, loop=True)
+            moving = {frame.pose_sequence for frame in client.frames(seconds=2)}
+            if len(moving) < 3:
+                raise RuntimeError(f"a clip that plays gives {len(moving)} poses in two seconds")
+            client.play("")
 
     def browser(self):
         """The same positions over a WebSocket as over TCP."""
