@@ -9,16 +9,19 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <memory>
 #include <numeric>
 #include <thread>
+#include <utility>
 
 #include <ecorche/values/error.hpp>
 #include "bench/server/crowd.hpp"
@@ -173,26 +176,64 @@ double mean(const std::vector<double>& values) {
              : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// What the simulation is told of this machine, by the fullest point that holds: one client alone finds cold
-// caches, and the server measures quality beside it. Of a worker's times the longest twentieth is left out:
-// those waited for a core.
-MachineLoad learn(const Settings& settings, const Measured& alone, const Measured& full) {
-  MachineLoad load;
-  load.cores = cores_here();
-  load.workers = load.cores;
-  load.rate = settings.rate;
-  load.seconds = settings.seconds;
-  const double longest = quantile(full.work, 0.95);
-  std::copy_if(full.work.begin(), full.work.end(), std::back_inserter(load.work),
-               [&](double ms) { return ms <= longest; });
-  load.io = std::max(0.005, full.server_ms - mean(load.work));
-  load.client = full.clients_ms;
-  load.fixed_ms =
-      std::max(0.0, std::min(alone.p50, full.p50) - quantile(load.work, 0.5) - load.io - load.client);
-  return load;
+// Processor of a frame at a load: what it costs by itself, and its part of what is done as often whatever the
+// load: the more clients, the more frames a thread makes each time it wakes.
+struct Cost {
+  double own = 0, shared = 0;  // ms
+  double of(double clients) const { return own + shared / clients; }
+};
+
+// Least squares of relative errors, over points of at least an eighth of `full` clients.
+Cost cost_of(const std::vector<Measured>& points, std::size_t full, double Measured::*ms) {
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Measured& point : points) {
+    if (8 * point.load.posers < full || point.shown < kWhole) continue;
+    const Eigen::Vector2d row = Eigen::Vector2d(1, 1 / static_cast<double>(point.load.posers)) / point.*ms;
+    squares += row * row.transpose();
+    right += row;
+    least = std::min(least, point.*ms);
+  }
+  const Eigen::Vector2d found = squares.fullPivLu().solve(right);
+  // One point alone, or noise: the same at every load.
+  return found[0] > 0 && found[1] > 0 ? Cost{found[0], found[1]} : Cost{least, 0};
 }
 
-void hold_against(const Settings& settings, const MachineLoad& machine, std::size_t most) {
+// What the simulation is told of this machine. Of a worker's times, of the fullest point that holds, the
+// longest twentieth is left out: those waited for a core.
+struct Machine {
+  MachineLoad load;
+  Cost server, client;
+
+  MachineLoad with(std::size_t clients, int processes) const {
+    MachineLoad out = load;
+    out.clients = clients;
+    out.processes = processes;
+    const auto all = static_cast<double>(clients);
+    out.io = std::max(0.005, server.of(all / processes) - mean(load.work));
+    out.client = client.of(all);
+    return out;
+  }
+};
+
+Machine learn(const Settings& settings, const std::vector<Measured>& points, const Measured& full) {
+  Machine out;
+  out.load.cores = out.load.workers = cores_here();
+  out.load.rate = settings.rate;
+  out.load.seconds = settings.seconds;
+  const double longest = quantile(full.work, 0.95);
+  std::copy_if(full.work.begin(), full.work.end(), std::back_inserter(out.load.work),
+               [&](double ms) { return ms <= longest; });
+  out.server = cost_of(points, full.load.posers, &Measured::server_ms);
+  out.client = cost_of(points, full.load.posers, &Measured::clients_ms);
+  const MachineLoad there = out.with(full.load.posers, 1);
+  out.load.fixed_ms = std::max(
+      0.0, std::min(points.front().p50, full.p50) - quantile(there.work, 0.5) - there.io - there.client);
+  return out;
+}
+
+void hold_against(const Settings& settings, const Machine& machine, std::size_t most) {
   const Table table({{"posing clients", 14},
                      {"processes"},
                      {"p50 ms"},
@@ -208,10 +249,7 @@ void hold_against(const Settings& settings, const MachineLoad& machine, std::siz
                                     most + std::max<std::size_t>(1, most / 2)};
     for (const std::size_t count : counts) {
       const Measured there = measure(settings, {.posers = count, .processes = processes});
-      MachineLoad load = machine;
-      load.clients = count;
-      load.processes = processes;
-      const Waited here = simulate(load);
+      const Waited here = simulate(machine.with(count, processes));
       table.row({std::to_string(count), std::to_string(processes), fixed(there.p50, 2), fixed(here.p50, 2),
                  fixed(there.p99, 2), fixed(here.p99, 2), fixed(there.shown, 2), fixed(here.shown, 2),
                  fixed(there.cores, 2), fixed(here.cores, 2)});
@@ -227,11 +265,7 @@ std::vector<std::size_t> dealt(std::size_t clients, std::size_t servers) {
   return of;
 }
 
-void plan_fleet(const Settings& settings, MachineLoad machine, double server_ms) {
-  machine.cores = machine.workers = settings.fleet_cores;
-  machine.client = 0;
-  const double work =
-      static_cast<double>(settings.fleet_clients) * settings.rate * server_ms / 1000;  // cores
+void plan_fleet(const Settings& settings, const Machine& machine) {
   const Table table({{std::to_string(settings.fleet_clients) + " clients, servers", 24},
                      {"cores each"},
                      {"processes each"},
@@ -240,19 +274,27 @@ void plan_fleet(const Settings& settings, MachineLoad machine, double server_ms)
                      {"its p99 ms"},
                      {"its cores busy"},
                      {"shown"}});
-  for (const double use : {1.0, 0.9, 0.8, 0.7, 0.6, 0.5}) {
+  const double work = static_cast<double>(settings.fleet_clients) * settings.rate * machine.server.own / 1000;
+  std::size_t before = 0;
+  for (const double use : {1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4}) {
     const auto servers = static_cast<std::size_t>(std::ceil(work / (use * settings.fleet_cores)));
+    if (std::exchange(before, servers) == servers) continue;
     const auto of = dealt(settings.fleet_clients, servers);
-    machine.clients = *std::max_element(of.begin(), of.end());
-    machine.seconds = 3;
+    const std::size_t fullest = *std::max_element(of.begin(), of.end());
     // One I/O thread is to be idle for half of its time.
-    const double io = static_cast<double>(machine.clients) * settings.rate * machine.io / 1000;
-    machine.processes = std::max(1, static_cast<int>(std::ceil(io / kIoUse)));
-    machine.workers = settings.fleet_cores / machine.processes;
-    const Waited waited = simulate(machine);
-    table.row({std::to_string(servers), std::to_string(settings.fleet_cores),
-               std::to_string(machine.processes), std::to_string(machine.clients), fixed(waited.p50, 2),
-               fixed(waited.p99, 2), fixed(waited.cores, 1), fixed(waited.shown, 2)});
+    const double io =
+        static_cast<double>(fullest) * settings.rate * (machine.server.own - mean(machine.load.work)) / 1000;
+    const int processes = std::clamp(static_cast<int>(std::ceil(io / kIoUse)), 1, settings.fleet_cores);
+    MachineLoad load = machine.with(fullest, processes);
+    load.cores = settings.fleet_cores;
+    load.workers = std::max(1, settings.fleet_cores / processes);
+    load.client = 0;
+    load.seconds = 3;
+    const Waited waited = simulate(load);
+    const bool any = waited.shown > 0;
+    table.row({std::to_string(servers), std::to_string(settings.fleet_cores), std::to_string(processes),
+               std::to_string(fullest), any ? fixed(waited.p50, 2) : "", any ? fixed(waited.p99, 2) : "",
+               fixed(waited.cores, 1), fixed(waited.shown, 2)});
   }
 }
 
@@ -268,9 +310,9 @@ bool run(const Settings& settings) {
                      {"server ms/frame"},
                      {"clients ms/frame"},
                      {"holds", -5}});
-  std::vector<Measured> alone;
+  std::vector<Measured> points;  // of clients that pose, the first alone
   const auto show = [&](const Measured& point) {
-    if (point.load.posers == 1 && point.load.watchers == 0 && alone.empty()) alone.push_back(point);
+    if (point.load.watchers == 0) points.push_back(point);
     std::string what = std::to_string(point.load.posers) + " posing";
     if (point.load.watchers > 0) what += ", " + std::to_string(point.load.watchers) + " watching";
     table.row({what, std::to_string(point.vertices), fixed(point.kilobytes, 1), fixed(point.p50, 2),
@@ -299,15 +341,17 @@ bool run(const Settings& settings) {
       cores_here(), posing.load.posers, posing.vertices, settings.rate, watching.load.watchers,
       settings.bound_ms, share, settings.rate, posing.server_ms / 1e3, posing.kilobytes * settings.rate / 1e3,
       100 * share, watching.server_ms / 1e3);
-  const MachineLoad machine = learn(settings, alone.front(), posing);
+  const Machine machine = learn(settings, points, posing);
   std::printf(
-      "\nA simulation with the times of the fullest point (work %.2f ms, I/O %.3f ms, client %.3f ms, on the "
-      "way %.2f "
-      "ms) beside measured points:\n",
-      mean(machine.work), machine.io, machine.client, machine.fixed_ms);
+      "\nA simulation beside measured points, with these times: work %.3f ms a frame; with it, I/O and all "
+      "else %.3f ms and "
+      "%.2f ms shared by a process' clients; the\nclients' own %.3f ms and %.2f ms shared; on the way %.2f "
+      "ms.\n",
+      mean(machine.load.work), machine.server.own, machine.server.shared, machine.client.own,
+      machine.client.shared, machine.load.fixed_ms);
   hold_against(settings, machine, posing.load.posers);
   std::printf("\nThe same for a fleet, clients elsewhere, sessions dealt by hash:\n");
-  plan_fleet(settings, machine, posing.server_ms);
+  plan_fleet(settings, machine);
   return true;
 }
 
