@@ -9,7 +9,7 @@
 #include <ecorche/values/pose.hpp>
 #include <ecorche/values/skeleton.hpp>
 #include <ecorche/values/volumetric_skeleton.hpp>
-#include "app/command.hpp"
+#include "app/program.hpp"
 #include "runtime/spheres/balls.hpp"
 #include "runtime/spheres/seams.hpp"
 

@@ -2,7 +2,7 @@
 // `--bridge`, which every command that poses balls has, and `--no-bridge`.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "app/cli.hpp"
 
 namespace ecorche::app {
 

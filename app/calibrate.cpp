@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <chrono>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 
 #include <ecorche/model_file/model_file.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/correction_report.hpp"
 #include "app/safe_range.hpp"

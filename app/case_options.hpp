@@ -2,9 +2,8 @@
 // What every subcommand that reads a case lets its user say about it.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include <ecorche/io/case_file.hpp>
+#include "app/cli.hpp"
 #include "app/read_budget.hpp"
 
 namespace ecorche::app {

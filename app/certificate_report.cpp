@@ -2,6 +2,7 @@
 #include "app/certificate_report.hpp"
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "preprocess/bounds.hpp"
 

@@ -2,7 +2,7 @@
 // A certificate for readers: every figure with the bound that it keeps, and why that bound.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "preprocess/bounds.hpp"

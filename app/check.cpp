@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include <ecorche/io/case_file.hpp>
 #include "app/case_options.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/drawn_surfaces.hpp"
 #include "preprocess/check/inspect_case.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche cohort`: the arguments of a BIDS App in front of the Snakemake workflow, and nothing else.
 #include <tbb/info.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cctype>
@@ -8,6 +9,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "core/files/atomic_file.hpp"
 #include "core/platform/other_program.hpp"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "app/cli.hpp"
 #include "app/nan_value.hpp"
 #include "core/values/text.hpp"
 #include "io/case/yaml_reader.hpp"

@@ -2,7 +2,7 @@
 // The command line's own words: what is unknown and what was meant, and help pages.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "app/cli_fwd.hpp"
 
 namespace ecorche::app {
 

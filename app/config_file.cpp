@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/cli.hpp"
 #include "app/nan_value.hpp"
 #include "io/case/yaml_reader.hpp"
 

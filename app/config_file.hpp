@@ -2,8 +2,9 @@
 // Options of a command from a file, by the very definitions that read them from the command line.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+#include "app/cli_fwd.hpp"
 
 namespace ecorche::app {
 

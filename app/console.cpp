@@ -4,9 +4,10 @@
 #include <cstdio>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
 #include "app/abandonable.hpp"
-#include "app/command.hpp"
+#include "app/program.hpp"
 #include "core/platform/terminal.hpp"
 
 namespace ecorche::app {

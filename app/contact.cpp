@@ -4,8 +4,10 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "app/balls_of_file.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "runtime/spheres/spatial_index.hpp"
 

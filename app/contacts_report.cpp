@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/contacts_report.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "preprocess/check/touching_limbs.hpp"
 #include "preprocess/parting/cut_contacts.hpp"
 

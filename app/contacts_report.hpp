@@ -2,7 +2,7 @@
 // Limbs that touch, for readers.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include <ecorche/values/model.hpp>

@@ -2,7 +2,7 @@
 // What a model's correction and its safe ranges are, for `info` and `calibrate`.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include <ecorche/values/model.hpp>

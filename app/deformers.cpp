@@ -7,10 +7,12 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include "app/bridge_option.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/unknown_name.hpp"

@@ -3,9 +3,11 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>
 #include "app/balls_of_file.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/export_rig.hpp"
 #include "app/tet_regions.hpp"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>

@@ -3,12 +3,13 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include <ecorche/values/model.hpp>
-#include "app/command.hpp"
 #include "app/motion_source.hpp"
+#include "app/program.hpp"
 
 namespace ecorche::app {
 

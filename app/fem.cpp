@@ -2,6 +2,7 @@
 // `ecorche fem`: `ecorche pose --skinning fem` with all that can be said of the elements.
 #include <memory>
 
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/pose_plan.hpp"
 #include "preprocess/fem/material.hpp"

@@ -2,6 +2,7 @@
 #include "app/fem_pose.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "app/materials_report.hpp"
 #include "app/usage_error.hpp"

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/hang_skeleton.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/model_file/model_file.hpp>
+#include "app/cli.hpp"
 #include "app/point_table.hpp"
 #include "app/usage_error.hpp"
 #include "core/files/atomic_file.hpp"

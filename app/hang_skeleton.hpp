@@ -2,10 +2,11 @@
 // The tree of a volumetric skeleton and what its voxels hang on, as `ecorche thin` is told.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 
-#include "app/command.hpp"
+#include "app/cli_fwd.hpp"
+#include "app/program.hpp"
 #include "app/step_clock.hpp"
 #include "io/surface/volumetric_skeleton_file.hpp"
 #include "preprocess/thin/mask.hpp"

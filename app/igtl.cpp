@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/wire/address.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/igtl/link_server.hpp"
 #include "app/pose_frames.hpp"

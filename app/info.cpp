@@ -2,9 +2,11 @@
 // ecorche info MODEL: what a model holds.
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>
 #include "app/certificate_report.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
 #include "app/correction_report.hpp"

@@ -3,6 +3,7 @@
 #include "core/values/degrees.hpp"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/values/joint_rule.hpp>
 

@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/version.hpp>
 #include "app/abandonable.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/command_line.hpp"
 #include "app/signals.hpp"

@@ -2,6 +2,7 @@
 #include "app/materials_report.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace ecorche::app {
 

@@ -2,7 +2,7 @@
 // How stiff a model's flesh is, for `info` and `fem`.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

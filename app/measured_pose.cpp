@@ -2,6 +2,7 @@
 #include "app/measured_pose.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "runtime/settle/carry_tissues.hpp"
 #include "runtime/settle/unfold.hpp"

@@ -3,6 +3,7 @@
 
 #include <sstream>
 
+#include "app/cli.hpp"
 #include "core/values/text.hpp"
 #include "preprocess/tet/mesher.hpp"
 

@@ -2,12 +2,12 @@
 // How finely a body is prepared, for every subcommand that prepares one.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <ecorche/preprocess/pipeline.hpp>
+#include "app/cli_fwd.hpp"
 
 namespace ecorche::app {
 

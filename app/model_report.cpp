@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/model_report.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include <ecorche/values/joint_rule.hpp>
 
 namespace ecorche::app {

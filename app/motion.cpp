@@ -3,8 +3,10 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
 #include "app/text_line.hpp"

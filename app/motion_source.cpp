@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include <ecorche/values/error.hpp>
+#include "app/cli.hpp"
 #include "app/marker_source.hpp"
 #include "app/read_budget.hpp"
 #include "app/usage_error.hpp"

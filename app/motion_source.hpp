@@ -9,7 +9,8 @@
 
 #include <ecorche/values/pose.hpp>
 #include <ecorche/values/skeleton.hpp>
-#include "app/command.hpp"
+#include "app/cli_fwd.hpp"
+#include "app/program.hpp"
 #include "core/kinematics/retarget.hpp"
 #include "io/motion/clip_file.hpp"
 

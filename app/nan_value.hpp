@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <string>
+
+#include "app/cli.hpp"
 
 namespace ecorche::app {
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche new`: a scan in, a case out, with all that was decided in words.
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/scan/case_text.hpp"
 #include "app/scan/new_case.hpp"

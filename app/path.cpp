@@ -3,8 +3,10 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "app/balls_of_file.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "core/files/atomic_file.hpp"
 #include "runtime/spheres/spatial_index.hpp"

@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/io/case_file.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/phantom_scan.hpp"
 #include "core/files/atomic_file.hpp"

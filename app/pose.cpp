@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include <ecorche/io/case_file.hpp>
@@ -15,6 +15,7 @@
 #include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
 #include "app/bridge_option.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/measured_pose.hpp"
 #include "app/pose_frames.hpp"

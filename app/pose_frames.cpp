@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/io/pose_library.hpp>
 #include <ecorche/values/error.hpp>
+#include "app/cli.hpp"
 #include "app/solved_pose.hpp"
 #include "app/usage_error.hpp"
 

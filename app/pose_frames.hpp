@@ -9,8 +9,9 @@
 
 #include <ecorche/values/pose.hpp>
 #include <ecorche/values/skeleton.hpp>
-#include "app/command.hpp"
+#include "app/cli_fwd.hpp"
 #include "app/motion_source.hpp"
+#include "app/program.hpp"
 #include "app/solved_pose.hpp"
 
 namespace ecorche::app {

@@ -2,7 +2,7 @@
 // What `ecorche pose` says of a posed body.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include <ecorche/runtime/body_poser.hpp>

@@ -2,7 +2,7 @@
 // What is against a posed body, in words: which figure, by how much, where, and what to do.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 
 #include <ecorche/runtime/body_poser.hpp>

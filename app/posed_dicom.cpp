@@ -2,6 +2,7 @@
 #include "app/posed_dicom.hpp"
 
 #include <ecorche/version.hpp>
+#include "app/cli.hpp"
 #include "app/read_budget.hpp"
 #include "app/usage_error.hpp"
 

@@ -2,13 +2,13 @@
 // What commands that write images as DICOM let their user say, and how posed volumes become files.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <functional>
 #include <string>
 
 #include <ecorche/values/model.hpp>
-#include "app/command.hpp"
+#include "app/cli_fwd.hpp"
+#include "app/program.hpp"
 #include "core/files/read_options.hpp"
 #include "io/image/dicom_writer.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/preprocess/pipeline.hpp>
-#include "app/command.hpp"
+#include "app/program.hpp"
 
 namespace ecorche::app {
 

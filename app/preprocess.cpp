@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "app/case_options.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/mesh_options.hpp"
 #include "app/model_report.hpp"

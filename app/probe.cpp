@@ -5,11 +5,13 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/probe.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/point_table.hpp"
 #include "app/pose_frames.hpp"

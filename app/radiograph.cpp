@@ -4,11 +4,13 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/radiograph_scan.hpp>
 #include <ecorche/version.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/radiograph_setup.hpp"

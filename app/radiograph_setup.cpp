@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <ecorche/values/error.hpp>
+#include "app/cli.hpp"
 #include "app/unknown_name.hpp"
 #include "app/usage_error.hpp"
 #include "core/values/degrees.hpp"

@@ -2,13 +2,13 @@
 // Where source and detector of `ecorche radiograph` stand.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <ecorche/runtime/radiograph_choice.hpp>
 #include <ecorche/values/model.hpp>
+#include "app/cli_fwd.hpp"
 
 namespace ecorche::app {
 

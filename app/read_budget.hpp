@@ -2,9 +2,8 @@
 // What every subcommand that reads foreign files lets its user say about their size.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
-#include "app/command.hpp"
+#include "app/cli.hpp"
+#include "app/program.hpp"
 #include "core/files/read_options.hpp"
 #include "io/image/image_choice.hpp"
 

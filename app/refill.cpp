@@ -4,10 +4,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "app/balls_of_file.hpp"
 #include "app/bridge_option.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/posed_dicom.hpp"

@@ -2,7 +2,9 @@
 #include "app/relax_pose.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
+#include "app/cli.hpp"
 #include "app/fem_pose.hpp"
 #include "app/usage_error.hpp"
 #include "runtime/settle/settle_flesh.hpp"

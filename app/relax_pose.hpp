@@ -2,10 +2,10 @@
 // What moves flesh after skinning: --unfold, --settle, and finite elements.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
+#include "app/cli_fwd.hpp"
 #include "app/measured_pose.hpp"
 #include "app/pose_plan.hpp"
 

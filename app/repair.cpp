@@ -2,6 +2,7 @@
 // `ecorche repair`: a case in, a mended case out, and a list of what was done.
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <nlohmann/json.hpp>
 
 #include <cmath>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/values/error.hpp>
 #include "app/case_options.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "preprocess/check/surface_figures.hpp"
 #include "preprocess/geometry/hole_size.hpp"

@@ -2,6 +2,7 @@
 #include "app/replay.hpp"
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <utility>

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include <ecorche/client/client.hpp>
-#include "app/command.hpp"
+#include "app/program.hpp"
 
 namespace ecorche::app {
 

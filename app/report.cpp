@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <ecorche/model_file/model_file.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/report/cohort_page.hpp"
 #include "app/report/page.hpp"

@@ -2,9 +2,11 @@
 // `ecorche rig CASE`: the joints of a case, found in seconds, before anything else is prepared.
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/io/case_file.hpp>
 #include "app/case_options.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/joint_json.hpp"
 #include "core/files/atomic_file.hpp"

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <stop_token>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/version.hpp>
 #include <ecorche/wire/address.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/config_file.hpp"
 #include "app/json_log.hpp"

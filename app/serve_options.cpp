@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "app/cli.hpp"
+
 namespace ecorche::app {
 namespace {
 

@@ -2,10 +2,10 @@
 // What `ecorche serve` may be told: declared here once, for the command line and the configuration file.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
+#include "app/cli_fwd.hpp"
 #include "runtime/server/resources/options.hpp"
 
 namespace ecorche::app {

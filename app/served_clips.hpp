@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <ecorche/values/skeleton.hpp>
-#include "app/command.hpp"
+#include "app/program.hpp"
 #include "runtime/server/session/clip.hpp"
 
 namespace ecorche::app {

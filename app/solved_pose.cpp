@@ -4,6 +4,7 @@
 #include "core/values/degrees.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <ecorche/kinematics/forward.hpp>
 #include "io/case/ik_file.hpp"

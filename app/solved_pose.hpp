@@ -7,7 +7,7 @@
 
 #include <ecorche/values/pose.hpp>
 #include <ecorche/values/skeleton.hpp>
-#include "app/command.hpp"
+#include "app/program.hpp"
 
 namespace ecorche::app {
 

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <optional>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include <ecorche/client/client.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/version.hpp>
 #include <ecorche/wire/convert.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/motion_source.hpp"
 #include "app/replay.hpp"

@@ -2,6 +2,7 @@
 #include "app/stream_text.hpp"
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 namespace ecorche::app {
 namespace {

@@ -2,7 +2,7 @@
 // The report of `ecorche stream` for people.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace ecorche::app {

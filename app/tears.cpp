@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -13,6 +14,7 @@
 #include <ecorche/kinematics/forward.hpp>
 #include "app/balls_of_file.hpp"
 #include "app/bridge_option.hpp"
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/pose_frames.hpp"
 #include "app/usage_error.hpp"

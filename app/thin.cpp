@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/hang_skeleton.hpp"
 #include "app/read_budget.hpp"

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include <ecorche/model_file/model_file.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/images_back.hpp"
 #include "app/posed_tets.hpp"

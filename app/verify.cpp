@@ -2,11 +2,13 @@
 // ecorche verify MODEL: digests, invariants and the certificate, all measured again.
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/preprocess/pipeline.hpp>
+#include "app/cli.hpp"
 #include "app/command.hpp"
 #include "app/contacts_report.hpp"
 #include "app/model_report.hpp"

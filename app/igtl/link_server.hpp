@@ -10,10 +10,10 @@
 #include <span>
 #include <string>
 
-#include "app/command.hpp"
 #include "app/igtl/peer.hpp"
 #include "app/igtl/posed_messages.hpp"
 #include "app/igtl/tracked_pose.hpp"
+#include "app/program.hpp"
 
 namespace ecorche::app::igtl {
 

@@ -52,6 +52,8 @@ void read_status(const Json& status, Participant& out) {
   for (const auto& [name, value] : status.at("figures").items())
     out.figures.emplace_back(name, value.is_number() ? value.get<double>() : kNone);
   for (const Json& row : status.at("poses")) out.poses.push_back(posed_row(row));
+  for (const Json& row : status.value("left_out", Json::array()))
+    out.left_out.push_back({row.at("pose"), row.at("why")});
   if (!status.at("ok")) {
     const Json& failed = status.at("failed");
     out.state = Participant::State::failed;
@@ -212,7 +214,8 @@ std::string to_json(const std::vector<Participant>& cohort, const std::vector<Fi
     const Participant& one = cohort[i];
     ++counts[state_name(one.state)];
     Json row{{"participant_id", one.name},     {"status", state_name(one.state)}, {"repaired", one.repaired},
-             {"least_joint", one.least_joint}, {"warnings", one.warnings},        {"poses", Json::array()}};
+             {"least_joint", one.least_joint}, {"warnings", one.warnings},        {"poses", Json::array()},
+             {"left_out", Json::array()}};
     for (const PosedRow& pose : one.poses) {
       row["poses"].push_back({{"pose", pose.pose},
                               {"verdict", pose.pass ? "pass" : "warn"},
@@ -224,6 +227,8 @@ std::string to_json(const std::vector<Participant>& cohort, const std::vector<Fi
                               {"warnings", pose.warnings},
                               {"worst", pose.worst}});
     }
+    for (const LeftOutPose& pose : one.left_out)
+      row["left_out"].push_back({{"pose", pose.pose}, {"why", pose.why}});
     if (one.state == Participant::State::failed) {
       row["failed"] = {{"step", one.step},   {"fault", one.fault}, {"exit_code", one.exit_code},
                        {"where", one.where}, {"what", one.what},   {"mend", one.mend}};

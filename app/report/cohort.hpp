@@ -18,6 +18,11 @@ struct PosedRow {
   std::string worst;    ///< the first of them
 };
 
+/// A pose of the library that has none of the body's joints.
+struct LeftOutPose {
+  std::string pose, why;
+};
+
 struct Participant {
   enum class State : unsigned char {
     pass,        ///< every pose keeps its limits
@@ -34,6 +39,7 @@ struct Participant {
   std::string least_joint;                              ///< the joint that is surest of least
   std::vector<std::string> warnings;                    ///< of the preparation
   std::vector<PosedRow> poses;
+  std::vector<LeftOutPose> left_out;
   /// Of the preparation, measured: another run has others. NaN where it is not known.
   double seconds = std::numeric_limits<double>::quiet_NaN(), peak_mib = seconds;
   std::string picture;  ///< the bytes of a PNG; empty: none

@@ -203,6 +203,8 @@ std::string table(const std::vector<Participant>& cohort, const std::vector<Figu
         if (!row.pass) why += (why.empty() ? "" : ", ") + escaped(row.pose);
       }
     }
+    for (const LeftOutPose& pose : one.left_out)
+      why += (why.empty() ? "" : ", ") + escaped(pose.pose) + " <span class=soft>left out</span>";
     out += "<td class=why data-of=reason>" + why;
     for (const Figure& figure : figures) {
       const double x = figure.of[i];
@@ -239,6 +241,9 @@ std::string pose_section(const Participant& one) {
                 row.warnings) +
            "<td class=why>" + escaped(row.worst) + "</tr>\n";
   }
+  for (const LeftOutPose& pose : one.left_out)
+    out += "<tr><td>" + escaped(pose.pose) + "<td class=soft>left out<td colspan=4><td class=why>" +
+           escaped(pose.why) + "</tr>\n";
   return out + "</table>\n";
 }
 

@@ -27,6 +27,7 @@ table{border-collapse:collapse;width:100%}th{text-align:left;font-weight:600;col
 td,th{padding:.18rem .7rem .18rem 0;vertical-align:top;border-bottom:1px solid var(--line)}
 td:nth-child(3){white-space:nowrap}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .why,.soft,figcaption{color:var(--soft);font-size:.87rem}.bad{color:var(--bad);font-weight:600}.good{color:var(--good)}
+@media(max-width:40rem){table{display:block;overflow-x:auto}.why{min-width:16rem}}
 .row{display:flex;flex-wrap:wrap;gap:1.2rem;align-items:flex-start}figure{margin:0}img{max-width:100%;height:auto;border-radius:4px;display:block}
 .key span{display:inline-block;margin:0 .9rem .2rem 0;white-space:nowrap}.key i{display:inline-block;width:.85em;height:.85em;border-radius:2px;margin-right:.35em;vertical-align:-.08em}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(17rem,1fr));gap:1rem 2rem}svg{width:100%}svg text{font-size:10px;fill:var(--soft)}

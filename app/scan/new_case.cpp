@@ -2,7 +2,9 @@
 #include "app/scan/new_case.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "app/cli.hpp"
 #include "app/scan/unread_files.hpp"
 
 namespace ecorche::app {

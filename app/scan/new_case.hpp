@@ -2,10 +2,10 @@
 // A scan's files in, a case's files out: what `new` does, and `pose --scan` on its way.
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
-#include "app/command.hpp"
+#include "app/cli_fwd.hpp"
+#include "app/program.hpp"
 #include "app/read_budget.hpp"
 #include "app/scan/case_folder.hpp"
 

@@ -2,7 +2,9 @@
 #include "app/scan/posed_scan.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "app/cli.hpp"
 #include "app/prepare_model.hpp"
 #include "core/files/scratch_folder.hpp"
 #include "core/platform/heap.hpp"

@@ -2,12 +2,12 @@
 // `pose --scan`: from the files of a scan to a model, with nothing left between.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
-#include "app/command.hpp"
+#include "app/cli_fwd.hpp"
 #include "app/mesh_options.hpp"
+#include "app/program.hpp"
 #include "app/scan/new_case.hpp"
 
 namespace ecorche::app {
