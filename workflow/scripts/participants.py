@@ -2,9 +2,12 @@
 """Who is in a cohort: a BIDS tree, or a table participants.tsv with the columns participant_id, files and options."""
 import csv
 import dataclasses
+import os
 import pathlib
 import re
 import shlex
+
+import yaml
 
 ID = re.compile(r"^sub-[0-9A-Za-z]+$")
 IMAGES = (".nii", ".nii.gz", ".nrrd", ".mha", ".seg.nrrd")
@@ -24,6 +27,7 @@ class Participant:
     id: str
     sources: list  # paths as the command line is given them: one case, or the files of a scan
     options: list  # words for `ecorche preprocess`
+    data: str = ""  # the folder of a case's files with `root: data`
 
     @property
     def is_case(self):
@@ -31,12 +35,37 @@ class Participant:
                                            or not self.sources[0].exists() and not self.sources[0].name.endswith(IMAGES))
 
     def files(self):
-        """Every file that a source holds, those that exist, in an order that is always the same."""
+        """Every file that a source holds or a case names, those that exist, in an order that is always the same."""
         out = []
         for source in self.sources:
             folder = source.parent if source.name == "case.yaml" else source
-            out += [path for path in sorted(folder.rglob("*")) if path.is_file() and not hidden(path, folder)] if folder.is_dir() else [source]
+            out += inside(folder) if folder.is_dir() else [source]
+        if self.is_case:
+            out += [path for named in self.named(self.case) for path in (inside(named) if named.is_dir() else [named])]
         return [path for path in dict.fromkeys(out) if path.is_file()]
+
+    @property
+    def case(self):
+        return self.sources[0] if self.sources[0].name.endswith(".yaml") else self.sources[0] / "case.yaml"
+
+    def named(self, case):
+        """What a case names elsewhere: below the folder of data, or by a way out of its own folder. Its faults are for `ecorche check` to tell."""
+        try:
+            entries = [yaml.safe_load(case.read_text())]
+        except (OSError, UnicodeDecodeError, yaml.YAMLError):
+            return []
+        out = []
+        while entries:
+            entry = entries.pop()
+            entries += entry.values() if isinstance(entry, dict) else entry if isinstance(entry, list) else []
+            if isinstance(entry, dict):
+                root = self.data if entry.get("root") == "data" else case.parent
+                out += [pathlib.Path(os.path.normpath(os.path.join(root, entry[key]))) for key in ("file", "table") if root and isinstance(entry.get(key), str)]
+        return sorted({path for path in out if not path.is_relative_to(case.parent)})
+
+
+def inside(folder):
+    return [path for path in sorted(folder.rglob("*")) if path.is_file() and not hidden(path, folder)]
 
 
 def hidden(path, folder):
@@ -86,7 +115,7 @@ def in_tree(bids, name):
     return found + tables
 
 
-def read(bids, validate, labels=()):
+def read(bids, validate, labels=(), data=""):
     """All participants, or those of `labels` (with or without sub-), by name. Throws Refused."""
     bids = pathlib.Path(bids)
     if not bids.exists():
@@ -110,5 +139,5 @@ def read(bids, validate, labels=()):
         given = [root / word.strip() for word in row["files"].split(";") if word.strip()] if "files" in row else in_tree(root, name)
         # Nothing there: the path that was looked for stands for it, so that the step that reads it says what is missing.
         sources = [path.resolve() for path in given or [root / name / "case.yaml"]]
-        out.append(Participant(name, sources, shlex.split(row.get("options", "").replace("=", " "))))
+        out.append(Participant(name, sources, shlex.split(row.get("options", "").replace("=", " ")), data))
     return out

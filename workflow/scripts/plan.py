@@ -21,6 +21,7 @@ import samples
 import step_forks
 
 ATTEMPTS = 3  # of a step that its machine failed
+MOST_NAMED = 100  # participants whose locks one run holds, an open file each
 
 
 class Plan:
@@ -41,8 +42,11 @@ class Plan:
         self.out = pathlib.Path(self.config["out"]).resolve()
         bids = pathlib.Path(self.config["bids"]).resolve()
         self.root = str(bids.parent if bids.is_file() else bids)
-        labels = [label for label in self.config.get("labels", "").split(",") if label]
-        people = participants.read(bids, lambda row: self.against("participants", row), labels)
+        self.labels = [label for label in self.config.get("labels", "").split(",") if label]
+        self.data = os.path.abspath(os.path.join(self.config.get("from", os.getcwd()), self.config["data"])) if self.config["data"] else ""
+        if self.data and not os.path.isdir(self.data):
+            raise participants.Refused("configuration: data", f"no folder {self.data}", "give its path from the folder where you are", 66)
+        people = participants.read(bids, lambda row: self.against("participants", row), self.labels, self.data)
         self.people = {one.id: one for one in people}
         self.threads = self.config["threads"]
         # Samples of few participants are made side by side by all processors of this machine.
@@ -90,13 +94,20 @@ class Plan:
             raise participants.Refused(self.ecorche, f"does not run: {error}", "name the program with --config ecorche=PATH", 66) from None
 
     def lock(self):
-        """One run at a time in a folder. The lock goes with the process: a killed run leaves none."""
+        """One run at a time in a folder; or several, as tasks of a job array are, each of other participants, which it names, and of no group. A
+        lock goes with the process: a killed run leaves none."""
+        some = self.labels and self.levels == ["participant"] and len(self.people) <= MOST_NAMED
+        self.held = [self.locked("lock", self.out, fcntl.LOCK_SH if some else fcntl.LOCK_EX)]
+        self.held += [self.locked(f"lock-{name}", f"{self.out}/{name}", fcntl.LOCK_EX) for name in self.people] if some else []
+
+    def locked(self, name, what, how):
         (self.out / ".cohort").mkdir(parents=True, exist_ok=True)
-        self.held = open(self.out / ".cohort/lock", "w")
+        file = open(self.out / ".cohort" / name, "w")
         try:
-            fcntl.flock(self.held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, how | fcntl.LOCK_NB)
         except OSError:
-            raise participants.Refused(self.out, "another run of this cohort is at work here", "wait for its end, or name another folder", 75) from None
+            raise participants.Refused(what, "another run of this cohort is at work here", "wait for its end, or name another folder", 75) from None
+        return file
 
     def bound_memory(self):
         """All jobs of this machine together take no more than it has; on a cluster every node sees to that itself."""
@@ -113,9 +124,9 @@ class Plan:
         scan = lambda who: [] if self.is_case(who) else ["new"]  # noqa: E731
         depends = {
             "new": lambda who: {"files": self.sources(who)},
-            "check": lambda who: {"files": self.sources(who), "is_case": self.is_case(who), "root": self.root,
+            "check": lambda who: {"files": self.sources(who), "is_case": self.is_case(who), "root": self.root, "data": self.data_of(who),
                                   "repair": self.config["repair"] is not False, "after": scan(who)},
-            "repair": lambda who: {"repair": self.config["repair"] is not False, "words": self.repair_words(), "after": ["check"]},
+            "repair": lambda who: {"repair": self.config["repair"] is not False, "words": self.repair_words(), "data": self.data_of(who), "after": ["check"]},
             "preprocess": lambda who: {"words": self.preprocess_words(who), "cache_gib": self.config["cache_gib"], "after": ["repair"]},
             "verify": lambda who: {"after": ["preprocess"]},
             "pose": lambda pose: {"words": self.pose_words(pose), "after": ["verify"]},
@@ -136,10 +147,16 @@ class Plan:
     def is_case(self, participant):
         return self.people[participant].is_case
 
+    def data_of(self, participant):
+        """Where a case of one's own may have files; `ecorche new` makes none that does."""
+        return self.data if self.is_case(participant) else ""
+
     def preprocess_words(self, participant):
         """Those of the table come last and win."""
         own = self.people[participant].options
         common = {f"--{name}": value for name, value in self.config["preprocess"].items() if f"--{name}" not in own}
+        if self.data_of(participant):
+            common["--data"] = self.data
         return [word for name, value in sorted(common.items()) for word in (name, str(value))] + own
 
     def repair_words(self):

@@ -24,6 +24,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import record  # noqa: E402
 
 DATA_FAULTS = {64, 65, 66, 77, 78}
+NOT_ITS_POSE = "has none of the joints of the pose"  # what `ecorche pose` says where a leg is to raise its arms
 STOPPED = {130, 143}  # somebody wants an end: neither tried again at once nor written down
 
 
@@ -162,6 +163,9 @@ class Step:
             return {"kind": "internal", "where": self.name, "what": what, "mend": f"see log/{self.name}.log"}
         return {"kind": "internal", "where": self.name, "what": lines[-1] if lines else f"ended with {code}", "mend": f"see log/{self.name}.log"}
 
+    def data_words(self):
+        return ["--data", self.given["data"]] if self.given.get("data") else []
+
     def keep(self, name, found):
         record.write_text(self.folder / name, json.dumps(found, indent=1, sort_keys=True) + "\n")
 
@@ -182,11 +186,11 @@ def check(step):
     """An error that check finds is a fact, not an end, where repair may come."""
     import participants
     case = step.given["files"][0] if step.given["is_case"] else step.fact("case")
-    inputs = participants.Participant(step.options.participant, [pathlib.Path(path) for path in step.given["files"]], []).files()
+    inputs = participants.Participant(step.options.participant, [pathlib.Path(path) for path in step.given["files"]], [], step.given.get("data", "")).files()
     step.fresh("check.json")
     facts = {"case": case, "sound": True, "inputs": record.digests(inputs, step.given["root"])}
     try:
-        found = step.call("check", case)
+        found = step.call("check", case, *step.data_words())
     except Fault as fault:
         if fault.code != 65 or not step.given["repair"]:
             step.keep("check.json", {"ok": False, "error": {**fault.said, "exit_code": fault.code}})
@@ -201,8 +205,8 @@ def repair(step):
     step.fresh("mended", "repair.json")
     if step.fact("sound") or not allowed:
         return [], {"case": case}
-    step.keep("repair.json", step.call("repair", case, "-o", "mended", *step.given["words"]))
-    step.call("check", "mended")
+    step.keep("repair.json", step.call("repair", case, "-o", "mended", *step.given["words"], *step.data_words()))
+    step.call("check", "mended", *step.data_words())
     return ["mended", "repair.json"], {"case": "mended"}
 
 
@@ -229,7 +233,12 @@ def pose(step):
     target = f"posed/{name}"
     step.fresh(target)
     (step.folder / "posed").mkdir(exist_ok=True)
-    step.call("pose", "model.hdf", "-o", target, *step.given["words"])
+    try:
+        step.call("pose", "model.hdf", "-o", target, *step.given["words"])
+    except Fault as fault:
+        if not fault.said["what"].startswith(NOT_ITS_POSE):
+            raise
+        return [], {"left_out": f"{fault.said['where']}: {fault.said['what']}"}
     return [target], {}
 
 

@@ -31,7 +31,7 @@ def pose_rows(folder, name):
 
 def of(folder, participant, after, before):
     failed = next((record for record in before if not record["ok"]), None)
-    out = {"participant": participant, "ok": failed is None, "failed": None, "figures": {}, "least_joint": "", "warnings": [], "poses": [],
+    out = {"participant": participant, "ok": failed is None, "failed": None, "figures": {}, "least_joint": "", "warnings": [], "poses": [], "left_out": [],
            "repaired": (folder / "mended").is_dir()}
     if failed:
         out["failed"] = {"step": failed["step"], "fault": failed["fault"], **failed["error"]}
@@ -40,7 +40,11 @@ def of(folder, participant, after, before):
     out["figures"] = {name: find(made) for name, find in FIGURES.items()}
     out["least_joint"] = min(made["rig"], key=lambda fit: fit["confidence"])["joint"] if made["rig"] else ""
     out["warnings"] = made["warnings"]
-    out["poses"] = [row for name in after if name.startswith("pose-") for row in pose_rows(folder, name.partition("-")[2])]
+    for name, record in zip(after, before):
+        if name.startswith("pose-"):
+            pose, why = name.partition("-")[2], record["facts"].get("left_out")
+            out["left_out"] += [{"pose": pose, "why": why}] if why else []
+            out["poses"] += [] if why else pose_rows(folder, pose)
     return out
 
 

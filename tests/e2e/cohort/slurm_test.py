@@ -95,6 +95,24 @@ class OnSlurm(unittest.TestCase):
         self.assertEqual(sorted(found), sorted(whole))
         self.assertEqual([name for name in whole if found[name] != whole[name]], [])
 
+    def test_an_array_of_the_readers_own(self):
+        page = (cohort_test.ROOT / "docs/how-to/cohort.md").read_text()
+        (self.folder / "array.sh").write_text(re.search(r"```text\n(#!/bin/sh\n#SBATCH.*?)```", page, re.DOTALL)[1])
+        commands = re.search(r"```sh\n(ls bids .*?)```", page, re.DOTALL)[1]
+        (self.folder / "bids/participants.tsv").unlink()  # all of a size
+        alone = self.folder / "alone"
+        subprocess.run(list(map(str, [cohort_test.ECORCHE, "--threads", "2", "cohort", self.folder / "bids", alone, "participant", "group",
+                                      "--config", self.folder / "cohort.yaml"])), check=True, capture_output=True, cwd=self.folder)
+        with slurm_node.SlurmNode(self.folder / "slurm") as node:
+            path = f"{pathlib.Path(cohort_test.ECORCHE).parent}:{node.env['PATH']}"
+            done = subprocess.run(["sh", "-ec", commands], env={**node.env, "PATH": path}, cwd=self.folder, capture_output=True, text=True, timeout=300)
+            self.assertEqual(done.returncode, 0, done.stderr[-3000:])
+            states = [job["JobState"] for job in node.jobs().values()]
+        self.assertEqual(states, ["COMPLETED"] * 4)
+        whole, found = kept(alone), kept(self.folder / "results")
+        self.assertEqual(sorted(found), sorted(whole))
+        self.assertEqual([name for name in whole if found[name] != whole[name]], [])
+
     def until(self, found, process, seconds=120):
         end = time.monotonic() + seconds
         while time.monotonic() < end:

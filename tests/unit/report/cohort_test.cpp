@@ -133,7 +133,8 @@ class StatusFile : public ::testing::Test {
   const std::string good =
       R"({"participant": "sub-07", "ok": true, "failed": null, "figures": {"tets": 12}, "least_joint": "knee", "warnings": ["w"],
       "repaired": true, "poses": [{"pose": "a", "verdict": "pass", "inverted_rest_mm3": 1, "inverted_share": 0, "min_det_f": 1,
-      "volume_change": 0, "unsigned_volume_change": 0, "warnings": 0, "worst": ""}]})";
+      "volume_change": 0, "unsigned_volume_change": 0, "warnings": 0, "worst": ""}],
+      "left_out": [{"pose": "b", "why": "a <leg>"}]})";
   fs::path folder;
 };
 
@@ -148,6 +149,12 @@ TEST_F(StatusFile, IsReadWithItsTimes) {
   EXPECT_EQ(one.figure("tets"), 12);
   EXPECT_TRUE(std::isnan(one.figure("nodes")));
   EXPECT_TRUE(one.repaired);
+  ASSERT_EQ(one.left_out.size(), 1U);
+  EXPECT_NE(pose_section(one).find("<td>b<td class=soft>left out<td colspan=4><td class=why>a &lt;leg&gt;"),
+            std::string::npos);
+  EXPECT_NE(group_page({one}, figures_of({one})).find("b <span class=soft>left out</span>"),
+            std::string::npos);
+  EXPECT_NE(to_json({one}, {}).find("a <leg>"), std::string::npos);
 }
 
 TEST_F(StatusFile, EveryPrefixOfOneIsRefusedByItsName) {
