@@ -4,6 +4,7 @@
 Directives (HTML comments, so that readers do not see them):
 
     <!-- docs-test: needs=phantom,model -->  of the page: what lies in the folder before the first block (WANTS below)
+    <!-- docs-test: seconds=1200 -->         of the page: how long its commands may take together (default: 280)
     <!-- docs-test: background=7070 -->      the next block runs beside those that follow, which wait until its port answers
     <!-- docs-test: fails=1 -->              the next block ends with this exit code
     <!-- docs-test: skip=WHY -->             the next block is not run (its options are looked up all the same)
@@ -25,7 +26,7 @@ import time
 from documentation import program
 from documentation.pages import ROOT
 
-SECONDS = 280  # a page's commands, all together; on an idle machine none needs half a minute
+SECONDS = 280  # a page's commands, all together; on an idle machine few need half a minute
 
 
 def put_phantom(folder):
@@ -54,7 +55,12 @@ def put_repository(folder):
             (folder / path.name).symlink_to(path)
 
 
-WANTS = {"phantom": put_phantom, "model": put_model, "surfaces": put_surfaces, "repository": put_repository}
+def put_clone(folder):
+    """The folder is a copy of the repository's sources, in which one may build."""
+    shutil.copytree(ROOT, folder, dirs_exist_ok=True, symlinks=True, ignore=shutil.ignore_patterns(".git", "build", "node_modules", "__pycache__"))
+
+
+WANTS = {"phantom": put_phantom, "model": put_model, "surfaces": put_surfaces, "repository": put_repository, "clone": put_clone}
 _made = {}
 
 
@@ -77,11 +83,13 @@ def clean():
 
 def problems_of(page):
     """Of the directives, then the first block that does not do what it should."""
-    wanted, problems = [], []
+    wanted, problems, seconds = [], [], SECONDS
     for directive in page.directives:
         kind, _, value = directive.partition("=")
         if kind == "needs":
             wanted += value.split(",")
+        elif kind == "seconds" and value.isdigit():
+            seconds = int(value)
         elif not (kind in ("background", "fails") and value.isdigit() or kind == "skip" and value or directive.startswith("run\n")):
             problems.append((1, f"unknown directive 'docs-test: {directive.splitlines()[0]}'"))
     problems += [(1, f"needs '{name}' (known: {', '.join(WANTS)})") for name in wanted if name not in WANTS]
@@ -93,7 +101,7 @@ def problems_of(page):
         folder = pathlib.Path(scratch)
         for name in wanted:
             WANTS[name](folder)
-        return run_in(folder, script_of(page))
+        return run_in(folder, script_of(page), seconds)
 
 
 def script_of(page):
@@ -129,8 +137,10 @@ def own_loopback():
         return []
 
 
-def run_in(folder, script):
-    environment = dict(os.environ, PATH=f"{program.binary().parent}:/usr/bin:{os.environ['PATH']}", HOME=str(folder))
+def run_in(folder, script, seconds):
+    # Pages that build find what the repository's own build left in the compiler's cache.
+    environment = dict(os.environ, PATH=f"{program.binary().parent}:/usr/bin:{os.environ['PATH']}", HOME=str(folder), CCACHE_BASEDIR=str(folder),
+                       CCACHE_NOHASHDIR="1", CCACHE_DIR=os.environ.get("CCACHE_DIR") or str(pathlib.Path.home() / ".cache/ccache"))
     heard, said = os.pipe()
     with tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen([*own_loopback(), "bash", "-c", f"exec 3>&{said}\n" + script], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
@@ -138,7 +148,7 @@ def run_in(folder, script):
         os.close(said)
         begun = time.monotonic()
         try:
-            code = process.wait(SECONDS)
+            code = process.wait(seconds)
         except subprocess.TimeoutExpired:
             code = None
         finally:
