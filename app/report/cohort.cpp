@@ -67,7 +67,8 @@ void read_status(const Json& status, Participant& out) {
   }
   const bool pass =
       std::all_of(out.poses.begin(), out.poses.end(), [](const PosedRow& row) { return row.pass; });
-  out.state = pass ? Participant::State::pass : Participant::State::warn;
+  const bool posed = !out.poses.empty() || out.left_out.empty();
+  out.state = pass && posed ? Participant::State::pass : Participant::State::warn;
 }
 
 double median_of(std::vector<double> values) {

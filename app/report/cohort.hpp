@@ -26,7 +26,7 @@ struct LeftOutPose {
 struct Participant {
   enum class State : unsigned char {
     pass,        ///< every pose keeps its limits
-    warn,        ///< some pose does not
+    warn,        ///< some pose does not, or it can take none
     failed,      ///< it has no model, or not every pose
     unfinished,  ///< nobody has run it to its end
   };

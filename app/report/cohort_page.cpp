@@ -98,7 +98,8 @@ std::string counts(const std::vector<Participant>& cohort) {
     out += text("<span class=%s><b>%d</b>%s</span>", tone(state), of[state], state_name(state));
   }
   return out +
-         "</div>\n<p class=soft>pass: every pose keeps its limits. warn: some pose does not. failed: it has "
+         "</div>\n<p class=soft>pass: every pose keeps its limits. warn: some pose does not, or it can take "
+         "none. failed: it has "
          "no "
          "model, or not every pose. For training and education, not for planning surgery.</p>\n";
 }

@@ -157,6 +157,16 @@ TEST_F(StatusFile, IsReadWithItsTimes) {
   EXPECT_NE(to_json({one}, {}).find("a <leg>"), std::string::npos);
 }
 
+TEST_F(StatusFile, WhoCanTakeNoPoseDoesNotPass) {
+  std::string none = good;
+  none.replace(none.find(R"([{"pose": "a")"), none.find("\"left_out\"") - none.find(R"([{"pose": "a")"),
+               "[], ");
+  write("status.json", none);
+  EXPECT_EQ(read_participant(folder).state, Participant::State::warn);
+  write("status.json", none.replace(none.find(R"([{"pose": "b")"), std::string::npos, "[]}"));
+  EXPECT_EQ(read_participant(folder).state, Participant::State::pass);
+}
+
 TEST_F(StatusFile, EveryPrefixOfOneIsRefusedByItsName) {
   for (std::size_t length = 0; length < good.size(); length += 3) {
     write("status.json", good.substr(0, length));
