@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/skin/body_parts.hpp"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -9,6 +10,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "runtime/skin/skin_clusters.hpp"
@@ -20,28 +22,45 @@ constexpr std::size_t kBoneVerticesPerBlock = 2048;  // a multiple of any vector
 // Of the mask of clusters.
 constexpr std::size_t kWordsPerSlab = NodeClusters::slab / NodeClusters::size / 64;
 static_assert(kWordsPerSlab * 64 * NodeClusters::size == NodeClusters::slab);
-constexpr std::size_t kSpansPerThread = 8;  // few, since cells reach across their ends
+constexpr std::size_t kSpansPerThread = 8;     // few, since cells reach across their ends
+constexpr std::size_t kWorthThreads = 20'000;  // vertices or nodes; fewer are done before a thread wakes
+
+// Each on one thread.
+template <class Each>
+void for_tissues(const Model& model, Each&& each) {
+  std::size_t vertices = 0;
+  for (const Tissue& tissue : model.tissues) vertices += static_cast<std::size_t>(tissue.V.rows());
+  if (vertices < kWorthThreads) {
+    for (std::size_t t = 0; t < model.tissues.size(); ++t) each(t);
+  } else {
+    tbb::parallel_for(std::size_t{0}, model.tissues.size(), each);
+  }
+}
 
 std::span<const float> floats(const PointsF& points) {
   return {points.data(), static_cast<std::size_t>(points.size())};
 }
 
+std::vector<TissueNodes> nodes_of_tissues(const Model& model) {
+  std::vector<TissueNodes> out(model.tissues.size());
+  tbb::enumerable_thread_specific<NodesOfTissues> nodes(std::cref(model));
+  for_tissues(model, [&](std::size_t t) {
+    if (!model.tissues[t].tet.empty()) out[t] = nodes.local().of(model.tissues[t]);
+  });
+  return out;
+}
+
 // Nodes of one kind hold up the same tissues; of kind 0, none.
-std::vector<std::uint32_t> kinds_of_nodes(const Model& model) {
+std::vector<std::uint32_t> kinds_of_nodes(const Model& model, const std::vector<TissueNodes>& hold) {
   std::vector<std::uint32_t> kind(model.node_count(), 0);
-  std::vector<std::int32_t> seen(model.node_count(), -1);
   std::uint32_t kinds = 0;
   std::vector<std::uint32_t> with;  // by kind: the same and this tissue
-  for (std::size_t t = 0; t < model.tissues.size(); ++t) {
+  for (const TissueNodes& of_tissue : hold) {
     with.assign(kinds + 1, 0);
-    for (const std::int32_t tet : model.tissues[t].tet) {
-      for (int c = 0; c < 4; ++c) {
-        const auto node = static_cast<std::size_t>(model.tets(tet, c));
-        if (std::exchange(seen[node], static_cast<std::int32_t>(t)) == static_cast<std::int32_t>(t)) continue;
-        std::uint32_t& more = with[kind[node]];
-        if (more == 0) more = ++kinds;
-        kind[node] = more;
-      }
+    for (const std::uint32_t node : of_tissue.nodes) {
+      std::uint32_t& more = with[kind[node]];
+      if (more == 0) more = ++kinds;
+      kind[node] = more;
     }
   }
   return kind;
@@ -50,8 +69,6 @@ std::vector<std::uint32_t> kinds_of_nodes(const Model& model) {
 float diagonal(const PointsF& points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
-
-constexpr std::size_t kWorthThreads = 20'000;  // vertices or nodes; fewer are done before a thread wakes
 
 auto kernel_of(Skinning skinning) {
   switch (skinning) {
@@ -72,13 +89,15 @@ T* data_or_null(std::vector<T>& rows) {
 
 }  // namespace
 
-BodyParts::BodyParts(const Model& model)
-    : clusters_(cluster_nodes(model, kinds_of_nodes(model))),
+BodyParts::BodyParts(const Model& model) : BodyParts(model, nodes_of_tissues(model)) {}
+
+BodyParts::BodyParts(const Model& model, std::vector<TissueNodes> hold)
+    : clusters_(cluster_nodes(model, kinds_of_nodes(model, hold))),
       corrections_(model, clusters_),
       tissues_(model.tissues.size()),
       origin_(middle_of(floats(model.nodes))),
       reach_(std::max(1.0F, diagonal(model.nodes))) {
-  const auto build = [&](std::size_t t) {
+  for_tissues(model, [&](std::size_t t) {
     const Tissue& tissue = model.tissues[t];
     Part& part = tissues_[t];
     if (tissue.segment != Tissue::by_tets) {
@@ -86,20 +105,13 @@ BodyParts::BodyParts(const Model& model)
       part.normals = rest_normals(tissue);
       return;
     }
-    part.groups = group_vertices(model, tissue, clusters_.lane);
+    part.groups = group_vertices(model, tissue, std::exchange(hold[t], {}), clusters_.lane);
     part.mask.assign((clusters_.clusters() + 63) / 64, 0);
     for (const std::uint32_t row : part.groups.rows) {
       const std::size_t cluster = row / (3 * NodeClusters::size);
       part.mask[cluster / 64] |= std::uint64_t{1} << cluster % 64;
     }
-  };
-  std::size_t vertices = 0;
-  for (const Tissue& tissue : model.tissues) vertices += static_cast<std::size_t>(tissue.V.rows());
-  if (vertices < kWorthThreads) {
-    for (std::size_t t = 0; t < tissues_.size(); ++t) build(t);
-  } else {
-    tbb::parallel_for(std::size_t{0}, tissues_.size(), build);
-  }
+  });
   std::vector<std::vector<Run>> of_slab(clusters_.slabs());
   for (std::uint32_t t = 0; t < tissues_.size(); ++t) {
     if (model.tissues[t].segment != Tissue::by_tets) {
@@ -246,7 +258,7 @@ void BodyParts::pose(const Model& model, Skinning skinning, std::span<const std:
   for (std::size_t c = 0; c < 3; ++c) {
     out.box.low[c] = static_cast<float>(static_cast<double>(origin_[c] - reach_) + root.shift[c]);
   }
-  out.box.step = 2 * reach_ / 65535;
+  out.box.step = box_step();
   const SkinClusters job{clusters_,
                          scratch.motions,
                          root,

@@ -11,6 +11,7 @@
 #include "runtime/skin/corrections.hpp"
 #include "runtime/skin/move_vertices.hpp"
 #include "runtime/skin/node_clusters.hpp"
+#include "runtime/skin/tissue_nodes.hpp"
 
 namespace ecorche::runtime {
 
@@ -22,6 +23,8 @@ class BodyParts {
 
   std::size_t lane_floats() const { return 3 * clusters_.node.size() + 1; }
   std::size_t modes() const { return corrections_.modes(); }
+  /// Of PosedBody::box.
+  float box_step() const { return 2 * reach_ / 65535; }
   void make_scratch(PosedBody::Scratch& scratch) const;
 
   /// The nodes and tissues of `out.segments`, slab after slab: what hangs on a slab's nodes is moved while
@@ -53,6 +56,7 @@ class BodyParts {
   };
   struct Frame;
 
+  BodyParts(const Model& model, std::vector<TissueNodes> hold);
   void add_bone(std::uint32_t tissue, std::size_t vertices);
   void add_runs(std::uint32_t tissue, std::vector<std::vector<Run>>& of_slab);
   void choose(std::span<const std::uint32_t> tissues, NodesOf nodes, PosedBody::Scratch& scratch) const;

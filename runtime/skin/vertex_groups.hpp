@@ -9,6 +9,7 @@
 #include <ecorche/runtime/aligned.hpp>
 #include <ecorche/values/model.hpp>
 #include "runtime/skin/node_clusters.hpp"
+#include "runtime/skin/tissue_nodes.hpp"
 
 namespace ecorche::runtime {
 
@@ -58,8 +59,10 @@ struct VertexGroups {
   std::size_t last_slab(const Cell& cell) const { return rows[cell.palette + cell.count - 1] / slab_floats; }
 };
 
-/// `lane`: of NodeClusters. The tissue hangs on tets (`tet`, `barycentric` as Tissue says).
-VertexGroups group_vertices(const Model& model, const Tissue& tissue, std::span<const std::uint32_t> lane);
+/// `hold`: the tissue's nodes; `lane`: of NodeClusters. The tissue hangs on tets (`tet`, `barycentric` as
+/// Tissue says).
+VertexGroups group_vertices(const Model& model, const Tissue& tissue, const TissueNodes& hold,
+                            std::span<const std::uint32_t> lane);
 
 /// #V by 3, unit normals of the rest surface, each the sum of its triangles' by area; zero where there are
 /// none.
@@ -67,7 +70,7 @@ PointsF rest_normals(const Tissue& tissue);
 
 /// The shares g of the posed normal n' ~ g1 e2 x e3 + g2 e3 x e1 + g3 e1 x e2, e the posed edges of the
 /// vertex' tet from its first corner: the cofactor of the deformation times the rest normal n gives
-/// g_i = e_i . n. Largest is 1; zero where n is.
-Eigen::Vector3f normal_shares(const Model& model, std::int32_t tet, const Eigen::Vector3f& normal);
+/// g_i = e_i . n, with the edges at rest, a column each. Largest is 1; zero where n is.
+Eigen::Vector3f normal_shares(const Eigen::Matrix3f& edges, const Eigen::Vector3f& normal);
 
 }  // namespace ecorche::runtime

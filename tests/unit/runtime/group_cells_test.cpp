@@ -137,7 +137,8 @@ TEST(VertexGroups, HoldEachVertexOnceWithItsTetAndItsNumbers) {
   for (const bool shuffled : {false, true}) {
     const Model model = strip(400, 7, shuffled);
     const Tissue& tissue = model.tissues[0];
-    const VertexGroups groups = group_vertices(model, tissue, own_lanes(model));
+    const VertexGroups groups =
+        group_vertices(model, tissue, NodesOfTissues(model).of(tissue), own_lanes(model));
     EXPECT_EQ(groups.in_order, !shuffled);
     EXPECT_LT(groups.cells.size(), groups.groups.size());
     std::vector<int> seen(groups.vertices);
@@ -171,7 +172,8 @@ TEST(VertexGroups, HoldEachVertexOnceWithItsTetAndItsNumbers) {
 TEST(VertexGroups, MarkVerticesWithoutANormal) {
   Model model = strip(40, 4, false);
   model.tissues[0].F.resize(0, 3);
-  const VertexGroups groups = group_vertices(model, model.tissues[0], own_lanes(model));
+  const VertexGroups groups =
+      group_vertices(model, model.tissues[0], NodesOfTissues(model).of(model.tissues[0]), own_lanes(model));
   for (std::size_t g = 0; g < groups.groups.size(); ++g) {
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(groups.normal[32 * g + i], VertexGroups::no_normal);
   }
