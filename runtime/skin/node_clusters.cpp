@@ -159,9 +159,9 @@ void fill_places(const Model& model, std::size_t cluster, NodeClusters& out) {
 // Of the first in the order of lanes, for any number of threads.
 [[noreturn]] void refuse_weightless(const Model& model, const NodeClusters& out) {
   Row row;
-  for (const std::uint32_t node : out.node)
-    if (!row.read(model, node)) unfit(model, "node " + std::to_string(node) + " has no weight");
-  unfit(model, "a node has no weight");
+  const auto first = std::find_if(out.node.begin(), out.node.end(),
+                                  [&](std::uint32_t node) { return !row.read(model, node); });
+  unfit(model, "node " + std::to_string(*first) + " has no weight");
 }
 
 void fill_clusters(const Model& model, NodeClusters& out) {
