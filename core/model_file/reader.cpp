@@ -139,19 +139,22 @@ void check_vtk(const Source& source, const Model& model) {
   same("/VTKHDF/NumberOfPoints", model.node_count());
   same("/VTKHDF/NumberOfCells", tets);
   same("/VTKHDF/NumberOfConnectivityIds", 4 * tets);
+  // Looked at while they pass; a digest that differs is told first.
   const auto offsets_good = [&] {
-    const auto offsets = source.vector<std::int32_t>("/VTKHDF/Offsets", {tets + 1});
-    for (std::size_t t = 0; t < offsets.size(); ++t) {
-      if (offsets[t] < 0 || static_cast<std::size_t>(offsets[t]) != 4 * t) {
-        source.refuse("/VTKHDF/Offsets", "row " + std::to_string(t) + " is not " + std::to_string(4 * t));
-      }
-    }
+    std::size_t bad = tets + 1;
+    source.scan<std::int32_t>("/VTKHDF/Offsets", {tets + 1}, [&](std::size_t row, auto offsets) {
+      for (std::size_t i = 0; i < offsets.size(); ++i)
+        if (offsets[i] != static_cast<std::int64_t>(4 * (row + i))) bad = std::min(bad, row + i);
+    });
+    if (bad <= tets)
+      source.refuse("/VTKHDF/Offsets", "row " + std::to_string(bad) + " is not " + std::to_string(4 * bad));
   };
   const auto types_good = [&] {
-    const auto types = source.vector<std::uint8_t>("/VTKHDF/Types", {tets});
-    if (std::any_of(types.begin(), types.end(), [](std::uint8_t type) { return type != kVtkTetra; })) {
-      source.refuse("/VTKHDF/Types", "holds a cell that is not a tetrahedron");
-    }
+    bool good = true;
+    source.scan<std::uint8_t>("/VTKHDF/Types", {tets}, [&](std::size_t, auto types) {
+      good &= std::all_of(types.begin(), types.end(), [](std::uint8_t type) { return type == kVtkTetra; });
+    });
+    if (!good) source.refuse("/VTKHDF/Types", "holds a cell that is not a tetrahedron");
   };
   run_as_in_turn({offsets_good, types_good});
 }
@@ -222,8 +225,7 @@ ModelVolume read_volume(const Source& source, const std::string& name) {
   if (volume.image.components > 1) shape.push_back(static_cast<std::uint64_t>(volume.image.components));
   volume.image.type = scalar_type(source, voxels, source.find(voxels).type);
   const StoredDataset& dataset = source.find(voxels, element_type(volume.image.type), shape);
-  volume.image.bytes = Source::room<std::byte>(dataset.bytes);
-  source.read(voxels, dataset, volume.image.bytes);
+  volume.image.bytes = source.values<std::byte>(voxels, dataset);
   return volume;
 }
 
@@ -296,6 +298,13 @@ std::vector<SafeRange> read_safe_ranges(const Source& source) {
 void read_arrays(const Source& source, Model& model) {
   std::vector<std::function<void()>> parts;
   const auto part = [&](auto read) { parts.emplace_back(std::move(read)); };
+  const auto all = [&](const std::string& group, auto& rows, auto read) {
+    const std::vector<std::string> names = source.ordered_members(group);
+    rows.resize(names.size());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      part([&source, &row = rows[i], name = names[i], read] { row = read(source, name); });
+  };
+  all("/ecorche/volumes", model.volumes, read_volume);  // the largest first: whoever is done takes the rest
   part([&] { model.nodes = source.matrix<PointsF>("/VTKHDF/Points"); });
   part([&] { model.tets = source.matrix<Tets>("/VTKHDF/Connectivity", true); });
   part([&] { model.tet_label = source.vector<std::uint16_t>("/VTKHDF/CellData/label"); });
@@ -310,14 +319,7 @@ void read_arrays(const Source& source, Model& model) {
     model.materials.young_kpa = source.vector<double>(at + "young_kpa", {model.materials.tissue.size()});
     part([&] { model.materials.of_tet = source.vector<std::uint16_t>("/ecorche/materials/tet"); });
   }
-  const auto all = [&](const std::string& group, auto& rows, auto read) {
-    const std::vector<std::string> names = source.ordered_members(group);
-    rows.resize(names.size());
-    for (std::size_t i = 0; i < names.size(); ++i)
-      part([&source, &row = rows[i], name = names[i], read] { row = read(source, name); });
-  };
   all("/ecorche/tissues", model.tissues, read_tissue);
-  all("/ecorche/volumes", model.volumes, read_volume);
   all("/ecorche/spheres", model.spheres, read_spheres);
   all("/ecorche/correction", model.corrections,
       [&skeleton = model.rig.skeleton](const Source& from, const std::string& joint) {

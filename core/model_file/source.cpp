@@ -8,9 +8,6 @@
 namespace ecorche::model_file {
 namespace {
 
-// Small enough for the cache, so that hashing finds what reading has just brought.
-constexpr std::size_t kBlock = 1 << 20;
-
 std::string shape_text(const Source::Shape& shape) {
   std::string text;
   for (const std::uint64_t extent : shape) {
@@ -70,7 +67,12 @@ const StoredDataset& Source::find(const std::string& path, ElementType type, con
 }
 
 void Source::read(const std::string& path, const StoredDataset& dataset, std::span<std::byte> out) const {
-  if (read_and_digest(dataset, out) != dataset.digest) {
+  read_blocks(path, dataset, [&](std::uint64_t at, std::uint64_t size) { return out.subspan(at, size); });
+}
+
+void Source::read_blocks(const std::string& path, const StoredDataset& dataset, const Room& room,
+                         const Seen& seen) const {
+  if (digest_of(dataset, room, seen) != dataset.digest) {
     refuse(path, "is damaged: its XXH64 is not the stored one");
   }
 }
@@ -94,19 +96,20 @@ void Source::refuse(const std::string& path, const std::string& what) const {
 
 bool Source::digest_is_good(const std::string& path) const {
   const StoredDataset& dataset = find(path);
-  return read_and_digest(dataset, {}) == dataset.digest;
+  std::vector<std::byte> passing(std::min(block, dataset.bytes));
+  const auto room = [&](std::uint64_t, std::uint64_t size) { return std::span(passing).first(size); };
+  return digest_of(dataset, room, {}) == dataset.digest;
 }
 
-// Without a place to keep the bytes (`out` empty) they pass through a block.
-std::uint64_t Source::read_and_digest(const StoredDataset& dataset, std::span<std::byte> out) const {
-  std::vector<std::byte> passing(out.empty() ? std::min<std::uint64_t>(kBlock, dataset.bytes) : 0);
+std::uint64_t Source::digest_of(const StoredDataset& dataset, const Room& room, const Seen& seen) const {
   Digest digest;
-  for (std::uint64_t at = 0; at < dataset.bytes; at += kBlock) {
+  for (std::uint64_t at = 0; at < dataset.bytes; at += block) {
     context_.check_stop();
-    const std::uint64_t size = std::min<std::uint64_t>(kBlock, dataset.bytes - at);
-    const std::span<std::byte> block = out.empty() ? std::span(passing).first(size) : out.subspan(at, size);
-    catalogue_.file.read(dataset.offset + at, block);
-    digest.bytes(block);
+    const std::uint64_t size = std::min(block, dataset.bytes - at);
+    const std::span<std::byte> bytes = room(at, size);
+    catalogue_.file.read(dataset.offset + at, bytes);
+    digest.bytes(bytes);
+    if (seen) seen(at, size);
     const std::lock_guard lock(mutex_);
     read_bytes_ += size;
     if (total_bytes_ > 0)

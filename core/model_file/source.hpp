@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -37,19 +39,32 @@ class Source {
 
   template <class T>
   std::vector<T> vector(const std::string& path, Shape shape = {any}) const {
-    const StoredDataset& dataset = find(path, element_type_of<T>, shape);
-    std::vector<T> values = room<T>(dataset.bytes / sizeof(T));
-    read(path, dataset, std::as_writable_bytes(std::span(values)));
-    return values;
+    return values<T>(path, find(path, element_type_of<T>, shape));
   }
-  /// So many zeros, to be read into.
+  /// All of a dataset, whatever its type and shape. It grows by blocks: what is read finds the zeros that it
+  /// replaces in the cache.
   template <class T>
-  static std::vector<T> room(std::size_t count) {
-    std::vector<T> values;
-    values.reserve(count);
-    platform::advise_huge_pages(values.data(), count * sizeof(T));
-    values.resize(count);
-    return values;
+  std::vector<T> values(const std::string& path, const StoredDataset& dataset) const {
+    std::vector<T> out;
+    out.reserve(dataset.bytes / sizeof(T));
+    platform::advise_huge_pages(out.data(), dataset.bytes);
+    read_blocks(path, dataset, [&](std::uint64_t at, std::uint64_t size) {
+      out.resize((at + size) / sizeof(T));
+      return std::as_writable_bytes(std::span(out)).subspan(at, size);
+    });
+    return out;
+  }
+  /// Reads a column without keeping it: `each(row, values)` for runs of rows, before the digest is checked.
+  template <class T, class Each>
+  void scan(const std::string& path, const Shape& shape, Each&& each) const {
+    const StoredDataset& dataset = find(path, element_type_of<T>, shape);
+    std::vector<T> passing(std::min(block, dataset.bytes) / sizeof(T));
+    const auto room = [&](std::uint64_t, std::uint64_t size) {
+      return std::as_writable_bytes(std::span(passing)).first(size);
+    };
+    read_blocks(path, dataset, room, [&](std::uint64_t at, std::uint64_t size) {
+      each(at / sizeof(T), std::span<const T>(passing).first(size / sizeof(T)));
+    });
   }
   template <class T>
   T scalar(const std::string& path) const {
@@ -78,7 +93,15 @@ class Source {
   bool digest_is_good(const std::string& path) const;
 
  private:
-  std::uint64_t read_and_digest(const StoredDataset& dataset, std::span<std::byte> out) const;
+  // A power of two, and so small that hashing finds in the cache what reading has just brought.
+  static constexpr std::uint64_t block = 1 << 18;
+  using Room = std::function<std::span<std::byte>(std::uint64_t at, std::uint64_t size)>;
+  using Seen = std::function<void(std::uint64_t at, std::uint64_t size)>;
+
+  // Block by block into the room that is given for each. Throws Error{data} where the digest differs.
+  void read_blocks(const std::string& path, const StoredDataset& dataset, const Room& room,
+                   const Seen& seen = {}) const;
+  std::uint64_t digest_of(const StoredDataset& dataset, const Room& room, const Seen& seen) const;
 
   const Catalogue& catalogue_;
   const Context& context_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files with all their signatures in order that are no model: parts missing, of the wrong kind, or saying
 // nonsense.
+#include <utility>
+
 #include "tests/unit/model_file/hostile.hpp"
 
 namespace ecorche::test {
@@ -29,6 +31,32 @@ TEST_F(Hostile, ADatasetWhereAGroupBelongs) {
         forge.group(kWeight);
       },
       {kWeight, "cannot be opened as a dataset: "});
+}
+
+// Large arrays come in blocks: each row to its place, and what is wrong is told by its row.
+TEST_F(Hostile, ARowFarBehindTheFirstBlock) {
+  Model model = toy_model();
+  const Eigen::Index times = 700;
+  model.tets = model.tets.replicate(times, 1).eval();
+  const std::vector<std::uint16_t> label = std::exchange(model.tet_label, {});
+  for (Eigen::Index i = 0; i < times; ++i)
+    model.tet_label.insert(model.tet_label.end(), label.begin(), label.end());
+  model.contested.clear();
+  ASSERT_GT(model.tet_count(), 300'000U);
+  model_file::write(model, file("a.hdf"), {});
+  expect_same(model_file::read(file("a.hdf"), {}), model);
+  expect_refused(
+      [](Forge& forge) {
+        forge.edit<std::int32_t>("/VTKHDF/Offsets", H5T_NATIVE_INT32,
+                                 [](auto& v) { std::swap(v[200'000], v[200'001]); });
+      },
+      {"/VTKHDF/Offsets", "row 200000"});
+  model_file::write(model, file("a.hdf"), {});
+  expect_refused(
+      [](Forge& forge) {
+        forge.edit<std::uint8_t>("/VTKHDF/Types", H5T_NATIVE_UINT8, [](auto& v) { v[300'000] = 12; });
+      },
+      {"/VTKHDF/Types", "not a tetrahedron"});
 }
 
 TEST_F(Hostile, SignedContentsThatAreNoModel) {
