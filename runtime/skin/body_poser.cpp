@@ -167,6 +167,10 @@ std::span<const std::uint32_t> BodyPoser::lanes() const {
   return impl_->parts.clusters().lane;
 }
 
+float BodyPoser::box_step() const {
+  return impl_->parts.box_step();
+}
+
 HeldArrays BodyPoser::arrays() const {
   HeldArrays out;
   impl_->parts.add_arrays(out);

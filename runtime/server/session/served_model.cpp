@@ -11,6 +11,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/wire/convert.hpp>
+#include "core/platform/huge_pages.hpp"
 #include "proto/arrays.hpp"
 
 namespace ecorche::server {
@@ -123,6 +124,7 @@ struct ServedModel::Made {
     for (const Tissue& tissue : model.tissues)
       bytes += wire::aligned(static_cast<std::size_t>(tissue.F.size()) * sizeof(std::uint32_t));
     payload->reserve(bytes);
+    platform::advise_huge_pages(payload->data(), bytes);
     for (const Tissue& tissue : model.tissues) {
       const std::span corners(tissue.F.data(), static_cast<std::size_t>(tissue.F.size()));
       v1::Array array = wire::append(*payload, corners, 3);
@@ -143,6 +145,7 @@ ServedModel::ServedModel(Made made, std::vector<NamedPose> poses,
       opened(std::move(made.opened)),
       triangles(std::move(made.triangles)),
       topology(std::move(made.topology)),
+      step(made.poser->box_step()),
       poser_(std::move(made.poser)),
       bodies(*poser_),
       background_bodies(*poser_),
@@ -151,10 +154,6 @@ ServedModel::ServedModel(Made made, std::vector<NamedPose> poses,
       skinning_(model().rig.skeleton, std::move(poses)),
       shared_(std::move(pages), summary.name()) {
   for (Clip& clip : made.clips) clips.push_back(std::make_shared<const Clip>(std::move(clip)));
-  runtime::PosedBody body = poser_->make_frame({.positions = false});
-  const Pose rest = Pose::rest(model().segment_count());
-  if (poser_->run(rest, runtime::Skinning::lbs, {}, body, runtime::NodesOf::tissues).ok())
-    step = body.box.step;
   runtime::HeldArrays arrays = arrays_of(model());
   for (const auto& array : poser_->arrays()) arrays.push_back(array);
   runtime::add_array(*topology, arrays);

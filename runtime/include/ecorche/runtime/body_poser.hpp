@@ -109,6 +109,9 @@ class BodyPoser {
   /// All tissues of the model.
   std::span<const std::uint32_t> all_tissues() const;
 
+  /// mm, of PosedBody::box in every pose.
+  float box_step() const;
+
   /// #nodes: which row of PosedBody::Scratch::lanes holds a node.
   std::span<const std::uint32_t> lanes() const;
 
