@@ -131,8 +131,8 @@ TEST_F(DroughtTest, NoMoreThanSoManyBytes) {
   for (std::int64_t bytes = 0; bytes < 8 << 20; bytes += step, step += step / 8) {
     {
       const Drought drought(bytes);
-      converse(*server, 0.1);  // a busy machine is slower than dry ones
-      browse(*server, 0.1);
+      converse(*server, 0.3);  // a busy machine is slower than dry ones
+      browse(*server, 0.3);
       failed += Drought::failed();
       ++dry;
     }
