@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "preprocess/label_surfaces/nearest.hpp"
+#include "preprocess/scan/part_joints.hpp"
 #include "preprocess/scan/pieces.hpp"
 #include "preprocess/scan/template_cloud.hpp"
 
@@ -93,6 +94,7 @@ class Cutter {
     watershed(part_.mask, depth, part_.size, finest / 4, of_, context_);
     context_.report(0.8);
     out.left_out = islands();
+    part_joints(body_, clouds_, placed_, part_.grid, of_, context_);
     agreement(out.bones);
     std::vector<double> hollows;
     for (const TemplateBone& bone : body_.bones) hollows.push_back(bone.hollow_mm2);

@@ -10,7 +10,6 @@ constexpr int kWholeRounds = 20, kRounds = 40;
 constexpr double kWideReach = 90;  // mm: the same at first, for the whole
 constexpr double kLastReach = 14;  // mm: pairs farther apart are none
 constexpr double kGrowth = 1.05;   // of the whole over its first size: pairs far off shrink it
-constexpr double kSize = 1.18;     // of a segment over the body's
 constexpr double kJoint = 0.25;    // weight of a joint over that of its segment's pairs
 constexpr double kTurn = 0.04;     // the same for each of the points that keep it as its parent lies
 constexpr double kFewPairs = 12;   // what a segment weighs at least there
@@ -82,19 +81,15 @@ Similarity fit_whole(const Points& own, const Points& bone, const ImageGrid& gri
 }
 
 void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clouds, const Points& bone,
-                  const ImageGrid& grid, std::vector<Similarity>& placed, const Context& context,
-                  double first_reach) {
+                  const ImageGrid& grid, const SegmentsFit& how, std::vector<Similarity>& placed,
+                  const Context& context) {
   const geometry::NearestPoint nearest(bone, all_rows(bone));
   const std::vector<Similarity> first = placed;
   const std::size_t count = clouds.size();
-  double size = 1;
-  for (std::size_t s = 0; s < count; ++s) {
-    if (clouds[s].nearest) size = placed[s].scale;
-  }
   for (int round = 0; round < kRounds; ++round) {
     context.check_stop();
     const double share = static_cast<double>(round) / (kRounds - 1);
-    const double reach = first_reach + (kLastReach - first_reach) * std::min(1.0, 1.25 * share);
+    const double reach = how.first_reach + (kLastReach - how.first_reach) * std::min(1.0, 1.25 * share);
     std::vector<SimilarityFit> fits(count);
     for (Eigen::Index p = 0; p < bone.rows(); ++p) {
       const Eigen::Vector3d at = bone.row(p).transpose();
@@ -115,7 +110,7 @@ void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clo
     }
     std::vector<Similarity> next = placed;
     for (std::size_t s = 0; s < count; ++s) {
-      if (!clouds[s].nearest) continue;
+      if (!clouds[s].nearest || (!how.held.empty() && how.held[s] != 0)) continue;
       const double weight = std::max(kFewPairs, fits[s].weight());
       const auto hold = [&](const Eigen::Vector3d& joint, const Similarity& other) {
         fits[s].add(joint, other(joint), kJoint * weight);
@@ -138,7 +133,7 @@ void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clo
         if (body.segments[c].parent == static_cast<int>(s) && clouds[c].nearest)
           hold(body.segments[c].joint, placed[c]);
       }
-      next[s] = fits[s].solve(size / kSize, size * kSize);
+      next[s] = fits[s].solve(how.size / kOddSegment, how.size * kOddSegment);
     }
     placed = std::move(next);
   }

@@ -19,12 +19,21 @@ double misfit_of(const std::vector<SegmentCloud>& clouds, const std::vector<Simi
 Similarity fit_whole(const Points& own, const Points& bone, const ImageGrid& grid, Similarity place,
                      const Context& context);
 
+/// The most that a segment is larger or smaller than the body.
+inline constexpr double kOddSegment = 1.18;
+
 /// mm: pairs farther apart than this at first are none.
 inline constexpr double kFirstReach = 60;
 
+struct SegmentsFit {
+  double size = 1;  ///< of the body over the template's
+  double first_reach = kFirstReach;
+  std::vector<std::uint8_t> held{};  ///< segments that stay where they are; empty: none
+};
+
 /// From where `placed` has them.
 void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clouds, const Points& bone,
-                  const ImageGrid& grid, std::vector<Similarity>& placed, const Context& context,
-                  double first_reach = kFirstReach);
+                  const ImageGrid& grid, const SegmentsFit& how, std::vector<Similarity>& placed,
+                  const Context& context);
 
 }  // namespace ecorche::scan

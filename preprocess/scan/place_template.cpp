@@ -9,6 +9,7 @@
 
 #include "preprocess/scan/distance_lattice.hpp"
 #include "preprocess/scan/fit_segments.hpp"
+#include "preprocess/scan/slide_joints.hpp"
 #include "preprocess/scan/views.hpp"
 
 namespace ecorche::scan {
@@ -102,7 +103,7 @@ class Search {
       const Similarity whole = fit_whole(own_, bone_, grid_, start.place, context_);
       for (const Similarity& h : held_) placed.push_back(whole.after(h));
       const std::vector<Similarity> first = placed;
-      fit_segments(body_, clouds_, bone_, grid_, placed, context_);
+      fit_segments(body_, clouds_, bone_, grid_, {whole.scale}, placed, context_);
       std::vector<std::uint8_t> in_play = all_in_play();
       const std::vector<SegmentCloud>* clouds = &clouds_;
       std::vector<SegmentCloud> fewer;
@@ -110,7 +111,7 @@ class Search {
         fewer = segment_clouds(body_, in_play);
         clouds = &fewer;
         placed = first;
-        fit_segments(body_, fewer, bone_, grid_, placed, context_);
+        fit_segments(body_, fewer, bone_, grid_, {whole.scale}, placed, context_);
       }
       const double misfit = misfit_of(*clouds, placed, bone_, nearest, grid_);
       if (misfit >= out.misfit) continue;
@@ -118,6 +119,11 @@ class Search {
       out.segments = placed;
       out.in_play = in_play;
       out.scale = whole.scale;
+    }
+    if (out.misfit < 1) {
+      const std::vector<SegmentCloud> clouds = segment_clouds(body_, out.in_play);
+      slide_joints(body_, clouds, bone_, grid_, out.scale, out.segments, context_);
+      out.misfit = misfit_of(clouds, out.segments, bone_, nearest, grid_);
     }
     return out;
   }
