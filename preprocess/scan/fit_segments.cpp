@@ -80,6 +80,14 @@ Similarity fit_whole(const Points& own, const Points& bone, const ImageGrid& gri
   return place;
 }
 
+double size_of_last(const std::vector<SegmentCloud>& clouds, const std::vector<Similarity>& placed) {
+  double size = 1;
+  for (std::size_t s = 0; s < clouds.size(); ++s) {
+    if (clouds[s].nearest) size = placed[s].scale;
+  }
+  return size;
+}
+
 void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clouds, const Points& bone,
                   const ImageGrid& grid, const SegmentsFit& how, std::vector<Similarity>& placed,
                   const Context& context) {

@@ -31,6 +31,9 @@ struct SegmentsFit {
   std::vector<std::uint8_t> held{};  ///< segments that stay where they are; empty: none
 };
 
+/// Of the last of the segments in play: a body whose bones become known on the way grows and shrinks with it.
+double size_of_last(const std::vector<SegmentCloud>& clouds, const std::vector<Similarity>& placed);
+
 /// From where `placed` has them.
 void fit_segments(const BodyTemplate& body, const std::vector<SegmentCloud>& clouds, const Points& bone,
                   const ImageGrid& grid, const SegmentsFit& how, std::vector<Similarity>& placed,

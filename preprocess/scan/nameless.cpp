@@ -327,15 +327,6 @@ bool no_upper_arm(const BodyTemplate& body, const LabelMeanings& found) {
          });
 }
 
-// A body grows and shrinks with it from round to round: its bones become known on the way.
-double size_of_last(const std::vector<SegmentCloud>& clouds, const Placed& placed) {
-  double size = 1;
-  for (std::size_t s = 0; s < clouds.size(); ++s) {
-    if (clouds[s].nearest) size = placed.segments[s].scale;
-  }
-  return size;
-}
-
 // Classified and fitted in turn, until the bones stay the same; the best of all rounds' becomes `out`.
 void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, const ImageGrid& grid,
             const TooShort& too_short, Placed placed, LabelMeanings& out, const Context& context) {
@@ -357,7 +348,7 @@ void refine(const BodyTemplate& body, const std::vector<NamelessLabel>& labels, 
     if (strict && now.score > out.score) out = now;
     if ((strict && bones == last) || bones.empty() || round == kRefineRounds) break;
     fit_segments(body, clouds, points_of(labels, bones, kFitPoints), grid,
-                 {size_of_last(clouds, placed), bones.size() > sure ? kGrowReach : kFitReach},
+                 {size_of_last(clouds, placed.segments), bones.size() > sure ? kGrowReach : kFitReach},
                  placed.segments, context.quiet());
     last = std::move(bones);
   }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "preprocess/scan/slide_joints.hpp"
 
-#include <cstdio>
-#include <cstdlib>
+#include <cmath>
+#include <memory>
 #include <numeric>
+#include <utility>
 
 #include "preprocess/scan/fit_segments.hpp"
 #include "preprocess/scan/views.hpp"
