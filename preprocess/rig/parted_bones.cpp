@@ -10,16 +10,18 @@ namespace {
 constexpr double kHalfSureMm = 10;
 constexpr double kNotMeasured = 1.0 / 3;
 
-// The most that a joint of a CT alone was off that of its labels, mm: the built-in patient by two seeds,
-// after which the template is made (2 to 5 mm, an ankle 14), and a body that it is not made after, ICRP's
-// woman, whole and from the knees to the hips. A shoulder was 3 mm off, on her alone: 8 are assumed.
+// The most that a joint of a CT alone was off that of its labels, mm: the built-in patient, after which the
+// template is made (2 to 5 mm, an ankle 14), and two bodies that it is not made after, BodyParts3D's man and
+// ICRP's woman, whole. An elbow and a wrist were that far off before they slid along their limb (since then 6
+// and 29 mm), and are called no surer for it; the rows from `lumbosacral` on are from before, too. A shoulder
+// was 3 mm off, on her alone: 8 are assumed.
 struct Expected {
   std::string_view joint;
   double mm = 0;
 };
 constexpr std::array<Expected, 13> kExpected{{{"pelvis", 7},
-                                              {"hip", 9},
-                                              {"knee", 9.5},
+                                              {"hip", 9.6},
+                                              {"knee", 6},
                                               {"ankle", 34},
                                               {"shoulder", 8},
                                               {"elbow", 38},

@@ -103,7 +103,7 @@ class CtAlone(unittest.TestCase):
         said = self.ok("rig", self.folder / "case")
         self.assertEqual(said["skeleton"], "human", "its poses are written for that")
         sure = {row["joint"]: row["fit"]["confidence"] for row in said["rig"]}
-        self.assertLess(max(sure.values()), 0.68)
+        self.assertLess(max(sure.values()), 0.74)
         for joint in ("temporomandibular", "sternoclavicular_left", "sternoclavicular_right"):
             self.assertLess(sure[joint], 0.3, joint)
         self.assertGreaterEqual(min(sure["hip_left"], sure["hip_right"]), 0.5)
