@@ -100,7 +100,8 @@ int angles_of(const Joint& joint) {
 // The first multiple of the step at which the body tears, or 0 where it does not up to 180 degrees.
 double first_tear(const TearingBody& body, std::size_t joint, const AngleAxis& angle, double sign,
                   double step, double gain, bool bridged, const Context& context) {
-  for (double degrees = step; degrees <= 180; degrees += step) {
+  for (int n = 1; n * step <= 180; ++n) {
+    const double degrees = n * step;
     Pose pose = Pose::rest(body.rig.skeleton.segments.size());
     Eigen::Vector3d axis = Eigen::Vector3d::Zero();
     axis[angle.axis] = sign * angle.sign;

@@ -157,6 +157,7 @@ std::vector<std::uint32_t> along_morton(const PointsF& V) {
   }
   std::sort(code.begin(), code.end());
   std::vector<std::uint32_t> out;
+  out.reserve(code.size());
   for (const auto& [bits, v] : code) out.push_back(v);
   return out;
 }
