@@ -77,7 +77,7 @@ void Source::read_blocks(const std::string& path, const StoredDataset& dataset, 
   }
 }
 
-std::vector<std::string> Source::texts(const std::string& path, Shape shape) const {
+std::vector<std::string> Source::texts(const std::string& path, const Shape& shape) const {
   const StoredDataset& dataset = find(path, ElementType::text, shape);
   std::string bytes(dataset.bytes, '\0');
   read(path, dataset, std::as_writable_bytes(std::span(bytes)));

@@ -83,7 +83,7 @@ class Source {
          std::as_writable_bytes(std::span(values.data(), static_cast<std::size_t>(values.size()))));
     return values;
   }
-  std::vector<std::string> texts(const std::string& path, Shape shape = {any}) const;
+  std::vector<std::string> texts(const std::string& path, const Shape& shape = {any}) const;
   std::string text(const std::string& path) const { return texts(path, {1}).front(); }
 
   /// Throws Error{data} at `path`.
