@@ -137,9 +137,10 @@ class Slider {
     };
     double best = misfit(0), way = 0;
     const double first = best;
-    for (double w = -kFarthestSlide; w <= kFarthestSlide; w += kSlideStep) {
+    const int steps = static_cast<int>(kFarthestSlide / kSlideStep);
+    for (int n = -steps; n <= steps; ++n) {
       context_.check_stop();
-      const double m = w == 0 ? first : misfit(w);
+      const double w = n * kSlideStep, m = n == 0 ? first : misfit(w);
       if (m < kSlideGain * first && m < best) best = m, way = w;
     }
     if (way == 0) return false;

@@ -14,7 +14,8 @@ namespace {
 // Of a long bone along z from `low` to `high`: a thin shaft with thick ends of 30 mm, the upper one narrower.
 Points long_bone(double low, double high) {
   std::vector<Eigen::Vector3d> all;
-  for (double z = low + 2; z < high; z += 5) {
+  for (int n = 0; low + 2 + 5 * n < high; ++n) {
+    const double z = low + 2 + 5 * n;
     const double r = z - low < 30 ? 26 : high - z < 30 ? 20 : 8;
     for (int a = 0; a < 10; ++a) all.emplace_back(r * std::cos(0.63 * a), r * std::sin(0.63 * a), z);
   }
