@@ -291,6 +291,8 @@ void plan_fleet(const Settings& settings, const Machine& machine) {
     load.client = 0;
     load.seconds = 3;
     const Waited waited = simulate(load);
+    // The short work of I/O threads is let in beyond what the cores have: too few servers.
+    if (waited.cores > settings.fleet_cores) continue;
     const bool any = waited.shown > 0;
     table.row({std::to_string(servers), std::to_string(settings.fleet_cores), std::to_string(processes),
                std::to_string(fullest), any ? fixed(waited.p50, 2) : "", any ? fixed(waited.p99, 2) : "",
