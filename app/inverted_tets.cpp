@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "runtime/quality/tet_kinds.hpp"
+
 namespace ecorche::app {
 namespace {
 
@@ -29,11 +31,12 @@ std::vector<std::uint8_t> tets_of_tissues(const Model& model) {
 
 InvertedTets inverted_tets(const Model& model, std::span<const float> det_f) {
   const std::vector<std::uint8_t> held = tets_of_tissues(model);
+  const std::vector<runtime::TetKind> kinds = runtime::tet_kinds(model);
   const auto& segments = model.rig.skeleton.segments;
   std::vector<InvertedNear> near(segments.size());
   InvertedTets out;
   for (std::size_t t = 0; t < det_f.size(); ++t) {
-    if (det_f[t] > 0) continue;
+    if (det_f[t] > 0 || kinds[t] != runtime::TetKind::body) continue;
     out.in_tissues += held[t];
     const auto corner = [&](Eigen::Index k) -> Eigen::RowVector3d {
       return model.nodes.row(model.tets(static_cast<Eigen::Index>(t), k)).cast<double>();

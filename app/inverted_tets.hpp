@@ -22,7 +22,8 @@ struct InvertedTets {
   std::uint64_t in_tissues = 0;    ///< those that a vertex of a soft tissue besides the skin hangs on
 };
 
-/// `det_f`: of every tet (runtime::tet_det_f); inverted are those of zero or less.
+/// `det_f`: of every tet (runtime::tet_det_f); inverted are those of zero or less. As all figures of the tets
+/// over runtime::TetKind::body alone.
 InvertedTets inverted_tets(const Model& model, std::span<const float> det_f);
 
 }  // namespace ecorche::app

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include <ecorche/runtime/body_poser.hpp>
+#include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/values/context.hpp>
+#include "app/bone_overlaps.hpp"
 #include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::app {
@@ -31,6 +33,9 @@ class MeasuredPose {
   /// that hangs on them.
   void replace(const std::vector<float>& nodes, const std::vector<std::uint8_t>& moved);
 
+  /// What there is to say of the still body, by its tets, its tissues and its bones.
+  runtime::PoseQuality measure();
+
   const runtime::BodyPoser& poser() const { return poser_; }
   const runtime::PosedBody& body() const { return body_; }
   const runtime::PosedBody& still() const { return moved_ ? still_ : body_; }
@@ -42,6 +47,8 @@ class MeasuredPose {
   const runtime::BodyPoser& poser_;
   runtime::PosedBody body_, still_;
   bool moved_ = false;
+  const std::vector<std::uint8_t> closed_;  // of the model's tissues
+  BoneOverlaps overlaps_;
 };
 
 }  // namespace ecorche::app

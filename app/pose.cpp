@@ -244,7 +244,6 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
   const std::uint64_t identity = model_file::identity(*model);
   const runtime::BodyPoser poser(model);
   const runtime::VolumePoser volumes(model);
-  const std::vector<std::uint8_t> closed = runtime::closed_surfaces(*model);
   const runtime::Skinning skinning =
       runtime::skinning_from_name(settings.by_fem() ? "cor" : settings.skinning);
   MeasuredPose posed(poser);
@@ -267,8 +266,8 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
     const runtime::PosedBody& body = posed.body();
     const std::vector<float> det_f = runtime::tet_det_f(*model, posed.still().nodes);
     json quality =
-        quality_json(*model, body, runtime::measure(*model, posed.still(), poser.all_tissues(), {}, closed),
-                     det_f, {skinning, settings.settle || settings.by_fem(), settings.deformer == "tets"});
+        quality_json(*model, body, posed.measure(), det_f,
+                     {skinning, settings.settle || settings.by_fem(), settings.deformer == "tets"});
     add_relaxed(relaxed, quality);
     if (!frame.missed.empty()) {
       quality["verdict"] = "warn";

@@ -56,7 +56,7 @@ Pose named_pose(const Program& program, const std::string& name, const Rig& rig)
 void add_frame_options(CLI::App& command, FrameChoice& choice) {
   command.add_option(
       "--pose", choice.pose,
-      "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, supine");
+      "a pose file, or lib:NAME: anatomical, arms_up, lateral, lithotomy, prone, sitting, squatting, supine");
   command.add_option("--ik", choice.ik, "goals of points of the body, a file (docs/reference/motion.md)");
   command
       .add_option("--ik-tolerance", choice.ik_tolerance_mm,

@@ -36,7 +36,23 @@ json thresholds_json(const runtime::QualityThresholds& most) {
           {"max_tissue_change", tissues},
           {"max_doubtful_turn_deg", most.max_doubtful_turn * 180 / std::numbers::pi},
           {"min_confidence", most.min_confidence},
-          {"max_bone_rigidity_mm", most.max_bone_rigidity_mm}};
+          {"max_bone_rigidity_mm", most.max_bone_rigidity_mm},
+          {"max_bone_overlap_mm", most.max_bone_overlap_mm}};
+}
+
+json gaps_json(const runtime::JointGaps& gaps) {
+  return {{"tets", gaps.tets},
+          {"rest_mm3", gaps.rest_mm3},
+          {"inverted_tets", gaps.inverted_tets},
+          {"inverted_rest_mm3", gaps.inverted_rest_mm3}};
+}
+
+json overlap_json(const Model& model, const runtime::BoneOverlap& overlap) {
+  if (overlap.mm == 0) return {{"mm", 0.0}};
+  return {{"mm", overlap.mm},
+          {"bone", model.tissues[overlap.bone].name},
+          {"into", model.tissues[overlap.into].name},
+          {"at_mm", {overlap.at.x(), overlap.at.y(), overlap.at.z()}}};
 }
 
 }  // namespace
@@ -80,6 +96,8 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
            {{"edge_mm", quality.places.edge_mm},
             {"inverted", place_json(quality.places.inverted)},
             {"changed", place_json(quality.places.changed)}}},
+          {"joint_gaps", gaps_json(quality.gaps)},
+          {"bone_overlap", overlap_json(model, quality.overlap)},
           {"skin_caps", caps_json(model)},
           {"volume_change", quality.volume_change},
           {"unsigned_volume_change", quality.unsigned_volume_change},
@@ -98,6 +116,12 @@ json quality_json(const Model& model, const runtime::PosedBody& body, const runt
 
 namespace {
 
+// What bones do to what lies between them, where they do anything.
+std::string between_bones(const json& gaps) {
+  const auto inverted = gaps["inverted_tets"].get<unsigned long long>();
+  return inverted == 0 ? "" : fmt::format(" and {} between bones", inverted);
+}
+
 std::string clamped_line(const json& clamped) {
   std::string limits;
   for (const json& limit : clamped["limits"])
@@ -112,12 +136,12 @@ std::string clamped_line(const json& clamped) {
 std::string line_of(const json& frame) {
   const json& quality = frame["quality"];
   std::string out = fmt::format(
-      "{}: {}, {} inverted tets, volume {:+.2f} % ({:.2f} % unsigned), bones rigid within {:.1e} mm, {} "
+      "{}: {}, {} inverted tets{}, volume {:+.2f} % ({:.2f} % unsigned), bones rigid within {:.1e} mm, {} "
       "files\n",
       frame["folder"].get<std::string>(), quality["verdict"].get<std::string>(),
-      quality["inverted_tets"].get<unsigned long long>(), 100 * quality["volume_change"].get<double>(),
-      100 * quality["unsigned_volume_change"].get<double>(), quality["bone_rigidity_mm"].get<double>(),
-      frame["files"].size());
+      quality["inverted_tets"].get<unsigned long long>(), between_bones(quality["joint_gaps"]),
+      100 * quality["volume_change"].get<double>(), 100 * quality["unsigned_volume_change"].get<double>(),
+      quality["bone_rigidity_mm"].get<double>(), frame["files"].size());
   if (quality.contains("fem")) out += fem_line(quality["fem"]);
   out += settled_line(quality);
   out += warning_lines(quality["warnings"]);

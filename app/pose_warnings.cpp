@@ -63,6 +63,8 @@ class Wording {
         return tissue(breach, std::move(out));
       case Figure::doubtful_joint:
         return joint(breach, std::move(out));
+      case Figure::bone_overlap:
+        return overlap(breach, std::move(out));
       case Figure::bone_rigidity:
         break;
     }
@@ -108,6 +110,41 @@ class Wording {
         fmt::format("{} turns by {:.0f} degrees though it was found with a confidence of only {:.2f}",
                     joint.name, doubtful.turned * degrees_per_radian, doubtful.confidence);
     out["mend"] = "ecorche rig CASE says how it was found; give its center and axes in the skeleton";
+    return out;
+  }
+
+  json overlap(const Breach& breach, json out) const {
+    const runtime::BoneOverlap& found = quality_.overlap;
+    const Tissue &bone = model_.tissues[found.bone], &into = model_.tissues[found.into];
+    const Joint& joint = model_.rig.skeleton
+                             .segments[joint_between(static_cast<std::size_t>(bone.segment),
+                                                     static_cast<std::size_t>(into.segment))]
+                             .joint;
+    out["kind"] = "bone_overlap";
+    out["joint"] = joint.name;
+    out["at_mm"] = {found.at.x(), found.at.y(), found.at.z()};
+    out["what"] = fmt::format("{} runs {:.1f} mm deeper into {} than in the scan, more than {:.0f} mm",
+                              bone.name, breach.value, into.name, breach.threshold);
+    out["mend"] =
+        fmt::format("turn {} less, or look at its center and axes: ecorche rig CASE says how they were found",
+                    joint.name);
+    return out;
+  }
+
+  // The joint that turns most of those between two segments.
+  std::size_t joint_between(std::size_t a, std::size_t b) const {
+    const auto& segments = model_.rig.skeleton.segments;
+    std::vector<int> passed(segments.size(), 0);
+    for (const std::size_t end : {a, b})
+      for (int s = static_cast<int>(end); s >= 0; s = segments[static_cast<std::size_t>(s)].parent)
+        ++passed[static_cast<std::size_t>(s)];
+    std::size_t out = a;
+    double most = -1;
+    for (std::size_t s = 0; s < segments.size(); ++s) {
+      if (passed[s] != 1 || turn_of(body_.pose, s) <= most) continue;
+      most = turn_of(body_.pose, s);
+      out = s;
+    }
     return out;
   }
 

@@ -19,7 +19,7 @@ void add_relaxing(CLI::App& command, PoseSettings& settings) {
                    "bones remain");
   command.add_flag("--settle", settings.settle,
                    "bring the flesh near to the balance that ecorche fem solves for, in seconds (3 million "
-                   "tets: about a minute); bones stay");
+                   "tets: two minutes); bones stay");
 }
 
 void check_relaxing(const PoseSettings& settings) {

@@ -9,7 +9,7 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
-#include "app/bone_overlap.hpp"
+#include "app/bone_overlaps.hpp"
 #include "core/elastic/flesh.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/correct/samples.hpp"
@@ -187,7 +187,7 @@ class Looking {
   Points rest_;
   fem::SelfContactFinder contact_;
   Skinned plain_, corrected_;
-  BoneOverlap bones_;
+  BoneOverlaps bones_;
   double voxel_;
 };
 

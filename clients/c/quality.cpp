@@ -21,6 +21,8 @@ const char* figure_name(runtime::Figure figure) {
       return "doubtful_joint";
     case runtime::Figure::bone_rigidity:
       return "bone_rigidity";
+    case runtime::Figure::bone_overlap:  // which ecorche pose looks for
+      return "bone_overlap";
   }
   return "";
 }

@@ -2,8 +2,9 @@
 #include "core/elastic/flesh.hpp"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
+
+#include "core/elastic/joint_gaps.hpp"
 
 namespace ecorche::elastic {
 namespace {
@@ -61,23 +62,9 @@ std::vector<double> stiffness_of(const Model& model, const std::vector<std::int3
 Flesh flesh_of(const Model& model) {
   Flesh out;
   const std::size_t nodes = model.node_count();
-  out.segment.assign(nodes, -1);
-  for (std::size_t t = 0; t < model.tet_count(); ++t) {
-    if (model.tet_label[t] == TetMesh::soft) continue;
-    for (int c = 0; c < 4; ++c)
-      out.segment[at(model.tets(static_cast<Eigen::Index>(t), c))] =
-          model.bone_segment[model.tet_label[t] - 1U];
-  }
+  out.segment = held_by(model);
+  const std::vector<std::uint8_t> gaps = joint_gaps(model, out.segment);
   const auto is_held = [&](std::int32_t node) { return out.segment[at(node)] >= 0; };
-  const auto holds_two = [&](const auto& tet) {
-    std::int32_t one = -1;
-    for (const std::int32_t node : tet) {
-      const std::int32_t s = out.segment[at(node)];
-      if (s >= 0 && one >= 0 && s != one) return true;
-      if (s >= 0) one = s;
-    }
-    return false;
-  };
   std::vector<std::int32_t> soft;
   for (std::size_t t = 0; t < model.tet_count(); ++t) {
     if (model.tet_label[t] != TetMesh::soft) continue;
@@ -85,7 +72,7 @@ Flesh flesh_of(const Model& model) {
     const auto tet = model.tets.row(static_cast<Eigen::Index>(t));
     if (std::all_of(tet.begin(), tet.end(), is_held)) {
       ++out.on_bones;
-    } else if (holds_two(tet)) {
+    } else if (!gaps.empty() && gaps[t] != 0) {
       out.between.push_back(static_cast<std::int32_t>(t));
     } else {
       soft.push_back(static_cast<std::int32_t>(t));

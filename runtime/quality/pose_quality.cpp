@@ -8,10 +8,10 @@
 #include <numeric>
 #include <vector>
 
-#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/verdict.hpp>
 #include "core/linear/decompositions.hpp"
 #include "runtime/quality/floats.hpp"
+#include "runtime/quality/tet_kinds.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -28,11 +28,11 @@ struct TetSums {
   double min_det_f = 1;
 };
 
-TetSums sum_block(const Model& model, std::span<const float> posed, std::span<const std::uint8_t> left_out,
+TetSums sum_block(const Model& model, std::span<const float> posed, std::span<const TetKind> kinds,
                   std::size_t begin, std::size_t end) {
   TetSums sums;
   for (std::size_t t = begin; t < end; ++t) {
-    if (!left_out.empty() && left_out[t] != 0) continue;
+    if (kinds[t] != TetKind::body) continue;
     ++sums.tets;
     const double before = det_of(model.tets, floats(model.nodes), t), after = det_of(model.tets, posed, t);
     sums.rest += before;
@@ -47,12 +47,11 @@ TetSums sum_block(const Model& model, std::span<const float> posed, std::span<co
   return sums;
 }
 
-TetSums sum_tets(const Model& model, std::span<const float> posed, std::span<const std::uint8_t> left_out) {
+TetSums sum_tets(const Model& model, std::span<const float> posed, std::span<const TetKind> kinds) {
   const std::size_t count = model.tet_count();
   std::vector<TetSums> blocks((count + kTetsPerBlock - 1) / kTetsPerBlock);
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-    blocks[b] =
-        sum_block(model, posed, left_out, b * kTetsPerBlock, std::min(count, (b + 1) * kTetsPerBlock));
+    blocks[b] = sum_block(model, posed, kinds, b * kTetsPerBlock, std::min(count, (b + 1) * kTetsPerBlock));
   });
   TetSums all;
   for (const TetSums& block : blocks) {
@@ -65,6 +64,20 @@ TetSums sum_tets(const Model& model, std::span<const float> posed, std::span<con
     all.min_det_f = std::min(all.min_det_f, block.min_det_f);
   }
   return all;
+}
+
+JointGaps sum_gaps(const Model& model, std::span<const float> posed, std::span<const TetKind> kinds) {
+  JointGaps out;
+  for (std::size_t t = 0; t < kinds.size(); ++t) {
+    if (kinds[t] != TetKind::gap) continue;
+    const double rest_mm3 = det_of(model.tets, floats(model.nodes), t) / 6;
+    ++out.tets;
+    out.rest_mm3 += rest_mm3;
+    if (det_of(model.tets, posed, t) > 0) continue;
+    ++out.inverted_tets;
+    out.inverted_rest_mm3 += rest_mm3;
+  }
+  return out;
 }
 
 Vector3d mean_of(std::span<const float> points) {
@@ -170,8 +183,8 @@ std::vector<std::uint8_t> closed_surfaces(const Model& model) {
 PoseQuality measure(const Model& model, const PosedBody& body, std::span<const std::uint32_t> tissues,
                     const QualityThresholds& thresholds, std::span<const std::uint8_t> closed) {
   PoseQuality out;
-  const std::vector<std::uint8_t> at_caps = cap_tets(model);
-  const TetSums sums = sum_tets(model, body.nodes, at_caps);
+  const std::vector<TetKind> kinds = tet_kinds(model);
+  const TetSums sums = sum_tets(model, body.nodes, kinds);
   out.tets_measured = sums.tets;
   out.inverted_tets = sums.inverted;
   out.inverted_rest_mm3 = sums.inverted_rest / 6;
@@ -181,7 +194,11 @@ PoseQuality measure(const Model& model, const PosedBody& body, std::span<const s
     out.volume_change = sums.posed / sums.rest - 1;
     out.unsigned_volume_change = sums.changed / sums.rest;
   }
-  out.places = worst_places(model, body.nodes, at_caps);
+  std::vector<std::uint8_t> left_out(kinds.size());
+  std::transform(kinds.begin(), kinds.end(), left_out.begin(),
+                 [](TetKind kind) { return kind == TetKind::body ? 0 : 1; });
+  out.places = worst_places(model, body.nodes, left_out);
+  out.gaps = sum_gaps(model, body.nodes, kinds);
 
   out.tissues.resize(tissues.size());
   std::vector<double> residuals(tissues.size(), 0);

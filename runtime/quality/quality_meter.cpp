@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/verdict.hpp>
 #include "runtime/quality/floats.hpp"
+#include "runtime/quality/tet_kinds.hpp"
 
 namespace ecorche::runtime {
 namespace {
@@ -62,11 +62,12 @@ struct QualityMeter::Sums {
 QualityMeter::QualityMeter(std::shared_ptr<const Model> model, std::size_t most_tets)
     : model_(std::move(model)), parts_(model_->tissues.size()) {
   const std::size_t all = model_->tet_count(), count = std::min(all, most_tets);
-  const std::vector<std::uint8_t> at_caps = cap_tets(*model_);
+  if (count > 0) tets_per_drawn_ = static_cast<double>(all) / static_cast<double>(count);
+  const std::vector<TetKind> kinds = tet_kinds(*model_);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t begin = all * i / count, end = all * (i + 1) / count;
     const auto t = static_cast<Eigen::Index>(begin + drawn(i, end - begin));
-    if (!at_caps.empty() && at_caps[static_cast<std::size_t>(t)] != 0) continue;
+    if (kinds[static_cast<std::size_t>(t)] != TetKind::body) continue;
     corners_.push_back({});
     for (int c = 0; c < 4; ++c) {
       corners_.back()[static_cast<std::size_t>(c)] = static_cast<std::uint32_t>(model_->tets(t, c));
@@ -155,7 +156,7 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
   out.tets_measured = rest_.size();
   out.min_det_f = all.min_det_f;
   const auto measured = static_cast<double>(rest_.size());
-  const double scale = static_cast<double>(model_->tet_count()) / std::max(1.0, measured);
+  const double scale = tets_per_drawn_;
   out.inverted_tets = static_cast<std::uint64_t>(std::llround(static_cast<double>(all.inverted) * scale));
   out.inverted_rest_mm3 = all.inverted_rest / 6 * scale;
   if (all.rest > 0) {

@@ -11,13 +11,14 @@ namespace ecorche::runtime {
 std::vector<Breach> breaches(const PoseQuality& quality) {
   const QualityThresholds& most = quality.thresholds;
   std::vector<Breach> out;
-  out.reserve(5 + quality.tissues.size() + quality.doubtful.size());
+  out.reserve(6 + quality.tissues.size() + quality.doubtful.size());
   const auto hold = [&](Figure figure, double value, double threshold, std::size_t row = 0) {
     if (!(value <= threshold)) out.push_back(Breach{figure, row, value, threshold});
   };
   // First: a joint that is not where it should be brings all the rest with it.
   for (std::size_t j = 0; j < quality.doubtful.size(); ++j)
     hold(Figure::doubtful_joint, quality.doubtful[j].turned, most.max_doubtful_turn, j);
+  hold(Figure::bone_overlap, quality.overlap.mm, most.max_bone_overlap_mm);
   hold(Figure::inverted_share, quality.inverted_share, most.max_inverted_share);
   hold(Figure::place_inverted, quality.places.inverted.share, most.max_place_inverted);
   hold(Figure::place_change, quality.places.changed.share, most.max_place_change);

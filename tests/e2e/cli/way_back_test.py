@@ -14,7 +14,7 @@ import numpy as np
 
 from posed_files import CASE, ECORCHE, MODEL, corners, run
 
-LIBRARY = ("anatomical", "arms_up", "lateral", "lithotomy", "prone", "sitting", "supine")
+LIBRARY = ("anatomical", "arms_up", "lateral", "lithotomy", "prone", "sitting", "squatting", "supine")
 MOST_BONE_MM, MOST_SOFT_MM = 0.01, 0.05  # of returned vertices, the worst and on average
 
 

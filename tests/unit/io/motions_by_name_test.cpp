@@ -33,7 +33,7 @@ double degrees(const Rig& rig, const Pose& pose, const std::string& joint, std::
 
 TEST(PoseLibrary, AnglesMeanTheSameOnEveryBody) {
   EXPECT_EQ(library_poses(), (std::vector<std::string>{"anatomical", "arms_up", "lateral", "lithotomy",
-                                                       "prone", "sitting", "supine"}));
+                                                       "prone", "sitting", "squatting", "supine"}));
   for (const char* body : {"bodyparts3d", "icrp110_female"}) {
     const Rig rig = rig_of(body);
     for (const std::string& name : library_poses()) {

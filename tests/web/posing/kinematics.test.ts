@@ -156,7 +156,7 @@ test("named degrees and the library are read as the program reads them", async (
   const theirs = await readPose(fs.readFileSync(path.join(posed(MODEL, "--pose", write(named)).out, "pose.yaml"), "utf8"), rig);
   assertSame(ours, theirs);
   const all = presets(parse(library) as Library, rig);
-  assert.deepEqual(all.map(({ name }) => name), ["anatomical", "arms_up", "lateral", "lithotomy", "prone", "sitting", "supine"]);
+  assert.deepEqual(all.map(({ name }) => name), ["anatomical", "arms_up", "lateral", "lithotomy", "prone", "sitting", "squatting", "supine"]);
   for (const { name, pose } of all) {
     assertSame(pose, await readPose(fs.readFileSync(path.join(posed(MODEL, "--pose", `lib:${name}`).out, "pose.yaml"), "utf8"), rig));
   }

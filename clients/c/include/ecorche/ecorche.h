@@ -192,7 +192,7 @@ ECORCHE_API ecorche_code ecorche_pose_create(const ecorche_model* model, ecorche
 ECORCHE_API void ecorche_pose_destroy(ecorche_pose* pose);
 /* As scanned again. */
 ECORCHE_API ecorche_code ecorche_pose_reset(ecorche_pose* pose);
-/* "lib:sitting" (anatomical, arms_up, lateral, lithotomy, prone, sitting, supine) or a pose file. All that it
+/* "lib:sitting" (anatomical, arms_up, lateral, lithotomy, prone, sitting, squatting, supine) or a pose file. All that it
  * does not name is as scanned; of the library's what the model has not is left out. */
 ECORCHE_API ecorche_code ecorche_pose_load(ecorche_pose* pose, const char* name);
 /* One anatomical angle, absolute, by names: "elbow_left", "flexion", or what the joint calls the opposite.

@@ -207,7 +207,7 @@ class Pose:
         return self
 
     def load(self, name: Union[str, "os.PathLike[str]"]) -> "Pose":
-        """A pose file, or `lib:` and anatomical, arms_up, lateral, lithotomy, prone, sitting or supine; all else is as scanned."""
+        """A pose file, or `lib:` and anatomical, arms_up, lateral, lithotomy, prone, sitting, squatting or supine; all else is as scanned."""
         call("pose_load", self._handle, text(name))
         return self
 

@@ -13,7 +13,7 @@ namespace ecorche::io {
 
 inline constexpr std::string_view library_prefix = "lib:";
 
-/// anatomical, arms_up, lateral, lithotomy, prone, sitting, supine: io/case/data/poses.yaml.
+/// anatomical, arms_up, lateral, lithotomy, prone, sitting, squatting, supine: io/case/data/poses.yaml.
 std::vector<std::string> library_poses();
 
 /// A pose by name, on a rig.

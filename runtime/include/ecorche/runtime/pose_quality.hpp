@@ -19,6 +19,7 @@ struct QualityThresholds {
   double max_inverted_share = 1e-3;  ///< rest volume of inverted tets over that of the body
   double max_volume_change = 0.10;   ///< of the whole body, unsigned
   double max_bone_rigidity_mm = 1e-3;
+  double max_bone_overlap_mm = 5;    ///< deeper than at rest, of bones that joints turn into each other
   double tissue_factor = 1;          ///< times tissue_limit of a tissue's group
   double max_place_inverted = 0.05;  ///< of the worst place's volume
   double max_place_change = 0.5;     ///< likewise, unsigned
@@ -44,7 +45,21 @@ struct DoubtfulJoint {
   double confidence = 0;
 };
 
-/// What was measured of a pose.
+/// The tets between bones that move against each other (elastic::joint_gaps).
+struct JointGaps {
+  std::uint64_t tets = 0, inverted_tets = 0;
+  double rest_mm3 = 0, inverted_rest_mm3 = 0;
+};
+
+/// The bone that a pose drives deepest into a bone of another segment.
+struct BoneOverlap {
+  std::size_t bone = 0, into = 0;                ///< rows of Model::tissues
+  double mm = 0;                                 ///< how much deeper than at rest; 0: none is
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< its deepest vertex, scanned, LPS mm
+};
+
+/// What was measured of a pose. Tets at the skin's caps (skin_caps.hpp), and those in the gaps of joints,
+/// which are no flesh, count for no figure of the tets but for `gaps`.
 struct PoseQuality {
   std::uint64_t inverted_tets = 0;  ///< of posed volume zero or less
   double inverted_rest_mm3 = 0;
@@ -53,13 +68,14 @@ struct PoseQuality {
   double volume_change = 0;  ///< of the tets, all together
   double unsigned_volume_change =
       0;  ///< sum of |posed - rest| over the tets, over that of rest: folds cannot cancel
-  std::uint64_t tets_measured =
-      0;  ///< all but those at the skin's caps (skin_caps.hpp), or the subset that these are estimated from
+  std::uint64_t tets_measured = 0;  ///< all that count, or the subset that these are estimated from
   double inverted_share_error = 0;  ///< standard error of the estimate; 0 where all tets were measured
   double volume_change_error = 0;   ///< likewise
   std::vector<TissueChange> tissues;
   double bone_rigidity_mm = 0;  ///< largest distance of a bone vertex from its bone's best rigid fit
   WorstPlaces places;           ///< where all tets were measured
+  JointGaps gaps;               ///< likewise
+  BoneOverlap overlap;          ///< `measure` does not look for it: see BoneOverlaps
   std::vector<ClampedJoint> clamped;
   std::vector<DoubtfulJoint> doubtful;
   QualityThresholds thresholds;

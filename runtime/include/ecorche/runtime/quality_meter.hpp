@@ -55,6 +55,7 @@ class QualityMeter {
   std::shared_ptr<const Model> model_;
   std::vector<std::array<std::uint32_t, 4>> corners_;  // of the subset
   std::vector<float> rest_;                            // their determinants
+  double tets_per_drawn_ = 1;
   std::vector<Part> parts_;
 };
 

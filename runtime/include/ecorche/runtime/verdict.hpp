@@ -19,6 +19,7 @@ enum class Figure : std::uint8_t {
   tissue_change,   ///< `row`: of PoseQuality::tissues
   doubtful_joint,  ///< `row`: of PoseQuality::doubtful; the figure is the turn, radians
   bone_rigidity,   ///< mm
+  bone_overlap,    ///< mm
 };
 
 /// A figure beyond its threshold.
