@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -18,8 +17,9 @@
 namespace ecorche::app {
 
 /// Of the surfaces of a model's bones, by their vertices. Bones of one segment never run into each other, and
-/// what overlaps in the scan does not count: a vertex's depth in another bone is held against the depth of
-/// the deepest one at rest. `segments`: motions from rest.
+/// what overlaps in the scan does not count: a vertex's depth in another bone is held against its own depth
+/// at rest, and against that of the deepest one, as far as bones of a scan touch (3 mm). `segments`: motions
+/// from rest.
 class BoneOverlaps {
  public:
   /// `model` must outlive it. Nothing is looked at before bones come near each other.
@@ -47,16 +47,16 @@ class BoneOverlaps {
     std::size_t vertex = 0;
   };
 
-  const Trees& trees(Bone& bone);
-  Depth depth(const Bone& of, Bone& in, const RigidTransform& motion,
-              double enough = std::numeric_limits<double>::infinity());
-  double depth_at_rest(std::size_t of, std::size_t in);
+  void build_trees(Bone& bone);
+  static double depth(const Bone& in, const Eigen::Vector3d& p);  // 0 outside; of its trees
+  double touching(std::size_t of, std::size_t in);
+  Depth overlap(std::size_t a, std::size_t b, const RigidTransform& motion, double enough);
   template <class Look>
   void each_pair(std::span<const RigidTransform> segments, Look&& look);
 
   const Model& model_;
   std::vector<Bone> bones_;
-  std::map<std::pair<std::size_t, std::size_t>, double> at_rest_;
+  std::map<std::pair<std::size_t, std::size_t>, double> touching_;
 };
 
 }  // namespace ecorche::app

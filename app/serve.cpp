@@ -169,6 +169,16 @@ int run_serve(const ServeSettings& settings, const Program& program) {
                 "give it CAP_SYS_NICE or an RLIMIT_RTPRIO of 1 (ulimit -r 1), or serve without");
   }
 
+  // Before anybody is told where it listens: who knows may send a signal.
+  const std::stop_callback on_stop(program.stop, [&server] {
+    tell("STOPPING=1");
+    server.stop();
+  });
+  const OnHangup on_hangup([&server] {
+    tell(platform::reloading_since_now());
+    server.reload([] { tell("READY=1"); });
+  });
+
   const std::string where = written(options.listen.host, server.port());
   if (!settings.port_file.empty()) {
     std::string ports = std::to_string(server.port()) + "\n";
@@ -188,15 +198,7 @@ int run_serve(const ServeSettings& settings, const Program& program) {
   }
   program.result(text, report);
 
-  const std::stop_callback on_stop(program.stop, [&server] {
-    tell("STOPPING=1");
-    server.stop();
-  });
-  const OnHangup on_hangup([&server] {
-    tell(platform::reloading_since_now());
-    server.reload([] { tell("READY=1"); });
-  });
-  tell("READY=1\nSTATUS=listening on " + where);
+  if (!program.stop.stop_requested()) tell("READY=1\nSTATUS=listening on " + where);
   server.run();
   return 0;
 }

@@ -93,6 +93,32 @@ class Service(unittest.TestCase):
                 manager.process.communicate(timeout=30)
                 self.assertEqual(manager.process.returncode, 0)
 
+    def test_who_knows_the_port_may_send_sighup(self):
+        """Though its next words, which nobody reads, hold it up: a pipe that is full."""
+        reader, writer = os.pipe()
+        os.set_blocking(writer, False)
+        try:
+            while os.write(writer, bytes(4096)):
+                pass
+        except BlockingIOError:
+            os.set_blocking(writer, True)
+        with tempfile.TemporaryDirectory() as folder:
+            port = pathlib.Path(folder, "port")
+            server = subprocess.Popen([ECORCHE, "serve", MODEL, "--listen", "127.0.0.1:0", "--no-http", "--port-file", port], stdout=writer,
+                                      stderr=subprocess.PIPE, text=True)
+            os.close(writer)
+            until = time.monotonic() + 60
+            while not port.exists() and server.poll() is None and time.monotonic() < until:
+                time.sleep(0.005)
+            server.send_signal(signal.SIGHUP)
+            while b"listening on" not in (said := os.read(reader, 1 << 16)):
+                self.assertTrue(said, "SIGHUP ended it")
+            os.close(reader)
+            server.terminate()
+            _, err = server.communicate(timeout=30)
+            self.assertEqual(server.returncode, 0, err)
+            self.assertIn("asked to read the models again", err)
+
     def test_what_fails_is_never_ready(self):
         with Manager("/nowhere.hdf", "--listen", "127.0.0.1:0", "--no-http") as manager:
             _, err = manager.process.communicate(timeout=60)
