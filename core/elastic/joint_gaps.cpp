@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/elastic/joint_gaps.hpp"
 
-#include <algorithm>
-
 namespace ecorche::elastic {
 
 std::vector<std::int32_t> held_by(const Model& model) {
