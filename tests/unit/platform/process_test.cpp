@@ -10,8 +10,11 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <stop_token>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include <ecorche/values/error.hpp>
@@ -111,15 +114,27 @@ TEST(OtherProgram, HandsBackItsCodeOrItsSignal) {
 }
 
 TEST(OtherProgram, IsToldOnceToStopAndSoIsWhatItStarted) {
+  // Both would sleep for a minute; the shell counts what it is told. It is told only once both wait: a
+  // shell that had set its trap, but had not yet started the other, would start it afterwards.
+  const std::filesystem::path waits =
+      std::filesystem::path(testing::TempDir()) / ("waits_" + std::to_string(process_id()));
   std::stop_source stop;
-  stop.request_stop();
-  // Both would sleep for a minute; the shell counts what it is told.
+  const std::jthread teller([&](const std::stop_token& ended) {
+    while (!std::filesystem::exists(waits) && !ended.stop_requested())
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    stop.request_stop();
+  });
   const auto start = std::chrono::steady_clock::now();
-  const int code = run_program(*find_program("sh"),
-                               {"-c", "n=0; trap 'n=$((n+1))' INT; sleep 60; sleep 0.3; exit $((40 + n))"},
-                               stop.get_token());
+  const int code =
+      run_program(*find_program("sh"),
+                  {"-c",
+                   "n=0; trap 'n=$((n+1))' INT; sh -c ': > \"$1\"; exec sleep 60' - \"$1\"; sleep 0.3; "
+                   "exit $((40 + n))",
+                   "-", waits.string()},
+                  stop.get_token());
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
-  EXPECT_TRUE(code == 41 || code == 130) << code;  // 130: it was told before it had set its trap
+  EXPECT_EQ(code, 41);
+  std::filesystem::remove(waits);
 }
 
 }  // namespace
