@@ -11,8 +11,8 @@
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/values/model.hpp>
 #include <ecorche/values/transform.hpp>
-#include "preprocess/geometry/face_tree.hpp"
-#include "preprocess/geometry/winding_tree.hpp"
+#include "core/geometry/face_tree.hpp"
+#include "core/geometry/winding_tree.hpp"
 
 namespace ecorche::app {
 

@@ -13,8 +13,8 @@
 #include "app/case_options.hpp"
 #include "app/cli.hpp"
 #include "app/command.hpp"
+#include "core/geometry/hole_size.hpp"
 #include "preprocess/check/surface_figures.hpp"
-#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/label_surfaces/label_surfaces.hpp"
 #include "preprocess/repair/repair_surface.hpp"
 

@@ -11,11 +11,11 @@
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/preprocess/pipeline.hpp>
+#include "core/geometry/closest_point.hpp"
+#include "core/geometry/dihedral.hpp"
+#include "core/geometry/edges.hpp"
 #include "core/linear/decompositions.hpp"
 #include "preprocess/bounds.hpp"
-#include "preprocess/geometry/closest_point.hpp"
-#include "preprocess/geometry/dihedral.hpp"
-#include "preprocess/geometry/edges.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::preprocess {

@@ -6,7 +6,7 @@
 #include <map>
 #include <numeric>
 
-#include "preprocess/geometry/dihedral.hpp"
+#include "core/geometry/dihedral.hpp"
 
 namespace ecorche::preprocess {
 namespace {

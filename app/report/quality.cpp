@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "preprocess/geometry/dihedral.hpp"
+#include "core/geometry/dihedral.hpp"
 
 namespace ecorche::app::report {
 

@@ -8,8 +8,8 @@
 #include <array>
 #include <cmath>
 
-#include "preprocess/geometry/dihedral.hpp"
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/dihedral.hpp"
+#include "core/geometry/face_tree.hpp"
 
 namespace ecorche::bench {
 namespace {

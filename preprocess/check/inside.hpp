@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <ecorche/values/mesh.hpp>
-#include "preprocess/geometry/winding_tree.hpp"
+#include "core/geometry/winding_tree.hpp"
 
 namespace ecorche::check {
 

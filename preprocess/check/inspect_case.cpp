@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 
+#include "core/geometry/face_tree.hpp"
 #include "core/values/text.hpp"
 #include "preprocess/check/frames.hpp"
 #include "preprocess/check/image_places.hpp"
@@ -20,7 +21,6 @@
 #include "preprocess/check/label_ids.hpp"
 #include "preprocess/check/self_intersections.hpp"
 #include "preprocess/check/surface_parts.hpp"
-#include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::check {
 namespace {

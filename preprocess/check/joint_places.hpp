@@ -8,7 +8,7 @@
 
 #include <ecorche/values/case.hpp>
 #include <ecorche/values/skeleton.hpp>
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 
 namespace ecorche::check {
 

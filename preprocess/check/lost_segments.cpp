@@ -6,9 +6,9 @@
 #include <map>
 #include <string>
 
+#include "core/geometry/face_tree.hpp"
+#include "core/geometry/hole_size.hpp"
 #include "preprocess/check/inside.hpp"
-#include "preprocess/geometry/face_tree.hpp"
-#include "preprocess/geometry/hole_size.hpp"
 
 namespace ecorche::check {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/geometry/hole_size.hpp"
+#include "core/geometry/surface_edges.hpp"
 #include "core/values/text.hpp"
-#include "preprocess/geometry/hole_size.hpp"
-#include "preprocess/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/geometry/hole_size.hpp"
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/hole_size.hpp"
+#include "core/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <ecorche/values/mesh.hpp>
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
 

@@ -14,8 +14,8 @@
 #include <optional>
 #include <utility>
 
-#include "preprocess/geometry/nearest_point.hpp"
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/nearest_point.hpp"
+#include "core/geometry/surface_edges.hpp"
 
 namespace ecorche::check {
 namespace {

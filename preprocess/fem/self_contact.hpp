@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <ecorche/values/mesh.hpp>
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 
 namespace ecorche::fem {
 

@@ -12,9 +12,9 @@
 #include <limits>
 #include <optional>
 
-#include "preprocess/geometry/closest_point.hpp"
-#include "preprocess/geometry/face_tree.hpp"
-#include "preprocess/geometry/morton.hpp"
+#include "core/geometry/closest_point.hpp"
+#include "core/geometry/face_tree.hpp"
+#include "core/geometry/morton.hpp"
 #include "preprocess/mapping/boundary.hpp"
 #include "preprocess/mapping/point_cells.hpp"
 #include "preprocess/mapping/tet_corners.hpp"

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "preprocess/geometry/closest_point.hpp"
+#include "core/geometry/closest_point.hpp"
 #include "preprocess/mapping/tet_corners.hpp"
 #include "preprocess/mapping/tet_grid.hpp"
 

@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "preprocess/geometry/nearest_point.hpp"
+#include "core/geometry/nearest_point.hpp"
 #include "preprocess/parting/fill_gaps.hpp"
 #include "preprocess/parting/part_surface.hpp"
 

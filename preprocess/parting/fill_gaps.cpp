@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 #include "preprocess/repair/soup.hpp"
 
 namespace ecorche::parting {

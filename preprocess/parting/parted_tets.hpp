@@ -12,7 +12,7 @@
 
 #include <ecorche/values/context.hpp>
 #include <ecorche/values/model.hpp>
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 #include "preprocess/parting/part_limbs.hpp"
 
 namespace ecorche::parting {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <span>
 
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 #include "preprocess/parting/minimum_cut.hpp"
 
 namespace ecorche::parting {

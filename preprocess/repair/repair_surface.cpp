@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
+#include "core/geometry/surface_edges.hpp"
 #include "preprocess/check/surface_parts.hpp"
-#include "preprocess/geometry/surface_edges.hpp"
 #include "preprocess/repair/soup.hpp"
 
 namespace ecorche::repair {

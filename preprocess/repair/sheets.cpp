@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 #include "preprocess/repair/soup.hpp"
 
 namespace ecorche::repair {

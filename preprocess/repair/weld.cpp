@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 #include "preprocess/repair/soup.hpp"
 
 namespace ecorche::repair {

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 
 namespace ecorche::rig {
 namespace {

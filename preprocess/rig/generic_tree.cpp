@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 #include "preprocess/rig/bone_points.hpp"
 
 namespace ecorche::rig {

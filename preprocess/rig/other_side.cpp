@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/geometry/face_tree.hpp"
 #include "core/linear/decompositions.hpp"
-#include "preprocess/geometry/face_tree.hpp"
 
 namespace ecorche::rig {
 namespace {

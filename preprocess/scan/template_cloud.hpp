@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <ecorche/values/mesh.hpp>
-#include "preprocess/geometry/nearest_point.hpp"
+#include "core/geometry/nearest_point.hpp"
 #include "preprocess/scan/body_template.hpp"
 #include "preprocess/scan/similarity.hpp"
 

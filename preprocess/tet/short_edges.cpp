@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/geometry/dihedral.hpp"
-#include "preprocess/geometry/edges.hpp"
+#include "core/geometry/dihedral.hpp"
+#include "core/geometry/edges.hpp"
 
 namespace ecorche::tet {
 namespace {

@@ -8,7 +8,7 @@
 #include <array>
 #include <cmath>
 
-#include "preprocess/geometry/winding_tree.hpp"
+#include "core/geometry/winding_tree.hpp"
 
 namespace ecorche::voxel {
 namespace {

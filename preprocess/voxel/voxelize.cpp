@@ -19,9 +19,9 @@
 #include <optional>
 #include <string>
 
+#include "core/geometry/face_tree.hpp"
+#include "core/geometry/hole_size.hpp"
 #include "core/values/text.hpp"
-#include "preprocess/geometry/face_tree.hpp"
-#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/voxel/open_surface.hpp"
 #include "preprocess/voxel/rasterize.hpp"
 #include "preprocess/voxel/snapped_surface.hpp"

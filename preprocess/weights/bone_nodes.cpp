@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
 namespace ecorche::weights {

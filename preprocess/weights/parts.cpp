@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "preprocess/geometry/nearest_point.hpp"
+#include "core/geometry/nearest_point.hpp"
 
 namespace ecorche::weights {
 

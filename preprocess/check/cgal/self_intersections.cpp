@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 
 namespace ecorche::check {
 namespace {

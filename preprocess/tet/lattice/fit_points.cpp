@@ -9,8 +9,8 @@
 #include <numbers>
 #include <vector>
 
-#include "preprocess/geometry/dihedral.hpp"
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/dihedral.hpp"
+#include "core/geometry/face_tree.hpp"
 #include "preprocess/tet/lattice/incidence.hpp"
 
 namespace ecorche::tet {

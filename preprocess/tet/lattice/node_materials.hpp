@@ -10,7 +10,7 @@
 #include <ecorche/values/case.hpp>
 #include <ecorche/values/context.hpp>
 #include <ecorche/values/image.hpp>
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 #include "preprocess/tet/lattice/bcc_lattice.hpp"
 
 namespace ecorche::tet {

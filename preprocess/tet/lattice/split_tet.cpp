@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "preprocess/geometry/dihedral.hpp"
+#include "core/geometry/dihedral.hpp"
 
 namespace ecorche::tet {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <utility>
 
-#include "preprocess/geometry/closest_point.hpp"
+#include "core/geometry/closest_point.hpp"
 #include "tests/support/triangle_distance.hpp"
 
 namespace ecorche::geometry {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/geometry/nearest_point.hpp"
+#include "core/geometry/nearest_point.hpp"
 
 #include <gtest/gtest.h>
 

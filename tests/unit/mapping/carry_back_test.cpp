@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "preprocess/geometry/closest_point.hpp"
+#include "core/geometry/closest_point.hpp"
 #include "preprocess/mapping/bind.hpp"
 #include "preprocess/mapping/tet_corners.hpp"
 #include "tests/unit/mapping/lattices.hpp"

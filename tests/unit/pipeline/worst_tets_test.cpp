@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include <ecorche/preprocess/pipeline.hpp>
-#include "preprocess/geometry/dihedral.hpp"
+#include "core/geometry/dihedral.hpp"
 #include "tests/unit/pipeline/two_bones.hpp"
 
 namespace ecorche::preprocess {

@@ -9,9 +9,9 @@
 #include <numbers>
 #include <random>
 
+#include "core/geometry/hole_size.hpp"
 #include "preprocess/check/surface_figures.hpp"
 #include "preprocess/check/surface_parts.hpp"
-#include "preprocess/geometry/hole_size.hpp"
 #include "preprocess/repair/soup.hpp"
 #include "tests/unit/io/small_case.hpp"
 

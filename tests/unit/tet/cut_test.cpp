@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-#include "preprocess/geometry/closest_point.hpp"
+#include "core/geometry/closest_point.hpp"
 #include "preprocess/tet/lattice/cut_lattice.hpp"
 #include "preprocess/tet/lattice/grade.hpp"
 #include "preprocess/tet/lattice/manifold_labels.hpp"

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "preprocess/geometry/closest_point.hpp"
+#include "core/geometry/closest_point.hpp"
 #include "preprocess/tet/lattice/claims.hpp"
 #include "preprocess/tet/lattice/clipper.hpp"
 #include "preprocess/tet/lattice/cut_lattice.hpp"

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "preprocess/geometry/dihedral.hpp"
-#include "preprocess/geometry/edges.hpp"
+#include "core/geometry/dihedral.hpp"
+#include "core/geometry/edges.hpp"
 #include "preprocess/tet/mesher.hpp"
 #include "tests/unit/weights/box_mesh.hpp"
 

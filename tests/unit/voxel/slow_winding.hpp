@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "preprocess/geometry/winding_tree.hpp"
+#include "core/geometry/winding_tree.hpp"
 
 namespace ecorche::voxel {
 

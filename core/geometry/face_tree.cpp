@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/geometry/face_tree.hpp"
+#include "core/geometry/face_tree.hpp"
 
 #include <algorithm>
 #include <numeric>
 
-#include "preprocess/geometry/closest_point.hpp"
-#include "preprocess/geometry/morton.hpp"
+#include "core/geometry/closest_point.hpp"
+#include "core/geometry/morton.hpp"
 
 namespace ecorche::geometry {
 namespace {

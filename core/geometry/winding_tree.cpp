@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/geometry/winding_tree.hpp"
+#include "core/geometry/winding_tree.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "preprocess/geometry/face_tree.hpp"
-#include "preprocess/geometry/morton.hpp"
+#include "core/geometry/face_tree.hpp"
+#include "core/geometry/morton.hpp"
 
 namespace ecorche::geometry {
 namespace {

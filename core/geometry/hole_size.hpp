@@ -5,7 +5,7 @@
 #include <span>
 
 #include <ecorche/values/mesh.hpp>
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 
 namespace ecorche::geometry {
 

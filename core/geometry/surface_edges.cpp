@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/geometry/surface_edges.hpp"
+#include "core/geometry/surface_edges.hpp"
 
 #include <algorithm>
 #include <array>

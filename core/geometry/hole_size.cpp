@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "preprocess/geometry/hole_size.hpp"
+#include "core/geometry/hole_size.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
