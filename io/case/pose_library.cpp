@@ -38,18 +38,22 @@ LibraryPose library_pose(std::string_view name, const Rig& rig) {
   }
   std::vector<kinematics::AngleValue> values;
   LibraryPose out;
-  for (const auto& [joint, angles] : entry->at("joints").pairs()) {
-    for (const std::string side : {"_left", "_right"}) {
-      for (const auto& [key, value] : angles.pairs()) {
-        const std::string angle = key.substr(0, key.size() - kDegrees.size());
-        const auto found = kinematics::find_named_angle(rig.skeleton, joint + side, angle);
-        if (found) {
-          values.push_back({*found, value.degrees()});
-        } else {
-          out.left_out.push_back(joint + side + "." + angle);
-        }
+  const auto turn = [&](const std::string& joint, const Value& angles) {
+    for (const auto& [key, value] : angles.pairs()) {
+      const std::string angle = key.substr(0, key.size() - kDegrees.size());
+      const auto found = kinematics::find_named_angle(rig.skeleton, joint, angle);
+      if (found) {
+        values.push_back({*found, value.degrees()});
+      } else {
+        out.left_out.push_back(joint + "." + angle);
       }
     }
+  };
+  for (const auto& [joint, angles] : entry->at("joints").pairs()) {
+    for (const std::string side : {"_left", "_right"}) turn(joint + side, angles);
+  }
+  if (const auto middle = entry->find("middle")) {
+    for (const auto& [joint, angles] : middle->pairs()) turn(joint, angles);
   }
   if (values.empty()) {
     throw Error(ErrorKind::config, "skeleton " + rig.skeleton.name,

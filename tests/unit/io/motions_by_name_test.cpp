@@ -53,6 +53,9 @@ TEST(PoseLibrary, AnglesMeanTheSameOnEveryBody) {
       EXPECT_NEAR(degrees(rig, sitting, "hip" + side, 0), 85, 1e-9) << body;
       EXPECT_NEAR(degrees(rig, sitting, "knee" + side, 0), 90, 1e-9) << body;
     }
+    const LibraryPose squatting = library_pose("squatting", rig);
+    EXPECT_NEAR(degrees(rig, squatting.pose, "lumbosacral", 0), 15, 1e-9) << body << ": in the middle";
+    EXPECT_EQ(squatting.left_out, std::vector<std::string>{}) << body;
   }
   // The woman's hips abduct where the other's adduct.
   const Rig woman = rig_of("icrp110_female"), man = rig_of("bodyparts3d");

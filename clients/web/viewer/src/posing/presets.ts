@@ -16,7 +16,10 @@ export interface Preset {
 /** What io/case/data/poses.yaml holds. */
 export type Library = Readonly<Record<string, {
   readonly root?: { readonly rotation: Quat };
+  /** By the name of a joint without its side. */
   readonly joints: Readonly<Record<string, Readonly<Record<string, number>>>>;
+  /** Of joints that have none. */
+  readonly middle?: Readonly<Record<string, Readonly<Record<string, number>>>>;
 }>>;
 
 // What one rig calls the opposite of the other: core/kinematics/named_angles.cpp.
@@ -42,20 +45,22 @@ export function presetPose(library: Library, name: string, rig: Rig): Pose | nul
   const rest = restPose(rig);
   const rotation = [...rest.rotation];
   let found = false;
-  for (const [joint, angles] of Object.entries(entry.joints)) {
-    for (const side of ["_left", "_right"]) {
-      const row = findJoint(rig, joint + side);
-      if (row < 0 || rig.segments[row]!.joint.sequence.length === 0) continue;
-      const values = [...restAngles(rig.segments[row]!.joint)] as [number, number, number];
-      for (const [key, degrees] of Object.entries(angles)) {
-        const at = findAngle(rig, row, key.replace(/_deg$/, ""));
-        if (!at) continue;
-        values[at.angle] = at.sign * degrees / DEGREES;
-        found = true;
-      }
-      rotation[row] = rotationFromAngles(rig.segments[row]!.joint, values as Angles);
+  const turn = (joint: string, angles: Readonly<Record<string, number>>) => {
+    const row = findJoint(rig, joint);
+    if (row < 0 || rig.segments[row]!.joint.sequence.length === 0) return;
+    const values = [...restAngles(rig.segments[row]!.joint)] as [number, number, number];
+    for (const [key, degrees] of Object.entries(angles)) {
+      const at = findAngle(rig, row, key.replace(/_deg$/, ""));
+      if (!at) continue;
+      values[at.angle] = at.sign * degrees / DEGREES;
+      found = true;
     }
+    rotation[row] = rotationFromAngles(rig.segments[row]!.joint, values as Angles);
+  };
+  for (const [joint, angles] of Object.entries(entry.joints)) {
+    for (const side of ["_left", "_right"]) turn(joint + side, angles);
   }
+  for (const [joint, angles] of Object.entries(entry.middle ?? {})) turn(joint, angles);
   if (!found) return null;
   if (entry.root) {
     // Given in the room: into the root joint's own frame.
