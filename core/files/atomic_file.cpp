@@ -191,11 +191,10 @@ std::string read_text(const fs::path& path, std::size_t limit) {
 void make_folder(const fs::path& path) {
   std::error_code error;
   fs::create_directories(path, error);
-  if (error || !fs::is_directory(path)) {
-    throw Error(ErrorKind::cannot_create, path.string(),
-                "cannot make this folder" + (error ? ": " + error.message() : std::string()),
-                "name another folder");
-  }
+  if (!error && fs::is_directory(path, error)) return;
+  throw Error(ErrorKind::cannot_create, path.string(),
+              "cannot make this folder" + (error ? ": " + error.message() : std::string()),
+              "name another folder");
 }
 
 }  // namespace ecorche::files
