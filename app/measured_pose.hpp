@@ -9,7 +9,7 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/values/context.hpp>
-#include "app/bone_overlaps.hpp"
+#include "runtime/quality/bone_overlaps.hpp"
 #include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::app {
@@ -48,7 +48,7 @@ class MeasuredPose {
   runtime::PosedBody body_, still_;
   bool moved_ = false;
   const std::vector<std::uint8_t> closed_;  // of the model's tissues
-  BoneOverlaps overlaps_;
+  runtime::BoneOverlaps overlaps_;
 };
 
 }  // namespace ecorche::app

@@ -9,11 +9,11 @@
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
-#include "app/bone_overlaps.hpp"
 #include "core/elastic/flesh.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/correct/samples.hpp"
 #include "preprocess/fem/self_contact.hpp"
+#include "runtime/quality/bone_overlaps.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -187,7 +187,7 @@ class Looking {
   Points rest_;
   fem::SelfContactFinder contact_;
   Skinned plain_, corrected_;
-  BoneOverlaps bones_;
+  runtime::BoneOverlaps bones_;
   double voxel_;
 };
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <ecorche/ecorche.h>
@@ -18,6 +19,7 @@
 #include <ecorche/runtime/volume_poser.hpp>
 #include <ecorche/values/model.hpp>
 #include "clients/c/edited_pose.hpp"
+#include "runtime/quality/bone_overlaps.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::c {
@@ -37,6 +39,22 @@ class Lazy {
   mutable std::unique_ptr<const T> value_;
 };
 
+/// Of one model, for bodies of any threads, one at a time: what they find out about its bones stays.
+class SharedOverlaps {
+ public:
+  explicit SharedOverlaps(const Model& model) : overlaps_(model) {}
+
+  runtime::BoneOverlap deepest(std::span<const RigidTransform> segments) const {
+    const std::lock_guard lock(mutex_);
+    // While it waits for its own loops, the thread must not take up another body's measure.
+    return tbb::this_task_arena::isolate([&] { return overlaps_.deepest(segments); });
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable runtime::BoneOverlaps overlaps_;
+};
+
 struct OpenModel {
   std::shared_ptr<const Model> model;
   runtime::BodyPoser poser;
@@ -45,6 +63,7 @@ struct OpenModel {
 
   Lazy<runtime::QualityMeter> meter;
   Lazy<std::vector<std::uint8_t>> closed;
+  SharedOverlaps overlaps{*model};
   Lazy<runtime::VolumePoser> volumes;
   Lazy<runtime::Probe> probe;
 

@@ -21,7 +21,7 @@ const char* figure_name(runtime::Figure figure) {
       return "doubtful_joint";
     case runtime::Figure::bone_rigidity:
       return "bone_rigidity";
-    case runtime::Figure::bone_overlap:  // which ecorche pose looks for
+    case runtime::Figure::bone_overlap:
       return "bone_overlap";
   }
   return "";
@@ -29,6 +29,8 @@ const char* figure_name(runtime::Figure figure) {
 
 const char* name_of(const ecorche_body& body, const runtime::Breach& breach) {
   if (breach.figure == runtime::Figure::tissue_change) return body.quality.tissues[breach.row].name.c_str();
+  if (breach.figure == runtime::Figure::bone_overlap)
+    return body.open->model->tissues[body.quality.overlap.bone].name.c_str();
   if (breach.figure != runtime::Figure::doubtful_joint) return "";
   const auto joint = static_cast<std::size_t>(body.quality.doubtful[breach.row].joint);
   return body.open->skeleton().segments[joint].joint.name.c_str();
@@ -55,6 +57,8 @@ ecorche_code ecorche_body_measure(ecorche_body* body, int sampled, ecorche_quali
         return std::make_unique<const std::vector<std::uint8_t>>(runtime::closed_surfaces(*open.model));
       });
       body->quality = runtime::measure(*open.model, body->posed, body->tissues, {}, closed);
+      body->quality.overlap = open.overlaps.deepest(body->posed.segments);
+      runtime::judge({}, body->quality);
     });
     body->reasons = runtime::breaches(body->quality);
     ecorche_quality quality = ECORCHE_QUALITY_INIT;
@@ -65,6 +69,7 @@ ecorche_code ecorche_body_measure(ecorche_body* body, int sampled, ecorche_quali
     quality.min_det_f = body->quality.min_det_f;
     quality.volume_change = body->quality.volume_change;
     quality.bone_rigidity = body->quality.bone_rigidity_mm;
+    quality.bone_overlap = body->quality.overlap.mm;
     return c::fill(out, quality);
   });
 }

@@ -8,6 +8,7 @@
 
 #include <ecorche/runtime/verdict.hpp>
 #include "runtime/quality/floats.hpp"
+#include "runtime/quality/overlap_meter.hpp"
 #include "runtime/quality/tet_kinds.hpp"
 
 namespace ecorche::runtime {
@@ -76,6 +77,17 @@ QualityMeter::QualityMeter(std::shared_ptr<const Model> model, std::size_t most_
   }
   tbb::parallel_for(std::size_t{0}, parts_.size(),
                     [&](std::size_t t) { parts_[t] = look_at(model_->tissues[t]); });
+  overlaps_ = std::make_unique<const OverlapMeter>(*model_);
+}
+
+QualityMeter::~QualityMeter() = default;
+
+void QualityMeter::prepare(const PosedBody& body) const {
+  overlaps_->deepest(body.segments);
+}
+
+void QualityMeter::prepare(std::size_t tissue) const {
+  overlaps_->prepare(tissue);
 }
 
 QualityMeter::Part QualityMeter::look_at(const Tissue& tissue) {
@@ -188,6 +200,7 @@ PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::ui
                       .share_error = changes[i].error};
     out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, changes[i].residual);
   }
+  out.overlap = overlaps_->deepest(body.segments);
   out.clamped = body.clamped;
   out.doubtful = doubtful_joints(model_->rig, body.pose, thresholds);
   judge(thresholds, out);

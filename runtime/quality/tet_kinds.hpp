@@ -12,7 +12,7 @@ namespace ecorche::runtime {
 enum class TetKind : std::uint8_t {
   body,  ///< bone or flesh: what figures of the tets are over
   cap,   ///< where the border of the scan cuts the body (skin_caps.hpp)
-  gap,   ///< in a joint, between bones that slide past one another (core/elastic/joint_gaps.hpp)
+  gap,   ///< one of elastic::joint_gaps, between bones that one joint turns against each other
 };
 
 /// Of every tet. O(#T).

@@ -31,6 +31,7 @@ ToldQuality to_c(const v1::PoseQuality& told) {
   quality.min_det_f = told.min_det_f();
   quality.volume_change = told.volume_change();
   quality.bone_rigidity = told.bone_rigidity();
+  quality.bone_overlap = told.overlap().mm();
   return out;
 }
 

@@ -79,13 +79,15 @@ void SessionRegistry::stop() {
   for (const auto& session : retired_) session->stop_volumes();
 }
 
-// Packed triangles, then levels of detail, one tissue after another, so that whoever asks for some waits for
-// one at most. Not for a model that nobody has any more.
+// Packed triangles, then levels of detail and what is asked of bones that run into each other, one tissue
+// after another, so that whoever asks for some waits for one at most. Not for a model that nobody has any
+// more.
 void SessionRegistry::prepare_details(std::shared_ptr<const ServedModel> model, std::uint32_t tissue) {
   if (leaving_ || tissue >= model->model().tissues.size() || model.use_count() == 1) return;
   executor_.submit(Service::levels, [this, model = std::move(model), tissue]() mutable {
     if (hooks_.may_coarsen && !hooks_.may_coarsen()) return;
     try {
+      model->meter().prepare(tissue);
       if (tissue == 0) model->pack_triangles();
       model->make_levels({tissue});
       if (tissue + 1 == model->model().tissues.size()) model->share_details();

@@ -11,8 +11,10 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
 #include <ecorche/runtime/quality_meter.hpp>
+#include <ecorche/runtime/verdict.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
 #include <ecorche/version.hpp>
+#include "runtime/quality/bone_overlaps.hpp"
 #include "tests/unit/c/opened_toy.hpp"
 
 namespace ecorche::c {
@@ -194,9 +196,13 @@ TEST_F(Bodies, QualityIsThatOfTheClasses) {
   const runtime::PosedBody wanted = posed(2.2);
   const runtime::BodyPoser poser(toy);
   for (const int sampled : {0, 1}) {
-    const runtime::PoseQuality quality = sampled != 0
-                                             ? runtime::QualityMeter(toy).measure(wanted, poser.all_tissues())
-                                             : runtime::measure(*toy, wanted, poser.all_tissues());
+    runtime::PoseQuality quality = sampled != 0
+                                       ? runtime::QualityMeter(toy).measure(wanted, poser.all_tissues())
+                                       : runtime::measure(*toy, wanted, poser.all_tissues());
+    if (sampled == 0) {
+      quality.overlap = runtime::BoneOverlaps(*toy).deepest(wanted.segments);
+      runtime::judge({}, quality);
+    }
     ecorche_quality told = ECORCHE_QUALITY_INIT;
     ASSERT_EQ(ecorche_body_measure(body, sampled, &told), ECORCHE_OK) << ecorche_error_message();
     EXPECT_EQ(told.pass != 0, quality.pass);
@@ -205,6 +211,7 @@ TEST_F(Bodies, QualityIsThatOfTheClasses) {
     EXPECT_EQ(told.min_det_f, quality.min_det_f);
     EXPECT_EQ(told.volume_change, quality.volume_change);
     EXPECT_EQ(told.bone_rigidity, quality.bone_rigidity_mm);
+    EXPECT_EQ(told.bone_overlap, quality.overlap.mm);
     EXPECT_EQ(told.reason_count == 0, quality.pass);
     ASSERT_GT(told.reason_count, 0U) << "bent so far it does not pass";
     for (std::uint32_t row = 0; row < told.reason_count; ++row) {
@@ -212,7 +219,9 @@ TEST_F(Bodies, QualityIsThatOfTheClasses) {
       ASSERT_EQ(ecorche_body_reason(body, row, &reason), ECORCHE_OK);
       EXPECT_GT(reason.value, reason.threshold);
       EXPECT_GT(std::strlen(reason.figure), 4U);
-      EXPECT_EQ(std::strlen(reason.name) > 0, std::string(reason.figure) == "tissue_change") << reason.figure;
+      const std::string figure = reason.figure;
+      EXPECT_EQ(std::strlen(reason.name) > 0, figure == "tissue_change" || figure == "bone_overlap")
+          << figure;
     }
     ecorche_reason reason = ECORCHE_REASON_INIT;
     EXPECT_EQ(ecorche_body_reason(body, told.reason_count, &reason), ECORCHE_INVALID_ARGUMENT);

@@ -88,6 +88,8 @@ Model ball_in_socket(const UnitSphere& sphere, std::array<std::int32_t, 2> segme
     for (int c = 0; c < 4; ++c)
       model.tets(static_cast<Eigen::Index>(t), c) = tets[t][static_cast<std::size_t>(c)];
   model.bone_segment.assign(segment_of_bone.begin(), segment_of_bone.end());
+  model.rig.skeleton.segments.resize(2);
+  model.rig.skeleton.segments[1].parent = 0;
   return model;
 }
 
@@ -127,6 +129,31 @@ TEST(JointGaps, APerfectBallInItsSocketInvertsWhatLiesBetween) {
     before = share;
   }
   EXPECT_NEAR(before, 0.43, 0.02) << "of a right angle";
+}
+
+// The ball and the socket hang on a third segment, and their joints lie so far apart.
+Model on_a_third(const UnitSphere& sphere, double mm) {
+  Model model = ball_in_socket(sphere, {1, 2});
+  model.rig.skeleton.segments.resize(3);
+  for (std::size_t s : {1U, 2U}) model.rig.skeleton.segments[s].parent = 0;
+  model.rig.skeleton.segments[2].joint.center = {mm, 0, 0};
+  return model;
+}
+
+TEST(JointGaps, OfBonesThatNoJointTurnsAgainstEachOtherAreFlesh) {
+  const UnitSphere sphere(2);
+  const Model two_hips = on_a_third(sphere, 180), kneecap = on_a_third(sphere, 30);
+  EXPECT_EQ(measure(two_hips, turned(two_hips, sphere, 90), {}).gaps.tets, 0U);
+  EXPECT_GT(measure(two_hips, turned(two_hips, sphere, 90), {}).inverted_tets, 0U);
+  EXPECT_EQ(measure(kneecap, turned(kneecap, sphere, 90), {}).gaps.tets, 3 * sphere.face.size());
+  // Its parent's parent, about whose joint it turns, too, or about one far from it.
+  for (const double mm : {20.0, 120.0}) {
+    Model model = ball_in_socket(sphere, {2, 0});
+    model.rig.skeleton.segments.resize(3);
+    model.rig.skeleton.segments[2].parent = 1;
+    model.rig.skeleton.segments[2].joint.center = {0, mm, 0};
+    EXPECT_EQ(measure(model, turned(model, sphere, 0), {}).gaps.tets, mm < 50 ? 3 * sphere.face.size() : 0U);
+  }
 }
 
 TEST(JointGaps, BonesOfOneSegmentHaveNone) {

@@ -45,6 +45,12 @@ void expect_measured(const TestServer& server, const Pose& pose, const v1::MeshF
     EXPECT_EQ(told.doubtful(j).turned(), joint.turned);
     EXPECT_EQ(told.doubtful(j).confidence(), joint.confidence);
   }
+  EXPECT_EQ(told.overlap().mm(), expected.overlap.mm);
+  EXPECT_EQ(told.has_overlap(), expected.overlap.mm > 0);
+  EXPECT_EQ(told.overlap().bone(), expected.overlap.bone);
+  EXPECT_EQ(told.overlap().into(), expected.overlap.into);
+  EXPECT_EQ(told.overlap().at().z(), expected.overlap.at.z());
+  EXPECT_EQ(told.max_bone_overlap(), thresholds.max_bone_overlap_mm);
   EXPECT_EQ(told.verdict(), expected.pass ? v1::PoseQuality::VERDICT_PASS : v1::PoseQuality::VERDICT_WARN);
   for (std::size_t t = 0; t < tissues.size(); ++t) {
     const v1::TissueChange& change = told.tissues(static_cast<int>(t));

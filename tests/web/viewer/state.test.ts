@@ -2,12 +2,15 @@
 // What the viewer knows without a picture: layers and their undo, names, colours, the scale of distances, the scanned body of a level.
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { create } from "@bufbuild/protobuf";
+import { PoseQualitySchema } from "../../../clients/web/protocol/src/gen/ecorche/v1/stream_pb.js";
 import { capsOf, restNumbers } from "../../../clients/web/viewer/src/rest.js";
 import { farthestFromRest, niceRange } from "../../../clients/web/viewer/src/scene/distance.js";
 import { lookOf } from "../../../clients/web/viewer/src/scene/palette.js";
 import { firstState, type AppState } from "../../../clients/web/viewer/src/state/app_state.js";
 import { History } from "../../../clients/web/viewer/src/state/history.js";
 import { Layers, shownOpacity } from "../../../clients/web/viewer/src/state/layers.js";
+import { qualityOf } from "../../../clients/web/viewer/src/state/quality.js";
 import { groupOrder, labelOf, matches } from "../../../clients/web/viewer/src/state/names.js";
 import { Store } from "../../../clients/web/viewer/src/state/store.js";
 
@@ -110,4 +113,12 @@ test("caps come in the order of a level, and a model that nothing cuts has none"
   assert.deepEqual([...capsOf([whole(0b10, 0b100), whole()], layout)!], [255, 0, 255, 0, 0]);
   assert.deepEqual([...capsOf([whole(0b10), whole()], layout)!], [255, 0, 0, 0, 0], "a server may leave out the last bytes");
   assert.equal(capsOf([whole(), whole()], layout), null);
+});
+
+test("bones that run into each other are told of beyond their limit, by name", () => {
+  const model = withBody().store.state.model;
+  const overlaps = (mm: number) => qualityOf(create(PoseQualitySchema, { overlap: { bone: 1, into: 9, mm }, maxBoneOverlap: 5 }), model).figures
+    .filter(({ name }) => name.startsWith("Overlap"));
+  assert.deepEqual(overlaps(6), [{ name: "Overlap of femur, left with tissue 9", value: "6.00 mm", limit: "5.00 mm", over: true }]);
+  assert.deepEqual(overlaps(5), []);
 });

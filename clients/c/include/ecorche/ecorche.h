@@ -269,19 +269,20 @@ typedef struct ecorche_quality {
   double min_det_f;      /* least posed over rest volume of a tet */
   double volume_change;  /* share */
   double bone_rigidity;  /* mm */
+  double bone_overlap;   /* mm: how much deeper than in the scan a bone lies in another */
 } ecorche_quality;
 #define ECORCHE_QUALITY_INIT \
-  { sizeof(ecorche_quality), 0, 0, 0, 0, 0, 0, 0 }
+  { sizeof(ecorche_quality), 0, 0, 0, 0, 0, 0, 0, 0 }
 
-/* Of the last update. `sampled`: on 8192 tets, in a fraction of a frame; else on all. Tissues count that were
- * posed. */
+/* Of the last update. `sampled`: on 8192 tets and some of the bones' vertices, in a fraction of a frame but for
+ * the first time that bones move against each other; else on all. Tissues count that were posed. */
 ECORCHE_API ecorche_code ecorche_body_measure(ecorche_body* body, int sampled, ecorche_quality* out);
 
 typedef struct ecorche_reason {
   size_t struct_size;
   const char* figure; /* inverted_share, place_inverted, place_change, volume_change, tissue_change,
-                         doubtful_joint or bone_rigidity */
-  const char* name;   /* of the tissue or the joint, or "" */
+                         doubtful_joint, bone_overlap or bone_rigidity */
+  const char* name;   /* of the tissue, the joint or the bone, or "" */
   double value, threshold;
 } ecorche_reason;
 #define ECORCHE_REASON_INIT \

@@ -60,7 +60,8 @@ class BodyOptions(Sized):
 
 class QualityInfo(Sized):
     _fields_ = [("struct_size", c_size_t), ("passes", c_int32), ("reason_count", c_uint32), ("inverted_tets", c_uint64),
-                ("inverted_share", c_double), ("min_det_f", c_double), ("volume_change", c_double), ("bone_rigidity", c_double)]
+                ("inverted_share", c_double), ("min_det_f", c_double), ("volume_change", c_double), ("bone_rigidity", c_double),
+                ("bone_overlap", c_double)]
 
 
 class ReasonInfo(Sized):

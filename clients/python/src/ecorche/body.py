@@ -35,6 +35,7 @@ class Quality:
     min_det_f: float  # least posed over rest volume of a tet
     volume_change: float  # share
     bone_rigidity: float  # mm
+    bone_overlap: float  # mm: how much deeper than in the scan a bone lies in another
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,8 @@ class Body:
             reason = ReasonInfo()
             call("body_reason", self._handle, row, ctypes.byref(reason))
             reasons.append(Reason(reason.figure.decode(), reason.name.decode(), reason.value, reason.threshold))
-        return Quality(bool(info.passes), reasons, info.inverted_tets, info.inverted_share, info.min_det_f, info.volume_change, info.bone_rigidity)
+        return Quality(bool(info.passes), reasons, info.inverted_tets, info.inverted_share, info.min_det_f, info.volume_change, info.bone_rigidity,
+                       info.bone_overlap)
 
     def volume(self, name: Union[str, int] = 0, grid: Optional[Grid] = None, *, nearest: bool = False) -> tuple[np.ndarray, Grid]:
         """The posed volume, (k, j, i) or (k, j, i, components), and its grid: `grid`, or the scan's own grown until it holds the body."""

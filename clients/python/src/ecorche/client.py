@@ -194,7 +194,7 @@ class Client(Anatomy):
         info, sequence = QualityInfo(), ctypes.c_uint64()
         self._call("quality", self._handle, ctypes.byref(info), ctypes.byref(sequence))
         return Quality(bool(info.passes), [], info.inverted_tets, info.inverted_share, info.min_det_f, info.volume_change,
-                       info.bone_rigidity), sequence.value
+                       info.bone_rigidity, info.bone_overlap), sequence.value
 
     def to_rest(self, points: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], list[Optional[str]]]:
         """Points of the posed body, (P, 3): where they were in the scan (NaN outside the body), and the tissue there."""

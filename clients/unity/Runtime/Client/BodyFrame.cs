@@ -19,13 +19,16 @@ namespace Ecorche
         public double VolumeChange;
         /// <summary>mm.</summary>
         public double BoneRigidity;
+        /// <summary>mm: how much deeper than in the scan a bone lies in another one.</summary>
+        public double BoneOverlap;
         /// <summary>The pose that was measured.</summary>
         public ulong PoseSequence;
 
         internal static Quality From(PoseQuality told) => new Quality
         {
             Passes = told.Verdict == PoseQualityVerdict.Pass, InvertedTets = told.InvertedTets, InvertedShare = told.InvertedShare,
-            MinDetF = told.MinDetF, VolumeChange = told.VolumeChange, BoneRigidity = told.BoneRigidity, PoseSequence = told.PoseSequence,
+            MinDetF = told.MinDetF, VolumeChange = told.VolumeChange, BoneRigidity = told.BoneRigidity,
+            BoneOverlap = told.HasOverlap ? told.Overlap.Mm : 0, PoseSequence = told.PoseSequence,
         };
     }
 

@@ -54,7 +54,7 @@ namespace Ecorche.Native
             return new Quality
             {
                 Passes = told.Pass != 0, InvertedTets = told.InvertedTets, InvertedShare = told.InvertedShare, MinDetF = told.MinDetF,
-                VolumeChange = told.VolumeChange, BoneRigidity = told.BoneRigidity,
+                VolumeChange = told.VolumeChange, BoneRigidity = told.BoneRigidity, BoneOverlap = told.BoneOverlap,
             };
         }
 

@@ -37,7 +37,7 @@ namespace Ecorche.Native
             public int Pass;
             public uint ReasonCount;
             public ulong InvertedTets;
-            public double InvertedShare, MinDetF, VolumeChange, BoneRigidity;
+            public double InvertedShare, MinDetF, VolumeChange, BoneRigidity, BoneOverlap;
         }
 
         [StructLayout(LayoutKind.Sequential)]

@@ -75,7 +75,7 @@ struct PoseQuality {
   double bone_rigidity_mm = 0;  ///< largest distance of a bone vertex from its bone's best rigid fit
   WorstPlaces places;           ///< where all tets were measured
   JointGaps gaps;               ///< likewise
-  BoneOverlap overlap;          ///< `measure` does not look for it: see BoneOverlaps
+  BoneOverlap overlap;          ///< QualityMeter and BoneOverlaps look for it, `measure` does not
   std::vector<ClampedJoint> clamped;
   std::vector<DoubtfulJoint> doubtful;
   QualityThresholds thresholds;

@@ -12,6 +12,8 @@
 
 namespace ecorche::runtime {
 
+class OverlapMeter;
+
 /// Made once per model; shared and immutable, as BodyPoser is.
 class QualityMeter {
  public:
@@ -23,16 +25,23 @@ class QualityMeter {
   /// Looks at `most_tets` tets, one drawn from each of as many equal runs of the model's order (Morton: so
   /// everywhere in the body), the same ones in every pose; at all where there are no more.
   explicit QualityMeter(std::shared_ptr<const Model> model, std::size_t most_tets = default_tets);
+  ~QualityMeter();
 
   /// As runtime::measure, which is its slow twin, but for what follows. Tets: shares, volume change and the
   /// count of inverted ones are estimates from the subset, their standard errors are in
   /// `inverted_share_error` and `volume_change_error`; the smallest det F is that of the subset, so no less
   /// than the true one. Tissues that follow the tets: a coarse surface on some of their vertices, whose
   /// difference from a coarser one is `share_error`; small surfaces whole, exact to 1e-5 of their volume.
-  /// Which place is worst is not looked for. Bones: their rigidity is that of up to 64 vertices each, and
-  /// their volume is the rest's. Same figures for any thread count.
+  /// Which place is worst is not looked for. Bones: their rigidity is that of up to 64 vertices each, their
+  /// volume is the rest's, and how deep they run into each other is looked for near joints, and where they
+  /// nearly touch in the scan (OverlapMeter). Same figures for any thread count.
   PoseQuality measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                       const QualityThresholds& thresholds = {}) const;
+
+  /// What `measure` works out first, once: of bones that never moved against each other before, or of one
+  /// tissue, whatever moves. Up to a second for a whole body.
+  void prepare(const PosedBody& body) const;
+  void prepare(std::size_t tissue) const;
 
   /// How many are measured.
   std::size_t tets() const { return rest_.size(); }
@@ -57,6 +66,7 @@ class QualityMeter {
   std::vector<float> rest_;                            // their determinants
   double tets_per_drawn_ = 1;
   std::vector<Part> parts_;
+  std::unique_ptr<const OverlapMeter> overlaps_;
 };
 
 }  // namespace ecorche::runtime
