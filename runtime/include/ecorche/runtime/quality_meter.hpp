@@ -38,9 +38,10 @@ class QualityMeter {
   PoseQuality measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                       const QualityThresholds& thresholds = {}) const;
 
-  /// What `measure` works out first, once: of bones that never moved against each other before, or of one
-  /// tissue, whatever moves. Up to a second for a whole body.
+  /// What `measure` works out first, once, of bones that never moved against each other before: up to a
+  /// second for a whole body.
   void prepare(const PosedBody& body) const;
+  /// The same of one tissue, a row of Model::tissues, whatever moves against it.
   void prepare(std::size_t tissue) const;
 
   /// How many are measured.
