@@ -45,7 +45,7 @@ LibraryPose library_pose(std::string_view name, const Rig& rig) {
       if (found) {
         values.push_back({*found, value.degrees()});
       } else {
-        out.left_out.push_back(joint + "." + angle);
+        out.left_out.push_back(std::string(joint).append(".").append(angle));
       }
     }
   };

@@ -42,7 +42,8 @@ class DepthGrid {
 
   Eigen::Vector3d point(const Eigen::Vector3i& i) const { return low_ + spacing_ * i.cast<double>(); }
   std::size_t row(const Eigen::Vector3i& i) const {
-    return static_cast<std::size_t>((i.z() * size_.y() + i.y()) * size_.x() + i.x());
+    const Eigen::Matrix<std::size_t, 3, 1> at = i.cast<std::size_t>(), size = size_.cast<std::size_t>();
+    return (at.z() * size.y() + at.y()) * size.x() + at.x();
   }
   float between(const Eigen::Vector3f& p) const;
   void measure(const SurfaceTrees& trees, const Eigen::Vector3i& from, std::vector<std::uint8_t>& rough);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <ecorche/runtime/verdict.hpp>
+#include <ecorche/wire/convert.hpp>
 #include "runtime/server/schedule/serially.hpp"
 
 namespace ecorche::server {
