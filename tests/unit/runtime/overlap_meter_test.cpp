@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -130,6 +131,43 @@ TEST(OverlapMeter, SaysWhatTheSlowWaySays) {
     }
   }
   EXPECT_GT(deep, 10);
+}
+
+// As BoneOverlaps says it, asking for every vertex.
+double by_every_vertex(const Model& model, const std::vector<RigidTransform>& segments) {
+  double deepest = 0;
+  for (const std::size_t of : {0U, 1U}) {
+    const Tissue& in = model.tissues[1 - of];
+    const SurfaceTrees trees(SurfaceMesh{in.V.cast<double>(), in.F});
+    const RigidTransform motion = segments[1 - of].inverse() * segments[of];
+    std::vector<double> rest, now;
+    for (Eigen::Index v = 0; v < model.tissues[of].V.rows(); ++v) {
+      const Vector3d p = model.tissues[of].V.row(v).cast<double>().transpose();
+      rest.push_back(trees.depth(p));
+      now.push_back(trees.depth(motion * p));
+    }
+    const double touching = std::min(kTouchingMm, *std::max_element(rest.begin(), rest.end()));
+    for (std::size_t v = 0; v < rest.size(); ++v)
+      deepest = std::max(deepest, now[v] - std::max(touching, rest[v]));
+  }
+  return deepest;
+}
+
+TEST(BoneOverlaps, LeavesOutOnlyWhatCannotLieDeeper) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const double apart : {61.0, 58.0, 52.0}) {
+    const Model model = two_bones({0, 0, apart}, {12, 16, 30});
+    BoneOverlaps overlaps(model);
+    for (int k = 0; k < 8; ++k) {
+      const auto segments = turned({4 * unit(random), 4 * unit(random), apart / 2 - 4},
+                                   {unit(random), unit(random), 0.2 * unit(random)}, unit(random));
+      const double asked = by_every_vertex(model, segments);
+      EXPECT_NEAR(overlaps.deepest(segments).mm, asked, 1e-9) << apart << ' ' << k;
+      EXPECT_TRUE(asked == 0 || overlaps.meet(segments, 0.9 * asked));
+      EXPECT_FALSE(overlaps.meet(segments, 1.1 * asked + 0.01));
+    }
+  }
 }
 
 TEST(OverlapMeter, BonesThatMoveAlikeNeverMeet) {
