@@ -32,6 +32,8 @@
 #include "bench/runtime/plain_eigen.hpp"
 #include "bench/runtime/probing.hpp"
 #include "bench/runtime/volume_rows.hpp"
+#include "runtime/quality/bone_overlaps.hpp"
+#include "runtime/quality/overlap_meter.hpp"
 #include "runtime/skin/body_parts.hpp"
 #include "runtime/skin/skin_clusters.hpp"
 
@@ -245,6 +247,16 @@ class Bench {
     const runtime::QualityMeter meter(model_);
     line(table, "quality, subset of tets", threads,
          time(kFrames, [&](int) { meter.measure(frame, posers_[0]->all_tissues()); }));
+    line(table, "distances between bones, once", threads, time(5, [&](int) {
+           const runtime::OverlapMeter fresh(*model_);
+           for (std::size_t t = 0; t < model_->tissues.size(); ++t) fresh.prepare(t);
+         }));
+    const runtime::OverlapMeter overlaps(*model_);
+    line(table, "overlap of bones", threads,
+         time(kFrames, [&](int f) { overlaps.deepest(segments_[static_cast<std::size_t>(f % kFrames)]); }));
+    runtime::BoneOverlaps exact(*model_);
+    line(table, "overlap of bones, all vertices", threads,
+         time(9, [&](int f) { exact.deepest(segments_[static_cast<std::size_t>(f)]); }));
   }
 
   std::vector<std::uint32_t> needed_clusters() const {

@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <unordered_set>
@@ -35,6 +36,10 @@ std::vector<Eigen::Vector3f> thinned(const PointsF& V) {
     if (taken.insert(cube).second) out.emplace_back(V.row(v).transpose());
   }
   return out;
+}
+
+RigidTransform motion_against(std::span<const RigidTransform> segments, std::int32_t of, std::int32_t in) {
+  return segments[static_cast<std::size_t>(in)].inverse() * segments[static_cast<std::size_t>(of)];
 }
 
 Eigen::AlignedBox3d grown(const Eigen::AlignedBox3d& box, double mm) {
@@ -73,6 +78,7 @@ struct OverlapMeter::Bone {
   std::vector<std::pair<const Bone*, double>> near;  // bones that it meets within so many mm
   mutable std::once_flag made;
   mutable std::vector<Pair> pairs;  // bones in this one
+  mutable std::atomic<bool> prepared = false;
 
   Bone(const Tissue& of, std::size_t row) : tissue(row), segment(of.segment), points(thinned(of.V)) {
     for (Eigen::Index v = 0; v < of.V.rows(); ++v) box.extend(of.V.row(v).cast<double>().transpose());
@@ -124,7 +130,10 @@ std::vector<OverlapMeter::Pair> OverlapMeter::make_pairs(const Bone& in) const {
 
 // While it waits for its own loops, the thread must not take up another job: that one could want the same.
 const std::vector<OverlapMeter::Pair>& OverlapMeter::pairs_into(const Bone& in) const {
-  std::call_once(in.made, [&] { tbb::this_task_arena::isolate([&] { in.pairs = make_pairs(in); }); });
+  std::call_once(in.made, [&] {
+    tbb::this_task_arena::isolate([&] { in.pairs = make_pairs(in); });
+    in.prepared = true;
+  });
   return in.pairs;
 }
 
@@ -133,17 +142,25 @@ void OverlapMeter::prepare(std::size_t tissue) const {
     if (in->tissue == tissue && !in->near.empty()) pairs_into(*in);
 }
 
+// Whether something moves against the bone.
+bool OverlapMeter::asked(const Bone& in, std::span<const RigidTransform> segments) {
+  return std::any_of(in.near.begin(), in.near.end(), [&](const auto& near) {
+    return !stands_still(motion_against(segments, near.first->segment, in.segment));
+  });
+}
+
+std::optional<BoneOverlap> OverlapMeter::deepest_if_prepared(std::span<const RigidTransform> segments) const {
+  const auto lacks = [&](const auto& in) { return !in->prepared && asked(*in, segments); };
+  if (std::any_of(bones_.begin(), bones_.end(), lacks)) return std::nullopt;
+  return deepest(segments);
+}
+
 BoneOverlap OverlapMeter::deepest(std::span<const RigidTransform> segments) const {
-  const auto motion_of = [&](const Bone& of, const Bone& in) {
-    return segments[static_cast<std::size_t>(in.segment)].inverse() *
-           segments[static_cast<std::size_t>(of.segment)];
-  };
   const auto in_one = [&](const Bone& in) {
     BoneOverlap deepest;
-    const auto moves = [&](const auto& near) { return !stands_still(motion_of(*near.first, in)); };
-    if (std::none_of(in.near.begin(), in.near.end(), moves)) return deepest;
+    if (!asked(in, segments)) return deepest;
     for (const Pair& pair : pairs_into(in)) {
-      const RigidTransform motion = motion_of(*pair.of, in);
+      const RigidTransform motion = motion_against(segments, pair.of->segment, in.segment);
       if (stands_still(motion)) continue;
       const Eigen::Matrix3f turn = motion.q.toRotationMatrix().cast<float>();
       const Eigen::Vector3f shift = motion.t.cast<float>();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,8 @@ class OverlapMeter {
 
   /// The two that run deepest into each other. The same for any number of threads.
   BoneOverlap deepest(std::span<const RigidTransform> segments) const;
+  /// Nothing where distances that it would ask are not worked out yet.
+  std::optional<BoneOverlap> deepest_if_prepared(std::span<const RigidTransform> segments) const;
 
   /// Works out the distances to a bone, if the tissue is one, so that no pose waits for them.
   void prepare(std::size_t tissue) const;
@@ -33,6 +36,7 @@ class OverlapMeter {
   struct Bone;
   struct Pair;
 
+  static bool asked(const Bone& in, std::span<const RigidTransform> segments);
   const std::vector<Pair>& pairs_into(const Bone& in) const;
   std::vector<Pair> make_pairs(const Bone& in) const;
 

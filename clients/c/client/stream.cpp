@@ -2,6 +2,7 @@
 // Poses out, frames in.
 #include <algorithm>
 #include <chrono>
+#include <limits>
 
 #include <ecorche/wire/convert.hpp>
 #include "clients/c/client/connection.hpp"
@@ -31,7 +32,8 @@ ToldQuality to_c(const v1::PoseQuality& told) {
   quality.min_det_f = told.min_det_f();
   quality.volume_change = told.volume_change();
   quality.bone_rigidity = told.bone_rigidity();
-  quality.bone_overlap = told.overlap().mm();
+  quality.bone_overlap =
+      told.overlap_pending() ? std::numeric_limits<double>::quiet_NaN() : told.overlap().mm();
   return out;
 }
 

@@ -92,13 +92,18 @@ struct Judged {
 Judged judge(const PoseJob& job, const Subscription& subscription, const runtime::PosedBody& body) {
   if (!measured(job, subscription)) return {subscription.quality};
   const auto start = Clock::now();
-  const std::vector<std::uint32_t>& tissues = std::get<MeshSpec>(subscription.spec).tissues;
+  const MeshSpec& mesh = std::get<MeshSpec>(subscription.spec);
+  const std::vector<std::uint32_t>& tissues = mesh.tissues;
   // Where the body went far, its float32 positions are too coarse to be measured.
   const BodyPool::Lease still =
       runtime::stands_still(body) ? BodyPool::Lease() : pose_still(*job.model, job.request, tissues);
-  auto quality = std::make_shared<const v1::PoseQuality>(
-      server::describe(job.model->meter().measure(still ? *still : body, tissues, job.thresholds), tissues,
-                       job.request.sequence));
+  const runtime::QualityMeter& meter = job.model->meter();
+  const runtime::PosedBody& measured_body = still ? *still : body;
+  // Who asks for it with every frame waits for all of it; of others no frame waits for distances of bones.
+  const runtime::PoseQuality found = mesh.quality ? meter.measure(measured_body, tissues, job.thresholds)
+                                                  : meter.measure_now(measured_body, tissues, job.thresholds);
+  auto quality =
+      std::make_shared<const v1::PoseQuality>(server::describe(found, tissues, job.request.sequence));
   return {std::move(quality), true, microseconds(Clock::now() - start)};
 }
 

@@ -78,6 +78,7 @@ v1::PoseQuality describe(const runtime::PoseQuality& quality, const std::vector<
     overlap.set_mm(quality.overlap.mm);
     wire::to_proto(quality.overlap.at, *overlap.mutable_at());
   }
+  out.set_overlap_pending(quality.overlap_pending);
   out.set_max_bone_overlap(quality.thresholds.max_bone_overlap_mm);
   out.set_pose_sequence(pose);
   return out;

@@ -22,7 +22,8 @@ void QualityTracker::frame_made(const PosedFrame& frame, SubscriptionRow& row) {
     quality = frame.judged;
     if (frame.judged->pose_sequence() == 0) model_->rest_pose.know(mesh->tissues, frame.judged);
   }
-  if (!quality || quality->pose_sequence() != poses_.present().sequence) unmeasured_ = true;
+  if (!quality || quality->pose_sequence() != poses_.present().sequence || quality->overlap_pending())
+    unmeasured_ = true;
 }
 
 bool QualityTracker::measure(std::shared_ptr<const void> owner) {
@@ -47,9 +48,12 @@ bool QualityTracker::measure(std::shared_ptr<const void> owner) {
 void QualityTracker::measured(const QualityJob& job) {
   for (const QualityJob::Row& done : job.rows) {
     SubscriptionRow* row = table_.find(done.subscription);
-    if (row && done.quality && judged_by(*done.quality, thresholds_))
-      row->subscription.quality = done.quality;
+    if (!row || !done.quality || !judged_by(*done.quality, thresholds_)) continue;
+    const auto before = std::exchange(row->subscription.quality, done.quality);
+    if (before && before->overlap_pending() && before->pose_sequence() == poses_.present().sequence)
+      row->wait(Clock::now());
   }
+  if (table_.anybody_waits()) show_();
 }
 
 }  // namespace ecorche::server

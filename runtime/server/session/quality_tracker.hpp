@@ -2,6 +2,7 @@
 // What a session's poses are worth, and when that is measured.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -15,13 +16,19 @@
 namespace ecorche::server {
 
 /// Frames tell the quality of their pose where it was measured with them, and else the last that was. The
-/// present pose is measured beside the stream, in turns with other sessions, once a client has its frame. On
-/// the I/O thread.
+/// present pose is measured beside the stream, in turns with other sessions, once a client has its frame.
+/// Where a frame could not tell all of it, its pose is shown again with the rest. On the I/O thread.
 class QualityTracker {
  public:
+  /// `show`: somebody waits for the present pose.
   QualityTracker(Executor& executor, TurnQueue& turns, SubscriptionTable& table, const PoseSlot& poses,
-                 std::shared_ptr<const ServedModel> model)
-      : executor_(executor), turns_(turns), table_(table), poses_(poses), model_(std::move(model)) {}
+                 std::shared_ptr<const ServedModel> model, std::function<void()> show)
+      : executor_(executor),
+        turns_(turns),
+        table_(table),
+        poses_(poses),
+        model_(std::move(model)),
+        show_(std::move(show)) {}
 
   const runtime::QualityThresholds& thresholds() const { return thresholds_; }
   /// Who wants it with every frame waits for the present pose's by these.
@@ -44,6 +51,7 @@ class QualityTracker {
   SubscriptionTable& table_;
   const PoseSlot& poses_;
   std::shared_ptr<const ServedModel> model_;
+  std::function<void()> show_;
   runtime::QualityThresholds thresholds_;
   bool unmeasured_ = false;  ///< the present pose, and somebody is sent its frame
 };

@@ -40,7 +40,7 @@ Session::Session(const Services& services, std::shared_ptr<const ServedModel> mo
       volumes_(io_, executor_, memory_, table_, planner_, limits.poses_per_second, [this] { start_jobs(); }),
       probes_(kept_by_probe(model_->model()), owner_.kept ? owner_.kept : memory_.kept_pool(),
               services.destroy_later),
-      quality_(executor_, quality_turns_, table_, poses_, model_),
+      quality_(executor_, quality_turns_, table_, poses_, model_, [this] { start_jobs(); }),
       player_(std::make_shared<ClipPlayer>(
           io_,
           [this](const Pose& pose) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -168,6 +169,22 @@ TEST(BoneOverlaps, LeavesOutOnlyWhatCannotLieDeeper) {
       EXPECT_FALSE(overlaps.meet(segments, 1.1 * asked + 0.01));
     }
   }
+}
+
+TEST(OverlapMeter, WaitsForNothingWhereThatIsAsked) {
+  const Vector3d second(0, 0, 2 * kRadius + 1);
+  const Model model = two_bones(second, Vector3d::Constant(kRadius));
+  const OverlapMeter meter(model);
+  const auto bent = turned(second / 2, Vector3d::UnitX(), 1);
+  EXPECT_TRUE(meter.deepest_if_prepared(turned(second / 2, Vector3d::UnitX(), 0))) << "nothing is asked";
+  EXPECT_FALSE(meter.deepest_if_prepared(bent));
+  meter.prepare(0);
+  EXPECT_FALSE(meter.deepest_if_prepared(bent)) << "half of it";
+  meter.prepare(1);
+  const std::optional<BoneOverlap> found = meter.deepest_if_prepared(bent);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->mm, meter.deepest(bent).mm);
+  EXPECT_GT(found->mm, 1);
 }
 
 TEST(OverlapMeter, BonesThatMoveAlikeNeverMeet) {

@@ -5,6 +5,7 @@
 #include <ecorche/runtime/body_poser.hpp>
 #include <ecorche/runtime/quality_meter.hpp>
 #include <ecorche/runtime/verdict.hpp>
+#include "tests/support/toy_model.hpp"
 #include "tests/unit/server/test_server.hpp"
 
 namespace ecorche::server {
@@ -129,6 +130,54 @@ TEST(Quality, TissuesAreJudgedByTheirGroupsTimesAFactor) {
   const wire::Frame frame = client.next_mesh(200);
   expect_measured(server, client, frame.envelope.mesh_frame(), {.tissue_factor = 1e-6});
   EXPECT_EQ(frame.envelope.mesh_frame().quality().verdict(), v1::PoseQuality::VERDICT_WARN);
+}
+
+// The toy body with the ends of two bones 1 mm apart, below the joint at 200 mm that turns them: a corner of
+// the narrow one goes 1.7 mm into the other when it turns by 0.6.
+Model with_near_bones() {
+  Model model = test::toy_model();
+  for (Tissue& tissue : model.tissues) {
+    if (tissue.segment == 1) tissue.V.col(2).array() += 20;
+    if (tissue.segment != 2) continue;
+    tissue.V.col(2).array() -= 29;
+    tissue.V.col(0) *= 0.5F;
+  }
+  return model;
+}
+
+// Of a server that works nothing out by itself.
+TestHooks idle() {
+  TestHooks hooks;
+  hooks.may_coarsen = [] { return false; };
+  return hooks;
+}
+
+TEST(Quality, NoFrameWaitsForDistancesOfBonesAndAllOfItFollows) {
+  const TestServer server({}, idle(), with_near_bones());
+  TestClient client(server);
+  client.subscribe_mesh();
+  client.next_mesh(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  client.send(300, client.bent(angle_of(300)));
+  const wire::Frame first = client.next_mesh(300);
+  EXPECT_EQ(first.envelope.mesh_frame().quality().pose_sequence(), 300U);
+  EXPECT_TRUE(first.envelope.mesh_frame().quality().overlap_pending());
+  EXPECT_FALSE(first.envelope.mesh_frame().quality().has_overlap());
+  const wire::Frame second = client.next_mesh(300);
+  EXPECT_FALSE(second.envelope.mesh_frame().quality().overlap_pending());
+  EXPECT_GT(second.envelope.mesh_frame().quality().overlap().mm(), 1);
+  expect_measured(server, client, second.envelope.mesh_frame());
+}
+
+TEST(Quality, WhoWantsItWithEveryFrameGetsAllOfIt) {
+  const TestServer server({}, idle(), with_near_bones());
+  TestClient client(server);
+  client.subscribe_mesh({}, true);
+  client.next_mesh(0);
+  client.send(300, client.bent(angle_of(300)));
+  const wire::Frame frame = client.next_mesh(300);
+  EXPECT_FALSE(frame.envelope.mesh_frame().quality().overlap_pending());
+  expect_measured(server, client, frame.envelope.mesh_frame());
 }
 
 TEST(Quality, OfABodyFarAwayIsThatOfTheBody) {

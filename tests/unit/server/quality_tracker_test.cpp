@@ -39,7 +39,8 @@ struct Tracking {
   SubscriptionTable table{model, memory.kept_pool(), std::uint64_t{1} << 30,
                           [](const std::shared_ptr<const void>&) {}};
   PoseSlot poses{Pose::rest(model->model().segment_count())};
-  QualityTracker tracker{executor, turns, table, poses, model};
+  int shown = 0;
+  QualityTracker tracker{executor, turns, table, poses, model, [this] { ++shown; }};
   FakeMember member;
 };
 
@@ -80,6 +81,25 @@ TEST(QualityTrackerTest, OtherThresholdsAreToldToWhoWantsQualityWithFrames) {
   EXPECT_EQ(all.tracker.thresholds().max_volume_change, 0.6);
 }
 
+TEST(QualityTrackerTest, ShowsAPoseAgainOfWhichAFrameCouldNotTellAll) {
+  Tracking all;
+  SubscriptionRow& row = all.see();
+  runtime::PoseQuality quality;
+  quality.overlap_pending = true;
+  PosedFrame frame;
+  frame.judged = std::make_shared<const v1::PoseQuality>(describe(quality, {}, 0));
+  all.tracker.frame_made(frame, row);
+  EXPECT_EQ(row.subscription.quality, frame.judged);
+  EXPECT_TRUE(all.tracker.take_unmeasured());
+  const auto turn =
+      std::make_shared<Turn>([&] { return all.tracker.measure(nullptr); }, std::make_shared<Account>());
+  all.turns.ask(turn);
+  all.io.run();
+  EXPECT_FALSE(row.subscription.quality->overlap_pending());
+  EXPECT_TRUE(all.table.anybody_waits());
+  EXPECT_EQ(all.shown, 1);
+}
+
 TEST(QualityTrackerTest, MeasuresThePresentPoseInItsTurn) {
   Tracking all;
   EXPECT_FALSE(all.tracker.measure(nullptr)) << "nobody sees it";
@@ -105,6 +125,7 @@ TEST(QualityTrackerTest, MeasuresThePresentPoseInItsTurn) {
   ASSERT_TRUE(row.subscription.quality);
   EXPECT_EQ(row.subscription.quality->pose_sequence(), 0U);
   EXPECT_EQ(row.subscription.quality->verdict(), v1::PoseQuality::VERDICT_PASS);
+  EXPECT_EQ(all.shown, 0) << "the next frame tells it";
 }
 
 }  // namespace

@@ -269,7 +269,8 @@ typedef struct ecorche_quality {
   double min_det_f;      /* least posed over rest volume of a tet */
   double volume_change;  /* share */
   double bone_rigidity;  /* mm */
-  double bone_overlap;   /* mm: how much deeper than in the scan a bone lies in another */
+  double bone_overlap;   /* mm: how much deeper than in the scan a bone lies in another; NaN: a server that
+                            has just started has not looked yet */
 } ecorche_quality;
 #define ECORCHE_QUALITY_INIT \
   { sizeof(ecorche_quality), 0, 0, 0, 0, 0, 0, 0, 0 }

@@ -35,7 +35,7 @@ class Quality:
     min_det_f: float  # least posed over rest volume of a tet
     volume_change: float  # share
     bone_rigidity: float  # mm
-    bone_overlap: float  # mm: how much deeper than in the scan a bone lies in another
+    bone_overlap: float  # mm: how much deeper than in the scan a bone lies in another; NaN: a server that has just started has not looked yet
 
 
 @dataclass(frozen=True)

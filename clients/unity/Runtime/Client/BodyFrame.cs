@@ -19,7 +19,7 @@ namespace Ecorche
         public double VolumeChange;
         /// <summary>mm.</summary>
         public double BoneRigidity;
-        /// <summary>mm: how much deeper than in the scan a bone lies in another one.</summary>
+        /// <summary>mm: how much deeper than in the scan a bone lies in another one; NaN: a server that has just started has not looked yet.</summary>
         public double BoneOverlap;
         /// <summary>The pose that was measured.</summary>
         public ulong PoseSequence;
@@ -28,7 +28,7 @@ namespace Ecorche
         {
             Passes = told.Verdict == PoseQualityVerdict.Pass, InvertedTets = told.InvertedTets, InvertedShare = told.InvertedShare,
             MinDetF = told.MinDetF, VolumeChange = told.VolumeChange, BoneRigidity = told.BoneRigidity,
-            BoneOverlap = told.HasOverlap ? told.Overlap.Mm : 0, PoseSequence = told.PoseSequence,
+            BoneOverlap = told.OverlapPending ? double.NaN : told.HasOverlap ? told.Overlap.Mm : 0, PoseSequence = told.PoseSequence,
         };
     }
 

@@ -72,10 +72,11 @@ struct PoseQuality {
   double inverted_share_error = 0;  ///< standard error of the estimate; 0 where all tets were measured
   double volume_change_error = 0;   ///< likewise
   std::vector<TissueChange> tissues;
-  double bone_rigidity_mm = 0;  ///< largest distance of a bone vertex from its bone's best rigid fit
-  WorstPlaces places;           ///< where all tets were measured
-  JointGaps gaps;               ///< likewise
-  BoneOverlap overlap;          ///< QualityMeter and BoneOverlaps look for it, `measure` does not
+  double bone_rigidity_mm = 0;   ///< largest distance of a bone vertex from its bone's best rigid fit
+  WorstPlaces places;            ///< where all tets were measured
+  JointGaps gaps;                ///< likewise
+  BoneOverlap overlap;           ///< QualityMeter and BoneOverlaps look for it, `measure` does not
+  bool overlap_pending = false;  ///< not looked for: distances between bones are still being worked out
   std::vector<ClampedJoint> clamped;
   std::vector<DoubtfulJoint> doubtful;
   QualityThresholds thresholds;

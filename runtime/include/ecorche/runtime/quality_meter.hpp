@@ -37,6 +37,10 @@ class QualityMeter {
   /// nearly touch in the scan (OverlapMeter). Same figures for any thread count.
   PoseQuality measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                       const QualityThresholds& thresholds = {}) const;
+  /// The same at once: where `prepare` has not worked out what the pose asks for, nobody has looked how deep
+  /// bones run into each other, and `overlap_pending` says so.
+  PoseQuality measure_now(const PosedBody& body, std::span<const std::uint32_t> tissues,
+                          const QualityThresholds& thresholds = {}) const;
 
   /// What `measure` works out first, once, of bones that never moved against each other before: up to a
   /// second for a whole body.
@@ -58,6 +62,8 @@ class QualityMeter {
   struct Sums;
   struct Change;
 
+  PoseQuality measure_flesh(const PosedBody& body, std::span<const std::uint32_t> tissues) const;
+  void judge_joints(const PosedBody& body, const QualityThresholds& thresholds, PoseQuality& out) const;
   static Part look_at(const Tissue& tissue);
   static Change change(const Part& part, std::span<const float> posed);
   Sums sum(std::span<const float> nodes, std::size_t begin, std::size_t end) const;

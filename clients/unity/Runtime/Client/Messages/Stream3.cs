@@ -21,6 +21,7 @@ namespace Ecorche.Wire
         public double TissueFactor;
         public bool HasOverlap; public readonly BoneOverlap Overlap = new BoneOverlap();
         public double MaxBoneOverlap;
+        public bool OverlapPending;
 
         public void Clear()
         {
@@ -41,6 +42,7 @@ namespace Ecorche.Wire
             TissueFactor = default;
             HasOverlap = false;
             MaxBoneOverlap = default;
+            OverlapPending = default;
         }
 
         internal void Read(ref WireReader from)
@@ -67,6 +69,7 @@ namespace Ecorche.Wire
                     case 121: TissueFactor = from.Double(); break;
                     case 130: { var inner = from.Message(); Overlap.Read(ref inner); } HasOverlap = true; break;
                     case 137: MaxBoneOverlap = from.Double(); break;
+                    case 144: OverlapPending = from.Bool(); break;
                     default: from.Skip(key); break;
                 }
             }
