@@ -137,7 +137,8 @@ int run(const Program& program, const RigSettings& settings) {
     joints.back()["fit"]["axes_confidence"] = evidence[row].axes_confidence;
   }
   std::vector<check::Finding> findings = check::size_findings(patient);
-  for (check::Finding& finding : check::joint_findings(patient, rig, keeping(program, "joints", warned)))
+  for (check::Finding& finding :
+       check::joint_findings(patient, rig, check::Inside(patient.skin), keeping(program, "joints", warned)))
     findings.push_back(std::move(finding));
   nlohmann::json told = nlohmann::json::array();
   for (const check::Finding& f : warned) told.push_back(finding_json(f));

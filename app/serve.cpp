@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -162,8 +163,11 @@ int run_serve(const ServeSettings& settings, const Program& program) {
   // TBB's own threads join where a single pose leaves cores idle.
   const int threads = program.threads > 0 ? program.threads : tbb::this_task_arena::max_concurrency();
   tbb::task_arena arena(threads);
+  std::optional<server::LastInArena> frames_last;
+  if (settings.probes_first) frames_last.emplace(arena);
   server::Workers workers(threads, [&arena](const server::Job& job) { arena.execute(job); });
   server::Server server(options, read_models(settings, program), workers);
+  server::going_soon();
   if (settings.real_time && !server::going_first()) {
     throw Error(ErrorKind::refused, "--real-time", "the system does not let this process",
                 "give it CAP_SYS_NICE or an RLIMIT_RTPRIO of 1 (ulimit -r 1), or serve without");

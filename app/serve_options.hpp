@@ -22,7 +22,7 @@ struct ServeSettings {
   std::string token_file, tokens;
   std::string clips;
   std::string log = "info", log_format = "text";
-  bool real_time = false;
+  bool real_time = false, probes_first = false;
   bool merge_pages = false;
   std::string shared_models;
   server::Options options;

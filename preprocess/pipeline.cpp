@@ -225,8 +225,11 @@ Result run(const Case& patient, const Options& options, const Context& outer, co
   check::refuse(check::size_findings(patient));
   model.rig = stage.kept([&](const Context& inner) { return rig::fit(patient, inner); }, patient,
                          RigRequest{patient});
-  check::refuse(check::joint_findings(patient, model.rig, context));
-  check::refuse(check::lost_segments(patient));
+  {
+    const check::Inside in_skin(patient.skin);
+    check::refuse(check::joint_findings(patient, model.rig, in_skin, context));
+    check::refuse(check::lost_segments(patient, in_skin));
+  }
   if (hooks.on_rig) hooks.on_rig(model.rig);
   model.bone_segment = owners(patient, model.rig.skeleton);
   for (const CaseBone& bone : patient.bones) model.bone_names.push_back(bone.name);

@@ -2,9 +2,10 @@
 // One point a millisecond through a body that streams at 90 Hz, over loopback; then 10000 points a message.
 // bench/probe/run calls it, and makes a table of the one JSON object that it prints.
 //
-// usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|server|both
-// The last word: whose thread is on the kernel's real-time class, the server's as under --real-time, or that
-// of who probes as well, as a haptic device's loop would be.
+// usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|probes|server|both
+// The last word: who goes first. Nobody; probes, as under --probes-first, which asks for no rights; or by the
+// kernel's real-time class the server's thread, as under --real-time, or that of who probes as well, as a
+// haptic device's loop would be.
 #include <spdlog/spdlog.h>
 #include <tbb/task_arena.h>
 
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -58,22 +60,27 @@ v1::ModelOpened open(client::Client& client) {
 
 int main(int argc, char** argv) {
   if (argc != 5)
-    return std::fprintf(stderr, "usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|server|both\n"), 64;
+    return std::fprintf(stderr,
+                        "usage: bench_probe MODEL.hdf SECONDS f32|deltas nobody|probes|server|both\n"),
+           64;
   spdlog::set_level(spdlog::level::warn);  // standard output is for one JSON object
   const double seconds = std::atof(argv[2]);
   const auto model = std::make_shared<const Model>(model_file::read(argv[1], Context{}));
+  const std::string_view first = argv[4];
   tbb::task_arena arena;
+  std::optional<server::LastInArena> frames_last;
+  if (first == "probes") frames_last.emplace(arena);
   server::Workers workers(2, [&](const server::Job& job) { arena.execute(job); });
   server::Options options;
   options.listen.port = 0;
   server::Server server(options, {{"body", model}}, workers);
-  const std::string_view real_time = argv[4];
   std::atomic<bool> allowed = true;
   const auto go_first = [&allowed](bool wanted) {
     if (wanted && !server::going_first()) allowed = false;
   };
   std::thread serving([&] {
-    go_first(real_time != "nobody");
+    server::going_soon();
+    go_first(first == "server" || first == "both");
     server.run();
   });
   const wire::Address address{"127.0.0.1", server.port()};
@@ -130,7 +137,7 @@ int main(int argc, char** argv) {
     ask(1);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  go_first(real_time == "both");
+  go_first(first == "both");
   std::vector<double> one, many;
   const std::uint64_t before = frames;
   const auto start = Clock::now();

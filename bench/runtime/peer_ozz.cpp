@@ -14,10 +14,11 @@ constexpr std::size_t kInfluences = 4;
 class Ozz final : public SkinningPeer {
  public:
   Ozz(const HungPoints& points, std::size_t copies) : matrices_(points.segments), bodies_(copies) {
-    name = "ozz " ECORCHE_OZZ_VERSION " SkinningJob, 4 weights";
+    name = "ozz-animation";
 #ifdef __AVX2__
-    name += ", for this CPU";
+    name += " for this CPU";
 #endif
+    name += ", " ECORCHE_OZZ_VERSION ", SkinningJob of 4 weights";
     Body body;
     body.rest = points.at;
     body.posed.resize(points.at.size());

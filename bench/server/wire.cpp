@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -91,8 +92,9 @@ void same_frame(const std::string& program, const std::string& model, const std:
   char name[16];
   double p50 = 0, p99 = 0, bytes = 0, cpu = 0;
   while (pipe && std::fscanf(pipe.get(), "%15s %lf %lf %lf %lf", name, &p50, &p99, &bytes, &cpu) == 5) {
-    table.row({name, fixed(bytes / 1e6, 1), fixed(p50, 2), fixed(p99, 2), fixed(cpu, 1),
-               fixed(own.p50 / p50, 2), fixed(own.cpu_ms / cpu, 2)});
+    table.row({name == std::string_view("grpc") ? "gRPC" : "Protobuf over TCP", fixed(bytes / 1e6, 1),
+               fixed(p50, 2), fixed(p99, 2), fixed(cpu, 1), fixed(own.p50 / p50, 2),
+               fixed(own.cpu_ms / cpu, 2)});
   }
 }
 

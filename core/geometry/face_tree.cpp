@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/geometry/face_tree.hpp"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <numeric>
 
@@ -14,16 +17,24 @@ namespace {
 // least distance is looked at and the lowest of them wins, in whatever order.
 constexpr double kSlack = 1 + 1e-12;
 
+template <class Each>
+void for_rows(std::size_t count, const Each& each) {
+  constexpr std::size_t grain = 4096;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& rows) {
+    for (std::size_t i = rows.begin(); i < rows.end(); ++i) each(i);
+  });
+}
+
 }  // namespace
 
 std::vector<FaceTree::Corners> FaceTree::corners_of(const SurfaceMesh& surface) {
   std::vector<Corners> corners(static_cast<std::size_t>(surface.F.rows()));
-  for (std::size_t f = 0; f < corners.size(); ++f) {
+  for_rows(corners.size(), [&](std::size_t f) {
     for (std::size_t c = 0; c < 3; ++c) {
       const std::int32_t vertex = surface.F(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(c));
       corners[f][c] = surface.V.row(vertex).transpose();
     }
-  }
+  });
   return corners;
 }
 
@@ -31,25 +42,27 @@ FaceTree::FaceTree(const std::vector<Corners>& corners) {
   Eigen::AlignedBox3d box;
   for (const Corners& c : corners) box.extend(c[0]).extend(c[1]).extend(c[2]);
   std::vector<std::uint64_t> code(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) {
+  for_rows(corners.size(), [&](std::size_t i) {
     code[i] = morton((corners[i][0] + corners[i][1] + corners[i][2]) / 3, box);
-  }
+  });
   face_.resize(corners.size());
   std::iota(face_.begin(), face_.end(), 0);
-  std::sort(face_.begin(), face_.end(), [&](std::int32_t a, std::int32_t b) {
+  tbb::parallel_sort(face_.begin(), face_.end(), [&](std::int32_t a, std::int32_t b) {
     const auto x = code[static_cast<std::size_t>(a)], y = code[static_cast<std::size_t>(b)];
     return x != y ? x < y : a < b;
   });
-  corners_.reserve(corners.size());
+  corners_.resize(corners.size());
   place_.resize(corners.size());
-  for (const std::int32_t f : face_) {
-    place_[static_cast<std::size_t>(f)] = static_cast<std::int32_t>(corners_.size());
-    corners_.push_back(corners[static_cast<std::size_t>(f)]);
-  }
+  for_rows(face_.size(), [&](std::size_t place) {
+    const auto f = static_cast<std::size_t>(face_[place]);
+    place_[f] = static_cast<std::int32_t>(place);
+    corners_[place] = corners[f];
+  });
   std::vector<Eigen::AlignedBox3d> level((corners_.size() + kFan - 1) / kFan);
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    for (const Eigen::Vector3d& corner : corners_[i]) level[i / kFan].extend(corner);
-  }
+  for_rows(level.size(), [&](std::size_t leaf) {
+    for (std::size_t i = leaf * kFan; i < std::min((leaf + 1) * kFan, corners_.size()); ++i)
+      level[leaf].extend(bounds(i));
+  });
   while (!level.empty()) {
     levels_.push_back(std::move(level));
     if (levels_.back().size() == 1) break;

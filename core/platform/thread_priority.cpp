@@ -4,10 +4,26 @@
 #ifdef __linux__
 #include <sched.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 #endif
 
 namespace ecorche::platform {
+namespace {
+
+#ifdef __linux__
+// struct sched_attr of sched_setattr(2), which Debian 12's C library does not declare.
+struct SchedulingAttributes {
+  std::uint32_t size = sizeof(SchedulingAttributes), policy = SCHED_OTHER;
+  std::uint64_t flags = 1;  // SCHED_FLAG_RESET_ON_FORK
+  std::int32_t nice = 0;
+  std::uint32_t priority = 0;
+  std::uint64_t runtime = 0;  // ns of a turn
+  std::uint64_t deadline = 0, period = 0;
+};
+#endif
+
+}  // namespace
 
 bool set_thread_priority([[maybe_unused]] Priority priority) {
 #ifdef __linux__
@@ -19,6 +35,11 @@ bool set_thread_priority([[maybe_unused]] Priority priority) {
     case Priority::idle: {
       constexpr sched_param kNone{};
       return sched_setscheduler(0, SCHED_IDLE, &kNone) == 0;
+    }
+    case Priority::prompt: {
+      SchedulingAttributes attributes;
+      attributes.runtime = 100'000;
+      return syscall(SYS_sched_setattr, 0, &attributes, 0) == 0;
     }
     case Priority::real_time: {
       constexpr sched_param kLeast{.sched_priority = 1};

@@ -7,8 +7,11 @@
 namespace ecorche::platform {
 
 enum class Priority : std::uint8_t {
-  low,       ///< behind the usual ones, though not last: whoever waits for a lock of this thread's waits less
-  idle,      ///< last: a core that runs only such threads is an idle one to what wakes
+  low,   ///< behind the usual ones, though not last: whoever waits for a lock of this thread's waits less
+  idle,  ///< last: a core that runs only such threads is an idle one to what wakes
+  /// A usual one that runs 0.1 ms at a time, so that what runs in longer turns gives way to it once it wakes;
+  /// threads that it starts are usual ones. From Linux 6.12 on, and anybody may.
+  prompt,
   real_time  ///< before all usual ones; threads that it starts are usual ones
 };
 

@@ -14,12 +14,12 @@
 #include "io/case/label_sources.hpp"
 #include "io/case/skeleton_file.hpp"
 #include "io/case/stiffness.hpp"
+#include "io/case/surfaces_ahead.hpp"
 #include "io/case/yaml_reader.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/dicom_image.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/mask_folder.hpp"
-#include "io/surface/surface_file.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -67,7 +67,8 @@ class CaseReader {
         options_(options),
         context_(context),
         reading_{options.limits, [this](std::string_view line) { context_.warn(line); }},
-        root_(Value::read(file)) {
+        root_(Value::read(file)),
+        surfaces_(options.limits, context) {
     root_.allow(kCaseKeys);
     digest(file, file.filename().string());
   }
@@ -78,6 +79,7 @@ class CaseReader {
     steps_ = 2 + count("bones") + count("tissues") + count("volumes") + (root_.find("labels") ? 1 : 0);
     const PlacedSkeleton placed = read_skeleton_entry(root_.at("skeleton"));
     step();
+    surfaces_.read(root_, folder_, options_.data);
     const auto labels = root_.find("labels");
     if (labels) read_labels(*labels);
     const bool options = labels && labels->kind() == Kind::map;  // a plain list of maps has none
@@ -109,9 +111,8 @@ class CaseReader {
     }
     read_stiffness_of_flesh(root_, out_);
     if (const auto contacts = root_.find("contacts")) out_.contacts = read_contacts(*contacts, out_.skeleton);
-    if (const auto volumes = root_.find("volumes")) {
+    if (const auto volumes = root_.find("volumes"))
       for (const Value& entry : volumes->items()) read_volume(entry);
-    }
     return std::move(out_);
   }
 
@@ -239,7 +240,7 @@ class CaseReader {
     const Value file = is_map ? entry.at("file") : entry;
     const auto axes = is_map ? entry.find("frame") : std::nullopt;
     const auto unit = is_map ? entry.find("unit") : std::nullopt;
-    TaggedSurface surface = read_tagged_surface(locate(entry, file), options_.limits);
+    TaggedSurface surface = surfaces_.take(locate(entry, file));
     const auto tagged = surface.space ? axes_from_code(*surface.space) : std::nullopt;
     Frame frame = frame_;
     if (axes) frame.axes = parse_axes(*axes);
@@ -372,6 +373,7 @@ class CaseReader {
   const Context& context_;
   files::ReadOptions reading_;
   Value root_;
+  SurfacesAhead surfaces_;
   Frame frame_;
   bool frame_given_ = false;
   Case out_;

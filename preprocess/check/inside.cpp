@@ -2,6 +2,7 @@
 #include "preprocess/check/inside.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -26,8 +27,14 @@ int passes(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
 
 }  // namespace
 
-Inside::Inside(const SurfaceMesh& surface) : surface_(surface) {
-  tbb::parallel_for(0, 3, [&](int axis) { columns_[static_cast<std::size_t>(axis)] = build(axis); });
+// While it waits for its own loop, the thread must not take up another job: that one could ask the same.
+const Inside::Columns& Inside::columns(int axis) const {
+  std::call_once(built_, [&] {
+    tbb::this_task_arena::isolate([&] {
+      tbb::parallel_for(0, 3, [&](int each) { columns_[static_cast<std::size_t>(each)] = build(each); });
+    });
+  });
+  return columns_[static_cast<std::size_t>(axis)];
 }
 
 Inside::Columns Inside::build(int axis) const {
@@ -75,20 +82,20 @@ Inside::Columns Inside::build(int axis) const {
 }
 
 int Inside::crossings(const Vector3d& p, int axis) const {
-  const Columns& columns = columns_[static_cast<std::size_t>(axis)];
+  const Columns& along = columns(axis);
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;  // u, v, axis: right-handed
   const Vector2d q(p[u], p[v]);
   std::array<int, 2> cell{};
   for (int k = 0; k < 2; ++k) {
-    const double place = (q[k] - columns.low[k]) / columns.edge;
-    if (!(place >= 0 && place < columns.size[static_cast<std::size_t>(k)])) return 0;
+    const double place = (q[k] - along.low[k]) / along.edge;
+    if (!(place >= 0 && place < along.size[static_cast<std::size_t>(k)])) return 0;
     cell[static_cast<std::size_t>(k)] = static_cast<int>(place);
   }
   const std::size_t at = static_cast<std::size_t>(cell[0]) +
-                         static_cast<std::size_t>(columns.size[0]) * static_cast<std::size_t>(cell[1]);
+                         static_cast<std::size_t>(along.size[0]) * static_cast<std::size_t>(cell[1]);
   int sum = 0;
-  for (std::int32_t i = columns.offsets[at]; i < columns.offsets[at + 1]; ++i) {
-    const std::int32_t f = columns.triangles[static_cast<std::size_t>(i)];
+  for (std::int32_t i = along.offsets[at]; i < along.offsets[at + 1]; ++i) {
+    const std::int32_t f = along.triangles[static_cast<std::size_t>(i)];
     std::array<Vector3d, 3> corner;
     for (int c = 0; c < 3; ++c)
       corner[static_cast<std::size_t>(c)] = surface_.V.row(surface_.F(f, c)).transpose();

@@ -12,7 +12,6 @@
 #include "core/values/degrees.hpp"
 #include "core/values/text.hpp"
 #include "preprocess/check/frames.hpp"
-#include "preprocess/check/inside.hpp"
 #include "preprocess/check/joint_places.hpp"
 #include "preprocess/check/lost_segments.hpp"
 #include "preprocess/check/skin_fault.hpp"
@@ -80,8 +79,9 @@ std::vector<Change> changes() {
 
 class Joints {
  public:
-  Joints(const Case& patient, const Rig& rig)
+  Joints(const Case& patient, const Rig& rig, const Inside& in_skin)
       : patient_(patient),
+        in_skin_(in_skin),
         skeleton_(rig.skeleton),
         bones_(bones_of(patient, rig.skeleton)),
         in_bones_(bones_.size()) {}
@@ -122,8 +122,7 @@ class Joints {
 
   double beyond_skin(const Vector3d& p) const {
     if (patient_.skin.F.rows() == 0) return 0;
-    if (!inside_) inside_ = std::make_unique<Inside>(patient_.skin);
-    if ((*inside_)(p)) return 0;
+    if (in_skin_(p)) return 0;
     if (!skin_) skin_ = std::make_unique<geometry::FaceTree>(patient_.skin);
     return std::sqrt(skin_->nearest(p).squared);
   }
@@ -256,11 +255,11 @@ class Joints {
   }
 
   const Case& patient_;
+  const Inside& in_skin_;
   const Skeleton& skeleton_;
   std::vector<SegmentBones> bones_;
   // Made when first asked for: most joints need none.
   mutable std::vector<std::unique_ptr<Inside>> in_bones_;
-  mutable std::unique_ptr<Inside> inside_;
   mutable std::unique_ptr<geometry::FaceTree> skin_;
   std::vector<Finding> findings_;
   std::optional<std::optional<SkinFault>> fault_;  // of the skin, looked for where it matters
@@ -341,8 +340,9 @@ std::vector<Finding> size_findings(const Case& patient) {
   return out;
 }
 
-std::vector<Finding> joint_findings(const Case& patient, const Rig& rig, const Context& context) {
-  return Joints(patient, rig).run(context);
+std::vector<Finding> joint_findings(const Case& patient, const Rig& rig, const Inside& in_skin,
+                                    const Context& context) {
+  return Joints(patient, rig, in_skin).run(context);
 }
 
 void inspect_joints(const Case& patient, const Context& context, Report& report) {
@@ -364,8 +364,9 @@ void inspect_joints(const Case& patient, const Context& context, Report& report)
   };
   try {
     const Rig rig = rig::fit(patient, inner);
-    found = joint_findings(patient, rig, context);
-    for (Finding& lost : lost_segments(patient)) found.push_back(std::move(lost));
+    const Inside in_skin(patient.skin);
+    found = joint_findings(patient, rig, in_skin, context);
+    for (Finding& lost : lost_segments(patient, in_skin)) found.push_back(std::move(lost));
     report.findings.insert(report.findings.end(), found.begin(), found.end());
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::config && error.kind() != ErrorKind::data) throw;

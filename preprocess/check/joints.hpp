@@ -7,6 +7,7 @@
 
 #include <ecorche/values/case.hpp>
 #include <ecorche/values/context.hpp>
+#include "preprocess/check/inside.hpp"
 #include "preprocess/check/inspect_case.hpp"
 
 namespace ecorche::check {
@@ -22,8 +23,9 @@ std::vector<Finding> size_findings(const Case& patient);
 /// bones (where the skin is open or a shell, that is named instead, once), far from both bones that it joins,
 /// or turns (a hinge that flexes) about what is nearly a bone's shaft; and one for two neighbours whose bones
 /// are exchanged. Of the `generic` tree, which joins whatever bones lie near each other, they are warnings.
-/// `where` is `joint NAME`, `at` its centre.
-std::vector<Finding> joint_findings(const Case& patient, const Rig& rig, const Context& context);
+/// `where` is `joint NAME`, `at` its centre. `in_skin`: of the patient's skin.
+std::vector<Finding> joint_findings(const Case& patient, const Rig& rig, const Inside& in_skin,
+                                    const Context& context);
 
 /// Finds the joints and puts the findings of both behind `report`'s: the rig's warnings as warnings. Nothing
 /// is added where the case cannot be prepared anyhow. What the rig refuses is an error like any other.

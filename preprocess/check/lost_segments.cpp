@@ -4,11 +4,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "core/geometry/face_tree.hpp"
 #include "core/geometry/hole_size.hpp"
-#include "preprocess/check/inside.hpp"
 
 namespace ecorche::check {
 namespace {
@@ -24,31 +24,37 @@ Eigen::AlignedBox3d bounds_of(const SurfaceMesh& mesh) {
 // in its bounds.
 class Body {
  public:
-  explicit Body(const SurfaceMesh& skin)
-      : box_(bounds_of(skin)), inside_(skin), tree_(skin), near_(kOnSkin * box_.sizes().maxCoeff()) {}
+  Body(const SurfaceMesh& skin, const Inside& inside)
+      : skin_(skin), box_(bounds_of(skin)), inside_(inside), near_(kOnSkin * box_.sizes().maxCoeff()) {}
 
-  bool holds(const SurfaceMesh& bone) const {
+  bool holds(const SurfaceMesh& bone) {
     if (bounds_of(bone).contains(box_)) return true;
     const Eigen::Index step = std::max<Eigen::Index>(1, bone.V.rows() / kSamples);
     for (Eigen::Index v = 0; v < bone.V.rows(); v += step) {
       const Eigen::Vector3d p = bone.V.row(v).transpose();
-      if (inside_(p) || tree_.nearest(p).squared <= near_ * near_) return true;
+      if (inside_(p) || mm2_from_skin(p) <= near_ * near_) return true;
     }
     return false;
   }
 
  private:
+  double mm2_from_skin(const Eigen::Vector3d& p) {
+    if (!tree_) tree_.emplace(skin_);
+    return tree_->nearest(p).squared;
+  }
+
+  const SurfaceMesh& skin_;
   Eigen::AlignedBox3d box_;
-  Inside inside_;
-  geometry::FaceTree tree_;
+  const Inside& inside_;
+  std::optional<geometry::FaceTree> tree_;  // where all bones lie inside nobody asks for it
   double near_;
 };
 
 }  // namespace
 
-std::vector<Finding> lost_segments(const Case& patient) {
+std::vector<Finding> lost_segments(const Case& patient, const Inside& in_skin) {
   if (patient.skin.F.rows() == 0) return {};
-  const Body body(patient.skin);
+  Body body(patient.skin, in_skin);
   std::map<std::string, const CaseBone*> lost;
   std::map<std::string, bool> held;
   for (const CaseBone& bone : patient.bones) {

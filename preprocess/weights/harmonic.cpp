@@ -33,6 +33,27 @@ void for_pieces(Eigen::Index rows, F&& f) {
                     [&](const auto& range) { f(range.begin(), range.end() - range.begin()); });
 }
 
+/// Of each node of this kind its place among them, -1 of the others.
+std::vector<std::int32_t> places(const std::vector<std::uint8_t>& kind, std::uint8_t wanted) {
+  std::vector<std::int32_t> out(kind.size(), -1);
+  std::int32_t count = 0;
+  for (std::size_t n = 0; n < kind.size(); ++n) {
+    if (kind[n] == wanted) out[n] = count++;
+  }
+  return out;
+}
+
+/// The fixed nodes' rows.
+solve::Block rows_of(const std::vector<std::uint8_t>& fixed, std::int32_t free_count,
+                     const solve::Block& all) {
+  solve::Block out(all.rows() - free_count, all.cols());
+  Eigen::Index row = 0;
+  for (Eigen::Index n = 0; n < all.rows(); ++n) {
+    if (fixed[static_cast<std::size_t>(n)]) out.row(row++) = all.row(n);
+  }
+  return out;
+}
+
 FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_t>& free_row,
                      std::int32_t free_count, const solve::Block& boundary) {
   FreeSystem system;
@@ -104,28 +125,31 @@ FreeSystem eliminate(const solve::SparseMatrix& L, const std::vector<std::int32_
 
 HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<std::uint8_t>& fixed,
                               solve::Block boundary, solve::SpdSolver& solver, const Context& context) {
-  std::vector<std::int32_t> free_row(fixed.size(), -1);
-  std::int32_t free_count = 0;
-  for (std::size_t n = 0; n < fixed.size(); ++n) {
-    if (!fixed[n]) free_row[n] = free_count++;
-  }
+  const std::vector<std::int32_t> free_row = places(fixed, 0);
+  const auto free_count = static_cast<std::int32_t>(std::count(fixed.begin(), fixed.end(), 0));
   HarmonicResult result;
-  result.values = std::move(boundary);
-  if (free_count == 0) return result;
+  if (free_count == 0) {
+    result.values = std::move(boundary);
+    return result;
+  }
   if (free_count == static_cast<std::int32_t>(fixed.size())) {
     throw Error(ErrorKind::data, "weights", "no node is fixed", "the mesh must touch at least one bone");
   }
-  const FreeSystem system = eliminate(L, free_row, free_count, result.values);
+  const FreeSystem system = eliminate(L, free_row, free_count, boundary);
+  const solve::Block kept = rows_of(fixed, free_count, boundary);
+  boundary.resize(0, 0);  // all of it again once it is solved: memory is most in between
   context.check_stop();
   solver.factor(system.A, context);
   context.report(0.6);
   const solve::Block X = solver.solve(system.rhs, context);
   context.report(0.9);
   result.residual = solve::relative_residual(system.A, X, system.rhs);
+  result.values.resize(static_cast<Eigen::Index>(fixed.size()), X.cols());
+  const std::vector<std::int32_t> fixed_row = places(fixed, 1);
   for_pieces(result.values.rows(), [&](Eigen::Index first, Eigen::Index count) {
     for (Eigen::Index n = first; n < first + count; ++n) {
-      const std::int32_t row = free_row[static_cast<std::size_t>(n)];
-      if (row >= 0) result.values.row(n) = X.row(row);
+      const auto at = static_cast<std::size_t>(n);
+      result.values.row(n) = fixed[at] ? kept.row(fixed_row[at]) : X.row(free_row[at]);
     }
   });
   return result;

@@ -78,12 +78,28 @@ void giving_way(const Job& job) {
   job();
 }
 
+namespace {
+
 // To what wakes, a core that runs only such a thread is an idle one; with another priority it is not, and
 // what wakes may wait for as long as a turn takes (3 ms).
-void last_of_all(const Job& job) {
+void become_last() {
   thread_local const bool lowered = platform::set_thread_priority(platform::Priority::idle);
   static_cast<void>(lowered);
+}
+
+}  // namespace
+
+void last_of_all(const Job& job) {
+  become_last();
   job();
+}
+
+void LastInArena::on_scheduler_entry(bool /*worker*/) {
+  become_last();
+}
+
+bool going_soon() {
+  return platform::set_thread_priority(platform::Priority::prompt);
 }
 
 bool going_first() {

@@ -2,6 +2,9 @@
 // The threads that pose, so that the I/O thread never does.
 #pragma once
 
+#include <tbb/task_arena.h>
+#include <tbb/task_scheduler_observer.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -98,6 +101,19 @@ void giving_way(const Job& job);
 /// As giving_way, but runs only where a core would else be idle: a thread that wakes takes its core at once.
 /// For what nobody waits for, and what takes no locks that others want for long.
 void last_of_all(const Job& job);
+
+/// From when it is made, every thread that enters the arena is as one of last_of_all, and stays so: what
+/// wakes elsewhere, to answer or to ask, takes a core at once. Not beside what keeps all cores busy.
+class LastInArena : public tbb::task_scheduler_observer {
+ public:
+  explicit LastInArena(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
+  ~LastInArena() override { observe(false); }
+  void on_scheduler_entry(bool worker) override;
+};
+
+/// The calling thread asks for short turns: where it wakes, what computes in longer ones gives way to it
+/// (Linux 6.12 and later; elsewhere nothing changes). For a thread that sleeps most of the time.
+bool going_soon();
 
 /// The calling thread runs at once where it wakes, whatever else does (on Linux: SCHED_RR, priority 1;
 /// threads that it starts do not inherit it). For a thread that sleeps most of the time. False where the

@@ -110,6 +110,16 @@ class Access(unittest.TestCase):
         self.assertEqual(first, [server.process.pid])
         self.assertGreater(len(threads), 2)
 
+    def test_frames_give_way_where_probes_go_first(self):
+        """All threads that compute run last, the one that answers does not."""
+        for options, last in ([], False), (["--probes-first"], True):
+            with Server(MODEL, options=options) as server:
+                result = run("stream", server.address, "--seconds", 0.3, "--model", MODEL, "--json")
+                self.assertEqual(json.loads(result.stdout)["mismatches"], 0)
+                policies = {int(name): os.sched_getscheduler(int(name)) & ~os.SCHED_RESET_ON_FORK for name in os.listdir(f"/proc/{server.process.pid}/task")}
+            self.assertEqual(policies[server.process.pid], os.SCHED_OTHER)
+            self.assertEqual(os.SCHED_IDLE in policies.values(), last, policies)
+
     def test_what_cannot_be_served(self):
         empty = pathlib.Path(self.folder.name) / "empty"
         empty.write_text("\n")

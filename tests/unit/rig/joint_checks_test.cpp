@@ -45,7 +45,7 @@ void move(Case& patient, const Vector3d& by) {
 }
 
 std::vector<Finding> joints_of(const Case& patient) {
-  return joint_findings(patient, rig::fit(patient, {}), {});
+  return joint_findings(patient, rig::fit(patient, {}), Inside(patient.skin), {});
 }
 
 #define EXPECT_HOLDS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
