@@ -3,6 +3,7 @@
 #include <ecorche/preprocess/pipeline.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -94,6 +95,7 @@ void check_outputs(const PreprocessSettings& settings) {
 }
 
 int run(const Program& program, PreprocessSettings& settings) {
+  const auto start = std::chrono::steady_clock::now();
   check_outputs(settings);
   platform::use_big_heap();
   settings.refused = fs::path(settings.output).replace_extension(".refused.vtu");
@@ -105,6 +107,7 @@ int run(const Program& program, PreprocessSettings& settings) {
     report["stages"].push_back(
         {{"name", s.name}, {"seconds", s.seconds}, {"peak_rss_mib", s.peak_rss_mib}, {"kept", s.kept}});
   }
+  report["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   report["peak_rss_mib"] = preprocess::peak_rss_mib();
   program.result(text_report(made.model, settings, made.stages), report);
   return 0;

@@ -14,6 +14,7 @@
 #include "runtime/server/registry/unnamed_files.hpp"
 #include "runtime/server/resources/shares.hpp"
 #include "runtime/server/schedule/post_back.hpp"
+#include "runtime/server/schedule/serially.hpp"
 #include "runtime/server/session/quality_job.hpp"
 
 namespace ecorche::server {
@@ -87,7 +88,7 @@ void SessionRegistry::prepare_details(std::shared_ptr<const ServedModel> model, 
   executor_.submit(Service::levels, [this, model = std::move(model), tissue]() mutable {
     if (hooks_.may_coarsen && !hooks_.may_coarsen()) return;
     try {
-      model->meter().prepare(tissue);
+      serially([&] { model->meter().prepare(tissue); });  // the other cores are for frames
       if (tissue == 0) model->pack_triangles();
       model->make_levels({tissue});
       if (tissue + 1 == model->model().tissues.size()) model->share_details();
