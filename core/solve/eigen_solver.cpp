@@ -20,6 +20,7 @@ class EigenSolver final : public SpdSolver {
     take(std::move(state_), A, context, [](State& state) { state.cholesky.factorize(state.A); });
   }
 
+  using SpdSolver::solve;
   Block solve(const Block& B, const Context& context) const override {
     if (!state_) throw Error(ErrorKind::internal, "solver eigen", "solve before factor", "report it");
     auto rhs = std::make_shared<Block>(B);

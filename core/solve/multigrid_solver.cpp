@@ -92,6 +92,10 @@ class MultigridSolver final : public SpdSolver {
   }
 
   Block solve(const Block& B, const Context& context) const override {
+    return solve(SparseBlock(B), context);
+  }
+
+  Block solve(const SparseBlock& B, const Context& context) const override {
     if (!ready_) throw Error(ErrorKind::internal, "solver amg", "solve before factor", "report it");
     Block X(B.rows(), B.cols());
     for_parts(static_cast<std::size_t>(B.rows()), [&](std::size_t, std::size_t first, std::size_t past) {
@@ -197,14 +201,14 @@ class MultigridSolver final : public SpdSolver {
 
   // r = D^-1/2 (B - A X) of columns begin .. end, each scaled to unit length; returns the squared lengths of
   // the unscaled.
-  Columns residual(const Block& B, const Block& X, std::size_t begin, std::size_t end, std::size_t width,
-                   Space& r) const {
+  Columns residual(const SparseBlock& B, const Block& X, std::size_t begin, std::size_t end,
+                   std::size_t width, Space& r) const {
     const auto rows = static_cast<std::size_t>(A_.rows), all = static_cast<std::size_t>(B.cols());
     std::vector<Columns> parts((rows + kRowsAtOnce - 1) / kRowsAtOnce);
     for_parts(rows, [&](std::size_t part, std::size_t first, std::size_t last) {
       for (std::size_t row = first; row < last; ++row) {
         Columns sum{};
-        for (std::size_t c = begin; c < end; ++c) sum[c - begin] = B.data()[row * all + c];
+        if (const double* const b = B.row(row)) std::copy(b + begin, b + end, sum.begin());
         A_.for_row(static_cast<std::int32_t>(row), [&](std::int32_t column, double a) {
           const double* const x = X.data() + static_cast<std::size_t>(column) * all;
           for (std::size_t c = begin; c < end; ++c) sum[c - begin] -= a * x[c];
@@ -276,7 +280,7 @@ class MultigridSolver final : public SpdSolver {
   }
 
   // Columns begin .. end of B. Each column is its own iteration; they share the matrix's traffic.
-  void solve_some(const Block& B, std::size_t begin, std::size_t end, Block& X,
+  void solve_some(const SparseBlock& B, std::size_t begin, std::size_t end, Block& X,
                   const Context& context) const {
     const auto rows = static_cast<std::size_t>(A_.rows), all = static_cast<std::size_t>(B.cols());
     const std::size_t width = (end - begin + kLanes - 1) / kLanes * kLanes;

@@ -10,13 +10,11 @@
 #include <vector>
 
 #include <ecorche/values/context.hpp>
+#include "core/solve/sparse_block.hpp"
 
 namespace ecorche::solve {
 
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
-/// #unknowns by #right-hand sides, row by row: what belongs to one unknown is read together.
-using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 /// A factored system. Backends: `eigen` and `amg` (here), `cholmod` (preprocess/weights/cholmod, GPL); chosen
 /// by name.
 class SpdSolver {
@@ -30,6 +28,10 @@ class SpdSolver {
   virtual void refactor(const SparseMatrix& A, const Context& context) { factor(A, context); }
   /// Solves A X = B. Only after `factor`.
   virtual Block solve(const Block& B, const Context& context) const = 0;
+  /// The same of right-hand sides that take less memory; less in some backends alone.
+  virtual Block solve(const SparseBlock& B, const Context& context) const {
+    return solve(B.whole(), context);
+  }
 };
 
 using SpdSolverFactory = std::function<std::unique_ptr<SpdSolver>()>;

@@ -135,15 +135,17 @@ HarmonicResult solve_harmonic(const solve::SparseMatrix& L, const std::vector<st
   if (free_count == static_cast<std::int32_t>(fixed.size())) {
     throw Error(ErrorKind::data, "weights", "no node is fixed", "the mesh must touch at least one bone");
   }
-  const FreeSystem system = eliminate(L, free_row, free_count, boundary);
+  FreeSystem system = eliminate(L, free_row, free_count, boundary);
   const solve::Block kept = rows_of(fixed, free_count, boundary);
   boundary.resize(0, 0);  // all of it again once it is solved: memory is most in between
   context.check_stop();
   solver.factor(system.A, context);
   context.report(0.6);
-  const solve::Block X = solver.solve(system.rhs, context);
+  const solve::SparseBlock rhs(system.rhs);
+  system.rhs.resize(0, 0);
+  const solve::Block X = solver.solve(rhs, context);
   context.report(0.9);
-  result.residual = solve::relative_residual(system.A, X, system.rhs);
+  result.residual = solve::relative_residual(system.A, X, rhs.whole());
   result.values.resize(static_cast<Eigen::Index>(fixed.size()), X.cols());
   const std::vector<std::int32_t> fixed_row = places(fixed, 1);
   for_pieces(result.values.rows(), [&](Eigen::Index first, Eigen::Index count) {

@@ -131,6 +131,7 @@ class CholmodSolver final : public solve::SpdSolver {
     fill(std::move(state_), matrix, context);
   }
 
+  using SpdSolver::solve;
   Block solve(const Block& B, const Context& context) const override {
     if (!state_) fail(ErrorKind::internal, "solve before factor", "report it");
     if (B.size() == 0) return B;
