@@ -18,6 +18,7 @@ struct UnsetAllocator : std::allocator<T> {
   };
   // Whole vectors of any width, and no two threads in one line of the cache.
   static constexpr std::align_val_t alignment{64};
+  // NOLINTNEXTLINE(bugprone-sizeof-expression): of T, be it a pointer
   T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
   void deallocate(T* at, std::size_t) { ::operator delete(at, alignment); }
   template <class U>
