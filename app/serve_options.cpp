@@ -66,8 +66,7 @@ void declare_serve_options(CLI::App& command, ServeSettings& settings) {
                    "the thread that answers runs before all others of the machine, for steady latencies");
   command.add_flag("--probes-first", settings.probes_first,
                    "frames give way to whatever else wakes on this machine, so that probes are nearly always "
-                   "answered within "
-                   "a millisecond beside them; not beside programs that keep all cores busy");
+                   "answered within a millisecond beside them; not beside programs that keep all cores busy");
   command.add_flag(
       "--merge-pages", settings.merge_pages,
       "let the kernel keep one copy of what several servers of this machine have in memory alike");
