@@ -14,8 +14,10 @@ namespace {
 #ifdef __linux__
 // struct sched_attr of sched_setattr(2), which Debian 12's C library does not declare.
 struct SchedulingAttributes {
-  std::uint32_t size = sizeof(SchedulingAttributes), policy = SCHED_OTHER;
-  std::uint64_t flags = 1;  // SCHED_FLAG_RESET_ON_FORK
+  static constexpr std::uint64_t reset_on_fork = 1;
+
+  std::uint32_t size = sizeof(SchedulingAttributes), policy = 0;
+  std::uint64_t flags = 0;
   std::int32_t nice = 0;
   std::uint32_t priority = 0;
   std::uint64_t runtime = 0;  // ns of a turn
@@ -37,7 +39,11 @@ bool set_thread_priority([[maybe_unused]] Priority priority) {
       return sched_setscheduler(0, SCHED_IDLE, &kNone) == 0;
     }
     case Priority::prompt: {
+      // Its nice value, and a class that it was started in, stay.
       SchedulingAttributes attributes;
+      if (syscall(SYS_sched_getattr, 0, &attributes, sizeof attributes, 0) != 0) return false;
+      if (attributes.policy != SCHED_OTHER) return false;
+      attributes.flags |= SchedulingAttributes::reset_on_fork;
       attributes.runtime = 100'000;
       return syscall(SYS_sched_setattr, 0, &attributes, 0) == 0;
     }

@@ -151,32 +151,17 @@ QualityMeter::Sums QualityMeter::sum(std::span<const float> nodes, std::size_t b
 
 PoseQuality QualityMeter::measure(const PosedBody& body, std::span<const std::uint32_t> tissues,
                                   const QualityThresholds& thresholds) const {
-  PoseQuality out = measure_flesh(body, tissues);
-  out.overlap = overlaps_->deepest(body.segments);
-  judge_joints(body, thresholds, out);
-  return out;
+  return measure_with(overlaps_->deepest(body.segments), body, tissues, thresholds);
 }
 
 PoseQuality QualityMeter::measure_now(const PosedBody& body, std::span<const std::uint32_t> tissues,
                                       const QualityThresholds& thresholds) const {
-  PoseQuality out = measure_flesh(body, tissues);
-  const std::optional<BoneOverlap> overlap = overlaps_->deepest_if_prepared(body.segments);
-  if (overlap)
-    out.overlap = *overlap;
-  else
-    out.overlap_pending = true;
-  judge_joints(body, thresholds, out);
-  return out;
+  return measure_with(overlaps_->deepest_if_prepared(body.segments), body, tissues, thresholds);
 }
 
-void QualityMeter::judge_joints(const PosedBody& body, const QualityThresholds& thresholds,
-                                PoseQuality& out) const {
-  out.clamped = body.clamped;
-  out.doubtful = doubtful_joints(model_->rig, body.pose, thresholds);
-  judge(thresholds, out);
-}
-
-PoseQuality QualityMeter::measure_flesh(const PosedBody& body, std::span<const std::uint32_t> tissues) const {
+PoseQuality QualityMeter::measure_with(const std::optional<BoneOverlap>& overlap, const PosedBody& body,
+                                       std::span<const std::uint32_t> tissues,
+                                       const QualityThresholds& thresholds) const {
   std::vector<Sums> blocks((rest_.size() + kTetsPerSample - 1) / kTetsPerSample);
   std::vector<Change> changes(tissues.size());
   tbb::parallel_for(std::size_t{0}, blocks.size() + tissues.size(), [&](std::size_t b) {
@@ -226,6 +211,11 @@ PoseQuality QualityMeter::measure_flesh(const PosedBody& body, std::span<const s
                       .share_error = changes[i].error};
     out.bone_rigidity_mm = std::max(out.bone_rigidity_mm, changes[i].residual);
   }
+  out.overlap = overlap.value_or(BoneOverlap{});
+  out.overlap_pending = !overlap;
+  out.clamped = body.clamped;
+  out.doubtful = doubtful_joints(model_->rig, body.pose, thresholds);
+  judge(thresholds, out);
   return out;
 }
 

@@ -132,8 +132,8 @@ void FramePlanner::add(const FramePlan& plan, SubscriptionRow& row, PoseJob& job
     shown.rest = model_->rest_pose.positions(mesh->tissues);
 }
 
-// Of these tissues, what was measured before: of the present pose where that is shown again, else of another
-// one, which will do within a stream.
+// Of these tissues, what was wholly measured before: of the present pose where that is shown again, else of
+// another one, which will do within a stream.
 std::shared_ptr<const v1::PoseQuality> FramePlanner::known_quality(const MeshSpec& spec,
                                                                    const FramePlan& plan,
                                                                    const PoseJob& job) const {
@@ -141,7 +141,7 @@ std::shared_ptr<const v1::PoseQuality> FramePlanner::known_quality(const MeshSpe
   for (const SubscriptionRow& row : std::as_const(table_).rows()) {
     const MeshSpec* mesh = row.mesh();
     const auto& quality = row.subscription.quality;
-    if (mesh && quality && mesh->tissues == spec.tissues &&
+    if (mesh && quality && !quality->overlap_pending() && mesh->tissues == spec.tissues &&
         (!again || quality->pose_sequence() == plan.present))
       return quality;
   }

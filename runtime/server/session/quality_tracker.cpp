@@ -46,14 +46,17 @@ bool QualityTracker::measure(std::shared_ptr<const void> owner) {
 }
 
 void QualityTracker::measured(const QualityJob& job) {
+  bool shows_again = false;
   for (const QualityJob::Row& done : job.rows) {
     SubscriptionRow* row = table_.find(done.subscription);
     if (!row || !done.quality || !judged_by(*done.quality, thresholds_)) continue;
     const auto before = std::exchange(row->subscription.quality, done.quality);
-    if (before && before->overlap_pending() && before->pose_sequence() == poses_.present().sequence)
-      row->wait(Clock::now());
+    if (!before || !before->overlap_pending() || before->pose_sequence() != poses_.present().sequence)
+      continue;
+    row->wait(Clock::now());
+    shows_again = true;
   }
-  if (table_.anybody_waits()) show_();
+  if (shows_again) show_();
 }
 
 }  // namespace ecorche::server

@@ -180,6 +180,19 @@ TEST(Quality, WhoWantsItWithEveryFrameGetsAllOfIt) {
   expect_measured(server, client, frame.envelope.mesh_frame());
 }
 
+TEST(Quality, WhoWantsItWithEveryFrameIsNotGivenWhatAnotherWasToldAtOnce) {
+  const TestServer server({}, idle(), with_near_bones());
+  TestClient client(server, "shared"), observer(server, "shared");
+  client.subscribe_mesh();
+  client.next_mesh(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  client.send(300, client.bent(angle_of(300)));
+  observer.subscribe_mesh({}, true);
+  const wire::Frame frame = observer.next_mesh(300);
+  EXPECT_FALSE(frame.envelope.mesh_frame().quality().overlap_pending());
+  expect_measured(server, observer, frame.envelope.mesh_frame());
+}
+
 TEST(Quality, OfABodyFarAwayIsThatOfTheBody) {
   const TestServer server;
   TestClient client(server);

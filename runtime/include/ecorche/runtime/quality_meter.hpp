@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,8 +63,9 @@ class QualityMeter {
   struct Sums;
   struct Change;
 
-  PoseQuality measure_flesh(const PosedBody& body, std::span<const std::uint32_t> tissues) const;
-  void judge_joints(const PosedBody& body, const QualityThresholds& thresholds, PoseQuality& out) const;
+  // `overlap`: nothing where it is pending.
+  PoseQuality measure_with(const std::optional<BoneOverlap>& overlap, const PosedBody& body,
+                           std::span<const std::uint32_t> tissues, const QualityThresholds& thresholds) const;
   static Part look_at(const Tissue& tissue);
   static Change change(const Part& part, std::span<const float> posed);
   Sums sum(std::span<const float> nodes, std::size_t begin, std::size_t end) const;
