@@ -58,8 +58,21 @@ HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::si
   }
 }
 
-// Where results go is asked for some cells ahead; further ahead where they follow each other, since cells
-// take groups of the next slices of a scan too.
+// What a cell is read from, its groups' arrays and its palette.
+template <bool kNormals>
+HWY_INLINE void ask_for_cell(const VertexGroups& groups, std::size_t c) {
+  const VertexGroups::Cell& cell = groups.cells[c];
+  const std::size_t first = groups.first_group(c), count = cell.end - first;
+  ask_for_run(&groups.rows[cell.palette], cell.count);
+  ask_for_run(&groups.corners[kSize * first], kSize * count);
+  if (kNormals) ask_for_run(&groups.normal[2 * kSize * first], 2 * kSize * count);
+  if (groups.groups[first].step == 0) return;
+  const std::size_t data = groups.groups[first].data;
+  ask_for_run(&groups.narrow[data], std::min(3 * kSize * count, groups.narrow.size() - data));
+}
+
+// Cells and where their results go are asked for some cells ahead; results further ahead where they follow
+// each other, since cells take groups of the next slices of a scan too.
 constexpr std::size_t kAhead = 2;
 constexpr std::size_t kResultsAhead = 1024;
 
@@ -78,7 +91,7 @@ HWY_INLINE void move_cells(const TissueVertices& job, std::size_t begin, std::si
   const Sink sink(job.out);
   // Results too: where they follow each other one line after another, which the processor then foresees.
   std::size_t asked = std::max<std::size_t>(job.first, groups.groups[groups.first_group(begin)].first);
-  const auto ask_for_cell = [&](std::size_t c) HWY_ATTR {
+  const auto ask_for_results = [&](std::size_t c) HWY_ATTR {
     if (!groups.in_order) return;
     if (job.last == 0) {
       for (std::size_t g = groups.first_group(c); g < groups.cells[c].end; ++g) {
@@ -91,9 +104,13 @@ HWY_INLINE void move_cells(const TissueVertices& job, std::size_t begin, std::si
     sink.ask_for(asked, to - asked);
     asked = to;
   };
-  for (std::size_t c = begin; c < std::min(end, begin + kAhead); ++c) ask_for_cell(c);
+  const auto ask_for = [&](std::size_t c) HWY_ATTR {
+    ask_for_cell<kNormals>(groups, c);
+    ask_for_results(c);
+  };
+  for (std::size_t c = begin; c < std::min(end, begin + kAhead); ++c) ask_for(c);
   for (std::size_t c = begin; c < end; ++c) {
-    if (c + kAhead < end) ask_for_cell(c + kAhead);
+    if (c + kAhead < end) ask_for(c + kAhead);
     switch (groups.cells[c].count / kSize) {
       case 1:
         move_cell<kNormals, 1>(job, sink, c);

@@ -36,7 +36,7 @@ void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {
   // Asked once for a cluster: its vectors follow each other.
   std::size_t last = ~std::size_t{0};
   bool moves = false;
-  for_clusters(job, begin, end, [&](const Cluster& cluster, std::size_t at, const V3& x) HWY_ATTR {
+  for_clusters<true>(job, begin, end, [&](const Cluster& cluster, std::size_t at, const V3& x) HWY_ATTR {
     const V3 p = load_planar(centres + at, NodeClusters::size);
     const V3 y = minus(p, origin);
     V3 shift{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};

@@ -18,7 +18,7 @@ HWY_INLINE V3 translation(const Quaternion& real, const Quaternion& dual) {
 void skin_dqs(const SkinClusters& job, std::size_t begin, std::size_t end) {
   const V3 origin = all3(job.root.origin);
   const SegmentMotion* motions = job.motions.data();
-  for_clusters(job, begin, end, [&](const Cluster& cluster, std::size_t, const V3& x) HWY_ATTR {
+  for_clusters<false>(job, begin, end, [&](const Cluster& cluster, std::size_t, const V3& x) HWY_ATTR {
     Quaternion real = zero_quaternion(), dual = zero_quaternion();
     for (std::size_t k = 0; k < cluster.count; ++k) {
       const SegmentMotion& motion = motions[cluster.segments[k]];

@@ -11,7 +11,7 @@ namespace ecorche::runtime::HWY_NAMESPACE {
 
 void skin_lbs(const SkinClusters& job, std::size_t begin, std::size_t end) {
   const V3 origin = all3(job.root.origin);
-  for_clusters(job, begin, end, [&](const Cluster& cluster, std::size_t, const V3& x) HWY_ATTR {
+  for_clusters<false>(job, begin, end, [&](const Cluster& cluster, std::size_t, const V3& x) HWY_ATTR {
     return times(blend_displacements(job.motions.data(), cluster, minus(x, origin)), all(1 / whole));
   });
 }

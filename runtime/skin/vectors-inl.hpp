@@ -8,6 +8,8 @@
 #define ECORCHE_RUNTIME_SKIN_VECTORS_INL
 #endif
 
+#include <hwy/cache_control.h>
+
 #include "runtime/skin/lanes-inl.hpp"
 #include "runtime/skin/skin_clusters.hpp"
 
@@ -20,6 +22,13 @@ struct V3 {
 
 HWY_INLINE V all(float value) {
   return hn::Set(F(), value);
+}
+
+/// Asks for every line of `count` numbers.
+template <class T>
+HWY_INLINE void ask_for_run(const T* from, std::size_t count) {
+  constexpr std::size_t line = 64 / sizeof(T);
+  for (std::size_t i = 0; i < count; i += line) hwy::Prefetch(from + i);
 }
 
 HWY_INLINE V3 load_planar(const float* x, std::size_t stride) {
@@ -116,13 +125,26 @@ struct Cluster {
   const std::uint16_t* weights;  // of the first lane of the vector; the next segment's 64 further
 };
 
+/// Asks for what a kernel reads of a cluster; of centres where it has any use for them.
+template <bool kCentres>
+HWY_INLINE void ask_for_cluster(const NodeClusters& layout, std::size_t c) {
+  constexpr std::size_t size = NodeClusters::size;
+  ask_for_run(&layout.rest[3 * size * c], 3 * size);
+  if (kCentres) ask_for_run(&layout.centre[3 * size * c], 3 * size);
+  ask_for_run(&layout.weight[size * layout.begin[c]], size * (layout.begin[c + 1] - layout.begin[c]));
+}
+
+// A cluster's arrays are too short for the processor to foresee them all: asked for this many clusters ahead.
+constexpr std::size_t kClustersAhead = 3;
+
 /// `displace(cluster, first lane, x)` -> displacement, less the root's way.
-template <class Displace>
+template <bool kCentres, class Displace>
 HWY_INLINE void for_clusters(const SkinClusters& job, std::size_t begin, std::size_t end, Displace displace) {
   constexpr std::size_t size = NodeClusters::size;
   const Way way(job.root);
   const NodeClusters& layout = job.layout;
   for (std::size_t i = begin; i < end; ++i) {
+    if (i + kClustersAhead < end) ask_for_cluster<kCentres>(layout, job.clusters[i + kClustersAhead]);
     const std::size_t c = job.clusters[i], first = layout.begin[c];
     Cluster cluster{&layout.palette[first], layout.begin[c + 1] - first, &layout.weight[size * first]};
     for (std::size_t lane = 0; lane < size; lane += hn::Lanes(F())) {
