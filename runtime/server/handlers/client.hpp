@@ -144,6 +144,9 @@ class Client final : public std::enable_shared_from_this<Client>, public Member 
   bool deliver(const PosedFrame& frame) override;
   std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
                           bool still) override;
+  Clock::duration longest_gap(std::uint32_t subscription) const override {
+    return output_.longest_gap(subscription);
+  }
   void pose_done(const PoseOutcome& outcome, const Skipped& skipped) override;
   void control_changed(v1::Role role, bool vacant, double reserved_seconds) override;
   void model_changed(std::uint64_t identity) override;

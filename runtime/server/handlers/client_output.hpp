@@ -40,6 +40,8 @@ class ClientOutput {
                           bool still) {
     return outbox_.ask_level(subscription, finest, coarsest, still, Clock::now());
   }
+  /// As Member's.
+  Clock::duration longest_gap(std::uint32_t subscription) const { return outbox_.longest_gap(subscription); }
   /// As Member::may_take: within the client's share; who reads may have another frame made while the last one
   /// is written, however large they are. Where all memory is taken, only of what has been read.
   bool may_take(std::uint32_t subscription, std::uint64_t more) const;

@@ -10,6 +10,7 @@ using std::chrono::milliseconds;
 constexpr Clock::duration kSpell = std::chrono::seconds(10);
 constexpr Clock::duration kLeastLate = milliseconds(40), kMostLate = milliseconds(100);
 constexpr Clock::duration kAlwaysLate = milliseconds(180);
+constexpr Clock::duration kLongestGap = milliseconds(500);
 constexpr Clock::duration kLongestPatience = std::chrono::seconds(16);
 constexpr int kLateOnes = 2;  // a single one may be a lost packet
 
@@ -45,6 +46,10 @@ bool Flow::may_leave(Clock::time_point now) const {
   if (in_flight_.size() < few_) return true;
   if (in_flight_.size() >= most_in_flight || !shortest_) return false;
   return now - in_flight_.front().left <= *shortest_ * 3 / 2;
+}
+
+Clock::duration Flow::longest_gap() const {
+  return std::min(2 * shortest_.value_or(Clock::duration()), kLongestGap);
 }
 
 Clock::duration Flow::late() const {

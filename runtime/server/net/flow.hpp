@@ -34,6 +34,10 @@ class Flow {
   /// 180 ms while there is a coarser level: the shortest delay of large frames says little about the way.
   std::uint32_t level(std::uint32_t finest, std::uint32_t coarsest, Clock::time_point now);
 
+  /// For so long a lost packet may keep those behind it waiting: two of the shortest delays, since it is
+  /// missed after one and sent again in another; half a second at most. None before a frame arrived.
+  Clock::duration longest_gap() const;
+
   /// Some frame arrived.
   bool arrives() const { return shortest_.has_value(); }
   /// When the oldest one left that is on its way.

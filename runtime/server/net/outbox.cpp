@@ -30,6 +30,11 @@ bool Outbox::arrives(std::uint32_t subscription) const {
   return found != lanes_.end() && found->second.flow.arrives();
 }
 
+Clock::duration Outbox::longest_gap(std::uint32_t subscription) const {
+  const auto found = lanes_.find(subscription);
+  return found == lanes_.end() ? Clock::duration() : found->second.flow.longest_gap();
+}
+
 std::uint32_t Outbox::ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
                                 bool still, Clock::time_point now) {
   Lane& asked = lane(subscription);

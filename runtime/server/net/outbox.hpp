@@ -28,6 +28,8 @@ class Outbox {
   /// since nothing newer waits.
   std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
                           bool still, Clock::time_point now);
+  /// As Flow's; none before the subscription's first frame arrived.
+  Clock::duration longest_gap(std::uint32_t subscription) const;
   /// `keyframe`: number of the frame that must have come before; its own where it is one; 0: needs none.
   /// False, and nothing is taken, where that one never left and does not wait either. A frame of another
   /// level than was asked for is for others.

@@ -23,9 +23,14 @@ void ask_levels(SubscriptionRow& row, const FramePlan& plan) {
   const std::uint32_t finest = subscription.streams.front()->level(),
                       coarsest = subscription.streams.back()->level();
   subscription.levels = 0;
-  for (Member* member : row.members)
-    subscription.levels |= 1U << (member->ask_level(subscription.id, finest, coarsest, plan.still) - finest);
-  if (subscription.levels > 1) row.refresh_at = plan.now + PoseSlot::still_after;
+  Clock::time_point sure = plan.now + PoseSlot::still_after;
+  for (Member* member : row.members) {
+    const Clock::duration gap = member->longest_gap(subscription.id);
+    const bool still = plan.still && plan.now - plan.moved >= gap;
+    subscription.levels |= 1U << (member->ask_level(subscription.id, finest, coarsest, still) - finest);
+    sure = std::max(sure, (plan.still ? plan.moved : plan.now) + PoseSlot::still_after + gap);
+  }
+  if (subscription.levels > 1) row.refresh_at = sure;
 }
 
 }  // namespace

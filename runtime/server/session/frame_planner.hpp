@@ -24,7 +24,8 @@ struct FramePlan {
   Clock::time_point now;
   StreamKinds kinds = 0;  ///< that the job makes
   Shows shows = Shows::next;
-  bool still = false;              ///< the body stands still: members see all of it
+  bool still = false;              ///< nothing newer comes: members see all of it, once it is sure
+  Clock::time_point moved{};       ///< when the pose last became another one
   bool keyframes_at_once = false;  ///< the distance of keyframes is kept already
   std::uint64_t present = 0;       ///< sequence number of the pose that is shown
 };

@@ -8,6 +8,7 @@
 
 #include <ecorche/v1/envelope.pb.h>
 #include <ecorche/wire/framing.hpp>
+#include "runtime/server/net/asio.hpp"
 #include "runtime/server/resources/memory_budget.hpp"
 
 namespace ecorche::server {
@@ -25,6 +26,12 @@ class Member {
   /// The level of detail that suits the member's way for its next frame; `still`: nothing newer waits.
   virtual std::uint32_t ask_level(std::uint32_t subscription, std::uint32_t finest, std::uint32_t coarsest,
                                   bool still) = 0;
+  /// For so long a packet that is lost keeps those behind it from coming, on the member's way: poses that
+  /// stay away no longer have not ended.
+  virtual Clock::duration longest_gap(std::uint32_t subscription) const {
+    static_cast<void>(subscription);
+    return {};
+  }
   /// Only to the member that holds control.
   virtual void pose_done(const PoseOutcome& outcome, const Skipped& skipped) = 0;
   /// `vacant`: control is free; else, for so many seconds above 0, only its last holder may have it.

@@ -60,6 +60,8 @@ class PoseSlot {
   bool rests(Clock::time_point now, bool busy) const { return !busy && now - stirred_ > still_after; }
   /// The pose has not become another one of late.
   bool still(Clock::time_point now) const { return now - moved_ > still_after; }
+  /// When the pose last became another one.
+  Clock::time_point moved() const { return moved_; }
   /// Until when the next pose of the stream is expected; nothing where none is.
   std::optional<Clock::time_point> next_expected(Clock::time_point now) const;
 

@@ -17,6 +17,7 @@ FramePlan Session::plan_present(Clock::time_point now) const {
           .kinds = pose_kinds(),
           .shows = FramePlan::Shows::present,
           .still = true,
+          .moved = poses_.moved(),
           .keyframes_at_once = true,
           .present = poses_.present().sequence};
 }

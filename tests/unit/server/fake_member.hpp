@@ -23,6 +23,7 @@ struct FakeMember final : Member {
   bool reads = true;                  // what it was sent
   bool has_keyframes = true;          // that frames are against
   std::uint32_t level = 0;            // that suits it, unless the body stands still
+  Clock::duration gap{};              // that its way may leave between poses
   std::shared_ptr<const Pool> share = nullptr;
   std::uint64_t connection = 0;
   std::string called;
@@ -37,6 +38,7 @@ struct FakeMember final : Member {
   std::uint32_t ask_level(std::uint32_t, std::uint32_t finest, std::uint32_t, bool still) override {
     return still ? finest : finest + level;
   }
+  Clock::duration longest_gap(std::uint32_t) const override { return gap; }
   void pose_done(const PoseOutcome&, const Skipped&) override {}
   void control_changed(v1::Role role, bool vacant, double reserved_seconds) override {
     control.push_back({role, vacant, reserved_seconds});

@@ -117,6 +117,17 @@ TEST(Flow, AWayThatBecomesLongerIsGotUsedTo) {
   EXPECT_EQ(level, 0U);
 }
 
+TEST(Flow, ALostPacketKeepsOthersForTwoShortDelaysAndHalfASecondAtMost) {
+  Flow flow(2);
+  EXPECT_EQ(flow.longest_gap(), Clock::duration());
+  Way slow{.way = milliseconds(1600), .bytes = 0, .rate = 1};
+  slow.send(flow);
+  EXPECT_EQ(flow.longest_gap(), milliseconds(500));
+  Way quick{.way = milliseconds(100), .bytes = 0, .rate = 1, .now = slow.now, .number = slow.number};
+  quick.send(flow);
+  EXPECT_EQ(flow.longest_gap(), milliseconds(200));
+}
+
 TEST(Flow, NoCoarserLevelThanThereIs) {
   Flow flow(2);
   Way way{.way = milliseconds(100), .bytes = 1e9, .rate = 1};

@@ -163,6 +163,31 @@ TEST(FramePlannerTest, MembersAreAskedForTheirLevelAndSeeAllOfAStillBody) {
   EXPECT_FALSE(all.table.next_due());
 }
 
+TEST(FramePlannerTest, ABodyWhosePosesMayOnlyBeLateDoesNotStandStillYet) {
+  Planning all;
+  all.see_mesh(0, v1::ENCODING_F32, true);
+  all.member.level = 2;
+  all.member.gap = std::chrono::milliseconds(200);
+  const Clock::time_point moved = all.now;
+  FramePlan moving = all.plan(Shows::next);
+  moving.still = false;
+  all.make(moving);
+  EXPECT_EQ(all.table.next_due(), moved + PoseSlot::still_after + all.member.gap);
+  // Shown again for another reason, it is as coarse as before.
+  all.now = moved + PoseSlot::still_after;
+  all.table.rows().front().wait(all.now);
+  FramePlan again = all.plan(Shows::present);
+  again.moved = moved;
+  EXPECT_EQ(all.make(again).size(), 1U);
+  EXPECT_EQ(all.job.subscriptions[0].levels, 4U);
+  EXPECT_EQ(all.table.next_due(), moved + PoseSlot::still_after + all.member.gap);
+  all.now = *all.table.next_due();
+  all.table.wake(all.now);
+  again.now = all.now;
+  EXPECT_EQ(all.make(again).size(), 1U);
+  EXPECT_EQ(all.job.subscriptions[0].levels, 1U);
+}
+
 // Of the same tissues: within a stream any, of the pose that is shown again only its own.
 TEST(FramePlannerTest, TellsTheQualityThatIsKnown) {
   Planning all;
