@@ -27,6 +27,7 @@ Table table_of_times() {
                 {"worst", 9},
                 {"memory ms", 9},
                 {"arithmetic ms", 9},
+                {"walk ms", 9},
                 {"over the larger"},
                 {"plain Eigen"}});
 }
@@ -36,7 +37,7 @@ void line(const Table& table, const std::string& what, int threads, const Figure
   const auto known = [](double value, int digits) { return value > 0 ? fixed(value, digits) : ""; };
   table.row({what, std::to_string(threads), fixed(figure.median, 3), fixed(figure.best, 3),
              fixed(figure.worst, 3), known(floors.memory, 3), known(floors.arithmetic, 3),
-             known(floors.larger() > 0 ? figure.median / floors.larger() : 0, 2),
+             known(floors.walk, 3), known(floors.larger() > 0 ? figure.median / floors.larger() : 0, 2),
              against > 0 ? fixed(against / figure.median, 1) + " x" : ""});
 }
 

@@ -24,6 +24,7 @@ Table table_of_times();
 struct Floors {
   double memory = 0;      // its bytes over the bandwidth
   double arithmetic = 0;  // the same kernels on data in the first cache
+  double walk = 0;        // its bytes read and written as the kernels do, without their arithmetic
 
   double larger() const { return std::max(memory, arithmetic); }
 };

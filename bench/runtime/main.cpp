@@ -8,7 +8,8 @@
 // twofold. Memory: the fewest bytes that the layout needs (what it holds of each node and vertex, and each
 // result once) over the bandwidth measured with as many threads in this run; the time of a store's own fetch
 // of its line is the kernel's loss. Arithmetic: the same kernels on pieces of the body that stay in the first
-// cache. Each figure is the median over the walk, with the best and the worst beside it.
+// cache. Walk: all that the kernels read and write, in their order, without their arithmetic. Each figure is
+// the median over the walk, with the best and the worst beside it.
 #include <hwy/targets.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -28,6 +29,7 @@
 #include "bench/runtime/bandwidth.hpp"
 #include "bench/runtime/clip_poses.hpp"
 #include "bench/runtime/figure.hpp"
+#include "bench/runtime/memory_walk.hpp"
 #include "bench/runtime/peer_rows.hpp"
 #include "bench/runtime/plain_eigen.hpp"
 #include "bench/runtime/probing.hpp"
@@ -114,7 +116,7 @@ class Bench {
     copies_ = std::clamp<std::size_t>(static_cast<std::size_t>(4 * last_cache() / frame) + 1, 2, 12);
     for (std::size_t c = 0; c < copies_; ++c) {
       posers_.push_back(std::make_unique<runtime::BodyPoser>(model_));
-      clusters_.push_back(parts_.clusters());
+      laid_out_.push_back(parts_);
       plain_frames_.push_back(posers_.back()->make_frame());
       wire_frames_.push_back(posers_.back()->make_frame({.positions = false, .quantised = true}));
       full_frames_.push_back(
@@ -167,8 +169,10 @@ class Bench {
   }
 
  private:
+  static double bandwidth_now() { return bandwidth(4 * 3 * last_cache() / kMib); }
+
   void run_here(int threads) {
-    const double gbs = bandwidth(4 * 3 * last_cache() / kMib);
+    const double gbs = bandwidth_now();
     std::printf("\n%d thread%s: memory %.1f GB/s\n", threads, threads == 1 ? "" : "s", gbs);
     const Table table = table_of_times();
     if (wishes_.has("skin")) time_skin(table, threads, gbs);
@@ -197,8 +201,10 @@ class Bench {
     const double body = bytes_.nodes[2] + bytes_.tissues;
     const auto whole = [&](const char* what, std::vector<runtime::PosedBody>& bodies, double results,
                            double against) {
+      // Measured anew for each: it goes up and down by half within minutes, with what neighbours do.
+      const double memory = (body + results) / bandwidth_now() / 1e6;
       const Figure figure = frames(bodies);
-      line(table, what, threads, figure, {floor_of(body + results), frame_alone(bodies)}, against);
+      line(table, what, threads, figure, {memory, frame_alone(bodies), walk(bodies)}, against);
     };
     whole("frame, CoR, float32", plain_frames_, size_of(all, 12), plain);
     whole("frame, CoR, u16", wire_frames_, bytes_.quantised, plain);
@@ -275,6 +281,16 @@ class Bench {
     return nodes_alone(Skinning::cor, bodies) + arithmetic_of_tissues(*model_, parts_, bodies[0]);
   }
 
+  // Their memory alone. Overwrites what they hold.
+  double walk(std::vector<runtime::PosedBody>& bodies) {
+    return time(kFrames,
+                [&](int f) {
+                  const std::size_t copy = static_cast<std::size_t>(f) % copies_;
+                  walk_memory(*model_, laid_out_[copy], bodies[copy]);
+                })
+        .median;
+  }
+
   double plain_nodes(Skinning skinning) {
     return time(9, [&](int f) { plain_.nodes(segments_[static_cast<std::size_t>(f)], skinning); }).median;
   }
@@ -282,7 +298,7 @@ class Bench {
   void skin(Skinning skinning, const std::vector<std::uint32_t>& needed, int f) {
     const std::size_t copy = static_cast<std::size_t>(f) % copies_;
     auto& scratch = plain_frames_[copy].scratch;
-    const runtime::NodeClusters& layout = clusters_[copy];
+    const runtime::NodeClusters& layout = laid_out_[copy].clusters();
     const runtime::RootMotion root =
         runtime::make_motions(segments_[static_cast<std::size_t>(f % kFrames)], {0, 0, 0}, scratch.motions);
     const runtime::SkinClusters job{
@@ -313,7 +329,7 @@ class Bench {
   Wishes wishes_;
   std::size_t copies_ = 1;
   std::vector<std::unique_ptr<runtime::BodyPoser>> posers_;
-  std::vector<runtime::NodeClusters> clusters_;
+  std::vector<runtime::BodyParts> laid_out_;
   std::vector<runtime::PosedBody> plain_frames_, wire_frames_, full_frames_;
   std::vector<Pose> poses_, walk_;
   std::vector<std::vector<RigidTransform>> segments_;

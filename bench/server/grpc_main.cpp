@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole body in float32 through gRPC, and as Protobuf over plain TCP: bench_grpc MODEL.hdf SECONDS RATE.
+// The whole body in float32 through gRPC, as Protobuf over plain TCP, and as it lies in memory over plain
+// TCP: bench_grpc MODEL.hdf SECONDS RATE. No server that poses and uses TCP can be quicker than the last.
 //
-// Server and client are threads of this program. Both poses and both send as the bench does with ours: a pose
-// goes out at RATE, a latency ends when the client holds the parsed message. Prints `name p50 p99 bytes
-// cpu`, a line each: ms, and ms of processor a frame.
+// Server and client are threads of this program. All pose, and send as the bench does with ours: a pose goes
+// out at RATE, a latency ends when the client holds the parsed message. Prints `name p50 p99 bytes cpu`, a
+// line each: ms, and ms of processor a frame.
 #include <arpa/inet.h>
 #include <grpcpp/grpcpp.h>
 #include <netinet/in.h>
@@ -45,15 +46,26 @@ class Bodies {
         poser_(model_),
         body_(poser_.make_frame()) {}
 
-  void fill(const Ask& ask, Body& out) {
+  const std::vector<std::vector<float>>& pose(const Ask& ask) {
     const Pose pose = walking(model_->rig, ask.seconds());
     if (!poser_.run(pose, runtime::Skinning::cor, poser_.all_tissues(), body_, runtime::NodesOf::tissues)
              .ok())
       throw broken("no pose");
+    return body_.tissues;
+  }
+
+  void fill(const Ask& ask, Body& out) {
     out.set_sequence(ask.sequence());
     out.clear_positions();
-    for (const std::vector<float>& tissue : body_.tissues)
+    for (const std::vector<float>& tissue : pose(ask))
       out.add_positions(tissue.data(), tissue.size() * sizeof(float));
+  }
+
+  // Of all tissues.
+  std::size_t bytes() const {
+    std::size_t out = 0;
+    for (const std::vector<float>& tissue : body_.tissues) out += tissue.size() * sizeof(float);
+    return out;
   }
 
  private:
@@ -171,37 +183,79 @@ bool hear(int fd, Message& message, std::string& bytes) {
   return receive_all(fd, bytes.data(), size) && message.ParseFromString(bytes);
 }
 
+// Two ends of one connection over loopback.
+class Loopback {
+ public:
+  Loopback() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    if (bind(door_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0 || listen(door_, 1) != 0 ||
+        getsockname(door_, reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
+        connect(client_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
+      throw broken("no loopback");
+    server_ = accept(door_, nullptr, nullptr);
+    const int on = 1;
+    for (const int fd : {client_, server_}) setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  }
+  Loopback(const Loopback&) = delete;
+  Loopback& operator=(const Loopback&) = delete;
+  ~Loopback() {
+    for (const int fd : {door_, client_, server_}) close(fd);
+  }
+
+  int client() const { return client_; }
+
+  // `answer(server's end, what was asked)` on a thread of its own while `asking` runs.
+  template <class Answer>
+  void serve(const Answer& answer, const std::function<void()>& asking) const {
+    std::thread serving([&] {
+      Ask ask;
+      std::string bytes;
+      while (hear(server_, ask, bytes)) answer(server_, ask);
+    });
+    asking();
+    shutdown(client_, SHUT_RDWR);
+    serving.join();
+  }
+
+ private:
+  int door_ = socket(AF_INET, SOCK_STREAM, 0), client_ = socket(AF_INET, SOCK_STREAM, 0), server_ = -1;
+};
+
 void through_tcp(Bodies& bodies, double seconds, double rate) {
-  const int door = socket(AF_INET, SOCK_STREAM, 0), client = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  if (bind(door, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0 || listen(door, 1) != 0 ||
-      getsockname(door, reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
-      connect(client, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
-    throw broken("no loopback");
-  const int server = accept(door, nullptr, nullptr), on = 1;
-  for (const int fd : {client, server}) setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  std::thread serving([&] {
-    Ask ask;
-    Body body;
-    std::string bytes;
-    while (hear(server, ask, bytes)) {
-      bodies.fill(ask, body);
-      say(server, body, bytes);
-    }
+  const Loopback loopback;
+  Body sent, body;
+  std::string bytes, sent_bytes;
+  const auto answer = [&](int fd, const Ask& ask) {
+    bodies.fill(ask, sent);
+    say(fd, sent, sent_bytes);
+  };
+  loopback.serve(answer, [&] {
+    measure("bytes", seconds, rate, [&](const Ask& ask) {
+      say(loopback.client(), ask, bytes);
+      if (!hear(loopback.client(), body, bytes)) throw broken("the server ended");
+      return size_of(body, ask);
+    });
   });
-  Body body;
+}
+
+void as_it_lies(Bodies& bodies, double seconds, double rate) {
+  const Loopback loopback;
+  std::vector<char> held(bodies.bytes());
   std::string bytes;
-  measure("bytes", seconds, rate, [&](const Ask& ask) {
-    say(client, ask, bytes);
-    if (!hear(client, body, bytes)) throw broken("the server ended");
-    return size_of(body, ask);
+  const auto answer = [&](int fd, const Ask& ask) {
+    for (const std::vector<float>& tissue : bodies.pose(ask))
+      send_all(fd, reinterpret_cast<const char*>(tissue.data()), tissue.size() * sizeof(float));
+  };
+  loopback.serve(answer, [&] {
+    measure("raw", seconds, rate, [&](const Ask& ask) {
+      say(loopback.client(), ask, bytes);
+      if (!receive_all(loopback.client(), held.data(), held.size())) throw broken("the server ended");
+      return held.size();
+    });
   });
-  shutdown(client, SHUT_RDWR);
-  serving.join();
-  for (const int fd : {door, client, server}) close(fd);
 }
 
 }  // namespace
@@ -217,6 +271,7 @@ int main(int argc, char** argv) {
     const double seconds = std::atof(argv[2]), rate = std::atof(argv[3]);
     ecorche::bench::through_grpc(bodies, seconds, rate);
     ecorche::bench::through_tcp(bodies, seconds, rate);
+    ecorche::bench::as_it_lies(bodies, seconds, rate);
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "error: %s\n", error.what());

@@ -21,6 +21,7 @@
 #include "bench/server/attacks.hpp"
 #include "bench/server/crowd.hpp"
 #include "bench/server/deltas.hpp"
+#include "bench/server/door.hpp"
 #include "bench/server/peers.hpp"
 #include "bench/server/ready.hpp"
 #include "bench/server/region.hpp"
@@ -180,9 +181,11 @@ void observers(const Settings& settings, Loads& loads) {
           "at least 90, encoded once");
 }
 
-// Whoever is served, alone and beside `others`.
+// Whoever is served, alone and beside `others`, who come to the same server, and first to a door that does
+// nothing for them but send `bytes`.
 void beside(const Settings& settings, Loads& loads, const std::string& what,
-            const std::function<std::unique_ptr<Peers>(const Served&)>& others, const std::string& wanted) {
+            const std::function<std::unique_ptr<Peers>(const wire::Address&)>& others, std::size_t bytes,
+            const std::string& wanted) {
   const Served served(settings.program, settings.model, kRoomy);
   Crowd crowd(served.address(), settings.truth);
   const ClientOptions options{.vertices = 100'000,
@@ -192,8 +195,14 @@ void beside(const Settings& settings, Loads& loads, const std::string& what,
                               .check_each = settings.check_each};
   for (int i = 0; i < 4; ++i) crowd.join(options);
   const Sum alone = measure(settings, loads, served, "4 clients, 100 k vertices, alone", crowd, 0, 4, "");
+  {
+    const Door door(bytes);
+    const std::unique_ptr<Peers> elsewhere = others(door.address());
+    measure(settings, loads, served, "4 clients, 100 k vertices, as they come elsewhere: " + what, crowd, 0,
+            4, "", {}, elsewhere.get(), kComing);
+  }
   const double before = served.rss_mib();
-  const std::unique_ptr<Peers> peers = others(served);
+  const std::unique_ptr<Peers> peers = others(served.address());
   double most = 0;
   const auto look = [&] { most = std::max(most, served.rss_mib()); };
   Sum there = measure(settings, loads, served, "4 clients, 100 k vertices, as they come: " + what, crowd, 0,
@@ -269,6 +278,12 @@ void region(const Settings& settings) {
   }
 }
 
+std::size_t vertices_of(const Model& model) {
+  std::size_t out = 0;
+  for (const Tissue& tissue : model.tissues) out += static_cast<std::size_t>(tissue.V.rows());
+  return out;
+}
+
 constexpr const char* kLoads[] = {"body",    "f32",  "organ",    "posers", "observers",
                                   "stalled", "idle", "dripping", "volume", "clients"};
 
@@ -291,19 +306,21 @@ void run_loads(const Settings& settings, Loads& loads, const std::function<bool(
   }
   if (chosen("observers")) observers(settings, loads);
   if (chosen("stalled")) {
+    const std::size_t body = sizeof(float) * 3 * vertices_of(*settings.truth);
     beside(
         settings, loads, "32 clients that stop reading",
-        [](const Served& s) { return stalled_readers(s.address(), 32); }, "p99 within 20 %, gone in 10 s");
+        [](const wire::Address& to) { return stalled_readers(to, 32); }, body,
+        "p99 within 20 %, gone in 10 s");
   }
   if (chosen("idle")) {
     beside(
         settings, loads, "1000 idle connections",
-        [](const Served& s) { return idle_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
+        [](const wire::Address& to) { return idle_connections(to, 1000); }, 0, "unaffected, gone by 5 s");
   }
   if (chosen("dripping")) {
     beside(
         settings, loads, "1000 that send a byte a second",
-        [](const Served& s) { return dripping_connections(s.address(), 1000); }, "unaffected, gone by 5 s");
+        [](const wire::Address& to) { return dripping_connections(to, 1000); }, 0, "unaffected, gone by 5 s");
   }
   if (chosen("volume")) volume(settings, loads);
 }

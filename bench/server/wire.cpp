@@ -21,6 +21,12 @@ namespace ecorche::bench {
 namespace {
 
 using client::Clock;
+
+std::string row_of(std::string_view way) {
+  if (way == "grpc") return "gRPC";
+  return way == "bytes" ? "Protobuf over TCP" : "as it lies, over TCP";
+}
+
 constexpr double kRate = 20;
 constexpr double kWarmUp = 4;  // until the levels of detail are made
 
@@ -92,9 +98,8 @@ void same_frame(const std::string& program, const std::string& model, const std:
   char name[16];
   double p50 = 0, p99 = 0, bytes = 0, cpu = 0;
   while (pipe && std::fscanf(pipe.get(), "%15s %lf %lf %lf %lf", name, &p50, &p99, &bytes, &cpu) == 5) {
-    table.row({name == std::string_view("grpc") ? "gRPC" : "Protobuf over TCP", fixed(bytes / 1e6, 1),
-               fixed(p50, 2), fixed(p99, 2), fixed(cpu, 1), fixed(own.p50 / p50, 2),
-               fixed(own.cpu_ms / cpu, 2)});
+    table.row({row_of(name), fixed(bytes / 1e6, 1), fixed(p50, 2), fixed(p99, 2), fixed(cpu, 1),
+               fixed(own.p50 / p50, 2), fixed(own.cpu_ms / cpu, 2)});
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The posed nodes of a cell of groups, and the corners of a vector of vertices among them. Included once per
-// instruction set.
+// What a cell of groups is read from, its posed nodes, and the corners of a vector of vertices among them.
+// Included once per instruction set.
 #if defined(ECORCHE_RUNTIME_SKIN_CELL_NODES_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef ECORCHE_RUNTIME_SKIN_CELL_NODES_INL
 #undef ECORCHE_RUNTIME_SKIN_CELL_NODES_INL
@@ -8,11 +8,30 @@
 #define ECORCHE_RUNTIME_SKIN_CELL_NODES_INL
 #endif
 
+#include <algorithm>
+
 #include "runtime/skin/palette-inl.hpp"
 #include "runtime/skin/vectors-inl.hpp"
+#include "runtime/skin/vertex_groups.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
+
+// Cells are too short for the processor to foresee them: asked for this many cells ahead.
+constexpr std::size_t kCellsAhead = 2;
+
+/// Asks for what a cell is read from: its palette, and its groups' arrays.
+HWY_INLINE void ask_for_cell(const VertexGroups& groups, std::size_t c, bool normals) {
+  constexpr std::size_t size = VertexGroups::size;
+  const VertexGroups::Cell& cell = groups.cells[c];
+  const std::size_t first = groups.first_group(c), count = cell.end - first;
+  ask_for_run(&groups.rows[cell.palette], cell.count);
+  ask_for_run(&groups.corners[size * first], size * count);
+  if (normals) ask_for_run(&groups.normal[2 * size * first], 2 * size * count);
+  if (groups.groups[first].step == 0) return;
+  const std::size_t data = groups.groups[first].data;
+  ask_for_run(&groups.narrow[data], std::min(3 * size * count, groups.narrow.size() - data));
+}
 
 #if HWY_TARGET <= HWY_AVX3
 

@@ -58,22 +58,8 @@ HWY_INLINE void move_group(const VertexGroups& groups, const Sink& sink, std::si
   }
 }
 
-// What a cell is read from, its groups' arrays and its palette.
-template <bool kNormals>
-HWY_INLINE void ask_for_cell(const VertexGroups& groups, std::size_t c) {
-  const VertexGroups::Cell& cell = groups.cells[c];
-  const std::size_t first = groups.first_group(c), count = cell.end - first;
-  ask_for_run(&groups.rows[cell.palette], cell.count);
-  ask_for_run(&groups.corners[kSize * first], kSize * count);
-  if (kNormals) ask_for_run(&groups.normal[2 * kSize * first], 2 * kSize * count);
-  if (groups.groups[first].step == 0) return;
-  const std::size_t data = groups.groups[first].data;
-  ask_for_run(&groups.narrow[data], std::min(3 * kSize * count, groups.narrow.size() - data));
-}
-
-// Cells and where their results go are asked for some cells ahead; results further ahead where they follow
-// each other, since cells take groups of the next slices of a scan too.
-constexpr std::size_t kAhead = 2;
+// Where results go is asked for as far ahead as cells are; further where they follow each other, since cells
+// take groups of the next slices of a scan too.
 constexpr std::size_t kResultsAhead = 1024;
 
 template <bool kNormals, std::size_t kBlocks>
@@ -105,12 +91,12 @@ HWY_INLINE void move_cells(const TissueVertices& job, std::size_t begin, std::si
     asked = to;
   };
   const auto ask_for = [&](std::size_t c) HWY_ATTR {
-    ask_for_cell<kNormals>(groups, c);
+    ask_for_cell(groups, c, kNormals);
     ask_for_results(c);
   };
-  for (std::size_t c = begin; c < std::min(end, begin + kAhead); ++c) ask_for(c);
+  for (std::size_t c = begin; c < std::min(end, begin + kCellsAhead); ++c) ask_for(c);
   for (std::size_t c = begin; c < end; ++c) {
-    if (c + kAhead < end) ask_for(c + kAhead);
+    if (c + kCellsAhead < end) ask_for(c + kCellsAhead);
     switch (groups.cells[c].count / kSize) {
       case 1:
         move_cell<kNormals, 1>(job, sink, c);
