@@ -71,7 +71,7 @@ void Session::start_volumes(Clock::time_point now) {
   volumes_.start({.listener = listener(),
                   .make_job =
                       [this, now] {
-                        const std::shared_ptr<PoseJob> job = make_job();
+                        std::shared_ptr<PoseJob> job = make_job();
                         job->request = poses_.present();
                         job->request.arrived = now;
                         return job;
