@@ -36,8 +36,8 @@ BOUNDS = [Bound("is met", ONE, take, 2.5, "ms", floor=take, of="ms: itself"), Bo
           Bound("enough", ONE, take, 2.5, "a second", least=True), Bound("too few", ONE, take, 2.6, "a second", least=True),
           Bound("of a peer", TWO, take, 1, "x"), Bound("of a bench that fails", GONE, take, 1, "x"),
           Bound("of a row that is not there", ONE, at("nothing", "median ms"), 1, "x"),
-          Bound("cannot be met", ONE, take, 2.4, "ms", limit=take, isolates="no work at all"),
-          Bound("could be met", ONE, take, 2.4, "ms", limit=lambda printed: 2.3, isolates="some of the work")]
+          Bound("out of reach", ONE, take, 2.4, "ms", limit=take, isolates="no work at all"),
+          Bound("within reach", ONE, take, 2.4, "ms", limit=lambda printed: 2.3, isolates="some of the work")]
 '''
 TINY = '''#!/usr/bin/python3
 import sys
@@ -95,11 +95,11 @@ class Judging(unittest.TestCase):
         done, verdicts = self.judge()
         self.assertEqual(verdicts, {"is met": "holds", "is missed": "misses", "enough": "holds", "too few": "misses", "of a peer": "not here",
                                     "of a bench that fails": "not here", "of a row that is not there": "not in what the bench printed",
-                                    "cannot be met": "misses, and so does its limit", "could be met": "misses"})
+                                    "out of reach": "misses, and so does its limit", "within reach": "misses"})
         self.assertEqual(done.returncode, 1)
         self.assertIn("bench/tiny --ozz OZZ: needs --ozz", done.stdout)
         self.assertIn("bench/tiny broken: error: tiny: broken", done.stdout)
-        self.assertIn("limit of 'cannot be met': no work at all", done.stdout)
+        self.assertIn("limit of 'out of reach': no work at all", done.stdout)
 
     def test_a_busy_machine_gives_none(self):
         _, verdicts = self.judge(most_busy=-1)
