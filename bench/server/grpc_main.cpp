@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole body in float32 through gRPC, as Protobuf over plain TCP, and as it lies in memory over plain
-// TCP: bench_grpc MODEL.hdf SECONDS RATE. No server that poses and uses TCP can be quicker than the last.
+// TCP: bench_grpc MODEL.hdf SECONDS RATE. No server that poses first and then sends over TCP is quicker than
+// the last.
 //
 // Server and client are threads of this program. All pose, and send as the bench does with ours: a pose goes
 // out at RATE, a latency ends when the client holds the parsed message. Prints `name p50 p99 bytes cpu`, a

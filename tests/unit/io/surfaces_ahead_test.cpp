@@ -12,6 +12,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What holds on to limits and context lives no longer than they.
+struct SurfacesAheadTest : testing::Test {
+  const Scratch folder;
+  const files::ReadLimits limits;
+  const Context context;
+  SurfacesAhead surfaces{limits, context};
+};
+
 void write_tetrahedron(const fs::path& path, double size) {
   SurfaceMesh mesh;
   mesh.V.resize(4, 3);
@@ -21,8 +29,7 @@ void write_tetrahedron(const fs::path& path, double size) {
   write_surface(path, mesh);
 }
 
-TEST(SurfacesAhead, AreThoseThatAreReadOneByOne) {
-  const Scratch folder;
+TEST_F(SurfacesAheadTest, AreThoseThatAreReadOneByOne) {
   const fs::path bones = folder / "bones", data = folder / "elsewhere";
   fs::create_directories(bones);
   fs::create_directories(data);
@@ -39,9 +46,6 @@ TEST(SurfacesAhead, AreThoseThatAreReadOneByOne) {
       "tissues:\n"
       "  - {name: not_there, file: nothing.stl}\n",
       "case.yaml");
-  const files::ReadLimits limits;
-  const Context context;
-  SurfacesAhead surfaces(limits, context);
   surfaces.read(root, folder.path(), data);
   // Twice: what two entries name is read again for the second.
   for (const fs::path& path : {folder / "skin.stl", bones / "a.ply", bones / "a.ply", data / "b.obj"}) {
@@ -52,8 +56,7 @@ TEST(SurfacesAhead, AreThoseThatAreReadOneByOne) {
   }
 }
 
-TEST(SurfacesAhead, WhatIsWrongIsToldWhereItIsTaken) {
-  const Scratch folder;
+TEST_F(SurfacesAheadTest, WhatIsWrongIsToldWhereItIsTaken) {
   const fs::path broken = folder.put("broken.stl", "solid no triangle");
   const yaml::Value root = yaml::Value::parse(
       "skin: [no, skin]\n"
@@ -63,9 +66,6 @@ TEST(SurfacesAhead, WhatIsWrongIsToldWhereItIsTaken) {
       "  - {name: c, file: c.stl, root: data}\n"
       "tissues: none\n",
       "case.yaml");
-  const files::ReadLimits limits;
-  const Context context;
-  SurfacesAhead surfaces(limits, context);
   EXPECT_NO_THROW(surfaces.read(root, folder.path(), {}));
   const auto asked = error_of([&] { read_tagged_surface(broken); });
   const auto told = error_of([&] { surfaces.take(broken); });
@@ -73,12 +73,8 @@ TEST(SurfacesAhead, WhatIsWrongIsToldWhereItIsTaken) {
   EXPECT_STREQ(told->what(), asked->what());
 }
 
-TEST(SurfacesAhead, NobodyWaitsForAPipe) {
-  const Scratch folder;
+TEST_F(SurfacesAheadTest, NobodyWaitsForAPipe) {
   ASSERT_EQ(mkfifo((folder / "pipe.stl").c_str(), 0600), 0);
-  const files::ReadLimits limits;
-  const Context context;
-  SurfacesAhead surfaces(limits, context);
   surfaces.read(yaml::Value::parse("skin: pipe.stl\n", "case.yaml"), folder.path(), {});
 }
 
