@@ -15,8 +15,8 @@ namespace fs = std::filesystem;
 // What holds on to limits and context lives no longer than they.
 struct SurfacesAheadTest : testing::Test {
   const Scratch folder;
-  const files::ReadLimits limits;
-  const Context context;
+  const files::ReadLimits limits{};
+  const Context context{};
   SurfacesAhead surfaces{limits, context};
 };
 
