@@ -6,6 +6,7 @@
 #include "core/files/atomic_file.hpp"
 #include "core/model_file/digest.hpp"
 #include "core/model_file/hdf.hpp"
+#include "core/model_file/in_turn.hpp"
 #include "core/model_file/invariants.hpp"
 #include "core/model_file/layout.hpp"
 #include "core/platform/file.hpp"
@@ -39,11 +40,13 @@ std::uint64_t bound(const std::vector<const Entry*>& entries) {
   return bytes;
 }
 
-// One HDF5 file being made. The same datasets give the same bytes: no times, no filters, one order.
+// One HDF5 file being made. The same datasets give the same bytes: no times, no filters, one order. Any
+// thread may go on with it; none of it within a Session.
 class OutputFile {
  public:
   OutputFile(const fs::path& path, const fs::path& shown, std::uint64_t bytes)
       : path_(path), shown_(shown.string()) {
+    const hdf::Session session;
     reserve(path, shown_, bytes);
     const hdf::Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose),
         access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
@@ -59,11 +62,25 @@ class OutputFile {
                   "check the folder's rights and the disk's free space");
     }
     reserve(path, shown_, bytes);  // again: creating has truncated it
+    std::error_code ignored;
+    disk_ = platform::File(path, platform::Open::write, ignored);
   }
 
-  void make_group(const std::string& path) { group_at(path); }
+  ~OutputFile() {
+    const hdf::Session session;
+    groups_.clear();
+    file_.close();
+  }
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  void make_group(const std::string& path) {
+    const hdf::Session session;
+    group_at(path);
+  }
 
   void add(const Entry& entry) {
+    const hdf::Session session;
     const std::size_t slash = entry.path.rfind('/');
     const hdf::Id& group = group_at(entry.path.substr(0, slash));
     const hdf::Id type = hdf::file_type(entry.type, entry.width);
@@ -78,20 +95,21 @@ class OutputFile {
         H5Dcreate2(group, entry.path.c_str() + slash + 1, type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
         H5Dclose);
     if (!dataset.good()) fail(entry.path);
-    if (!entry.bytes.empty() &&
-        H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, entry.bytes.data()) < 0) {
-      fail(entry.path);
-    }
+    if (entry.bytes.empty()) return;
+    if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, entry.bytes.data()) < 0) fail(entry.path);
+    if (entry.bytes.size() >= kAlignFrom) disk_.begin_flush(H5Dget_offset(dataset), entry.bytes.size());
   }
 
   template <std::size_t N, class T>
   void set_attribute(const std::string& group, const char* name, const std::array<T, N>& values) {
+    const hdf::Session session;
     const hsize_t extent = N;
     const hdf::Id space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
     set_attribute(group, name, hdf::file_type(element_type_of<T>, sizeof(T)), space, values.data());
   }
   // ParaView asks for one fixed-length ASCII string.
   void set_attribute(const std::string& group, const char* name, const std::string& ascii) {
+    const hdf::Session session;
     const hdf::Id type(H5Tcopy(H5T_C_S1), H5Tclose), space(H5Screate(H5S_SCALAR), H5Sclose);
     H5Tset_size(type, ascii.size());
     H5Tset_strpad(type, H5T_STR_NULLPAD);
@@ -99,6 +117,7 @@ class OutputFile {
   }
 
   void close() {
+    const hdf::Session session;
     groups_.clear();
     hsize_t size = 0;
     if (H5Fflush(file_, H5F_SCOPE_LOCAL) < 0 || H5Fget_filesize(file_, &size) < 0 || !file_.close()) fail("");
@@ -137,9 +156,43 @@ class OutputFile {
 
   fs::path path_;
   std::string shown_;
-  hdf::Id file_;  // outlives the groups
+  platform::File disk_;  // the same file
+  hdf::Id file_;         // outlives the groups
   std::map<std::string, hdf::Id> groups_;
 };
+
+std::vector<std::uint64_t> digests_of(const std::vector<const Entry*>& entries, const Context& context) {
+  std::vector<std::uint64_t> out;
+  out.reserve(entries.size());
+  for (const Entry* entry : entries) {
+    context.check_stop();
+    out.push_back(Digest().bytes(entry->bytes).value());
+  }
+  return out;
+}
+
+void add_all(const std::vector<const Entry*>& entries, OutputFile& file, const Context& context) {
+  std::uint64_t total = 0, done = 0;
+  for (const Entry* entry : entries) total += entry->bytes.size();
+  for (const Entry* entry : entries) {
+    context.check_stop();
+    file.add(*entry);
+    done += entry->bytes.size();
+    context.report(static_cast<double>(done) / static_cast<double>(total));
+  }
+}
+
+// What the file holds, and its digests.
+Layout contents(const std::vector<const Entry*>& entries, const std::vector<std::uint64_t>& digests) {
+  std::vector<std::string> paths;
+  paths.reserve(entries.size());
+  for (const Entry* entry : entries) paths.push_back(entry->path);
+  Layout table;
+  table.texts("/ecorche/digests/dataset", paths);
+  table.copy("/ecorche/digests/xxh64", digests);
+  table.scalar("/ecorche/digests/own", contents_digest(table.entries()[0].bytes, table.entries()[1].bytes));
+  return table;
+}
 
 }  // namespace
 
@@ -151,34 +204,19 @@ void write(const Model& model, const fs::path& path, const Context& context) {
   check_invariants(model, path.string(), ErrorKind::internal, context);
   const Layout body = lay_out(model), shown = lay_out_vtk(model);
   std::vector<const Entry*> entries;
-  std::uint64_t total = 0, done = 0;
   for (const Layout* layout : {&body, &shown}) {
-    for (const Entry& entry : layout->entries()) {
-      entries.push_back(&entry);
-      total += entry.bytes.size();
-    }
+    for (const Entry& entry : layout->entries()) entries.push_back(&entry);
   }
 
   files::AtomicFile target(path);
   {
-    const hdf::Session session;
     OutputFile file(target.temporary(), path, bound(entries));
     file.make_group("/ecorche/tissues");  // also where a body has none
     file.make_group("/ecorche/volumes");
-    std::vector<std::string> digested;
     std::vector<std::uint64_t> digests;
-    for (const Entry* entry : entries) {
-      context.check_stop();
-      file.add(*entry);
-      digested.push_back(entry->path);
-      digests.push_back(Digest().bytes(entry->bytes).value());
-      done += entry->bytes.size();
-      context.report(static_cast<double>(done) / static_cast<double>(total));
-    }
-    Layout table;
-    table.texts("/ecorche/digests/dataset", digested);
-    table.copy("/ecorche/digests/xxh64", digests);
-    table.scalar("/ecorche/digests/own", contents_digest(table.entries()[0].bytes, table.entries()[1].bytes));
+    run_as_in_turn(
+        {[&] { digests = digests_of(entries, context); }, [&] { add_all(entries, file, context); }});
+    const Layout table = contents(entries, digests);
     for (const Entry& entry : table.entries()) file.add(entry);
     file.set_attribute("/ecorche", "format", std::array<std::int32_t, 2>{format_major, minor_of(model)});
     file.set_attribute("/VTKHDF", "Version", std::array<std::int64_t, 2>{1, 0});

@@ -104,6 +104,13 @@ std::error_code File::flush() noexcept {
   return ::fsync(descriptor_) == 0 ? std::error_code() : last_error();
 }
 
+void File::begin_flush([[maybe_unused]] std::uint64_t offset, [[maybe_unused]] std::uint64_t bytes) noexcept {
+#ifdef __linux__
+  ::sync_file_range(descriptor_, static_cast<off_t>(offset), static_cast<off_t>(bytes),
+                    SYNC_FILE_RANGE_WRITE);
+#endif
+}
+
 std::error_code flush(const std::filesystem::path& path) noexcept {
   std::error_code error;
   File file(path, Open::read, error);

@@ -46,6 +46,9 @@ class File {
   std::error_code resize(std::uint64_t bytes) noexcept;
   /// To the disk.
   std::error_code flush() noexcept;
+  /// Has the disk begin with these bytes, for which a later flush() then need not wait; where the system
+  /// knows no such thing, nothing.
+  void begin_flush(std::uint64_t offset, std::uint64_t bytes) noexcept;
 
  private:
   int descriptor_ = -1;
