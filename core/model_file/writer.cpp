@@ -44,8 +44,8 @@ std::uint64_t bound(const std::vector<const Entry*>& entries) {
 // thread may go on with it; none of it within a Session.
 class OutputFile {
  public:
-  OutputFile(const fs::path& path, const fs::path& shown, std::uint64_t bytes)
-      : path_(path), shown_(shown.string()) {
+  OutputFile(const fs::path& path, const fs::path& shown, std::uint64_t bytes) : OutputFile(path, shown) {
+    // Whatever is thrown from here on, the destructor is called.
     const hdf::Session session;
     reserve(path, shown_, bytes);
     const hdf::Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose),
@@ -125,6 +125,8 @@ class OutputFile {
   }
 
  private:
+  OutputFile(const fs::path& path, const fs::path& shown) : path_(path), shown_(shown.string()) {}
+
   static void set_up_group(hid_t creation) {
     H5Pset_obj_track_times(creation, false);
     H5Pset_link_phase_change(creation, 0xffff, 0);  // links stay in the group's own, checksummed header
