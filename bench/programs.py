@@ -82,10 +82,16 @@ def standard_model(tets):
     return model
 
 
+def outdated(made, *sources):
+    """Whether a file is missing, or older than a file that it was made of, or than one in a folder of them."""
+    files = [file for source in sources for file in ([source] if source.is_file() else source.rglob("*"))]
+    return not made.exists() or any(file.stat().st_mtime > made.stat().st_mtime for file in files)
+
+
 def example_model(body, data, tets=300_000):
-    """The model of examples/BODY, whose files lie in the folder `data`."""
+    """The model of examples/BODY, whose files lie in the folder `data`; made anew where the example has changed."""
     model = MADE / "examples" / f"{body}_{tets}.hdf"
-    if not model.exists():
+    if outdated(model, ROOT / "examples" / body):
         model.parent.mkdir(parents=True, exist_ok=True)
         ecorche("preprocess", ROOT / "examples" / body, "-o", model, "--data", data, "--max-tets", tets)
     return model

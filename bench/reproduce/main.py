@@ -2,10 +2,10 @@
 """Both papers by one command: writes docs/results.md with its pictures.
 
   scripts/reproduce [--data DIR]               every part, on the bodies that the page is of; on two quiet cores some two hours
-  scripts/reproduce --only NAME,...            these parts; the page keeps of the others what was found last
+  scripts/reproduce --only NAME,...            these parts; the others stay on the page as they are
   scripts/reproduce --size small -o PAGE.md    every part on the small phantom, to see that it runs: its figures mean nothing
 
-What was found stays in a file a part beside the page's bodies (build/bench/reproduce/SIZE, or --made DIR).
+The page is replaced after each part. What was found lies in a file a part beside the page's bodies, too (build/bench/reproduce/SIZE, or --made DIR).
 """
 import argparse
 import datetime
@@ -17,12 +17,13 @@ import time
 
 import programs
 import results
-from reproduce import (bodies, gagvani_effects, gagvani_fill, gagvani_thin, page, sujar_fem, sujar_pose, sujar_prepare, sujar_study, zhang)
+from reproduce import (bodies, gagvani_effects, gagvani_fill, gagvani_thin, page, sujar_fem, sujar_pose, sujar_prepare, sujar_study, verdicts,
+                       zhang)
 from reproduce.rows import Kit, to_json
 
-PARTS = [part for group in (sujar_prepare, sujar_pose, sujar_fem, sujar_study, gagvani_thin, gagvani_fill, gagvani_effects, zhang, bodies)
+PARTS = [part for group in (sujar_prepare, sujar_pose, sujar_fem, sujar_study, gagvani_thin, gagvani_fill, gagvani_effects, zhang, bodies, verdicts)
          for part in group.PARTS]
-PAGE = programs.ROOT / "docs/results.md"
+PAGE, PICTURES = programs.ROOT / "docs/results.md", "pictures/results"
 
 
 def parse():
@@ -61,26 +62,31 @@ def found_by(part, kit):
     found = part.find(kit)
     seconds, (machine_after, own_after) = time.monotonic() - start, processor_seconds()
     others = (machine_after - machine - (own_after - own)) / seconds / os.cpu_count()
-    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit, "others": max(0, others), "seconds": seconds,
-            "found": to_json(found)}
+    facts = results.machine()
+    return {"date": f"{datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z}", "commit": commit,
+            "machine": f"{facts['processor']}, {facts['memory']}, {facts['compiler']}", "others": max(0, others), "seconds": seconds, "found": to_json(found)}
+
+
+def put_down(options, kept):
+    """Replaces the page's sections of what was found, by part."""
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    before = options.output.read_text() if options.output.exists() else ""
+    results.replace(options.output, page.text(PARTS, kept, before, PICTURES, " --size small" if options.size == "small" else ""))
 
 
 def main():
     options = parse()
-    pictures = options.output.parent / "pictures/results"
-    kit = Kit(options.size, options.made, pictures, options.data and options.data.resolve(), not options.no_pictures)
+    kit = Kit(options.size, options.made, options.output.parent / PICTURES, options.data and options.data.resolve(), not options.no_pictures)
     chosen = [part for part in PARTS if part.name in (options.only or [each.name for each in PARTS])]
     left_out = [part for part in chosen if part.needs_data and not kit.data]
     for part in left_out:
         print(f"{part.name}: left out, it needs --data", file=sys.stderr)
-    file_of = lambda part: options.made / f"found_{part.name}.json"  # noqa: E731
+    put_down(options, {})
     for part in chosen:
         if part not in left_out:
             kept = found_by(part, kit)
-            file_of(part).write_text(json.dumps(kept, indent=1) + "\n")
+            (options.made / f"found_{part.name}.json").write_text(json.dumps(kept, indent=1) + "\n")
+            put_down(options, {part.name: kept})
             print(f"{part.name}: {len(kept['found']['rows'])} rows, {kept['seconds']:.0f} s", file=sys.stderr)
-    kept = {part.name: json.loads(file_of(part).read_text()) for part in PARTS if file_of(part).exists()}
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    options.output.write_text(page.text(PARTS, kept, "pictures/results", " --size small" if kit.small else ""))
     print(options.output)
     return 0

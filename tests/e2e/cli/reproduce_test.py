@@ -73,8 +73,11 @@ class Fast(Parts):
         page = (self.folder / "page.md").read_text()
         self.assertIn("Not run: `scripts/reproduce --only bodies --data DIR` does.", page)
         self.assertIn("## Gagvani and Silver 2001", page)
+        before = page[page.index("### Mapping tissues to tets (section 3.4)"):page.index("### Tets and weights")]
+        (self.folder / "made/found_mapping.json").unlink()
         done = self.run_parts("bodies")
         self.assertIn("bodies: left out, it needs --data", done.stderr)
+        self.assertIn(before, (self.folder / "page.md").read_text(), "a part that was not run now stays as it is")
 
     def test_wrong_words_are_refused(self):
         self.assertIn("--only figure_9: no such part (name some of: ", self.run_parts("figure_9", code=2).stderr)
