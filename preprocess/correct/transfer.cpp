@@ -9,10 +9,9 @@
 #include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/model_file/model_file.hpp>
-#include "core/elastic/flesh.hpp"
 #include "preprocess/correct/compress.hpp"
+#include "preprocess/correct/hold.hpp"
 #include "preprocess/correct/skinned_node.hpp"
-#include "preprocess/mapping/bind.hpp"
 
 namespace ecorche::correct {
 namespace {
@@ -31,29 +30,6 @@ Pose pose_of(const Skeleton& skeleton, std::size_t joint, const Eigen::RowVector
   return pose;
 }
 
-// Free nodes of the finer model in tets of the coarser one.
-struct Held {
-  std::vector<std::uint32_t> node;                                  // of the finer, ascending
-  std::vector<std::array<std::int32_t, 4>> corner;                  // nodes of the coarser
-  Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> share;  // #node by 4
-};
-
-Held hold(const Model& from, const Model& to, const Context& context) {
-  Held out;
-  const std::vector<std::int32_t> segment = elastic::flesh_of(to).segment;
-  for (std::size_t n = 0; n < segment.size(); ++n)
-    if (segment[n] < 0) out.node.push_back(static_cast<std::uint32_t>(n));
-  Points places(static_cast<Eigen::Index>(out.node.size()), 3);
-  for (std::size_t i = 0; i < out.node.size(); ++i)
-    places.row(static_cast<Eigen::Index>(i)) =
-        to.nodes.row(static_cast<Eigen::Index>(out.node[i])).cast<double>();
-  const mapping::Binding bound = mapping::Locator(from.nodes, from.tets).bind(places, context);
-  out.share = bound.barycentric.cast<double>();
-  for (const std::int32_t t : bound.tet)
-    out.corner.push_back({from.tets(t, 0), from.tets(t, 1), from.tets(t, 2), from.tets(t, 3)});
-  return out;
-}
-
 // Those of `all` that a correction of the coarser model reaches.
 Held reached(const Held& all, const JointCorrection& correction, std::size_t nodes) {
   std::vector<std::uint8_t> moved(nodes, 0);
@@ -69,6 +45,8 @@ Held reached(const Held& all, const JointCorrection& correction, std::size_t nod
     row.push_back(static_cast<Eigen::Index>(i));
   }
   out.share = all.share(row, Eigen::all);
+  out.beside = all.beside(row, Eigen::all);
+  for (const Eigen::Index i : row) out.alike.push_back(all.alike[static_cast<std::size_t>(i)]);
   return out;
 }
 
@@ -105,13 +83,14 @@ class OneSample {
     }
     std::vector<float> out(3 * held_.node.size());
     tbb::parallel_for(std::size_t{0}, held_.node.size(), [&](std::size_t k) {
-      Eigen::Vector3d goal = Eigen::Vector3d::Zero();
-      for (std::size_t c = 0; c < 4; ++c)
-        goal += held_.share(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)) *
-                place.row(local_[at(held_.corner[k][c])]).transpose();
+      const auto row = static_cast<Eigen::Index>(k);
       const SkinnedNode node = skin_node(to_, held_.node[k], segments);
+      Eigen::Vector3d goal = node.turn * held_.beside.row(row).transpose();
+      for (std::size_t c = 0; c < 4; ++c)
+        goal += held_.share(row, static_cast<Eigen::Index>(c)) *
+                place.row(local_[at(held_.corner[k][c])]).transpose();
       Eigen::Map<Eigen::Vector3f> missed(&out[3 * k]);
-      missed = (node.turn.conjugate() * (goal - node.at)).cast<float>();
+      missed = (held_.alike[k] * (node.turn.conjugate() * (goal - node.at))).cast<float>();
     });
     return out;
   }

@@ -8,7 +8,8 @@
 namespace ecorche::correct {
 
 /// What `to` needs so that each sample of `from`'s correction puts its nodes where it puts the same places of
-/// `from`: between the corners of the tet that holds a node at rest, linear; outside, as in the nearest tet.
+/// `from`: between the corners of the tet that holds a node at rest, linear; outside, as beside the nearest
+/// tet (see hold). Less, down to nothing, where the two models' weights differ.
 /// Less than `least_mm` is not kept. `joints`: names of those that are taken, all where there are none.
 /// Throws Error{usage} for rigs that differ, a model without correction, and a name that it does not correct.
 Calibration transfer(const Model& from, const Model& to, const std::vector<std::string>& joints,

@@ -8,6 +8,7 @@
 
 #include <ecorche/runtime/body_poser.hpp>
 #include "preprocess/correct/compress.hpp"
+#include "preprocess/correct/hold.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::test {
@@ -83,6 +84,73 @@ TEST(Transfer, MakesUpForOtherWeights) {
     }
   }
   EXPECT_GT(before, 1);
+}
+
+// The toy and a limb beside it, which touches it along x = 20 and is the base's alone. `wider`: mm that the
+// toy's own side there lies farther out, as in a mesh of another size.
+Model touched_by_a_limb(float wider) {
+  Model model = toy_model();
+  const Eigen::Index own = model.nodes.rows(), tets = model.tets.rows();
+  model.nodes.conservativeResize(2 * own, 3);
+  model.nodes.bottomRows(own) = model.nodes.topRows(own).rowwise() + Eigen::RowVector3f(40, 0, 0);
+  for (Eigen::Index n = 0; n < own; ++n)
+    if (model.nodes(n, 0) > 19.5F) model.nodes(n, 0) += wider;
+  model.tets.conservativeResize(2 * tets, 4);
+  model.tets.bottomRows(tets) = model.tets.topRows(tets).array() + static_cast<std::int32_t>(own);
+  model.tet_label.insert(model.tet_label.end(), static_cast<std::size_t>(tets), TetMesh::soft);
+  Weights& weights = model.weights;
+  for (Eigen::Index n = 0; n < own; ++n) {
+    weights.offsets.push_back(weights.offsets.back() + 1);
+    weights.segment.push_back(0);
+    weights.weight.push_back(1);
+  }
+  return model;
+}
+
+TEST(Transfer, HangsALimbOnItsOwnFleshWhereItTouchesAnother) {
+  const Model from = touched_by_a_limb(0), to = touched_by_a_limb(1);
+  const auto own = static_cast<std::int32_t>(toy_model().node_count());
+  const correct::Held held = correct::hold(from, to, {});
+  std::size_t over = 0;
+  for (std::size_t i = 0; i < held.node.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    EXPECT_NEAR(held.share.row(row).sum(), 1, 1e-6);
+    EXPECT_GE(held.share.row(row).minCoeff(), 0);
+    const Eigen::RowVector3d place = to.nodes.row(held.node[i]).cast<double>();
+    Eigen::RowVector3d found = held.beside.row(row);
+    for (std::size_t c = 0; c < 4; ++c)
+      found +=
+          held.share(row, static_cast<Eigen::Index>(c)) * from.nodes.row(held.corner[i][c]).cast<double>();
+    EXPECT_LT((found - place).norm(), 1e-5);
+    if (static_cast<std::int32_t>(held.node[i]) >= own || place.x() < 20.5 || place.z() < 130) continue;
+    ++over;  // it lies in the other limb's tets
+    EXPECT_GT(held.alike[i], 0.99);
+    EXPECT_NEAR(held.beside(row, 0), 1, 1e-5);
+    for (const std::int32_t corner : held.corner[i]) EXPECT_LT(corner, own);
+  }
+  EXPECT_GT(over, 10U);
+}
+
+TEST(Transfer, LeavesOutWhatHasNoSuchFleshNear) {
+  const Model from = touched_by_a_limb(0);
+  Model to = from;  // but that limb is one that nothing of `from` is like: half base, half tip
+  const auto own = static_cast<std::int32_t>(toy_model().node_count());
+  Weights& weights = to.weights;
+  weights.offsets.resize(static_cast<std::size_t>(own) + 1);
+  weights.segment.resize(weights.offsets.back());
+  weights.weight.resize(weights.offsets.back());
+  for (std::int32_t n = 0; n < own; ++n) {
+    weights.offsets.push_back(weights.offsets.back() + 2);
+    weights.segment.insert(weights.segment.end(), {0, 2});
+    weights.weight.insert(weights.weight.end(), {0.5F, 0.5F});
+  }
+  const correct::Held held = correct::hold(from, to, {});
+  for (std::size_t i = 0; i < held.node.size(); ++i) {
+    if (static_cast<std::int32_t>(held.node[i]) >= own)
+      EXPECT_LT(held.alike[i], 1e-6);
+    else
+      EXPECT_GT(held.alike[i], 0.99);
+  }
 }
 
 TEST(Transfer, RefusesWhatItCannotTake) {
