@@ -7,6 +7,7 @@
 #include "app/materials_report.hpp"
 #include "app/usage_error.hpp"
 #include "preprocess/fem/reference.hpp"
+#include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -64,6 +65,12 @@ json warnings_of(const fem::Reference& solved, bool two_starts) {
   return out;
 }
 
+// Settling knows one energy alone.
+bool settles(const fem::ReferenceOptions& options) {
+  return options.element == fem::Element::p1 && options.material == "stable_neo_hookean" &&
+         options.poisson == runtime::FleshSettler::poisson;
+}
+
 }  // namespace
 
 double poisson_of(const FemSettings& settings) {
@@ -83,6 +90,7 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
   options.material = settings.material;
   options.poisson = poisson_of(settings);
   options.two_starts = settings.two_starts;
+  if (settles(options)) options.nearer = runtime::settling(model, context);
   Pose pose = posed.still().pose;
   pose.root_translation.setZero();
   pose.rotation[0].setIdentity();
@@ -106,6 +114,7 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
             {"of_soft_tets", solved.soft_tets}}},
           {"converged", solved.converged()},
           {"start", solved.from},
+          {"settling_steps", solved.newton.nearer},
           {"iterations", solved.newton.iterations},
           {"factors", solved.newton.factors},
           {"residual", solved.newton.residual},
@@ -136,7 +145,8 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
             {"skinned_start", solved.seconds_skinned},
             {"rest_start", solved.seconds_rest},
             {"of_solution",
-             {{"assemble", seconds.assemble},
+             {{"settle", seconds.nearer},
+              {"assemble", seconds.assemble},
               {"factor", seconds.factor},
               {"solve", seconds.solve},
               {"energy", seconds.energy}}}}},

@@ -20,6 +20,7 @@
 #include "bench/table.hpp"
 #include "core/elastic/flesh.hpp"
 #include "preprocess/fem/reference.hpp"
+#include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -41,11 +42,16 @@ const std::vector<Stated> kPoses{
     {"elbow 40", {{"elbow_right", "flexion", 40}}},
     {"elbow 60", {{"elbow_right", "flexion", 60}}},
     {"elbow 100", {{"elbow_right", "flexion", 100}}},
+    {"elbow 130", {{"elbow_right", "flexion", 130}}},
     {"knee 25", {{"knee_right", "flexion", 25}}},
     {"knee 55", {{"knee_right", "flexion", 55}}},
     {"hip 35", {{"hip_right", "flexion", 35}, {"hip_right", "adduction", -8}}},
     {"hip 55", {{"hip_right", "flexion", 55}, {"hip_right", "rotation", 10}}},
+    {"hip 75", {{"hip_right", "flexion", 75}}},
+    {"hip 100", {{"hip_right", "flexion", 100}}},
     {"shoulder 45", {{"shoulder_right", "flexion", 45}, {"shoulder_right", "adduction", -20}}},
+    {"shoulder 80", {{"shoulder_right", "flexion", 80}}},
+    {"shoulder 120", {{"shoulder_right", "adduction", -120}}},
     {"arm",
      {{"shoulder_right", "flexion", 35}, {"elbow_right", "flexion", 50}, {"wrist_right", "flexion", 25}}},
     {"leg",
@@ -168,6 +174,8 @@ std::string percent(double share) {
 void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, const BodyPoser& corrected,
              const std::vector<std::string>& only, bool two_starts) {
   const FreeTets free = free_tets(*model);
+  const Context context;
+  const auto settling = runtime::settling(*model, context);
   const std::vector<float> rest(model->nodes.data(), model->nodes.data() + model->nodes.size());
   const double volume = free.volume(*model, rest);
   const Table table({{"pose"},
@@ -191,6 +199,7 @@ void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, 
     const std::vector<float> before = nodes_of(plain, pose, &done), after = nodes_of(corrected, pose);
     fem::ReferenceOptions options;
     options.two_starts = two_starts;
+    options.nearer = settling;
     // From the corrected body: it is nearer, and where it has folds that skinning has not, that would show.
     const fem::Reference truth = fem::solve_pose(*model, done, after, options, {});
     const char* believed = !truth.converged()        ? "none"

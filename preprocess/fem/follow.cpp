@@ -2,6 +2,7 @@
 #include "preprocess/fem/follow.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace ecorche::fem {
 namespace {
@@ -9,6 +10,8 @@ namespace {
 void add(NewtonResult& sum, NewtonResult one) {
   one.iterations += sum.iterations;
   one.factors += sum.factors;
+  one.nearer += sum.nearer;
+  one.seconds.nearer += sum.seconds.nearer;
   one.seconds.assemble += sum.seconds.assemble;
   one.seconds.factor += sum.seconds.factor;
   one.seconds.solve += sum.seconds.solve;
@@ -24,6 +27,7 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
   FollowResult out;
   out.newton.total = assembly.total(material, x);
   double step = options.first_step;
+  double folds_at = std::numeric_limits<double>::infinity();  // where a step last ended in new ones
   while (out.reached < 1 && step >= options.least_step && out.newton.iterations < options.most_iterations) {
     context.check_stop();
     const double t = std::min(1.0, out.reached + step);
@@ -37,7 +41,10 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
         steps.step(material, x, &increment, exact, options.last.linear_tolerance, g, told, context);
     Points next = moved(assembly.mesh(), goal, d, 1);
     NewtonOptions newton = options.last;
-    if (t < 1) newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
+    if (t < 1) {  // near already: what strides farther may leave the way for another balance
+      newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
+      newton.nearer = nullptr;
+    }
     add(told, minimise(assembly, material, steps, newton, next, context));
     const bool folds = step > options.folds_below && inverts(out.newton.total, told.total);
     const bool good = told.converged && !folds;
@@ -46,7 +53,8 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
       told.total = out.newton.total;
       add(out.newton, std::move(told));
       ++out.refused;
-      step /= 2;
+      folds_at = folds ? t : folds_at;
+      step = (t - out.reached) / 2;
       continue;
     }
     add(out.newton, std::move(told));
@@ -54,6 +62,9 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
     out.reached = t;
     ++out.steps;
     step = std::min(options.first_step, 2 * step);
+    // They come anew however they are come to: no stride beyond them before small steps are there.
+    if (out.reached < folds_at)
+      step = std::min(step, std::max((folds_at - out.reached) / 2, options.folds_below));
     context.report(t);
   }
   if (out.reached < 1) out.newton.converged = false;

@@ -12,7 +12,9 @@ namespace {
 constexpr double kArmijo = 1e-4;
 constexpr double kRounding = 1e-15;  // of energy, by volume: terms of order 1 cancel in it
 constexpr int kHalvings = 24;
-constexpr int kWhole = 4;  // of them that are tried so that no tet is turned inside out
+constexpr int kWhole = 4;            // of them that are tried so that no tet is turned inside out
+constexpr double kFoldsExact = 0.2;  // mm: about folds the true Hessian is definite only near the end
+constexpr double kNearer = 0.1;
 
 double largest_row(const Points& rows) {
   return rows.rows() == 0 ? 0 : rows.rowwise().norm().maxCoeff();
@@ -64,15 +66,28 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     out.converged = true;
     return out;
   }
+  if (options.nearer) {
+    Points there = x;
+    {
+      const Stopwatch watch(out.seconds.nearer);
+      out.nearer = options.nearer(there);
+    }
+    Total then = total(there);
+    if (then.energy < out.total.energy && then.inverted_tets <= out.total.inverted_tets) {
+      x = std::move(there);
+      out.total = std::move(then);
+    }
+  }
   const double rounding = kRounding * mesh.mean_stiffness() * std::abs(out.total.volume);
-  bool exact = false, may_be_exact = true;
+  bool exact = false;
+  double exact_below = options.exact_below_mm;
   Points g;
   while (out.iterations < options.most_iterations) {
     context.check_stop();
     const bool asked = exact;
     const double enough = exact ? options.linear_tolerance : options.far_tolerance;
     const Points d = steps.step(material, x, nullptr, exact, enough, g, out, context);
-    if (asked && !exact) may_be_exact = false;  // once indefinite near the end, filtered to the end
+    if (asked && !exact) exact_below = kNearer * out.step_mm;  // indefinite there: again much nearer the end
     out.residual = residual(mesh, g);
     out.step_mm = largest_row(d);
     ++out.iterations;
@@ -91,7 +106,7 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
       if (times == 1 && out.step_mm <= options.tolerance_mm) out.converged = true;
     }
     if (out.converged || !taken) break;
-    exact = may_be_exact && out.step_mm < options.exact_below_mm && out.total.inverted_tets == 0;
+    exact = out.step_mm < (out.total.inverted_tets == 0 ? exact_below : std::min(exact_below, kFoldsExact));
   }
   return out;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 
 #include <ecorche/values/context.hpp>
 #include "core/solve/spd_solver.hpp"
@@ -11,6 +12,9 @@
 namespace ecorche::fem {
 
 struct NewtonOptions {
+  /// Brings the free nodes near to balance by cheaper steps, and returns how many; null: Newton begins where
+  /// it is put. What it finds is taken where energy falls and no more tets are inside out.
+  std::function<int(Points& x)> nearer;
   double tolerance_mm = 1e-4;  ///< converged when no free node would move farther in a whole step
   int most_iterations = 60;
   /// Filtered Hessians until a step moves no node farther than this, then the true ones while they are
@@ -22,12 +26,13 @@ struct NewtonOptions {
 
 /// Where the time went, s.
 struct Seconds {
-  double assemble = 0, factor = 0, solve = 0, energy = 0;
+  double nearer = 0, assemble = 0, factor = 0, solve = 0, energy = 0;
 };
 
 struct NewtonResult {
   bool converged = false;
   int iterations = 0, factors = 0;
+  int nearer = 0;       ///< steps of NewtonOptions::nearer
   double step_mm = 0;   ///< largest move of a node that the last whole step asked for
   double residual = 0;  ///< largest force left on a free node, over the largest that holds a node
   Total total;

@@ -13,7 +13,7 @@
 namespace ecorche::fem {
 namespace {
 
-constexpr double kStep = 20 * std::numbers::pi / 180;  // of the joint that turns most, on the way from rest
+constexpr double kStep = 30 * std::numbers::pi / 180;  // of the joint that turns most, on the way from rest
 
 double largest_turn(const Pose& pose) {
   double out = 0;
@@ -82,7 +82,8 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
     place_held(*body, kinematics::forward(model.rig, kinematics::between(rest, pose, t)), x);
   };
   StepSolver steps(*assembly, *solver);
-  const NewtonOptions newton;
+  NewtonOptions newton;
+  if (options.element == Element::p1) newton.nearer = options.nearer;
 
   // From where skinning puts the nodes.
   const Points start = Eigen::Map<const PointsF>(skinned.data(), nodes, 3).cast<double>();

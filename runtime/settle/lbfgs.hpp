@@ -24,6 +24,7 @@ template <class F, class Initial, class Enough>
 int lbfgs(const F& f, const Initial& initial, const Enough& enough, Eigen::VectorXd& x, int steps) {
   constexpr std::size_t kMemory = 8;
   constexpr double kArmijo = 1e-4;
+  constexpr int kHalvings = 60;  // of a node far off its place the first step is absurdly long
   std::deque<LbfgsPair> pairs;
   Eigen::VectorXd gradient(x.size()), next_gradient(x.size()), direction, next;
   double value = f(x, gradient);
@@ -41,7 +42,7 @@ int lbfgs(const F& f, const Initial& initial, const Enough& enough, Eigen::Vecto
     const double slope = direction.dot(gradient);
     double length = 1, next_value = 0;
     bool lower = false;
-    for (int halving = 0; halving < 20 && !lower; ++halving, length /= 2) {
+    for (int halving = 0; halving < kHalvings && !lower; ++halving, length /= 2) {
       next = x + length * direction;
       next_value = f(next, next_gradient);
       lower = std::isfinite(next_value) && next_value <= value + kArmijo * length * slope;

@@ -13,7 +13,6 @@ namespace {
 
 using Eigen::Matrix3d;
 
-constexpr double kPoisson = 0.45;   // of linear tets: nearer to 0.5 they lock
 constexpr double kRounding = 1e-6;  // mm: what a body at rest moves by
 // The Laplacian is an estimate itself: solved no better than this, it takes as many steps as solved exactly.
 constexpr double kLaplacianTolerance = 0.01;
@@ -51,7 +50,7 @@ TetPatch::Tet tet_of(const Model& model, std::int32_t t, const std::vector<std::
 }  // namespace
 
 FleshSettler::FleshSettler(const Model& model, const Context& context)
-    : model_(model), material_(elastic::lame(kPoisson)) {
+    : model_(model), material_(elastic::lame(poisson)) {
   const elastic::Flesh flesh = elastic::flesh_of(model);
   patch_.free = rows_of(model, flesh, node_);
   if (patch_.free == 0)
@@ -71,7 +70,7 @@ FleshSettler::FleshSettler(const Model& model, const Context& context)
 // The Hessian at rest acts on a field that turns nothing like the Laplacian times 2 mu; L-BFGS finds the
 // rest.
 void FleshSettler::factor(const Context& context) {
-  const double stiffness = 2 * elastic::lame(kPoisson).mu;
+  const double stiffness = 2 * elastic::lame(poisson).mu;
   std::vector<Eigen::Triplet<double, std::int32_t>> entries;
   entries.reserve(10 * patch_.tets.size());
   const auto free = static_cast<std::int32_t>(patch_.free);
@@ -105,7 +104,8 @@ double FleshSettler::at(std::span<const double> x, std::span<double> gradient,
   return (*sum_)(x, cost, gradient, scratch);
 }
 
-std::vector<double> FleshSettler::places(std::span<const float> nodes) const {
+template <class Number>
+std::vector<double> FleshSettler::places(std::span<const Number> nodes) const {
   std::vector<double> out;
   out.reserve(3 * node_.size());
   for (const std::int32_t n : node_)
@@ -120,9 +120,10 @@ double FleshSettler::energy(std::span<const float> nodes, std::vector<double>& g
   return at(places(nodes), gradient, scratch);
 }
 
-Settled FleshSettler::run(PosedBody& body, const SettleOptions& options, const Context& context) const {
+Settled FleshSettler::run(std::span<double> nodes, const SettleOptions& options,
+                          const Context& context) const {
   Settled out;
-  std::vector<double> all = places(body.nodes);
+  std::vector<double> all = places(std::span<const double>(nodes));
   const auto unknowns = static_cast<Eigen::Index>(3 * patch_.free);
   const auto free = static_cast<Eigen::Index>(patch_.free);
   const Eigen::VectorXd start = Eigen::Map<const Eigen::VectorXd>(all.data(), unknowns);
@@ -152,20 +153,44 @@ Settled FleshSettler::run(PosedBody& body, const SettleOptions& options, const C
   out.steps = lbfgs(energy, laplacian, enough, x, options.most_steps);
   out.energy_after = energy(x, gradient);
 
-  std::vector<std::uint8_t> moved(model_.node_count(), 0);
   for (std::size_t r = 0; r < patch_.free; ++r) {
     const auto row = static_cast<Eigen::Index>(3 * r);
     const double far = (x.segment<3>(row) - start.segment<3>(row)).norm();
-    const Eigen::Vector3f place = x.segment<3>(row).cast<float>();
-    const auto n = static_cast<std::size_t>(node_[r]);
-    if (far <= kRounding || std::equal(place.begin(), place.end(), &body.nodes[3 * n])) continue;
-    std::copy(place.begin(), place.end(), &body.nodes[3 * n]);
-    moved[n] = 1;
+    if (far <= kRounding) continue;
+    const Eigen::Vector3d place = x.segment<3>(row);
+    std::copy(place.begin(), place.end(), &nodes[3 * static_cast<std::size_t>(node_[r])]);
     ++out.moved_nodes;
     out.largest_move_mm = std::max(out.largest_move_mm, far);
   }
+  return out;
+}
+
+Settled FleshSettler::run(PosedBody& body, const SettleOptions& options, const Context& context) const {
+  std::vector<double> nodes(body.nodes.begin(), body.nodes.end());
+  Settled out = run(nodes, options, context);
+  out.moved_nodes = 0;  // of those that single precision tells apart
+  std::vector<std::uint8_t> moved(model_.node_count(), 0);
+  for (const std::int32_t row : free_nodes()) {
+    const auto n = static_cast<std::size_t>(row);
+    Eigen::Map<Eigen::Vector3f> place(&body.nodes[3 * n]);
+    const Eigen::Vector3f now = Eigen::Map<const Eigen::Vector3d>(&nodes[3 * n]).cast<float>();
+    if (now == place) continue;
+    place = now;
+    moved[n] = 1;
+    ++out.moved_nodes;
+  }
+  if (out.moved_nodes == 0) out.largest_move_mm = 0;
   carry_tissues(model_, moved, body);
   return out;
+}
+
+std::function<int(Points& nodes)> settling(const Model& model, const Context& context) {
+  return [&model, &context, settler = std::shared_ptr<const FleshSettler>()](Points& nodes) mutable {
+    if (!settler) settler = std::make_shared<const FleshSettler>(model, context.quiet());
+    constexpr SettleOptions options{.most_steps = 200, .enough_mm = 1e-3};
+    return settler->run({nodes.data(), static_cast<std::size_t>(nodes.size())}, options, context.quiet())
+        .steps;
+  };
 }
 
 }  // namespace ecorche::runtime

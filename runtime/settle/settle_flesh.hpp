@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -29,13 +30,15 @@ struct Settled {
   double largest_move_mm = 0;
 };
 
-/// Moves free nodes of flesh (elastic::flesh_of) so that the stable neo-Hookean energy of linear tets falls,
-/// Poisson's ratio 0.45: preprocess/fem's own for its element p1. By L-BFGS, whose first estimate of the
-/// Hessian is the tets' Laplacian (Liu17), solved by multigrid: it takes each step to where forces reach
-/// through the whole body, in time in proportion to the tets. Made once for a model, which must outlive it;
-/// any number of threads may settle different bodies. The same bits for any number of threads.
+/// Moves free nodes of flesh (elastic::flesh_of) so that the stable neo-Hookean energy of linear tets falls:
+/// preprocess/fem's own for its element p1. By L-BFGS, whose first estimate of the Hessian is the tets'
+/// Laplacian (Liu17), solved by multigrid: it takes each step to where forces reach through the whole body,
+/// in time in proportion to the tets. Made once for a model, which must outlive it; any number of threads may
+/// settle different bodies. The same bits for any number of threads.
 class FleshSettler {
  public:
+  static constexpr double poisson = 0.45;  ///< of linear tets: nearer to 0.5 they lock
+
   /// Makes the hierarchy. Throws Error{data} where no soft tet hangs on a bone.
   FleshSettler(const Model& model, const Context& context);
   FleshSettler(const FleshSettler&) = delete;
@@ -44,6 +47,8 @@ class FleshSettler {
   /// From where `body` has its nodes; bones, and nodes of no flesh, stay to the bit. Vertices of tissues go
   /// along. Each body alone decides: nothing joins it to the one before.
   Settled run(PosedBody& body, const SettleOptions& options, const Context& context) const;
+  /// The same of places alone, 3 * #nodes of the model, in double precision.
+  Settled run(std::span<double> nodes, const SettleOptions& options, const Context& context) const;
 
   /// The energy at 3 * #nodes of the model, and its derivative in those of free_nodes(), 3 each.
   double energy(std::span<const float> nodes, std::vector<double>& gradient) const;
@@ -52,7 +57,8 @@ class FleshSettler {
 
  private:
   double at(std::span<const double> x, std::span<double> gradient, TetSum::Scratch& scratch) const;
-  std::vector<double> places(std::span<const float> nodes) const;
+  template <class Number>
+  std::vector<double> places(std::span<const Number> nodes) const;
   void factor(const Context& context);
 
   const Model& model_;
@@ -63,5 +69,10 @@ class FleshSettler {
   std::unique_ptr<solve::SpdSolver> laplacian_;
   solve::SparseMatrix matrix_;  // the Laplacian's lower triangle
 };
+
+/// Settles #nodes places of the model far enough for Newton's method to end soon, and returns in how many
+/// steps: tens of them cost as much as one of Newton's. The settler is made when it is first asked for.
+/// `model` and `context` must outlive it.
+std::function<int(Points& nodes)> settling(const Model& model, const Context& context);
 
 }  // namespace ecorche::runtime

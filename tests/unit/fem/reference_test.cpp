@@ -121,6 +121,18 @@ TEST(Reference, SaysWhereItIsNotToBeBelieved) {
   EXPECT_FALSE(alone.trusted());
 }
 
+TEST(Reference, ComesToAnEndAboutFoldsToo) {
+  const Model model = boned();
+  const Pose pose = bent(model, 140);
+  ReferenceOptions options;
+  options.two_starts = false;
+  const Reference solved = solve_pose(model, pose, skinned(model, pose), options, {});
+  EXPECT_TRUE(solved.inverted());
+  EXPECT_TRUE(solved.converged());
+  EXPECT_LT(solved.newton.step_mm, 1e-5);
+  EXPECT_FALSE(solved.trusted());
+}
+
 TEST(Reference, RefusesABodyWithoutBones) {
   Model model = boned();
   model.tet_label.assign(model.tet_count(), TetMesh::soft);

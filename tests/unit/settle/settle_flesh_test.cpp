@@ -127,6 +127,42 @@ TEST(SettleFlesh, ComesToTheSolutionOfFiniteElements) {
   }
 }
 
+TEST(SettleFlesh, FindsBackFromFarOff) {
+  Bent bend(45), lost(45);
+  const FleshSettler settler(*bend.model, {});
+  settler.run(bend.body, {.most_steps = 500, .enough_mm = 1e-4}, {});
+  const auto n = static_cast<std::size_t>(settler.free_nodes()[settler.free_nodes().size() / 2]);
+  lost.body.nodes[3 * n] += 2000;
+  const Settled done = settler.run(lost.body, {.most_steps = 500, .enough_mm = 1e-4}, {});
+  EXPECT_GT(done.energy_before, 1e6 * done.energy_after);
+  EXPECT_LT(largest_row(lost.nodes() - bend.nodes()), 0.05);
+}
+
+TEST(SettleFlesh, NewtonGoesOnFromWhereItEnds) {
+  const Bent bend(60);
+  const fem::Reference alone = fem::solve_pose(*bend.model, bend.pose, bend.body.nodes, {}, {});
+  const FleshSettler settler(*bend.model, {});
+  fem::ReferenceOptions options;
+  const Context context;
+  options.nearer = settling(*bend.model, context);
+  const fem::Reference after = fem::solve_pose(*bend.model, bend.pose, bend.body.nodes, options, {});
+  ASSERT_TRUE(after.converged());
+  EXPECT_TRUE(after.compared);
+  EXPECT_LT(after.between_starts_mm, 1e-3);
+  EXPECT_GT(after.newton.nearer, 5);
+  EXPECT_LT(after.newton.iterations, alone.newton.iterations);
+  EXPECT_LT(largest_row(after.nodes - alone.nodes), 1e-3);
+
+  // What leads away from balance is not taken.
+  options.nearer = [&](Points& x) {
+    for (const std::int32_t n : settler.free_nodes()) x(n, 0) += n % 2 == 0 ? 0.2 : -0.2;
+    return 1;
+  };
+  const fem::Reference misled = fem::solve_pose(*bend.model, bend.pose, bend.body.nodes, options, {});
+  EXPECT_EQ(misled.nodes, alone.nodes);
+  EXPECT_EQ(misled.newton.iterations, alone.newton.iterations);
+}
+
 TEST(SettleFlesh, LeavesBonesAndAllThatIsNoFleshToTheBit) {
   Bent bend(60);
   const std::vector<float> before = bend.body.nodes;
