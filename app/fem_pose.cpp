@@ -7,7 +7,6 @@
 #include "app/materials_report.hpp"
 #include "app/usage_error.hpp"
 #include "preprocess/fem/reference.hpp"
-#include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -65,12 +64,6 @@ json warnings_of(const fem::Reference& solved, bool two_starts) {
   return out;
 }
 
-// Settling knows one energy alone.
-bool settles(const fem::ReferenceOptions& options) {
-  return options.element == fem::Element::p1 && options.material == "stable_neo_hookean" &&
-         options.poisson == runtime::FleshSettler::poisson;
-}
-
 }  // namespace
 
 double poisson_of(const FemSettings& settings) {
@@ -90,7 +83,6 @@ json pose_by_fem(const FemSettings& settings, MeasuredPose& posed, const Context
   options.material = settings.material;
   options.poisson = poisson_of(settings);
   options.two_starts = settings.two_starts;
-  if (settles(options)) options.nearer = runtime::settling(model, context);
   Pose pose = posed.still().pose;
   pose.root_translation.setZero();
   pose.rotation[0].setIdentity();

@@ -20,7 +20,6 @@
 #include "bench/table.hpp"
 #include "core/elastic/flesh.hpp"
 #include "preprocess/fem/reference.hpp"
-#include "runtime/settle/settle_flesh.hpp"
 
 namespace ecorche::bench {
 namespace {
@@ -174,8 +173,6 @@ std::string percent(double share) {
 void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, const BodyPoser& corrected,
              const std::vector<std::string>& only, bool two_starts) {
   const FreeTets free = free_tets(*model);
-  const Context context;
-  const auto settling = runtime::settling(*model, context);
   const std::vector<float> rest(model->nodes.data(), model->nodes.data() + model->nodes.size());
   const double volume = free.volume(*model, rest);
   const Table table({{"pose"},
@@ -199,7 +196,6 @@ void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, 
     const std::vector<float> before = nodes_of(plain, pose, &done), after = nodes_of(corrected, pose);
     fem::ReferenceOptions options;
     options.two_starts = two_starts;
-    options.nearer = settling;
     // From the corrected body: it is nearer, and where it has folds that skinning has not, that would show.
     const fem::Reference truth = fem::solve_pose(*model, done, after, options, {});
     const char* believed = !truth.converged()        ? "none"

@@ -47,6 +47,7 @@ void settle(const runtime::FleshSettler& settler, double multigrid_s, const runt
     throw Error(ErrorKind::data, pose_file, status.message, "mend the pose");
   fem::ReferenceOptions options;
   options.two_starts = false;
+  options.settles = false;  // it is what settling is held against
   const fem::Reference solved = fem::solve_pose(model, skinned.pose, skinned.nodes, options, {});
   const std::string name = pose_file.substr(pose_file.find_last_of('/') + 1);
   if (!solved.converged()) {

@@ -20,9 +20,10 @@ Vector3d cofactors(const Vector3d& s) {
 
 class StableNeoHookean final : public Material {
  public:
-  explicit StableNeoHookean(const Lame& given) : of_(given) {}
+  explicit StableNeoHookean(const Lame& given) : lame_(given), of_(given) {}
   std::string_view name() const override { return "stable_neo_hookean"; }
   double bulk() const override { return of_.bulk(); }
+  std::optional<Lame> settles_by() const override { return lame_; }
 
   Stretched at(const Vector3d& s) const override {
     const double i = s.squaredNorm(), j = s.prod();
@@ -43,6 +44,7 @@ class StableNeoHookean final : public Material {
   }
 
  private:
+  Lame lame_;
   elastic::StableNeoHookean of_;
 };
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -35,6 +36,8 @@ class Material {
   virtual std::string_view name() const = 0;
   virtual double bulk() const = 0;
   virtual Stretched at(const Eigen::Vector3d& s) const = 0;
+  /// Lame's constants, of the material that elastic::Settler knows.
+  virtual std::optional<Lame> settles_by() const { return std::nullopt; }
   /// at(s).energy of the stretches of F, without them where the material can.
   virtual double energy(const Eigen::Matrix3d& F) const;
 };

@@ -70,7 +70,7 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     Points there = x;
     {
       const Stopwatch watch(out.seconds.nearer);
-      out.nearer = options.nearer(there);
+      out.nearer = options.nearer(there, context.quiet());
     }
     Total then = total(there);
     if (then.energy < out.total.energy && then.inverted_tets <= out.total.inverted_tets) {

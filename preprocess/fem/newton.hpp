@@ -14,7 +14,7 @@ namespace ecorche::fem {
 struct NewtonOptions {
   /// Brings the free nodes near to balance by cheaper steps, and returns how many; null: Newton begins where
   /// it is put. What it finds is taken where energy falls and no more tets are inside out.
-  std::function<int(Points& x)> nearer;
+  std::function<int(Points& x, const Context& context)> nearer;
   double tolerance_mm = 1e-4;  ///< converged when no free node would move farther in a whole step
   int most_iterations = 60;
   /// Filtered Hessians until a step moves no node farther than this, then the true ones while they are

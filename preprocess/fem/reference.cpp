@@ -7,6 +7,7 @@
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/kinematics/interpolate.hpp>
+#include "preprocess/fem/settling.hpp"
 #include "preprocess/fem/stopwatch.hpp"
 #include "preprocess/weights/harmonic.hpp"
 
@@ -83,7 +84,7 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
   };
   StepSolver steps(*assembly, *solver);
   NewtonOptions newton;
-  if (options.element == Element::p1) newton.nearer = options.nearer;
+  if (options.settles) newton.nearer = settling(body->mesh, *material);
 
   // From where skinning puts the nodes.
   const Points start = Eigen::Map<const PointsF>(skinned.data(), nodes, 3).cast<double>();

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <span>
 #include <string>
 
@@ -21,8 +20,7 @@ struct ReferenceOptions {
   std::string material = "stable_neo_hookean";
   double poisson = 0.45;
   bool two_starts = true;
-  /// NewtonOptions::nearer, of the first #nodes rows: the model's nodes. For element p1 alone.
-  std::function<int(Points& x)> nearer;
+  bool settles = true;  ///< before Newton's method, where settling() can
   std::string solver = "auto";  ///< weights::make_solver's; a factor is what preconditions
 };
 /// Two solutions that differ by less are one.

@@ -11,7 +11,7 @@ using Eigen::Matrix3d;
 
 /// Cost of one tet; `P` gets its derivative by J.
 double cost_of(const Matrix3d& J, double eps, Matrix3d& P) {
-  const Matrix3d K = cofactors(J);
+  const Matrix3d K = elastic::cofactors(J);
   const double det = J.col(0).dot(K.col(0)), root = std::sqrt(eps * eps + det * det);
   // Without the difference of near numbers that det < 0 would bring.
   const double chi = det > 0 ? (det + root) / 2 : eps * eps / (2 * (root - det));

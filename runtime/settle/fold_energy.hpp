@@ -6,12 +6,12 @@
 #include <span>
 #include <vector>
 
-#include "runtime/settle/tet_sum.hpp"
+#include "core/elastic/tet_sum.hpp"
 
 namespace ecorche::runtime {
 
 /// Tets about a fold; their weight is their rest volume in mean ones.
-using FoldPatch = TetPatch;
+using FoldPatch = elastic::TetPatch;
 
 /// The regularised energy of Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov, "Foldover-free maps
 /// in 50 lines of code" (ACM TOG 40, 2021), eqs. 3 and 4, of the map from rest with Jacobian J:
@@ -34,8 +34,8 @@ class FoldEnergy {
 
  private:
   const FoldPatch& patch_;
-  TetSum sum_;
-  mutable TetSum::Scratch scratch_;
+  elastic::TetSum sum_;
+  mutable elastic::TetSum::Scratch scratch_;
 };
 
 }  // namespace ecorche::runtime

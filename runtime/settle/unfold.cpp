@@ -7,10 +7,10 @@
 #include <cmath>
 
 #include <ecorche/runtime/pose_quality.hpp>
+#include "core/elastic/lbfgs.hpp"
 #include "runtime/settle/carry_tissues.hpp"
 #include "runtime/settle/fold_energy.hpp"
 #include "runtime/settle/fold_patches.hpp"
-#include "runtime/settle/lbfgs.hpp"
 #include "runtime/settle/patch_volumes.hpp"
 
 namespace ecorche::runtime {
@@ -70,7 +70,7 @@ Eigen::VectorXd relax(const FoldPatch& patch, PatchVolumes& volumes, double leng
   };
   double beyond = 0;  // the volumes' bounds, of a rest volume
   const auto round = [&](double eps) {
-    lbfgs(
+    elastic::lbfgs(
         [&](const Eigen::VectorXd& y, Eigen::VectorXd& gradient) {
           context.check_stop();
           const double sum = energy(placed(y), eps, {gradient.data(), static_cast<std::size_t>(free)});

@@ -125,7 +125,7 @@ TEST(Reference, ComesToAnEndAboutFoldsToo) {
   const Model model = boned();
   const Pose pose = bent(model, 140);
   ReferenceOptions options;
-  options.two_starts = false;
+  options.two_starts = options.settles = false;
   const Reference solved = solve_pose(model, pose, skinned(model, pose), options, {});
   EXPECT_TRUE(solved.inverted());
   EXPECT_TRUE(solved.converged());

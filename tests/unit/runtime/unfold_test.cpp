@@ -9,7 +9,7 @@
 
 #include <ecorche/runtime/pose_quality.hpp>
 #include "runtime/settle/fold_energy.hpp"
-#include "runtime/settle/lbfgs.hpp"
+#include "core/elastic/lbfgs.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
@@ -91,7 +91,7 @@ TEST(Lbfgs, FindsTheLeastOfAValley) {
   };
   Eigen::VectorXd x(2);
   x << -1.2, 1;
-  EXPECT_LT(lbfgs(f, x, 200, 0.1), 44);  // 42; 45 where its first guess of the curvature is 1
+  EXPECT_LT(elastic::lbfgs(f, x, 200, 0.1), 44);  // 42; 45 where its first guess of the curvature is 1
   EXPECT_NEAR(x[0], 1, 1e-6);
   EXPECT_NEAR(x[1], 1, 1e-6);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/settle/tet_sum.hpp"
+#include "core/elastic/tet_sum.hpp"
 
-namespace ecorche::runtime {
+namespace ecorche::elastic {
 
 TetSum::TetSum(const TetPatch& patch) : patch_(patch), first_(patch.free + 1, 0) {
   const auto each_free_corner = [&](auto f) {
@@ -29,4 +29,4 @@ void TetSum::gather(const Scratch& scratch, std::span<double> gradient) const {
   });
 }
 
-}  // namespace ecorche::runtime
+}  // namespace ecorche::elastic

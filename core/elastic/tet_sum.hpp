@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace ecorche::runtime {
+namespace ecorche::elastic {
 
 /// Tets in rows of their own nodes; the first `free` nodes may move, the others are held.
 struct TetPatch {
@@ -96,4 +96,4 @@ class TetSum {
   std::vector<std::uint32_t> first_, corner_;  // per free node: its corners, 4 * tet + corner
 };
 
-}  // namespace ecorche::runtime
+}  // namespace ecorche::elastic

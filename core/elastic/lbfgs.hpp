@@ -8,7 +8,7 @@
 #include <deque>
 #include <vector>
 
-namespace ecorche::runtime {
+namespace ecorche::elastic {
 
 /// A step and what it did to the gradient; rho = 1 / (s . y).
 struct LbfgsPair {
@@ -77,4 +77,4 @@ int lbfgs(const F& f, Eigen::VectorXd& x, int steps, double first_step) {
       f, initial, [](const Eigen::VectorXd&) { return false; }, x, steps);
 }
 
-}  // namespace ecorche::runtime
+}  // namespace ecorche::elastic
