@@ -20,7 +20,7 @@ struct ReferenceOptions {
   std::string material = "stable_neo_hookean";
   double poisson = 0.45;
   bool two_starts = true;
-  bool settles = true;  ///< before Newton's method, where settling() can
+  bool settles = true;          ///< before Newton's method, where settling() can
   std::string solver = "auto";  ///< weights::make_solver's; a factor is what preconditions
 };
 /// Two solutions that differ by less are one.

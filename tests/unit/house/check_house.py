@@ -19,7 +19,7 @@ ARROWS = {
     "core/geometry": ["core/values"],
     "core/kinematics": ["core/values", "core/linear"],
     "core/solve": ["core/values"],
-    "core/elastic": ["core/values"],
+    "core/elastic": ["core/values", "core/solve"],
     "core/model_file": ["core/values", "core/files"],
     "io/surface": ["core/values", "core/files"],
     "io/image": ["core/values", "core/files", "core/linear"],

@@ -8,8 +8,8 @@
 #include <random>
 
 #include <ecorche/runtime/pose_quality.hpp>
-#include "runtime/settle/fold_energy.hpp"
 #include "core/elastic/lbfgs.hpp"
+#include "runtime/settle/fold_energy.hpp"
 #include "tests/support/toy_model.hpp"
 
 namespace ecorche::runtime {
