@@ -9,6 +9,7 @@ namespace ecorche::correct {
 namespace {
 
 constexpr float kMost = 32767;
+constexpr double kLeastSize = 1e-3;  // mm, of a sample
 using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // #samples by 3 * #kept, mm.
@@ -21,28 +22,35 @@ Rows rows_of(std::span<const std::vector<float>> fields, const std::vector<std::
   return out;
 }
 
-// Columns: the shares of samples in modes, the weightiest first; of each the largest is positive.
-Eigen::MatrixXd principal(const Rows& rows, double left_mm, std::size_t most) {
+struct Modes {
+  Eigen::MatrixXd mix;     // #samples by #modes: what a sample has of each
+  Eigen::MatrixXd fields;  // #modes by 3 * #kept, mm
+};
+
+// The weightiest first; of each the largest share is positive. What is missed of a sample counts by the size
+// of the sample: deep bends move flesh by centimetres, and would take all modes for themselves.
+Modes principal(const Rows& rows, double left_mm, std::size_t most) {
   const Eigen::Index samples = rows.rows();
-  Eigen::MatrixXd gram(samples, samples);
-  for (Eigen::Index a = 0; a < samples; ++a)
-    for (Eigen::Index b = 0; b <= a; ++b)
-      gram(a, b) = gram(b, a) = rows.row(a).cast<double>().dot(rows.row(b).cast<double>());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
+  const Eigen::VectorXd weight = rows.cast<double>().rowwise().norm().cwiseMax(kLeastSize).cwiseInverse();
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * rows.cast<double>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(weighted * weighted.transpose());
+  const Eigen::ArrayXd unweigh = weight.array().square().inverse();
   const Eigen::Index nodes = rows.cols() / 3;
   const double enough = left_mm * left_mm * static_cast<double>(samples) * static_cast<double>(nodes);
-  double left = gram.trace();
+  double left = rows.cast<double>().squaredNorm();
   std::vector<Eigen::VectorXd> modes;
   for (Eigen::Index m = samples - 1; m >= 0 && modes.size() < most && (left > enough || modes.empty()); --m) {
     Eigen::VectorXd mode = eigen.eigenvectors().col(m);
     Eigen::Index largest = 0;
     mode.cwiseAbs().maxCoeff(&largest);
     if (mode[largest] < 0) mode = -mode;
+    left -= (unweigh * mode.array().square()).sum() * eigen.eigenvalues()[m];
     modes.push_back(std::move(mode));
-    left -= eigen.eigenvalues()[m];
   }
-  Eigen::MatrixXd out(samples, static_cast<Eigen::Index>(modes.size()));
-  for (std::size_t m = 0; m < modes.size(); ++m) out.col(static_cast<Eigen::Index>(m)) = modes[m];
+  Modes out{Eigen::MatrixXd(samples, static_cast<Eigen::Index>(modes.size())), {}};
+  for (std::size_t m = 0; m < modes.size(); ++m) out.mix.col(static_cast<Eigen::Index>(m)) = modes[m];
+  out.fields = out.mix.transpose() * weighted;
+  out.mix = weight.cwiseInverse().asDiagonal() * out.mix;
   return out;
 }
 
@@ -65,11 +73,11 @@ JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::
   }
   if (kept.empty()) return out;
   const Rows rows = rows_of(fields, kept);
-  const Eigen::MatrixXd mix = hinge ? Eigen::MatrixXd::Identity(rows.rows(), rows.rows())
-                                    : principal(rows, options.least_mm, options.most_modes);
-  out.mix = mix.cast<float>();
-  for (Eigen::Index m = 0; m < mix.cols(); ++m) {
-    const Eigen::RowVectorXf mode = (mix.col(m).transpose() * rows.cast<double>()).cast<float>();
+  const Modes modes = hinge ? Modes{Eigen::MatrixXd::Identity(rows.rows(), rows.rows()), rows.cast<double>()}
+                            : principal(rows, options.least_mm, options.most_modes);
+  out.mix = modes.mix.cast<float>();
+  for (Eigen::Index m = 0; m < modes.mix.cols(); ++m) {
+    const Eigen::RowVectorXf mode = modes.fields.row(m).cast<float>();
     const float scale = std::max(mode.cwiseAbs().maxCoeff() / kMost, 1e-12F);
     out.scale.push_back(scale);
     for (Eigen::Index i = 0; i < mode.size(); ++i)

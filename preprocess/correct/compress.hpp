@@ -17,8 +17,9 @@ struct CompressOptions {
 
 /// `fields`: a sample each, 3 * #node, mm; `turn`: theirs. A hinge keeps its samples as they are, since a
 /// pose takes two of them. Others keep principal modes (Kry02): as few as leave less than least_mm, root mean
-/// square over nodes and samples, but no more than most_modes. Each mode in 16 bits of its own largest
-/// number. Without a node that counts, `node` is empty. Deterministic.
+/// square over nodes and samples, but no more than most_modes, of which a small sample misses no more of its
+/// size than a large one. Each mode in 16 bits of its own largest number. Without a node that counts, `node`
+/// is empty. Deterministic.
 JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::Turns& turn,
                          std::span<const std::vector<float>> fields, const std::vector<std::uint32_t>& node,
                          const CompressOptions& options);

@@ -109,6 +109,7 @@ class Holding {
   // Whichever of `rows` move more as these tets do than as those that they hang on.
   void hang(const std::vector<std::size_t>& rows, const Tets& tets, const Context& context) {
     std::vector<std::uint32_t> nodes;
+    nodes.reserve(rows.size());
     for (const std::size_t i : rows) nodes.push_back(out_.node[i]);
     const mapping::Binding bound = mapping::Locator(from_.nodes, tets).bind(places(to_, nodes), context);
     tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t k) {

@@ -8,6 +8,8 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <numeric>
+#include <random>
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/runtime/body_poser.hpp>
@@ -192,6 +194,33 @@ TEST(Compress, KeepsWhatCountsWithinItsStep) {
         EXPECT_NEAR(back[3 + i], fields[s][6 + i], 1e-3);
       }
     }
+  }
+}
+
+TEST(Compress, MissesOfSmallSamplesNoMoreOfTheirSizeThanOfLargeOnes) {
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal;
+  constexpr std::size_t kNodes = 40;
+  std::vector<std::uint32_t> node(kNodes);
+  std::iota(node.begin(), node.end(), 0U);
+  JointCorrection::Turns turn(8, 3);
+  std::vector<std::vector<float>> fields;
+  const auto size = [](std::size_t s) { return s < 6 ? 30.0F : 1.0F; };  // mm; the last two are of mild bends
+  for (std::size_t s = 0; s < 8; ++s) {
+    turn.row(static_cast<Eigen::Index>(s)).setConstant(0.1 * static_cast<double>(s + 1));
+    fields.emplace_back(3 * kNodes);
+    for (float& x : fields.back()) x = size(s) * normal(random);
+  }
+  const JointCorrection kept = correct::compress(4, false, turn, fields, node, {.most_modes = 7});
+  ASSERT_EQ(kept.scale.size(), 7U);
+  for (std::size_t s = 0; s < fields.size(); ++s) {
+    const std::vector<float> back = correct::field_of(kept, s);
+    double missed = 0, whole = 0;
+    for (std::size_t i = 0; i < back.size(); ++i) {
+      missed += std::pow(back[i] - fields[s][i], 2);
+      whole += std::pow(fields[s][i], 2);
+    }
+    EXPECT_LT(std::sqrt(missed / whole), 0.7) << s;  // 1 where a sample is left out
   }
 }
 
