@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdicts of poses that bend joints far: as skinned, as corrected towards finite elements, and settled, with a picture of each that does not pass."""
+"""Verdicts of poses that bend joints far: as skinned, as corrected towards finite elements, and settled, with a picture of each that the correction does not make pass."""
 import json
 
 import programs
@@ -20,10 +20,9 @@ def corrected(coarse, fine):
     return out
 
 
-def judged(model, pose, out, *words):
-    """quality.json of a pose, whose bones and tets lie in `out`."""
-    bones = [tissue["name"] for tissue in programs.ecorche("info", model)["tissues"] if tissue["group"] == "bone"]
-    programs.ecorche("pose", model, "-o", out, "--pose", f"lib:{pose}", "--tissues", ",".join(bones), "--volumes", "none", "--tets", *words)
+def posed(model, pose, out, tissues, words):
+    """quality.json of a pose, whose tissues and tets lie in `out`."""
+    programs.ecorche("pose", model, "-o", out, "--pose", f"lib:{pose}", "--tissues", ",".join(tissues) or "none", "--volumes", "none", "--tets", *words)
     return json.loads((out / "quality.json").read_text())
 
 
@@ -33,23 +32,32 @@ def said(quality):
     return quality["verdict"] + (f" ({first}{f', and {more} more' if more > 0 else ''})" if first else "")
 
 
-def drawn(kit, folder, quality, name, about):
-    """The posed bones around the place that the first warning names."""
-    around = ",".join(f"{value:.1f}" for value in (*posed_place(folder, quality["warnings"][0]["at_mm"]), AROUND))
-    return kit.render(folder, name=name, suffix="side", about=about, words=("--only", "tissues", "--view", "side", f"--around={around}"))
+def drawn(kit, model, name, pose, qualities):
+    """The corrected and the settled body about the place of the first warning: bones that run into each other, or skin."""
+    of = next(quality for quality in reversed(qualities) if quality["warnings"])["warnings"][0]
+    bones = [tissue["name"] for tissue in programs.ecorche("info", model)["tissues"] if tissue["group"] == "bone"]
+    files = []
+    for quality, words in zip(qualities, ((), ("--settle",))):
+        out = folder_of(kit, "verdicts") / f"{name}{'_settled' if words else ''}"
+        posed(model, pose, out, bones if of["kind"] == "bone_overlap" else ["skin"], words)
+        around = ",".join(f"{value:.1f}" for value in (*posed_place(out, of["at_mm"]), AROUND))
+        programs.call(programs.ROOT / "scripts/render", out, "-o", kit.made / "pictures", "--name", out.name, "--only", "tissues", "--view", "oblique",
+                      "--height", 600, f"--around={around}")
+        files.append(kit.made / f"pictures/{out.name}_oblique.png")
+    return kit.row_of(files, name, f"{name.replace('_', ' ')}, corrected at the left, {said(qualities[0])}; settled at the right, {said(qualities[1])}")
 
 
 def rows_of(kit, body, tets, coarse_tets):
     coarse, fine = (programs.example_model(body, kit.data, count) for count in (coarse_tets, tets))
     model, rows, pictures = corrected(coarse, fine), [], []
     for pose in small_or(kit, POSES[:1], POSES):
-        out = folder_of(kit, "verdicts") / f"{body}_{pose}"
-        found = {"skinned": judged(fine, pose, out), "corrected": judged(model, pose, out), "settled": judged(model, pose, out, "--settle")}
+        out = folder_of(kit, "verdicts") / "judged"
+        found = {way: posed(of, pose, out, [], words) for way, of, words in (("skinned", fine, ()), ("corrected", model, ()), ("settled", model, ("--settle",)))}
+        passes = found["corrected"]["verdict"] == "pass"
         rows.append(Row(f"{body}: {pose.replace('_', ' ')}", UNKNOWN, "; ".join(f"{way}: {said(quality)}" for way, quality in found.items()),
-                        f"ecorche pose MODEL --pose lib:{pose} [--settle] -o DIR", "" if found["corrected"]["verdict"] == "pass" else "Asked of the corrected body: pass."))
-        if found["settled"]["verdict"] != "pass":
-            pictures += drawn(kit, out, found["settled"], f"verdict_{body}_{pose}",
-                              f"{body}, {pose.replace('_', ' ')}, settled: {found['settled']['warnings'][0]['what']}")
+                        f"ecorche pose MODEL --pose lib:{pose} [--settle] -o DIR", "" if passes else "Asked of the corrected body: pass."))
+        if kit.draw and not passes:
+            pictures.append(drawn(kit, model, f"{body}_{pose}", pose, (found["corrected"], found["settled"])))
     return rows, pictures
 
 
