@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdicts of poses that bend joints far: as skinned, as corrected towards finite elements, and settled, with a picture of each that the correction does not make pass."""
+"""Verdicts of poses that bend joints far: skinned, corrected towards finite elements, and settled; with a picture of each that is not mended by the correction."""
 import json
 
 import programs
@@ -44,7 +44,7 @@ def drawn(kit, model, name, pose, qualities):
         programs.call(programs.ROOT / "scripts/render", out, "-o", kit.made / "pictures", "--name", out.name, "--only", "tissues", "--view", "oblique",
                       "--height", 600, f"--around={around}")
         files.append(kit.made / f"pictures/{out.name}_oblique.png")
-    return kit.row_of(files, name, f"{name.replace('_', ' ')}, corrected at the left, {said(qualities[0])}; settled at the right, {said(qualities[1])}")
+    return kit.row_of(files, f"verdict_{name}", f"{name.replace('_', ' ')}, corrected at the left, {said(qualities[0])}; settled at the right, {said(qualities[1])}")
 
 
 def rows_of(kit, body, tets, coarse_tets):
