@@ -127,6 +127,12 @@ class Data(Parts):
         self.assertEqual(len(rows), 3)
         self.assertGreater(float(rows["knee: bones within the skin, as scanned"].split(" %")[0]), 90)
 
+    def test_verdicts_of_a_deep_pose(self):
+        rows, pictures = self.found("verdicts", "--data", os.environ["ECORCHE_DATA"])
+        self.assertEqual(list(rows), ["icrp110_female: sitting"])
+        self.assertRegex(rows["icrp110_female: sitting"], r"^skinned: (pass|warn)\b.*; corrected: (pass|warn)\b.*; settled: (pass|warn)\b")
+        self.assertEqual(len(pictures), "corrected: pass" not in rows["icrp110_female: sitting"])
+
 
 class Benches(Parts):
     def test_frames_and_seconds(self):
