@@ -153,8 +153,7 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
   command
       ->add_option("--folds", s->options.folds,
                    "share of the tets about a joint that a sample may leave inside out, where skinning "
-                   "leaves more; 0: "
-                   "none, and the correction ends where the first tet folds")
+                   "leaves more; 0: none, and the correction ends where the first tet folds")
       ->check(CLI::Range(0.0, 0.01))
       ->capture_default_str();
   command->add_option("--cache", s->cache,

@@ -15,8 +15,8 @@
 namespace ecorche::correct {
 namespace {
 
-// Half the sum of |differences| of weights, 0 to 1. Of a phantom and two bodies of 300 k tets held by 100 k,
-// 94 of 100 nodes differ by less than 0.1; in the wrong limb it is 0.9 and more.
+// Half the sum of |differences| of weights, 0 to 1. Of two real bodies of 300 k tets held by 100 k, 94 of 100
+// nodes differ by less than 0.1; in the wrong limb it is 0.9 and more.
 constexpr double kSame = 0.2, kOther = 0.5;
 // A tet hangs on a segment where a corner has so much of it.
 constexpr float kHangs = 0.25F;

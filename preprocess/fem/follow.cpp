@@ -10,8 +10,8 @@ namespace {
 void add(NewtonResult& sum, NewtonResult one) {
   one.iterations += sum.iterations;
   one.factors += sum.factors;
-  one.nearer += sum.nearer;
-  one.seconds.nearer += sum.seconds.nearer;
+  one.settling_steps += sum.settling_steps;
+  one.seconds.settle += sum.seconds.settle;
   one.seconds.assemble += sum.seconds.assemble;
   one.seconds.factor += sum.seconds.factor;
   one.seconds.solve += sum.seconds.solve;
@@ -43,7 +43,7 @@ FollowResult follow(const Assembly& assembly, const Material& material, StepSolv
     NewtonOptions newton = options.last;
     if (t < 1) {  // near already: what strides farther may leave the way for another balance
       newton.tolerance_mm = std::max(newton.tolerance_mm, options.between_mm);
-      newton.nearer = nullptr;
+      newton.settle = nullptr;
     }
     add(told, minimise(assembly, material, steps, newton, next, context));
     const bool folds = step > options.folds_below && inverts(out.newton.total, told.total);

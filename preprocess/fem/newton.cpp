@@ -14,7 +14,7 @@ constexpr double kRounding = 1e-15;  // of energy, by volume: terms of order 1 c
 constexpr int kHalvings = 24;
 constexpr int kWhole = 4;            // of them that are tried so that no tet is turned inside out
 constexpr double kFoldsExact = 0.2;  // mm: about folds the true Hessian is definite only near the end
-constexpr double kNearer = 0.1;
+constexpr double kExactAgain = 0.1;  // of the step at which it was indefinite
 
 double largest_row(const Points& rows) {
   return rows.rows() == 0 ? 0 : rows.rowwise().norm().maxCoeff();
@@ -66,11 +66,11 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     out.converged = true;
     return out;
   }
-  if (options.nearer) {
+  if (options.settle) {
     Points there = x;
     {
-      const Stopwatch watch(out.seconds.nearer);
-      out.nearer = options.nearer(there, context.quiet());
+      const Stopwatch watch(out.seconds.settle);
+      out.settling_steps = options.settle(there, context.quiet());
     }
     Total then = total(there);
     if (then.energy < out.total.energy && then.inverted_tets <= out.total.inverted_tets) {
@@ -87,7 +87,7 @@ NewtonResult minimise(const Assembly& assembly, const Material& material, StepSo
     const bool asked = exact;
     const double enough = exact ? options.linear_tolerance : options.far_tolerance;
     const Points d = steps.step(material, x, nullptr, exact, enough, g, out, context);
-    if (asked && !exact) exact_below = kNearer * out.step_mm;  // indefinite there: again much nearer the end
+    if (asked && !exact) exact_below = kExactAgain * out.step_mm;
     out.residual = residual(mesh, g);
     out.step_mm = largest_row(d);
     ++out.iterations;

@@ -14,7 +14,7 @@ namespace ecorche::fem {
 struct NewtonOptions {
   /// Brings the free nodes near to balance by cheaper steps, and returns how many; null: Newton begins where
   /// it is put. What it finds is taken where energy falls and no more tets are inside out.
-  std::function<int(Points& x, const Context& context)> nearer;
+  std::function<int(Points& x, const Context& context)> settle;
   double tolerance_mm = 1e-4;  ///< converged when no free node would move farther in a whole step
   int most_iterations = 60;
   /// Filtered Hessians until a step moves no node farther than this, then the true ones while they are
@@ -26,15 +26,15 @@ struct NewtonOptions {
 
 /// Where the time went, s.
 struct Seconds {
-  double nearer = 0, assemble = 0, factor = 0, solve = 0, energy = 0;
+  double settle = 0, assemble = 0, factor = 0, solve = 0, energy = 0;
 };
 
 struct NewtonResult {
   bool converged = false;
   int iterations = 0, factors = 0;
-  int nearer = 0;       ///< steps of NewtonOptions::nearer
-  double step_mm = 0;   ///< largest move of a node that the last whole step asked for
-  double residual = 0;  ///< largest force left on a free node, over the largest that holds a node
+  int settling_steps = 0;  ///< of NewtonOptions::settle
+  double step_mm = 0;      ///< largest move of a node that the last whole step asked for
+  double residual = 0;     ///< largest force left on a free node, over the largest that holds a node
   Total total;
   Seconds seconds;
 };

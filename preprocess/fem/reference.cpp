@@ -84,7 +84,7 @@ Reference solve_pose(const Model& model, const Pose& pose, std::span<const float
   };
   StepSolver steps(*assembly, *solver);
   NewtonOptions newton;
-  if (options.settles) newton.nearer = settling(body->mesh, *material);
+  if (options.settles) newton.settle = settling(body->mesh, *material);
 
   // From where skinning puts the nodes.
   const Points start = Eigen::Map<const PointsF>(skinned.data(), nodes, 3).cast<double>();

@@ -8,7 +8,7 @@
 
 namespace ecorche::fem {
 
-/// NewtonOptions::nearer by elastic::Settler, tens of whose steps cost as much as one of Newton's; null where
+/// NewtonOptions::settle by elastic::Settler, tens of whose steps cost as much as one of Newton's; null where
 /// it does not know the mesh's element or the material. The settler is made when it is first asked for.
 /// `mesh` must outlive it.
 std::function<int(Points& x, const Context& context)> settling(const Mesh& mesh, const Material& material);

@@ -133,6 +133,16 @@ TEST(Reference, ComesToAnEndAboutFoldsToo) {
   EXPECT_FALSE(solved.trusted());
 }
 
+TEST(Reference, TriesTheSameFoldNoSecondTimeInFullStride) {
+  const Model model = boned();
+  const Pose pose = bent(model, 130);
+  ReferenceOptions options;
+  options.settles = false;
+  const Reference solved = solve_pose(model, pose, skinned(model, pose), options, {});
+  EXPECT_EQ(solved.reached, 1);
+  EXPECT_EQ(solved.refused, 1);  // 2 where each step is twice the one before, whatever lies ahead
+}
+
 TEST(Reference, RefusesABodyWithoutBones) {
   Model model = boned();
   model.tet_label.assign(model.tet_count(), TetMesh::soft);

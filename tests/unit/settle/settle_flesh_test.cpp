@@ -150,8 +150,8 @@ TEST(SettleFlesh, NewtonGoesOnFromWhereItEnds) {
   ASSERT_TRUE(after.converged());
   EXPECT_TRUE(after.compared);
   EXPECT_LT(after.between_starts_mm, 1e-3);
-  EXPECT_EQ(alone.newton.nearer, 0);
-  EXPECT_GT(after.newton.nearer, 5);
+  EXPECT_EQ(alone.newton.settling_steps, 0);
+  EXPECT_GT(after.newton.settling_steps, 5);
   EXPECT_LT(after.newton.iterations, alone.newton.iterations);
   EXPECT_LT(largest_row(after.nodes - alone.nodes), 1e-3);
 }
@@ -170,7 +170,7 @@ TEST(SettleFlesh, NewtonTakesNoStartThatIsWorse) {
     return x;
   };
   fem::NewtonOptions misled;
-  misled.nearer = [&](Points& x, const Context&) {
+  misled.settle = [&](Points& x, const Context&) {
     for (Eigen::Index n = 0; n < x.rows(); ++n)
       if (body.mesh.free[static_cast<std::size_t>(n)] >= 0) x(n, 0) += n % 2 == 0 ? 0.2 : -0.2;
     return 1;
