@@ -151,10 +151,11 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
   command
-      ->add_option("--folds", s->options.folds,
-                   "share of the tets about a joint that a sample may leave inside out, where skinning "
-                   "leaves more; 0: none, and the correction ends where the first tet folds")
-      ->check(CLI::Range(0.0, 0.01))
+      ->add_option(
+          "--folds", s->options.folds,
+          "how many tets a sample may leave inside out, as a share of those that skinning leaves so; "
+          "0: none, and the correction ends where the first tet folds")
+      ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command->add_option("--cache", s->cache,
                       "a folder that keeps each solved sample: resumes an interrupted run");

@@ -18,9 +18,9 @@ struct CalibrateOptions {
   double step_deg = 15;             ///< between samples of a hinge, at most
   double least_mm = 0.05;           ///< smaller displacements are not kept
   double least_share = 1e-3;        ///< of weights: see neighbourhood
-  /// Of the tets about a joint: so many may be inside out in a sample, if skinning turns more. Without any a
-  /// correction ends where the first tet folds, at hips and elbows half way.
-  double folds = 0.005;
+  /// Of the tets that skinning leaves inside out: so many may be in a sample. Without any a correction ends
+  /// where the first tet folds, at hips and elbows half way.
+  double folds = 0.5;
   double poisson = 0.45;  ///< linear tets lock beyond
 };
 

@@ -12,6 +12,20 @@ namespace {
 constexpr double kToleranceMm = 1e-3;  // a fiftieth of what is kept at all
 constexpr double kHalf = 0.5;          // of the way from a sample to the next, which is short
 
+// Where flesh buckles, the way leads through balances so shallow that Newton walks on for hundreds of steps,
+// to another one that is centimetres off. What is near to balance on this way is worth more than that, and
+// folds on the way are no reason to go back: they are counted in the end.
+fem::FollowOptions through_folds(fem::NewtonOptions newton) {
+  constexpr double kNearMm = 0.5;
+  fem::FollowOptions way;
+  newton.tolerance_mm = kNearMm;
+  way.last = newton;
+  way.between_mm = kNearMm;
+  way.most_iterations = 400;
+  way.folds_below = 1;
+  return way;
+}
+
 }  // namespace
 
 SampleSolver::SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material,
@@ -19,7 +33,7 @@ SampleSolver::SampleSolver(const Model& model, const Neighbourhood& part, const 
     : model_(model),
       part_(part),
       material_(material),
-      most_folds_(static_cast<std::size_t>(folds * static_cast<double>(part.mesh.tets()))),
+      folds_(folds),
       assembly_(part.mesh),
       solver_(
           weights::make_solver(weights::solver_for(static_cast<std::int64_t>(3 * part.mesh.free_nodes)))) {}
@@ -45,12 +59,9 @@ Points SampleSolver::displaced(const Skinned& skinned, const std::vector<float>&
   return x;
 }
 
-fem::FollowResult SampleSolver::follow(fem::StepSolver& steps, const fem::NewtonOptions& newton,
+fem::FollowResult SampleSolver::follow(fem::StepSolver& steps, const fem::FollowOptions& way,
                                        const Nearer& from, const Pose& pose, Points& x,
                                        const Context& context) const {
-  fem::FollowOptions way;
-  way.last = newton;
-  if (!from.displacement.empty()) way.first_step = kHalf;
   x = displaced(skin(from.pose), from.displacement);
   const auto held_at = [&](double t, Points& to) {
     const Points at = skin(t < 1 ? kinematics::between(from.pose, pose, t) : pose).at;
@@ -74,8 +85,11 @@ SolvedSample SampleSolver::solve(const Pose& pose, const Nearer* nearer, const C
   SolvedSample out;
   out.iterations = found.iterations;
   if (!found.converged || found.total.inverted_tets > 0) {
+    fem::FollowOptions way{.last = newton};
+    if (!from.displacement.empty()) way.first_step = kHalf;
+    if (!found.converged) way = through_folds(newton);
     Points followed;
-    fem::NewtonResult other = follow(steps, newton, from, pose, followed, context).newton;
+    fem::NewtonResult other = follow(steps, way, from, pose, followed, context).newton;
     out.iterations += other.iterations;
     if (other.converged && (!found.converged || other.total.inverted_tets < found.total.inverted_tets)) {
       found = std::move(other);
@@ -84,8 +98,8 @@ SolvedSample SampleSolver::solve(const Pose& pose, const Nearer* nearer, const C
   }
   out.inverted_tets = found.total.inverted_tets;
   out.by_skinning = by_skinning;
-  const bool few = out.inverted_tets <= most_folds_ && out.inverted_tets < by_skinning;
-  out.clean = found.converged && (out.inverted_tets == 0 || few) ? 1 : 0;
+  const bool few = static_cast<double>(out.inverted_tets) <= folds_ * static_cast<double>(by_skinning);
+  out.clean = found.converged && few ? 1 : 0;
   if (out.clean == 0) return out;
   out.displacement.assign(3 * part_.node.size(), 0.0F);
   for (std::size_t i = 0; i < part_.node.size(); ++i) {

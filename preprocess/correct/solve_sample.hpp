@@ -40,12 +40,13 @@ struct Nearer {
 /// Samples of one joint. Each is solved alone: the same bits whatever was solved before it.
 class SampleSolver {
  public:
-  /// `model`, `part` and `material` must outlive it. `folds`: the share of the part's tets that a clean
-  /// sample may leave inside out, as long as skinning leaves more.
+  /// `model`, `part` and `material` must outlive it. `folds`: how many tets a clean sample may leave inside
+  /// out, as a share of those that skinning leaves so.
   SampleSolver(const Model& model, const Neighbourhood& part, const fem::Material& material, double folds);
 
   /// From skinning, displaced as in `nearer`, which may be null. Where that does not end without folds, the
-  /// flesh follows the joint (fem::follow) from there, or from rest; the better of both counts.
+  /// flesh follows the joint (fem::follow) from there, or from rest; the better of both counts. Where it does
+  /// not end at all, the way goes on through folds, and half a millimetre off balance is near enough.
   SolvedSample solve(const Pose& pose, const Nearer* nearer, const Context& context);
 
  private:
@@ -55,13 +56,13 @@ class SampleSolver {
   };
   Skinned skin(const Pose& pose) const;
   Points displaced(const Skinned& skinned, const std::vector<float>& displacement) const;
-  fem::FollowResult follow(fem::StepSolver& steps, const fem::NewtonOptions& newton, const Nearer& from,
+  fem::FollowResult follow(fem::StepSolver& steps, const fem::FollowOptions& way, const Nearer& from,
                            const Pose& pose, Points& x, const Context& context) const;
 
   const Model& model_;
   const Neighbourhood& part_;
   const fem::Material& material_;
-  std::size_t most_folds_;
+  double folds_;
   fem::Assembly assembly_;
   std::unique_ptr<solve::SpdSolver> solver_;
 };
