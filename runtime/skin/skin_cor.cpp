@@ -9,24 +9,41 @@
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
-/// The sum of the fields of a cluster's corrections at a vector of its lanes.
-HWY_INLINE V3 correction(const SkinClusters& job, std::size_t cluster, std::size_t lane) {
+/// What one joint adds at a vector of a cluster's lanes.
+HWY_INLINE V3 of_joint(const SkinClusters& job, const Corrections::Part& part, std::size_t lane) {
   const hn::Rebind<std::int16_t, F> d;
   const auto load = [&](const std::int16_t* from)
                         HWY_ATTR { return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(d, from))); };
   V3 u{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};
-  for (const Corrections::Part& part : job.corrections->of(cluster)) {
-    const std::int16_t* field = job.corrections->field(part) + lane;
-    for (std::size_t m = 0; m < part.modes; ++m, field += 3 * NodeClusters::size) {
-      const float mode = job.modes[part.first + m];
-      if (mode == 0) continue;
-      const V times_mode = all(mode);
-      u.x = hn::MulAdd(times_mode, load(field), u.x);
-      u.y = hn::MulAdd(times_mode, load(field + NodeClusters::size), u.y);
-      u.z = hn::MulAdd(times_mode, load(field + 2 * NodeClusters::size), u.z);
-    }
+  const std::int16_t* field = job.corrections->field(part) + lane;
+  for (std::size_t m = 0; m < part.modes; ++m, field += 3 * NodeClusters::size) {
+    const float mode = job.modes[part.first + m];
+    if (mode == 0) continue;
+    const V times_mode = all(mode);
+    u.x = hn::MulAdd(times_mode, load(field), u.x);
+    u.y = hn::MulAdd(times_mode, load(field + NodeClusters::size), u.y);
+    u.z = hn::MulAdd(times_mode, load(field + 2 * NodeClusters::size), u.z);
   }
   return u;
+}
+
+/// The corrections of a cluster at a vector of its lanes, all joints together (values/correction.hpp).
+HWY_INLINE V3 correction(const SkinClusters& job, std::size_t cluster, std::size_t lane) {
+  const auto parts = job.corrections->of(cluster);
+  V3 u = of_joint(job, parts[0], lane);
+  if (parts.size() == 1) return u;
+  V most = length(u), sum = most;
+  for (const Corrections::Part& part : parts.subspan(1)) {
+    const V3 other = of_joint(job, part, lane);
+    const V far = length(other);
+    u = plus(u, other);
+    most = hn::Max(most, far);
+    sum = hn::Add(sum, far);
+  }
+  const V rest = hn::Sub(sum, most), ratio = hn::Mul(rest, all(1 / JointCorrection::room_mm));
+  const V square = hn::Mul(ratio, ratio), fourth = hn::Mul(square, square);
+  const V left_out = hn::Div(hn::Mul(rest, fourth), hn::MulAdd(fourth, sum, sum));
+  return times(u, hn::IfThenElse(hn::Gt(sum, hn::Zero(F())), hn::Sub(all(1), left_out), all(1)));
 }
 
 void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {

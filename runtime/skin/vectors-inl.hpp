@@ -52,6 +52,10 @@ HWY_INLINE V3 plus_times(const V3& a, V b, const V3& c) {
   return {hn::MulAdd(b, c.x, a.x), hn::MulAdd(b, c.y, a.y), hn::MulAdd(b, c.z, a.z)};
 }
 
+HWY_INLINE V length(const V3& a) {
+  return hn::Sqrt(hn::MulAdd(a.x, a.x, hn::MulAdd(a.y, a.y, hn::Mul(a.z, a.z))));
+}
+
 HWY_INLINE V3 cross(const V3& a, const V3& b) {
   return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
           hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};

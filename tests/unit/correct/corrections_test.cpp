@@ -60,6 +60,38 @@ TEST(Corrections, AreThoseOfTheSlowTwin) {
   EXPECT_GT(moved, 3);
 }
 
+// Nodes that both joints move, by up to some centimetres.
+std::shared_ptr<Model> crowded_toy() {
+  auto model = corrected_toy();
+  JointCorrection &hinge = model->corrections[0], &ball = model->corrections[1];
+  for (float& scale : hinge.scale) scale *= 3;
+  for (float& scale : ball.scale) scale *= 3;
+  hinge.node = ball.node;
+  hinge.field.resize(3 * hinge.scale.size() * hinge.node.size(), 9000);
+  return model;
+}
+
+TEST(Corrections, OfJointsThatMoveTheSameFleshMakeRoomOnce) {
+  const auto model = crowded_toy();
+  const BodyPoser poser(model);
+  double left_out = 0;
+  for (const double bend : {0.1, 0.3, 0.5}) {
+    const PosedBody body = posed(poser, pose_of(*model, bend, Eigen::Vector3d(0.3, bend, 0.1)));
+    const auto segments = kinematics::forward(model->rig, body.pose);
+    EXPECT_LT(farthest(body.nodes, slow_corrected_nodes(*model, body.pose, segments)), 2e-3);
+    std::vector<Eigen::Vector3d> sum = reference_nodes(*model, segments, Skinning::cor, 1e-4);
+    for (const JointCorrection& only : model->corrections) {
+      Model alone = *model;
+      alone.corrections = {only};
+      const auto one = slow_corrected_nodes(alone, body.pose, segments);
+      const auto none = reference_nodes(*model, segments, Skinning::cor, 1e-4);
+      for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += one[n] - none[n];
+    }
+    left_out = std::max(left_out, farthest(body.nodes, sum));
+  }
+  EXPECT_GT(left_out, 5);
+}
+
 TEST(Corrections, EndWhereTheirSamplesEnd) {
   const auto model = corrected_toy();
   const BodyPoser poser(model);

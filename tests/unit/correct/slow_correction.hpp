@@ -4,7 +4,9 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <ecorche/values/model.hpp>
@@ -54,10 +56,26 @@ inline Eigen::VectorXd slow_shares_of_ball(const JointCorrection& c, Eigen::RowV
   return kernel.colPivHouseholderQr().solve(here).head(n);
 }
 
+/// What several joints move a node by together.
+inline Eigen::Vector3d slow_together(const std::vector<Eigen::Vector3d>& moved) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::vector<double> length;
+  for (const Eigen::Vector3d& u : moved) {
+    sum += u;
+    length.push_back(u.norm());
+  }
+  std::sort(length.rbegin(), length.rend());
+  const double others = std::accumulate(length.begin() + (length.empty() ? 0 : 1), length.end(), 0.0);
+  if (others == 0) return sum;
+  const double faded = others / (1 + std::pow(others / 8, 4));
+  return sum * (length[0] + faded) / (length[0] + others);
+}
+
 /// All nodes of a model, skinned by centres of rotation and corrected.
 inline std::vector<Eigen::Vector3d> slow_corrected_nodes(const Model& model, const Pose& pose,
                                                          const std::vector<RigidTransform>& segments) {
   std::vector<Eigen::Vector3d> out = reference_nodes(model, segments, runtime::Skinning::cor, 1e-4);
+  std::vector<std::vector<Eigen::Vector3d>> moved(out.size());
   for (const JointCorrection& c : model.corrections) {
     const auto joint = static_cast<std::size_t>(c.joint);
     const Eigen::RowVector3d turn = slow_turn(pose.rotation[joint]);
@@ -74,9 +92,10 @@ inline std::vector<Eigen::Vector3d> slow_corrected_nodes(const Model& model, con
       Eigen::Quaterniond blend(0, 0, 0, 0);
       for (const auto& [s, w] : reference_weights(model, c.node[row], 1e-4))
         blend.coeffs() += w * segments[s].q.coeffs();
-      out[c.node[row]] += blend.normalized() * u;
+      moved[c.node[row]].push_back(blend.normalized() * u);
     }
   }
+  for (std::size_t n = 0; n < out.size(); ++n) out[n] += slow_together(moved[n]);
   return out;
 }
 

@@ -14,7 +14,13 @@ namespace ecorche {
 /// Lewis00; of finite elements, compressed and local to a joint: Kry02). At a turn of the joint that is
 /// sample s, node[n] is moved by sum over modes m of mix(s, m) scale[m] field[m][n], in the frame that
 /// skinning turns with the node. At rest every field is zero.
+///
+/// Each joint was sampled with the others at rest: where several move the same flesh far, as both hips do the
+/// groin's, it would make room twice. So their sum is taken (m + o / (1 + (o / room_mm)^4)) / (m + o) times, m
+/// being the longest of their displacements of the node and o the lengths of the others together.
 struct JointCorrection {
+  static constexpr float room_mm = 8;  ///< little of what lies well below is lost
+
   /// A rotation vector a row.
   using Turns = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
   /// A sample a row, a mode a column.
