@@ -13,6 +13,7 @@
 #include "app/correction_report.hpp"
 #include "app/safe_range.hpp"
 #include "app/stage_folder.hpp"
+#include "app/whole_poses.hpp"
 #include "core/files/atomic_file.hpp"
 #include "preprocess/correct/calibrate.hpp"
 #include "preprocess/correct/transfer.hpp"
@@ -28,7 +29,8 @@ constexpr double kCacheGib = 1000;  // samples are never worth less than the tim
 struct CalibrateSettings {
   fs::path model, output, cache, from;
   correct::CalibrateOptions options;
-  bool ranges = true;
+  std::vector<std::string> poses;
+  bool whole_poses = true, ranges = true;
 };
 
 json report_of(const correct::JointReport& joint) {
@@ -55,12 +57,15 @@ std::string text_of(const json& report, const Model& model) {
                     row["joint"].get<std::string>(), row["tets"].get<int>(), row["clean"].get<int>(),
                     row["samples"].get<int>(), row["clean_deg"].get<double>(), row["nodes"].get<int>(),
                     row["modes"].get<int>(), row["bytes"].get<double>() / 1024, row["max_mm"].get<double>());
+  out += settled_poses_text(report["poses"]);
   out += correction_text(json::array(), safe_ranges_json(model));
   return out + fmt::format(
-                   "\nsolved in {:.0f} s, ranges in {:.0f} s. Nearer to finite elements, never nearer to the "
+                   "\nsolved in {:.0f} s, poses in {:.0f} s, ranges in {:.0f} s. Nearer to finite elements, "
+                   "never nearer to the "
                    "patient.\n"
                    "For training and education, not for planning surgery.",
-                   report["seconds"]["samples"].get<double>(), report["seconds"]["ranges"].get<double>());
+                   report["seconds"]["samples"].get<double>(), report["seconds"]["poses"].get<double>(),
+                   report["seconds"]["ranges"].get<double>());
 }
 
 // Joints without a clean sample keep skinning as it is, which must be said.
@@ -100,7 +105,12 @@ int run(const Program& program, const CalibrateSettings& s) {
   { const files::AtomicFile probe(s.output); }  // refused now, not after the hours that solving takes
   const auto model = std::make_shared<Model>(model_file::read(s.model, program.context("reading")));
   model->corrections.clear();
+  model->pose_corrections.clear();
   model->safe_ranges.clear();
+  // Who asks for some joints has no use for whole bodies, unless they are named.
+  std::vector<correct::WholePose> whole;
+  if (s.whole_poses && (s.options.joints.empty() || !s.poses.empty()))
+    whole = whole_poses(program, s.poses, model->rig);
   std::optional<StageFolder> store;
   if (!s.cache.empty()) store.emplace(s.cache, kCacheGib);
   const auto began = Clock::now();
@@ -109,6 +119,8 @@ int run(const Program& program, const CalibrateSettings& s) {
   warn_of(program, found);
   model->corrections = std::move(found.corrections);
   const auto solved = Clock::now();
+  const json poses = add_whole_poses(program, whole, *model);
+  const auto settled = Clock::now();
   std::vector<std::size_t> rows;
   for (const std::string& joint : s.options.joints)
     rows.push_back(static_cast<std::size_t>(model->rig.skeleton.find_joint(joint)));
@@ -123,7 +135,11 @@ int run(const Program& program, const CalibrateSettings& s) {
               {"output", s.output.string()},
               {"joints", json::array()},
               {"safe_ranges", safe_ranges_json(*model)},
-              {"seconds", {{"samples", seconds(began, solved)}, {"ranges", seconds(solved, measured)}}},
+              {"poses", poses},
+              {"seconds",
+               {{"samples", seconds(began, solved)},
+                {"poses", seconds(solved, settled)},
+                {"ranges", seconds(settled, measured)}}},
               {"purpose", "training and education, not planning of surgery"}};
   for (const correct::JointReport& joint : found.joints) report["joints"].push_back(report_of(joint));
   program.result(text_of(report, *model), report);
@@ -142,6 +158,12 @@ void declare_calibrate(CLI::App& app, Program& program, Run& chosen) {
       ->add_option("--joints", s->options.joints,
                    "joints to sample, with commas between; without it all that turn by themselves")
       ->delimiter(',');
+  command
+      ->add_option("--poses", s->poses,
+                   "whole poses to settle and keep, with commas between: pose files, or lib:NAME; without "
+                   "it all of the library, where no --joints are named")
+      ->delimiter(',');
+  command->add_flag("!--no-poses", s->whole_poses, "keep no whole poses")->excludes("--poses");
   command->add_option("--step", s->options.step_deg, "degrees between samples of a hinge, at most")
       ->check(CLI::Range(2.0, 60.0))
       ->capture_default_str();

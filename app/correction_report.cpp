@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -75,6 +76,44 @@ Json safe_ranges_json(const Model& model) {
                    {"corrected_deg", ends(r.corrected)},
                    {"bones_deg", at(r.bones)}});
   }
+  return out;
+}
+
+Json pose_corrections_json(const Model& model) {
+  Json out = Json::array();
+  for (const PoseCorrection& c : model.pose_corrections) {
+    Json joints = Json::array();
+    for (const std::int32_t joint : c.joint)
+      joints.push_back(model.rig.skeleton.segments[static_cast<std::size_t>(joint)].joint.name);
+    out.push_back(
+        {{"pose", c.pose}, {"joints", joints}, {"reach_deg", c.reach / kDegree}, {"nodes", c.node.size()}});
+  }
+  return out;
+}
+
+std::string pose_corrections_text(const Json& places) {
+  std::map<std::string, std::pair<int, int>> poses;  // places and nodes
+  for (const Json& row : places) {
+    auto& [count, nodes] = poses[row["pose"].get<std::string>()];
+    ++count;
+    nodes += row["nodes"].get<int>();
+  }
+  std::string out;
+  if (!poses.empty())
+    out += fmt::format("\nwhole poses, settled\n  {:<24} {:>7} {:>8}\n", "pose", "places", "nodes");
+  for (const auto& [pose, of] : poses)
+    out += fmt::format("  {:<24} {:>7} {:>8}\n", pose, of.first, of.second);
+  return out;
+}
+
+std::string settled_poses_text(const Json& poses) {
+  if (poses.empty()) return {};
+  const auto verdict = [](const Json& pass) { return pass.get<bool>() ? "pass" : "warn"; };
+  std::string out = "\nwhole poses, settled: places, nodes, at most (mm), verdict before, and now\n";
+  for (const Json& row : poses)
+    out += fmt::format("  {:<24} {:>8} {:>8} {:>6.1f} {:>6} {:>6}\n", row["pose"].get<std::string>(),
+                       row["places"].get<int>(), row["nodes"].get<int>(), row["largest_mm"].get<double>(),
+                       verdict(row["passed"]), verdict(row["passes"]));
   return out;
 }
 

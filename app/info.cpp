@@ -58,6 +58,7 @@ Json to_json(const std::string& path, const Model& model) {
            {"skin_caps", caps_json(model)},
            {"materials", materials_json(model, soft_tets_by_material(model))},
            {"corrections", corrections_json(model)},
+           {"pose_corrections", pose_corrections_json(model)},
            {"safe_ranges", safe_ranges_json(model)},
            {"provenance", model.provenance}};
   out["identity"] = text::hex(model_file::identity(model));
@@ -172,6 +173,7 @@ std::string info_text(const Json& info) {
   }
   if (!info["cut_contacts"].empty()) out += "\n" + printable_lines(cut_contacts_text(info["cut_contacts"]));
   if (!info["contacts"].empty()) out += "\n" + printable_lines(contacts_text(info["contacts"]));
+  out += printable_lines(pose_corrections_text(info["pose_corrections"]));
   out += printable_lines(correction_text(info["corrections"], info["safe_ranges"]));
   out += "\ncertificate\n";
   for (const auto& [name, value] : info["certificate"].items()) {

@@ -78,7 +78,7 @@ class Wording {
   // What helps besides turning less: for one pose, and for all.
   std::string relax() const {
     if (how_.settled || !how_.by_tets) return {};
-    const bool can_be_corrected = how_.skinning == runtime::Skinning::cor && model_.corrections.empty();
+    const bool can_be_corrected = how_.skinning == runtime::Skinning::cor && !model_.corrected();
     return can_be_corrected ? "use --settle, or calibrate the model, or " : "use --settle, or ";
   }
 

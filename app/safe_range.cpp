@@ -101,6 +101,7 @@ class Skinned {
 std::shared_ptr<const Model> without_corrections(const Model& model) {
   auto out = std::make_shared<Model>(model);
   out->corrections.clear();
+  out->pose_corrections.clear();
   return out;
 }
 

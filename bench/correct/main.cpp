@@ -84,6 +84,7 @@ bool pose_of(const Skeleton& skeleton, const Stated& stated, Pose& out) {
 std::shared_ptr<const Model> without_corrections(const Model& model) {
   auto out = std::make_shared<Model>(model);
   out->corrections.clear();
+  out->pose_corrections.clear();
   return out;
 }
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdicts of poses that bend joints far: skinned, corrected towards finite elements, and settled; with a picture of each that is not mended by the correction."""
+"""Verdicts of poses that bend joints far: skinned, corrected by joints alone and with whole poses, settled; with a picture of each that is not mended."""
 import json
 
 import programs
@@ -12,12 +12,13 @@ AROUND = 130  # mm, of what a picture shows
 
 
 def corrected(coarse, fine):
-    """`fine` with the correction that was calibrated on `coarse`; samples are those of bench/correct, where it ran."""
-    made, out = (model.with_name(f"{model.stem}_verdicts.hdf") for model in (coarse, fine))
-    if programs.outdated(out, coarse, fine):
-        programs.ecorche("--threads", 2, "calibrate", coarse, "-o", made, "--cache", programs.MADE / "samples", "--no-ranges")
-        programs.ecorche("--threads", 2, "calibrate", fine, "-o", out, "--from", made, "--no-ranges")
-    return out
+    """`fine` with the correction that was calibrated on `coarse`, of joints alone, and with whole poses; samples are those of bench/correct, where it ran."""
+    made, joints, whole = coarse.with_name(f"{coarse.stem}_verdicts.hdf"), fine.with_name(f"{fine.stem}_joints.hdf"), fine.with_name(f"{fine.stem}_whole.hdf")
+    if programs.outdated(whole, coarse, fine):
+        programs.ecorche("--threads", 2, "calibrate", coarse, "-o", made, "--cache", programs.MADE / "samples", "--no-ranges", "--no-poses")
+        programs.ecorche("--threads", 2, "calibrate", fine, "-o", joints, "--from", made, "--no-ranges", "--no-poses")
+        programs.ecorche("--threads", 2, "calibrate", fine, "-o", whole, "--from", made, "--no-ranges")
+    return joints, whole
 
 
 def posed(model, pose, out, tissues, words):
@@ -49,15 +50,17 @@ def drawn(kit, model, name, pose, qualities):
 
 def rows_of(kit, body, tets, coarse_tets):
     coarse, fine = (programs.example_model(body, kit.data, count) for count in (coarse_tets, tets))
-    model, rows, pictures = corrected(coarse, fine), [], []
+    joints, whole = corrected(coarse, fine)
+    rows, pictures = [], []
     for pose in small_or(kit, POSES[:1], POSES):
         out = folder_of(kit, "verdicts") / "judged"
-        found = {way: posed(of, pose, out, [], words) for way, of, words in (("skinned", fine, ()), ("corrected", model, ()), ("settled", model, ("--settle",)))}
+        found = {way: posed(of, pose, out, [], words) for way, of, words in
+                 (("skinned", fine, ()), ("joints alone", joints, ()), ("corrected", whole, ()), ("settled", joints, ("--settle",)))}
         passes = found["corrected"]["verdict"] == "pass"
         rows.append(Row(f"{body}: {pose.replace('_', ' ')}", UNKNOWN, "; ".join(f"{way}: {said(quality)}" for way, quality in found.items()),
                         f"ecorche pose MODEL --pose lib:{pose} [--settle] -o DIR", "" if passes else "Asked of the corrected body: pass."))
         if kit.draw and not passes:
-            pictures.append(drawn(kit, model, f"{body}_{pose}", pose, (found["corrected"], found["settled"])))
+            pictures.append(drawn(kit, whole, f"{body}_{pose}", pose, (found["corrected"], found["settled"])))
     return rows, pictures
 
 

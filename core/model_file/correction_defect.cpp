@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kFarthestTurn = std::numbers::pi + 1e-6;  // of a rotation vector
 constexpr double kOffLine = 1e-6;                          // radians, of a hinge's samples
+constexpr double kRounding = 1e-9;
 
 bool finite(float value) {
   return std::isfinite(value);
@@ -33,6 +34,20 @@ bool on_one_line(const JointCorrection::Turns& turn) {
   return true;
 }
 
+template <class T>
+bool ascending(const std::vector<T>& rows, std::size_t end) {
+  return !rows.empty() && rows.front() >= 0 && static_cast<std::size_t>(rows.back()) < end &&
+         std::adjacent_find(rows.begin(), rows.end(), std::greater_equal<>()) == rows.end();
+}
+
+std::optional<Defect> defect_of_nodes(const Model& model, const std::vector<std::uint32_t>& nodes,
+                                      const std::vector<std::uint8_t>& of_bone, const std::string& at) {
+  if (!ascending(nodes, model.node_count())) return Defect{at + "node", "is not ascending rows of nodes"};
+  if (std::any_of(nodes.begin(), nodes.end(), [&](std::uint32_t node) { return of_bone[node] != 0; }))
+    return Defect{at + "node", "names a node of a bone, which only its segment moves"};
+  return std::nullopt;
+}
+
 std::optional<Defect> defect_of(const Model& model, const JointCorrection& correction,
                                 const std::vector<std::uint8_t>& of_bone) {
   const Joint& joint = model.rig.skeleton.segments[static_cast<std::size_t>(correction.joint)].joint;
@@ -48,16 +63,27 @@ std::optional<Defect> defect_of(const Model& model, const JointCorrection& corre
     return Defect{at + "mix", "is not one finite number a sample and mode"};
   if (!std::all_of(correction.scale.begin(), correction.scale.end(), finite))
     return Defect{at + "scale", "is not finite"};
-  const auto unordered =
-      std::adjacent_find(correction.node.begin(), correction.node.end(), std::greater_equal<>());
-  if (correction.node.empty() || unordered != correction.node.end() ||
-      correction.node.back() >= model.node_count())
-    return Defect{at + "node", "is not ascending rows of nodes"};
-  if (std::any_of(correction.node.begin(), correction.node.end(),
-                  [&](std::uint32_t node) { return of_bone[node] != 0; }))
-    return Defect{at + "node", "names a node of a bone, which only its segment moves"};
+  if (auto defect = defect_of_nodes(model, correction.node, of_bone, at)) return defect;
   if (correction.field.size() != 3 * modes * correction.node.size())
     return Defect{at + "field", "is not three numbers a mode and node"};
+  return std::nullopt;
+}
+
+std::optional<Defect> defect_of(const Model& model, const PoseCorrection& correction,
+                                const std::vector<std::uint8_t>& of_bone, std::size_t index) {
+  const std::string at = "/ecorche/pose_correction/place_" + std::to_string(index + 1) + "/";
+  if (!ascending(correction.joint, model.segment_count()) || correction.joint.front() == 0)
+    return Defect{at + "joint", "is not ascending rows of joints, the root left out"};
+  if (correction.turn.rows() != static_cast<Eigen::Index>(correction.joint.size()) ||
+      !correction.turn.allFinite() || !(correction.turn.rowwise().norm().maxCoeff() <= kFarthestTurn))
+    return Defect{at + "turn", "is not one rotation vector a joint"};
+  // Else rest would be moved; what was stored as the distance is rounded.
+  if (!(correction.reach > 0) || !(correction.reach <= correction.turn.norm() * (1 + kRounding)))
+    return Defect{at + "reach", "is not above 0 and at most as far as rest"};
+  if (!std::isfinite(correction.scale)) return Defect{at + "scale", "is not finite"};
+  if (auto defect = defect_of_nodes(model, correction.node, of_bone, at)) return defect;
+  if (correction.field.size() != 3 * correction.node.size())
+    return Defect{at + "field", "is not three numbers a node"};
   return std::nullopt;
 }
 
@@ -103,7 +129,7 @@ std::vector<std::uint8_t> nodes_of_bones(const Model& model) {
 }  // namespace
 
 std::optional<Defect> first_defect_of_corrections(const Model& model) {
-  if (!model.corrections.empty()) {
+  if (!model.corrections.empty() || !model.pose_corrections.empty()) {
     const std::vector<std::uint8_t> of_bone = nodes_of_bones(model);
     std::int32_t before = -1;
     for (const JointCorrection& correction : model.corrections) {
@@ -112,6 +138,8 @@ std::optional<Defect> first_defect_of_corrections(const Model& model) {
       before = correction.joint;
       if (auto defect = defect_of(model, correction, of_bone)) return defect;
     }
+    for (std::size_t i = 0; i < model.pose_corrections.size(); ++i)
+      if (auto defect = defect_of(model, model.pose_corrections[i], of_bone, i)) return defect;
   }
   const auto place = [](const SafeRange& r) { return std::tuple(r.joint, r.angle, r.way); };
   for (std::size_t i = 0; i < model.safe_ranges.size(); ++i) {

@@ -206,6 +206,19 @@ void add_correction(Layout& out, const JointCorrection& correction, const std::s
   out.view<std::int16_t>(at + "field", correction.field, {modes, rows, 3});
 }
 
+void add_pose_correction(Layout& out, const PoseCorrection& correction, std::size_t index) {
+  const std::string at = "/ecorche/pose_correction/place_" + std::to_string(index + 1) + "/";
+  const auto rows = std::uint64_t{correction.node.size()};
+  out.scalar(at + "index", static_cast<std::int32_t>(index));
+  out.texts(at + "pose", {correction.pose});
+  out.view<std::int32_t>(at + "joint", correction.joint, {std::uint64_t{correction.joint.size()}});
+  out.view(at + "turn", elements(correction.turn), {count(correction.turn.rows()), 3});
+  out.scalar(at + "reach", correction.reach);
+  out.scalar(at + "scale", correction.scale);
+  out.view<std::uint32_t>(at + "node", correction.node, {rows});
+  out.view<std::int16_t>(at + "field", correction.field, {rows, 3});
+}
+
 // Ranges of a model before 1.4 do not.
 bool knows_contact(const std::vector<SafeRange>& ranges) {
   return !ranges.empty() && !std::isnan(ranges[0].skinned.contact);
@@ -272,6 +285,8 @@ Layout lay_out(const Model& model) {
     const auto joint = static_cast<std::size_t>(correction.joint);
     add_correction(out, correction, model.rig.skeleton.segments[joint].joint.name, i);
   }
+  for (std::size_t i = 0; i < model.pose_corrections.size(); ++i)
+    add_pose_correction(out, model.pose_corrections[i], i);
   add_safe_ranges(out, model.safe_ranges);
   for_each_figure(model.certificate, [&](std::string_view name, const auto& value) {
     out.scalar("/ecorche/quality/" + std::string(name), value);
@@ -281,6 +296,7 @@ Layout lay_out(const Model& model) {
 }
 
 std::int32_t minor_of(const Model& model) {
+  if (!model.pose_corrections.empty()) return 5;
   return !model.materials.empty() || knows_contact(model.safe_ranges) ? 4 : 3;
 }
 

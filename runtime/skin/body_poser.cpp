@@ -46,6 +46,15 @@ void check_correction(const Model& model, const JointCorrection& correction) {
   }
 }
 
+void check_correction(const Model& model, const PoseCorrection& correction) {
+  if (!below(correction.joint.data(), correction.joint.size(), model.segment_count()) ||
+      correction.turn.rows() != static_cast<Eigen::Index>(correction.joint.size()) ||
+      !(correction.reach > 0) || !below(correction.node.data(), correction.node.size(), model.node_count()) ||
+      correction.field.size() != 3 * correction.node.size()) {
+    unfit(model, "the correction of pose '" + correction.pose + "' does not fit its nodes and joints");
+  }
+}
+
 void check_model(const Model& model) {
   if (model.segment_count() == 0 || model.node_count() == 0) unfit(model, "it has no segment or no node");
   if (!below(model.tets.data(), static_cast<std::size_t>(model.tets.size()), model.node_count())) {
@@ -53,6 +62,7 @@ void check_model(const Model& model) {
   }
   for (const Tissue& tissue : model.tissues) check_tissue(model, tissue);
   for (const JointCorrection& correction : model.corrections) check_correction(model, correction);
+  for (const PoseCorrection& correction : model.pose_corrections) check_correction(model, correction);
   // A rig that cannot be constrained is found here, not in the middle of a session.
   Pose rest = Pose::rest(model.segment_count());
   std::vector<ClampedJoint> clamped;

@@ -87,33 +87,59 @@ void SampleShares::radial(const Eigen::RowVector3d& place, std::span<double> out
   }
 }
 
+Nearness::Nearness(const PoseCorrection& correction) : reach_(correction.reach) {
+  for (std::size_t j = 0; j < correction.joint.size(); ++j) {
+    const Eigen::RowVector3d turn = correction.turn.row(static_cast<Eigen::Index>(j));
+    joints_.push_back(
+        {static_cast<std::size_t>(correction.joint[j]),
+         Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.stableNormalized().transpose()))});
+  }
+}
+
+double Nearness::at(const Pose& pose) const {
+  double squared = 0;
+  for (const Turned& one : joints_)
+    squared += rotation_vector(one.turn.conjugate() * pose.rotation[one.joint]).squaredNorm();
+  const double left = 1 - squared / (reach_ * reach_);
+  return left > 0 ? left * left : 0;
+}
+
 Corrections::Corrections(const Model& model, const NodeClusters& clusters) {
-  std::vector<std::vector<Part>> of_cluster(clusters.clusters());
+  OfCluster joints(clusters.clusters()), poses(clusters.clusters());
   for (const JointCorrection& correction : model.corrections) {
     const auto joint = static_cast<std::size_t>(correction.joint);
-    const std::size_t modes = correction.scale.size(), rows = correction.node.size();
     joints_.push_back({joint, SampleShares(correction, model.rig.skeleton.segments[joint].joint.kind),
                        correction.mix, correction.scale});
-    for (std::size_t row = 0; row < rows; ++row) {
-      const std::size_t lane = clusters.lane[correction.node[row]], cluster = lane / NodeClusters::size;
-      std::vector<Part>& parts = of_cluster[cluster];
-      if (parts.empty() || parts.back().first != modes_) {
-        parts.push_back(
-            {static_cast<std::uint32_t>(modes_), static_cast<std::uint32_t>(modes), field_.size()});
-        field_.resize(field_.size() + 3 * NodeClusters::size * modes);
-      }
-      for (std::size_t m = 0; m < modes; ++m)
-        for (std::size_t c = 0; c < 3; ++c)
-          field_[parts.back().field + NodeClusters::size * (3 * m + c) + lane % NodeClusters::size] =
-              correction.field[3 * (rows * m + row) + c];
+    add(clusters, correction.node, correction.field, joints);
+  }
+  for (const PoseCorrection& correction : model.pose_corrections) {
+    poses_.push_back({Nearness(correction), correction.scale});
+    add(clusters, correction.node, correction.field, poses);
+  }
+  for (std::size_t c = 0; c <= clusters.clusters(); ++c) {
+    const auto first = static_cast<std::uint32_t>(parts_.size());
+    if (c < clusters.clusters()) parts_.insert(parts_.end(), joints[c].begin(), joints[c].end());
+    begin_.push_back({first, static_cast<std::uint32_t>(parts_.size())});
+    if (c < clusters.clusters()) parts_.insert(parts_.end(), poses[c].begin(), poses[c].end());
+  }
+}
+
+void Corrections::add(const NodeClusters& clusters, std::span<const std::uint32_t> node,
+                      std::span<const std::int16_t> field, OfCluster& out) {
+  const std::size_t rows = node.size(), modes = rows == 0 ? 0 : field.size() / (3 * rows);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const std::size_t lane = clusters.lane[node[row]], cluster = lane / NodeClusters::size;
+    std::vector<Part>& parts = out[cluster];
+    if (parts.empty() || parts.back().first != modes_) {
+      parts.push_back({static_cast<std::uint32_t>(modes_), static_cast<std::uint32_t>(modes), field_.size()});
+      field_.resize(field_.size() + 3 * NodeClusters::size * modes);
     }
-    modes_ += modes;
+    for (std::size_t m = 0; m < modes; ++m)
+      for (std::size_t c = 0; c < 3; ++c)
+        field_[parts.back().field + NodeClusters::size * (3 * m + c) + lane % NodeClusters::size] =
+            field[3 * (rows * m + row) + c];
   }
-  begin_.push_back(0);
-  for (const std::vector<Part>& parts : of_cluster) {
-    parts_.insert(parts_.end(), parts.begin(), parts.end());
-    begin_.push_back(static_cast<std::uint32_t>(parts_.size()));
-  }
+  modes_ += modes;
 }
 
 void Corrections::weigh(const Pose& pose, std::span<float> modes) const {
@@ -130,11 +156,14 @@ void Corrections::weigh(const Pose& pose, std::span<float> modes) const {
       modes[next++] = static_cast<float>(sum * static_cast<double>(joint.scale[m]));
     }
   }
+  for (const OfPose& one : poses_)
+    modes[next++] = static_cast<float>(one.nearness.at(pose) * static_cast<double>(one.scale));
 }
 
 bool Corrections::moves(std::size_t cluster, std::span<const float> modes) const {
-  const auto parts = of(cluster);
-  return std::any_of(parts.begin(), parts.end(), [&](const Part& part) {
+  const auto first = parts_.begin() + begin_[cluster].joints,
+             end = parts_.begin() + begin_[cluster + 1].joints;
+  return std::any_of(first, end, [&](const Part& part) {
     const auto of_part = modes.subspan(part.first, part.modes);
     return std::any_of(of_part.begin(), of_part.end(), [](float mode) { return mode != 0; });
   });

@@ -3,7 +3,7 @@
 // pose takes.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -41,9 +41,26 @@ class SampleShares {
   Eigen::VectorXd at_rest_;                           // #samples
 };
 
+/// How near a pose is to that of a PoseCorrection.
+class Nearness {
+ public:
+  explicit Nearness(const PoseCorrection& correction);
+
+  /// 1 at its own pose, falling to 0 at its reach.
+  double at(const Pose& pose) const;
+
+ private:
+  struct Turned {
+    std::size_t joint;
+    Eigen::Quaterniond turn;
+  };
+  std::vector<Turned> joints_;
+  double reach_;
+};
+
 class Corrections {
  public:
-  /// What one joint adds to one cluster: `modes` fields of 64 x, 64 y, 64 z from `field` on.
+  /// What one joint, or one pose, adds to one cluster: `modes` fields of 64 x, 64 y, 64 z from `field` on.
   struct Part {
     std::uint32_t first, modes;  // of weigh's
     std::size_t field;
@@ -53,13 +70,17 @@ class Corrections {
   /// `model` has been checked (model_file's invariants).
   Corrections(const Model& model, const NodeClusters& clusters);
 
-  /// Fields of all joints together.
+  /// Fields of all joints and poses together.
   std::size_t modes() const { return modes_; }
   /// How much of each field, in mm a step; all 0 at rest. `modes`: modes().
   void weigh(const Pose& pose, std::span<float> modes) const;
 
-  std::span<const Part> of(std::size_t cluster) const {
-    return std::span(parts_).subspan(begin_[cluster], begin_[cluster + 1] - begin_[cluster]);
+  std::span<const Part> of_joints(std::size_t cluster) const {
+    return std::span(parts_).subspan(begin_[cluster].joints, begin_[cluster].poses - begin_[cluster].joints);
+  }
+  std::span<const Part> of_poses(std::size_t cluster) const {
+    return std::span(parts_).subspan(begin_[cluster].poses,
+                                     begin_[cluster + 1].joints - begin_[cluster].poses);
   }
   /// Whether `modes` moves anything of the cluster.
   bool moves(std::size_t cluster, std::span<const float> modes) const;
@@ -74,9 +95,23 @@ class Corrections {
     std::vector<float> scale;
   };
 
+  struct OfPose {
+    Nearness nearness;
+    float scale;
+  };
+  // Into parts_.
+  struct Begin {
+    std::uint32_t joints, poses;
+  };
+  using OfCluster = std::vector<std::vector<Part>>;
+
+  void add(const NodeClusters& clusters, std::span<const std::uint32_t> node,
+           std::span<const std::int16_t> field, OfCluster& out);
+
   std::size_t modes_ = 0;
   std::vector<OfJoint> joints_;
-  std::vector<std::uint32_t> begin_;  // #clusters + 1, into parts_
+  std::vector<OfPose> poses_;
+  std::vector<Begin> begin_;  // #clusters + 1
   std::vector<Part> parts_;
   Aligned<std::int16_t> field_;
 };

@@ -9,8 +9,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace ecorche::runtime::HWY_NAMESPACE {
 
-/// What one joint adds at a vector of a cluster's lanes.
-HWY_INLINE V3 of_joint(const SkinClusters& job, const Corrections::Part& part, std::size_t lane) {
+/// What one joint, or one pose, adds at a vector of a cluster's lanes.
+HWY_INLINE V3 of_part(const SkinClusters& job, const Corrections::Part& part, std::size_t lane) {
   const hn::Rebind<std::int16_t, F> d;
   const auto load = [&](const std::int16_t* from)
                         HWY_ATTR { return hn::ConvertTo(F(), hn::PromoteTo(I(), hn::LoadU(d, from))); };
@@ -27,14 +27,14 @@ HWY_INLINE V3 of_joint(const SkinClusters& job, const Corrections::Part& part, s
   return u;
 }
 
-/// The corrections of a cluster at a vector of its lanes, all joints together (values/correction.hpp).
-HWY_INLINE V3 correction(const SkinClusters& job, std::size_t cluster, std::size_t lane) {
-  const auto parts = job.corrections->of(cluster);
-  V3 u = of_joint(job, parts[0], lane);
+/// All joints together (JointCorrection).
+HWY_INLINE V3 of_joints(const SkinClusters& job, std::span<const Corrections::Part> parts, std::size_t lane) {
+  if (parts.empty()) return V3{hn::Zero(F()), hn::Zero(F()), hn::Zero(F())};
+  V3 u = of_part(job, parts[0], lane);
   if (parts.size() == 1) return u;
   V most = length(u), sum = most;
   for (const Corrections::Part& part : parts.subspan(1)) {
-    const V3 other = of_joint(job, part, lane);
+    const V3 other = of_part(job, part, lane);
     const V far = length(other);
     u = plus(u, other);
     most = hn::Max(most, far);
@@ -44,6 +44,14 @@ HWY_INLINE V3 correction(const SkinClusters& job, std::size_t cluster, std::size
   const V square = hn::Mul(ratio, ratio), fourth = hn::Mul(square, square);
   const V left_out = hn::Div(hn::Mul(rest, fourth), hn::MulAdd(fourth, sum, sum));
   return times(u, hn::IfThenElse(hn::Gt(sum, hn::Zero(F())), hn::Sub(all(1), left_out), all(1)));
+}
+
+/// The corrections of a cluster at a vector of its lanes.
+HWY_INLINE V3 correction(const SkinClusters& job, std::size_t cluster, std::size_t lane) {
+  V3 u = of_joints(job, job.corrections->of_joints(cluster), lane);
+  for (const Corrections::Part& part : job.corrections->of_poses(cluster))
+    if (job.modes[part.first] != 0) u = plus(u, of_part(job, part, lane));
+  return u;
 }
 
 void skin_cor(const SkinClusters& job, std::size_t begin, std::size_t end) {

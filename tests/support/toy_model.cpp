@@ -336,12 +336,28 @@ Model fine_toy_model(int times) {
   return model;
 }
 
+// Of the nodes of `like`, up to 9.8 mm.
+PoseCorrection made_up_place(const JointCorrection& like) {
+  PoseCorrection out;
+  out.pose = "bent";
+  out.joint = {1, 2};
+  out.turn.resize(2, 3);
+  out.turn << 0.7, 0, 0, 0.1, 0.3, -0.2;
+  out.reach = 0.5;
+  out.scale = 3e-4F;
+  out.node = like.node;
+  out.field.assign(like.field.begin(),
+                   like.field.begin() + static_cast<std::ptrdiff_t>(3 * like.node.size()));
+  return out;
+}
+
 Model corrected_toy_model() {
   Model model = toy_model();
   JointCorrection::Turns line(3, 3), around(5, 3);
   line << 0.8, 0, 0, -0.5, 0, 0, 0.3, 0, 0;
   around << 0.5, 0, 0, 0, -0.6, 0, 0, 0, 0.4, 0.3, 0.3, 0.2, -0.4, 0.1, -0.2;
   model.corrections = {made_up_correction(model, 1, line, 3), made_up_correction(model, 2, around, 2)};
+  model.pose_corrections = {made_up_place(model.corrections[0])};
   SafeRange range;
   range.joint = 1;
   range.looked = 2.5;

@@ -13,8 +13,8 @@ namespace ecorche::test {
 Model toy_model();
 
 /// The same with a correction of its hinge (3 samples, as many modes) and of its ball (5 samples, 2 modes)
-/// that nobody measured, of every second free node each, and a safe range; every third tet, where it is soft,
-/// is of the tissue and four times as stiff.
+/// that nobody measured, of every second free node each, one of a whole pose of both, and a safe range; every
+/// third tet, where it is soft, is of the tissue and four times as stiff.
 Model corrected_toy_model();
 
 /// The same, its CT sampled so many times as finely along each axis: several bricks from 5 on.

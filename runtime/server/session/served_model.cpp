@@ -115,7 +115,7 @@ struct ServedModel::Made {
     if (std::string caps = cap_vertices(model); !caps.empty())
       opened.mutable_tissues(0)->set_cap_vertices(std::move(caps));
     for (const ModelVolume& volume : model.volumes) describe(volume, *opened.add_volumes());
-    opened.set_corrected(!model.corrections.empty());
+    opened.set_corrected(model.corrected());
     for (const SafeRange& range : model.safe_ranges) describe(range, *opened.add_safe_ranges());
   }
   void lay_out(const Model& model) {
@@ -228,7 +228,7 @@ void ServedModel::describe_skinning(const std::vector<std::uint32_t>& tissues, s
   skinning_.describe(
       *poser_, [this](std::uint32_t l, std::uint32_t t) { return &level(l, t); }, tissues, detail, out,
       payload);
-  out.set_without_correction(!model().corrections.empty());
+  out.set_without_correction(model().corrected());
 }
 
 const runtime::Probe& ServedModel::probe() const {

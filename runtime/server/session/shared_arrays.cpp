@@ -18,6 +18,7 @@ runtime::HeldArrays arrays_of(const Model& model) {
   for (const VolumetricSkeleton& balls : model.spheres)
     add(balls.voxel, balls.distance, balls.deficit, balls.parent, balls.segment);
   for (const JointCorrection& correction : model.corrections) add(correction.node, correction.field);
+  for (const PoseCorrection& correction : model.pose_corrections) add(correction.node, correction.field);
   return out;
 }
 

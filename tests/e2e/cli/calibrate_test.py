@@ -32,6 +32,11 @@ class Calibrate(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         return out
 
+    def quality(self, model, pose):
+        done = run("pose", model, "-o", self.folder / "judged", "--pose", pose, "--tissues", "skin")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads((self.folder / "judged/quality.json").read_text())
+
     def test_a_pose_between_samples_is_nearer_to_finite_elements(self):
         joints = "joints: {elbow_right: {flexion_deg: 40}}\n"
         to_cor = [json.loads((self.pose(model, "forty", joints, "fem", "--one-start") / "fem.json").read_text())["to_cor"]
@@ -120,6 +125,41 @@ class Calibrate(unittest.TestCase):
         self.assertGreater(joint["clean_deg"], 89)
         deepest = max((sample for sample in joint["tried"] if sample["clean"]), key=lambda sample: sample["from_rest_deg"][0])
         self.assertGreater(deepest["inverted_skinned"], 2 * deepest["inverted"])
+
+    def test_whole_poses_pass_as_settled_without_settling(self):
+        out, mine = self.folder / "poses.hdf", self.folder / "mine.yaml"
+        mine.write_text(HEAD + "joints: {knee_left: {flexion_deg: 65}, elbow_left: {flexion_deg: 60}}\n")
+        words = ("--joints", "elbow_right", "--cache", self.cache, "--step", 30, "--no-ranges")
+        done = run("--json", "calibrate", self.model, "-o", out, *words, "--poses", f"lib:sitting,{mine}")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = {row["pose"]: row for row in json.loads(done.stdout)["poses"]}
+        self.assertEqual(sorted(rows), sorted(["lib:sitting", str(mine)]))
+        self.assertEqual((rows[str(mine)]["passed"], rows[str(mine)]["passes"]), (False, True))
+        for pose, row in rows.items():
+            quality = [self.quality(model, pose) for model in (self.calibrated, out)]
+            self.assertEqual([was["verdict"] for was in quality], ["pass" if passes else "warn" for passes in (row["passed"], row["passes"])], pose)
+            self.assertLess(quality[1]["inverted_tets"], quality[0]["inverted_tets"] / 5, pose)
+        # Where nothing about a place is as in a pose, all is as before.
+        other = "joints: {knee_left: {flexion_deg: 30}, elbow_right: {flexion_deg: 50}}\n"
+        posed = [self.pose(model, "elsewhere", other) for model in (out, self.calibrated)]
+        self.assertEqual((posed[0] / "skin.stl").read_bytes(), (posed[1] / "skin.stl").read_bytes())
+
+        info = json.loads(run("--json", "info", out).stdout)
+        self.assertEqual({row["pose"] for row in info["pose_corrections"]}, set(rows))
+        self.assertEqual(sum(row["nodes"] for row in info["pose_corrections"]), sum(row["nodes"] for row in rows.values()))
+        knees = [row for row in info["pose_corrections"] if row["pose"] == str(mine) and "knee_left" in row["joints"]]
+        self.assertTrue(knees and all(0 < row["reach_deg"] <= 30 for row in knees), info["pose_corrections"])
+        self.assertRegex(run("info", out).stdout, r"lib:sitting +\d+ +\d+")
+
+    def test_whole_poses_that_are_none_are_refused(self):
+        for words, code, line in (
+                (("--poses", "lib:siting"), 64, "has no pose 'siting' (it has anatomical, arms_up"),
+                (("--poses", "absent.yaml"), 66, "absent.yaml: "),
+                (("--poses", "lib:sitting", "--no-poses"), 64, "--poses excludes --no-poses")):
+            done = run("calibrate", self.model, "-o", self.folder / "none.hdf", "--joints", "elbow_right", "--cache", self.cache, "--step", 30, *words)
+            self.assertEqual(done.returncode, code, done.stderr)
+            self.assertIn(line, done.stderr)
+            self.assertFalse((self.folder / "none.hdf").exists())
 
     def test_a_finer_model_takes_it_over(self):
         fine, out = self.folder / "fine.hdf", self.folder / "fine_calibrated.hdf"

@@ -130,7 +130,7 @@ class Data(Parts):
     def test_verdicts_of_a_deep_pose(self):
         rows, pictures = self.found("verdicts", "--data", os.environ["ECORCHE_DATA"])
         self.assertEqual(list(rows), ["icrp110_female: sitting"])
-        self.assertRegex(rows["icrp110_female: sitting"], r"^skinned: (pass|warn)\b.*; corrected: (pass|warn)\b.*; settled: (pass|warn)\b")
+        self.assertRegex(rows["icrp110_female: sitting"], r"^skinned: (pass|warn)\b.*; joints alone: (pass|warn)\b.*; corrected: (pass|warn)\b.*; settled: (pass|warn)\b")
         self.assertEqual(len(pictures), 0 if "corrected: pass" in rows["icrp110_female: sitting"] else 1)
 
 

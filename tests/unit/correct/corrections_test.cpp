@@ -67,6 +67,7 @@ std::shared_ptr<Model> crowded_toy() {
   for (float& scale : hinge.scale) scale *= 3;
   for (float& scale : ball.scale) scale *= 3;
   hinge.node = ball.node;
+  model->pose_corrections.clear();
   hinge.field.resize(3 * hinge.scale.size() * hinge.node.size(), 9000);
   return model;
 }
@@ -83,6 +84,7 @@ TEST(Corrections, OfJointsThatMoveTheSameFleshMakeRoomOnce) {
     for (const JointCorrection& only : model->corrections) {
       Model alone = *model;
       alone.corrections = {only};
+      alone.pose_corrections.clear();
       const auto one = slow_corrected_nodes(alone, body.pose, segments);
       const auto none = reference_nodes(*model, segments, Skinning::cor, 1e-4);
       for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += one[n] - none[n];
@@ -90,6 +92,26 @@ TEST(Corrections, OfJointsThatMoveTheSameFleshMakeRoomOnce) {
     left_out = std::max(left_out, farthest(body.nodes, sum));
   }
   EXPECT_GT(left_out, 5);
+}
+
+TEST(Corrections, OfAWholePoseFadeAwayFromIt) {
+  const auto model = corrected_toy();
+  auto joints_alone = std::make_shared<Model>(*model);
+  joints_alone->pose_corrections.clear();
+  const BodyPoser poser(model), alone(joints_alone);
+  double before = std::numeric_limits<double>::infinity(), nearest = 0;
+  for (const double off : {0.0, 0.1, 0.3, 0.45, 0.51}) {
+    const Pose pose = pose_of(*model, 0.7 - off, Eigen::Vector3d(0.1, 0.3, -0.2));
+    const PosedBody body = posed(poser, pose);
+    const auto segments = kinematics::forward(model->rig, body.pose);
+    EXPECT_LT(farthest(body.nodes, slow_corrected_nodes(*model, body.pose, segments)), 1e-3);
+    const double far = farthest(body.nodes, slow_corrected_nodes(*joints_alone, body.pose, segments));
+    EXPECT_LT(far, before);
+    before = far;
+    nearest = std::max(nearest, far);
+    EXPECT_EQ(body.nodes == posed(alone, pose).nodes, off > 0.5);
+  }
+  EXPECT_GT(nearest, 5);
 }
 
 TEST(Corrections, EndWhereTheirSamplesEnd) {
@@ -105,6 +127,7 @@ TEST(Corrections, LeaveRestAndBonesToTheBit) {
   const auto with = corrected_toy();
   auto without = std::make_shared<Model>(*with);
   without->corrections.clear();
+  without->pose_corrections.clear();
   const BodyPoser corrected(with), plain(without);
   Pose rest = pose_of(*with, 0, Eigen::Vector3d::Zero());
   EXPECT_EQ(posed(corrected, rest).nodes, posed(plain, rest).nodes);

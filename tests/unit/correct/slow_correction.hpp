@@ -56,6 +56,15 @@ inline Eigen::VectorXd slow_shares_of_ball(const JointCorrection& c, Eigen::RowV
   return kernel.colPivHouseholderQr().solve(here).head(n);
 }
 
+/// What turns with a node.
+inline Eigen::Quaterniond slow_frame(const Model& model, std::size_t node,
+                                     const std::vector<RigidTransform>& segments) {
+  Eigen::Quaterniond blend(0, 0, 0, 0);
+  for (const auto& [s, w] : reference_weights(model, node, 1e-4))
+    blend.coeffs() += w * segments[s].q.coeffs();
+  return blend.normalized();
+}
+
 /// What several joints move a node by together.
 inline Eigen::Vector3d slow_together(const std::vector<Eigen::Vector3d>& moved) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -89,13 +98,26 @@ inline std::vector<Eigen::Vector3d> slow_corrected_nodes(const Model& model, con
         for (std::size_t k = 0; k < 3; ++k)
           u[static_cast<Eigen::Index>(k)] += mode * c.field[3 * (m * c.node.size() + row) + k];
       }
-      Eigen::Quaterniond blend(0, 0, 0, 0);
-      for (const auto& [s, w] : reference_weights(model, c.node[row], 1e-4))
-        blend.coeffs() += w * segments[s].q.coeffs();
-      moved[c.node[row]].push_back(blend.normalized() * u);
+      moved[c.node[row]].push_back(slow_frame(model, c.node[row], segments) * u);
     }
   }
   for (std::size_t n = 0; n < out.size(); ++n) out[n] += slow_together(moved[n]);
+  for (const PoseCorrection& c : model.pose_corrections) {
+    double squared = 0;
+    for (std::size_t j = 0; j < c.joint.size(); ++j) {
+      const Eigen::Vector3d turn = c.turn.row(static_cast<Eigen::Index>(j)).transpose();
+      const Eigen::AngleAxisd there(turn.norm(), turn.normalized());
+      squared += std::pow(
+          Eigen::Quaterniond(there).angularDistance(pose.rotation[static_cast<std::size_t>(c.joint[j])]), 2);
+    }
+    const double share = squared < c.reach * c.reach ? std::pow(1 - squared / (c.reach * c.reach), 2) : 0;
+    for (std::size_t row = 0; row < c.node.size(); ++row) {
+      const Eigen::Vector3d u =
+          share * c.scale *
+          Eigen::Map<const Eigen::Matrix<std::int16_t, 3, 1>>(&c.field[3 * row]).cast<double>();
+      out[c.node[row]] += slow_frame(model, c.node[row], segments) * u;
+    }
+  }
   return out;
 }
 

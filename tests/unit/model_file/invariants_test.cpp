@@ -163,6 +163,28 @@ const std::vector<Break> kBreaks{
            0))};
      }},
     {"/ecorche/correction/tip_joint/field", [](Model& m) { m.corrections[1].field.pop_back(); }},
+    {"/ecorche/pose_correction/place_1/joint",
+     [](Model& m) {
+       m.pose_corrections[0].joint = {2, 1};
+     }},
+    {"/ecorche/pose_correction/place_1/joint",
+     [](Model& m) {
+       m.pose_corrections[0].joint = {0, 1};
+     }},
+    {"/ecorche/pose_correction/place_1/joint",
+     [](Model& m) {
+       m.pose_corrections[0].joint = {1, 3};
+     }},
+    {"/ecorche/pose_correction/place_1/joint", [](Model& m) { m.pose_corrections[0].joint.clear(); }},
+    {"/ecorche/pose_correction/place_1/turn",
+     [](Model& m) { m.pose_corrections[0].turn.conservativeResize(1, 3); }},
+    {"/ecorche/pose_correction/place_1/turn", [](Model& m) { m.pose_corrections[0].turn(1, 2) = kNan; }},
+    {"/ecorche/pose_correction/place_1/reach", [](Model& m) { m.pose_corrections[0].reach = 0; }},
+    {"/ecorche/pose_correction/place_1/reach", [](Model& m) { m.pose_corrections[0].reach = 0.9; }},
+    {"/ecorche/pose_correction/place_1/reach", [](Model& m) { m.pose_corrections[0].reach = kNan; }},
+    {"/ecorche/pose_correction/place_1/scale", [](Model& m) { m.pose_corrections[0].scale = kNanF; }},
+    {"/ecorche/pose_correction/place_1/node", [](Model& m) { m.pose_corrections[0].node.back() = 1 << 20; }},
+    {"/ecorche/pose_correction/place_1/field", [](Model& m) { m.pose_corrections[0].field.pop_back(); }},
     {"/ecorche/safe_range/joint", [](Model& m) { m.safe_ranges[1].joint = 3; }},
     {"/ecorche/safe_range/joint", [](Model& m) { m.safe_ranges[1].way = -1; }},
     {"/ecorche/safe_range/angle", [](Model& m) { m.safe_ranges[1].angle = 3; }},

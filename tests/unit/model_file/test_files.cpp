@@ -83,6 +83,7 @@ Model full_model() {
   model.spheres.insert(model.spheres.begin(), few);
   const Model corrected = corrected_toy_model();
   model.corrections = corrected.corrections;
+  model.pose_corrections = corrected.pose_corrections;
   model.safe_ranges = corrected.safe_ranges;
   model.materials = corrected.materials;
   double figure = 1;
@@ -235,6 +236,13 @@ void expect_same(const Model& a, const Model& b) {
     EXPECT_EQ(a.corrections[i].scale, b.corrections[i].scale);
     EXPECT_EQ(a.corrections[i].node, b.corrections[i].node);
     EXPECT_EQ(a.corrections[i].field, b.corrections[i].field);
+  }
+  ASSERT_EQ(a.pose_corrections.size(), b.pose_corrections.size());
+  for (std::size_t i = 0; i < a.pose_corrections.size(); ++i) {
+    const PoseCorrection &p = a.pose_corrections[i], &q = b.pose_corrections[i];
+    EXPECT_EQ(std::tie(p.pose, p.joint, p.reach, p.scale, p.node, p.field),
+              std::tie(q.pose, q.joint, q.reach, q.scale, q.node, q.field));
+    EXPECT_TRUE(same(p.turn, q.turn));
   }
   ASSERT_EQ(a.safe_ranges.size(), b.safe_ranges.size());
   for (std::size_t i = 0; i < a.safe_ranges.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <vector>
 
 namespace ecorche {
@@ -16,8 +17,8 @@ namespace ecorche {
 /// skinning turns with the node. At rest every field is zero.
 ///
 /// Each joint was sampled with the others at rest: where several move the same flesh far, as both hips do the
-/// groin's, it would make room twice. So their sum is taken (m + o / (1 + (o / room_mm)^4)) / (m + o) times, m
-/// being the longest of their displacements of the node and o the lengths of the others together.
+/// groin's, it would make room twice. So their sum is taken (m + o / (1 + (o / room_mm)^4)) / (m + o) times,
+/// m being the longest of their displacements of the node and o the lengths of the others together.
 struct JointCorrection {
   static constexpr float room_mm = 8;  ///< little of what lies well below is lost
 
@@ -34,6 +35,21 @@ struct JointCorrection {
   std::vector<float> scale;         ///< #modes, mm
   std::vector<std::uint32_t> node;  ///< rows of the nodes that it moves, ascending
   std::vector<std::int16_t> field;  ///< #modes * #node * 3
+};
+
+/// What JointCorrection leaves of one whole pose, at one place of the body: joints that bend together make
+/// other room than each alone. At a pose whose turns of `joint` are d radians away (the root of the sum of
+/// squares of the angles between), node[n] is moved by (1 - (d / reach)^2)^2 scale field[n], in the frame
+/// that skinning turns with the node; nothing from `reach` on.
+struct PoseCorrection {
+  std::string pose;  ///< what the pose is called
+  std::vector<std::int32_t>
+      joint;                    ///< rows of the skeleton that decide: those that move the place, ascending
+  JointCorrection::Turns turn;  ///< #joint by 3, rotation vectors from rest, radians: of the pose
+  double reach = 0;             ///< radians; rest and the other poses are no nearer
+  float scale = 0;              ///< mm
+  std::vector<std::uint32_t> node;  ///< as of JointCorrection
+  std::vector<std::int16_t> field;  ///< #node * 3
 };
 
 /// How far one angle of a joint may be turned from rest, the others at rest, before the body stops being one.

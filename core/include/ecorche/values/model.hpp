@@ -130,8 +130,11 @@ struct Model {
   std::map<std::string, std::string> provenance;  ///< options, versions, input digests; no times
   /// Ascending by joint. Empty unless `ecorche calibrate` made them, as are the ranges.
   std::vector<JointCorrection> corrections;
+  std::vector<PoseCorrection> pose_corrections;
   std::vector<SafeRange> safe_ranges;  ///< ascending by joint, then angle, then way
 
+  /// Whether skinning about centres of rotation is corrected.
+  bool corrected() const { return !corrections.empty() || !pose_corrections.empty(); }
   /// Nodes of the tets.
   std::size_t node_count() const { return static_cast<std::size_t>(nodes.rows()); }
   /// Tets.
