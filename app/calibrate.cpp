@@ -119,7 +119,7 @@ int run(const Program& program, const CalibrateSettings& s) {
   warn_of(program, found);
   model->corrections = std::move(found.corrections);
   const auto solved = Clock::now();
-  const json poses = add_whole_poses(program, whole, *model);
+  const json poses = add_whole_poses(program, whole, model, store ? &*store : nullptr);
   const auto settled = Clock::now();
   std::vector<std::size_t> rows;
   for (const std::string& joint : s.options.joints)

@@ -2,14 +2,19 @@
 #include "app/whole_poses.hpp"
 
 #include <algorithm>
-#include <memory>
+#include <concepts>
+#include <iterator>
+#include <optional>
+#include <type_traits>
 #include <utility>
 
 #include <ecorche/io/pose_library.hpp>
 #include <ecorche/kinematics/angles.hpp>
+#include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/body_poser.hpp>
 #include "app/measured_pose.hpp"
 #include "app/pose_frames.hpp"
+#include "preprocess/cache/kept_stage.hpp"
 
 namespace ecorche::app {
 namespace {
@@ -25,19 +30,78 @@ correct::WholePose whole_pose(const Program& program, const std::string& name, c
   return out;
 }
 
-json row_of(const std::string& pose, const std::vector<PoseCorrection>& places, bool passed, bool passes) {
+// What one pose came to.
+struct Settled {
+  std::vector<PoseCorrection> places;
+  std::uint8_t passed = 0, passes = 0;
+};
+
+template <class A, class T>
+requires std::same_as<std::remove_const_t<T>, Settled>
+void fields(A& archive, T& settled) {
+  archive(settled.places, settled.passed, settled.passes);
+}
+
+// One pose after the other, each with what those before it left in the model.
+class PoseSettler {
+ public:
+  PoseSettler(const std::shared_ptr<Model>& model, std::span<const correct::WholePose> poses)
+      : model_(model), poses_(poses) {}
+
+  Settled run(const correct::WholePose& whole, const Context& context) {
+    if (!settler_) settler_.emplace(*model_, context.quiet());
+    const runtime::BodyPoser poser(model_);
+    MeasuredPose posed(poser);
+    if (const Status status = posed.run(whole.pose, runtime::Skinning::cor); !status.ok())
+      throw Error(ErrorKind::data, whole.name, status.message, "mend the pose");
+    const std::vector<float> skinned = posed.still().nodes;
+    Settled out;
+    out.passed = posed.measure().pass ? 1 : 0;
+    posed.settle(*settler_, context.quiet());
+    out.passes = posed.measure().pass ? 1 : 0;
+    out.places = correct::pose_places(*model_, whole, poses_, skinned, posed.still().nodes, {});
+    return out;
+  }
+
+  // The model's identity has what those before it left, and the rig.
+  Settled run(const correct::WholePose& whole, preprocess::StageStore& store, const Context& context) {
+    namespace cache = preprocess::cache;
+    std::vector<double> turns;
+    const auto add = [&](const Pose& pose) {
+      for (const Eigen::Quaterniond& q : pose.rotation)
+        turns.insert(turns.end(), q.coeffs().begin(), q.coeffs().end());
+    };
+    add(whole.pose);
+    for (const correct::WholePose& other : poses_) add(other.pose);
+    const std::string name = cache::key(store, "pose", model_file::identity(*model_), whole.name, turns);
+    if (auto kept = cache::take<Settled>(store, name, context)) return std::move(*kept);
+    return cache::make_and_keep(store, name, context,
+                                [&](const Context& inner) { return run(whole, inner); });
+  }
+
+ private:
+  const std::shared_ptr<Model>& model_;
+  std::span<const correct::WholePose> poses_;
+  std::optional<runtime::FleshSettler> settler_;
+};
+
+double largest_mm(const PoseCorrection& place) {
+  double most = 0;
+  for (std::size_t i = 0; i < place.field.size(); i += 3)
+    most = std::max(
+        most, Eigen::Map<const Eigen::Matrix<std::int16_t, 3, 1>>(&place.field[i]).cast<double>().norm());
+  return static_cast<double>(place.scale) * most;
+}
+
+json row_of(const std::string& pose, const Settled& settled) {
   std::size_t nodes = 0;
   double most = 0;
-  for (const PoseCorrection& place : places) {
+  for (const PoseCorrection& place : settled.places) {
     nodes += place.node.size();
-    for (std::size_t i = 0; i < place.field.size(); i += 3)
-      most = std::max(
-          most,
-          static_cast<double>(place.scale) *
-              Eigen::Map<const Eigen::Matrix<std::int16_t, 3, 1>>(&place.field[i]).cast<double>().norm());
+    most = std::max(most, largest_mm(place));
   }
-  return {{"pose", pose},       {"places", places.size()}, {"nodes", nodes},
-          {"largest_mm", most}, {"passed", passed},        {"passes", passes}};
+  return {{"pose", pose},       {"places", settled.places.size()}, {"nodes", nodes},
+          {"largest_mm", most}, {"passed", settled.passed != 0},   {"passes", settled.passes != 0}};
 }
 
 }  // namespace
@@ -57,29 +121,20 @@ std::vector<correct::WholePose> whole_poses(const Program& program, const std::v
   return out;
 }
 
-json add_whole_poses(const Program& program, std::span<const correct::WholePose> poses, Model& model) {
+json add_whole_poses(const Program& program, std::span<const correct::WholePose> poses,
+                     const std::shared_ptr<Model>& model, preprocess::StageStore* store) {
   json rows = json::array();
-  if (poses.empty()) return rows;
+  PoseSettler settler(model, poses);
   const Context context = program.context("whole poses");
-  const runtime::FleshSettler settler(model, context.quiet());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     context.check_stop();
     context.report(static_cast<double>(i) / static_cast<double>(poses.size()));
-    const correct::WholePose& whole = poses[i];
-    // Its own copy: the poser keeps it, and `model` is added to.
-    const runtime::BodyPoser poser(std::make_shared<const Model>(model));
-    MeasuredPose posed(poser);
-    if (const Status status = posed.run(whole.pose, runtime::Skinning::cor); !status.ok())
-      throw Error(ErrorKind::data, whole.name, status.message, "mend the pose");
-    const std::vector<float> skinned = posed.still().nodes;
-    const bool passed = posed.measure().pass;
-    posed.settle(settler, context.quiet());
-    std::vector<PoseCorrection> places =
-        correct::pose_places(model, whole, poses, skinned, posed.still().nodes, {});
-    rows.push_back(row_of(whole.name, places, passed, posed.measure().pass));
-    std::move(places.begin(), places.end(), std::back_inserter(model.pose_corrections));
+    Settled settled =
+        store == nullptr ? settler.run(poses[i], context) : settler.run(poses[i], *store, context);
+    rows.push_back(row_of(poses[i].name, settled));
+    std::move(settled.places.begin(), settled.places.end(), std::back_inserter(model->pose_corrections));
   }
-  context.report(1);
+  if (!poses.empty()) context.report(1);
   return rows;
 }
 

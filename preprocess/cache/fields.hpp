@@ -54,6 +54,12 @@ void fields(A& archive, T& cor) {
   archive(cor.centre, cor.has_centre, cor.sigma);
 }
 
+template <class A, Some<PoseCorrection> T>
+void fields(A& archive, T& correction) {
+  archive(correction.pose, correction.joint, correction.turn, correction.reach, correction.scale,
+          correction.node, correction.field);
+}
+
 template <class A, Some<VolumetricSkeleton> T>
 void fields(A& archive, T& skeleton) {
   archive(skeleton.name, skeleton.grid, skeleton.metric, skeleton.thinness, skeleton.voxel, skeleton.distance,

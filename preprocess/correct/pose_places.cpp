@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include <ecorche/kinematics/forward.hpp>
@@ -39,36 +40,51 @@ Points left_of(const Model& model, const Pose& pose, std::span<const float> skin
   return out;
 }
 
+// Sets of nodes; a set is named by one of its nodes.
+class Sets {
+ public:
+  explicit Sets(std::size_t nodes) : parent_(nodes) { std::iota(parent_.begin(), parent_.end(), 0); }
+  std::int32_t of(std::int32_t node) {
+    while (parent(node) != node) node = parent(node) = parent(parent(node));
+    return node;
+  }
+  void join(std::int32_t a, std::int32_t b) { parent(of(a)) = of(b); }
+
+ private:
+  std::int32_t& parent(std::int32_t node) { return parent_[static_cast<std::size_t>(node)]; }
+  std::vector<std::int32_t> parent_;
+};
+
 // Of each node: its place, or none. Places are what hangs together of nodes that move by more than core_mm,
 // and what hangs on them of those that move by more than least_mm.
 std::vector<std::int32_t> places_of(const Model& model, const Points& left, const PlaceOptions& options) {
   const Eigen::VectorXd far = left.rowwise().norm();
+  const auto core = [&](std::int32_t node) { return far[node] > options.core_mm; };
+  Sets sets(model.node_count());
+  for (Eigen::Index t = 0; t < model.tets.rows(); ++t)
+    for (Eigen::Index c = 1; c < 4; ++c)
+      for (Eigen::Index before = 0; before < c; ++before)
+        if (core(model.tets(t, c)) && core(model.tets(t, before)))
+          sets.join(model.tets(t, c), model.tets(t, before));
   std::vector<std::int32_t> place(model.node_count(), kNoPlace);
-  for (std::size_t n = 0; n < place.size(); ++n)
-    if (far[static_cast<Eigen::Index>(n)] > options.core_mm) place[n] = static_cast<std::int32_t>(n);
-  // The least of a tet's places goes to its corners until nothing changes: first among cores, then beyond.
-  const auto spread = [&](bool cores) {
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (Eigen::Index t = 0; t < model.tets.rows(); ++t) {
-        std::int32_t least = kNoPlace;
-        for (Eigen::Index c = 0; c < 4; ++c) {
-          const std::int32_t own = place[static_cast<std::size_t>(model.tets(t, c))];
-          if (own != kNoPlace && (least == kNoPlace || own < least)) least = own;
-        }
-        for (Eigen::Index c = 0; c < 4 && least != kNoPlace; ++c) {
-          std::int32_t& own = place[static_cast<std::size_t>(model.tets(t, c))];
-          const bool takes =
-              cores ? own > least : own == kNoPlace && far[model.tets(t, c)] > options.least_mm;
-          if (!takes) continue;
-          own = least;
-          changed = true;
-        }
+  for (std::int32_t n = 0; n < static_cast<std::int32_t>(place.size()); ++n)
+    if (core(n)) place[static_cast<std::size_t>(n)] = sets.of(n);
+  // A layer of tets at a time.
+  for (bool grows = true; grows;) {
+    grows = false;
+    const std::vector<std::int32_t> before = place;
+    for (Eigen::Index t = 0; t < model.tets.rows(); ++t) {
+      std::int32_t beside = kNoPlace;
+      for (Eigen::Index c = 0; c < 4; ++c)
+        beside = std::max(beside, before[static_cast<std::size_t>(model.tets(t, c))]);
+      for (Eigen::Index c = 0; c < 4 && beside != kNoPlace; ++c) {
+        std::int32_t& own = place[static_cast<std::size_t>(model.tets(t, c))];
+        if (own != kNoPlace || !(far[model.tets(t, c)] > options.least_mm)) continue;
+        own = beside;
+        grows = true;
       }
     }
-  };
-  spread(true);
-  spread(false);
+  }
   return place;
 }
 
@@ -106,22 +122,19 @@ double distance(const Pose& a, const Pose& b, const Joints& joints) {
 using ByJoints = std::map<Joints, std::vector<std::uint32_t>>;
 
 // A few nodes go to the place of fewest joints that has all of theirs.
-ByJoints gathered(ByJoints all, std::size_t few) {
+ByJoints gathered(const ByJoints& all, std::size_t few) {
   ByJoints out;
-  std::erase_if(all, [&](auto& place) {
-    if (place.second.size() < few) return false;
-    out.insert(place);
-    return true;
-  });
-  for (auto& [joints, nodes] : all) {
-    const auto has_all = [&, own = std::cref(joints)](const auto& place) {
-      return std::includes(place.first.begin(), place.first.end(), own.get().begin(), own.get().end());
-    };
-    auto best = out.end();
-    for (auto at = out.begin(); at != out.end(); ++at)
-      if (has_all(*at) && (best == out.end() || at->first.size() < best->first.size())) best = at;
-    if (best == out.end()) best = out.emplace(joints, std::vector<std::uint32_t>()).first;
-    best->second.insert(best->second.end(), nodes.begin(), nodes.end());
+  for (const auto& [joints, nodes] : all)
+    if (nodes.size() >= few) out[joints] = nodes;
+  for (const auto& [joints, nodes] : all) {
+    if (nodes.size() >= few) continue;
+    const Joints* best = &joints;
+    for (const auto& [others, theirs] : out) {
+      const bool has_all = std::includes(others.begin(), others.end(), joints.begin(), joints.end());
+      if (has_all && (best == &joints || others.size() < best->size())) best = &others;
+    }
+    std::vector<std::uint32_t>& into = out[*best];
+    into.insert(into.end(), nodes.begin(), nodes.end());
   }
   for (auto& [joints, nodes] : out) std::sort(nodes.begin(), nodes.end());
   return out;
@@ -142,7 +155,7 @@ ByJoints by_joints(const Model& model, const Points& left, const PlaceOptions& o
   ByJoints out;
   for (std::size_t n = 0; n < place.size(); ++n)
     if (place[n] != kNoPlace) out[about[place[n]]].push_back(static_cast<std::uint32_t>(n));
-  return gathered(std::move(out), options.few);
+  return gathered(out, options.few);
 }
 
 }  // namespace

@@ -139,6 +139,11 @@ class Calibrate(unittest.TestCase):
             quality = [self.quality(model, pose) for model in (self.calibrated, out)]
             self.assertEqual([was["verdict"] for was in quality], ["pass" if passes else "warn" for passes in (row["passed"], row["passes"])], pose)
             self.assertLess(quality[1]["inverted_tets"], quality[0]["inverted_tets"] / 5, pose)
+        again = self.folder / "poses_again.hdf"
+        done = run("--json", "calibrate", self.model, "-o", again, *words, "--poses", f"lib:sitting,{mine}")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(again.read_bytes(), out.read_bytes())
+        self.assertEqual(sorted(file.name.split("-")[0] for file in self.cache.glob("pose-*")), ["pose", "pose"])
         # Where nothing about a place is as in a pose, all is as before.
         other = "joints: {knee_left: {flexion_deg: 30}, elbow_right: {flexion_deg: 50}}\n"
         posed = [self.pose(model, "elsewhere", other) for model in (out, self.calibrated)]
