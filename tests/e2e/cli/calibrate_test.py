@@ -145,7 +145,7 @@ class Calibrate(unittest.TestCase):
         self.assertEqual(again.read_bytes(), out.read_bytes())
         self.assertEqual(sorted(file.name.split("-")[0] for file in self.cache.glob("pose-*")), ["pose", "pose"])
         # Where nothing about a place is as in a pose, all is as before.
-        other = "joints: {knee_left: {flexion_deg: 30}, elbow_right: {flexion_deg: 50}}\n"
+        other = "joints: {knee_left: {flexion_deg: 30}, elbow_right: {flexion_deg: 20}}\n"
         posed = [self.pose(model, "elsewhere", other) for model in (out, self.calibrated)]
         self.assertEqual((posed[0] / "skin.stl").read_bytes(), (posed[1] / "skin.stl").read_bytes())
 
