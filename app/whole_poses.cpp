@@ -53,7 +53,7 @@ class PoseSettler {
     const runtime::BodyPoser poser(model_);
     MeasuredPose posed(poser);
     if (const Status status = posed.run(whole.pose, runtime::Skinning::cor); !status.ok())
-      throw Error(ErrorKind::data, whole.name, status.message, "mend the pose");
+      throw Error(ErrorKind::data, whole.name, status.message, "mend the pose file");
     const std::vector<float> skinned = posed.still().nodes;
     Settled out;
     out.passed = posed.measure().pass ? 1 : 0;

@@ -157,7 +157,10 @@ class Calibrate(unittest.TestCase):
         self.assertRegex(run("info", out).stdout, r"lib:sitting +\d+ +\d+")
 
     def test_whole_poses_that_are_none_are_refused(self):
+        far = self.folder / "far.yaml"
+        far.write_text(HEAD + "root: {translation_mm: [1.0e+12, 0, 0]}\njoints: {}\n")
         for words, code, line in (
+                (("--poses", far), 65, "far.yaml: the root's translation is not within 1e9 mm (mend the pose file)"),
                 (("--poses", "lib:siting"), 64, "has no pose 'siting' (it has anatomical, arms_up"),
                 (("--poses", "absent.yaml"), 66, "absent.yaml: "),
                 (("--poses", "lib:sitting", "--no-poses"), 64, "--poses excludes --no-poses")):

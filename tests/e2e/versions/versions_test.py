@@ -81,7 +81,7 @@ class Versions(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             (folder / "before.hdf").write_bytes(gzip.decompress(golden.read_bytes()))
-            words = ["corrected"] if golden.name == "toy_1_3.hdf.gz" else []
+            words = ["corrected_by_joints"] if golden.name in ("toy_1_3.hdf.gz", "toy_1_4.hdf.gz") else []
             subprocess.run([WRITE_TOY_MODEL, folder / "today.hdf", *words], check=True)
             (folder / "bent.yaml").write_text(POSE)
             surfaces = {}
@@ -103,12 +103,13 @@ class Versions(unittest.TestCase):
 
     def test_a_model_has_the_lowest_minor_that_says_all_of_it(self):
         with tempfile.TemporaryDirectory() as name:
-            for words, minor in (([], 3), (["corrected"], 4)):
+            for words, minor in (([], 3), (["corrected_by_joints"], 4), (["corrected"], 5)):
                 model = pathlib.Path(name, "toy.hdf")
                 subprocess.run([WRITE_TOY_MODEL, model, *words], check=True)
                 with h5py.File(model, "r") as file:
                     self.assertEqual(list(file["ecorche"].attrs["format"]), [1, minor])
-                    self.assertEqual("materials" in file["ecorche"], minor == 4)
+                    self.assertEqual("materials" in file["ecorche"], minor >= 4)
+                    self.assertEqual("pose_correction" in file["ecorche"], minor == 5)
 
     def test_another_major_is_refused(self):
         with tempfile.TemporaryDirectory() as name:

@@ -173,6 +173,24 @@ TEST(Corrections, HaveNoMemoryAndCareForNoThreads) {
   EXPECT_EQ(posed(poser, bent).nodes, again.nodes);
 }
 
+TEST(Corrections, OfAWholePoseThatDoNotFitAreRefused) {
+  for (const auto& harm :
+       {+[](PoseCorrection& c) { c.joint[1] = 3; },
+        +[](PoseCorrection& c) { c.turn.conservativeResize(1, 3); }, +[](PoseCorrection& c) { c.reach = 0; },
+        +[](PoseCorrection& c) { c.node.back() = 1'000'000; },
+        +[](PoseCorrection& c) { c.field.pop_back(); }}) {
+    const auto model = corrected_toy();
+    harm(model->pose_corrections[0]);
+    try {
+      const BodyPoser poser(model);
+      FAIL() << "taken";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::data);
+      EXPECT_NE(std::string(error.what()).find("' does not fit its nodes and joints"), std::string::npos);
+    }
+  }
+}
+
 TEST(Corrections, ThatDoNotFitAreRefused) {
   for (const auto& harm :
        {+[](JointCorrection& c) { c.joint = 3; }, +[](JointCorrection& c) { c.field.pop_back(); },

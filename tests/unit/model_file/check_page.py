@@ -15,7 +15,7 @@ VOXELS = "the volume's"  # any type of voxels
 
 def pattern(path):
     """The path as the page writes it: names of tissues, volumes and joints are <name>."""
-    return re.sub(r"^/ecorche/(tissues|volumes|spheres|correction)/[^/]+/", r"/ecorche/\1/<name>/", path)
+    return re.sub(r"^/ecorche/(tissues|volumes|spheres|correction|pose_correction)/[^/]+/", r"/ecorche/\1/<name>/", path)
 
 
 def stored(path):

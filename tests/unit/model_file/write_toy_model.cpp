@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_toy_model FILE.hdf [corrected]
+// write_toy_model FILE.hdf [corrected|corrected_by_joints]
 #include <cstdio>
 #include <string_view>
 
@@ -7,11 +7,11 @@
 #include "tests/support/toy_model.hpp"
 
 int main(int argc, char** argv) {
-  const bool corrected = argc == 3 && std::string_view(argv[2]) == "corrected";
-  if (argc != 2 && !corrected) return 64;
+  const std::string_view word = argc == 3 ? argv[2] : "";
+  if (argc > 3 || argc < 2 || (argc == 3 && word != "corrected" && word != "corrected_by_joints")) return 64;
   try {
-    const ecorche::Model model =
-        corrected ? ecorche::test::corrected_toy_model() : ecorche::test::toy_model();
+    ecorche::Model model = argc == 3 ? ecorche::test::corrected_toy_model() : ecorche::test::toy_model();
+    if (word == "corrected_by_joints") model.pose_corrections.clear();
     ecorche::model_file::write(model, argv[1], {});
     return 0;
   } catch (const ecorche::Error& error) {
