@@ -109,6 +109,7 @@ json row_of(const std::string& pose, const Settled& settled) {
 std::vector<correct::WholePose> whole_poses(const Program& program, const std::vector<std::string>& names,
                                             const Rig& rig) {
   std::vector<correct::WholePose> out;
+  out.reserve(names.size());
   for (const std::string& name : names) out.push_back(whole_pose(program, name, rig));
   if (!names.empty()) return out;
   for (const std::string& name : io::library_poses()) {
