@@ -117,14 +117,13 @@ class Calibrate(unittest.TestCase):
             self.assertGreater(sample["iterations"], 0)
             self.assertTrue(not sample["clean"] or 2 * sample["inverted"] <= sample["inverted_skinned"], sample)
 
-    def test_a_knee_is_corrected_beyond_where_its_flesh_buckles(self):
-        """From 90 degrees on Newton's method finds no balance in its iterations: without a way through folds the correction ended at 80."""
-        done = run("--json", "calibrate", self.model, "-o", self.folder / "knee_calibrated.hdf", "--joints", "knee_right", "--no-ranges")
+    def test_a_shoulder_is_corrected_beyond_where_its_flesh_buckles(self):
+        """Newton's method finds no balance there in its iterations: without a way through folds three of its samples stay unsolved."""
+        done = run("--json", "calibrate", self.model, "-o", self.folder / "shoulder.hdf", "--joints", "shoulder_left", "--no-ranges")
         self.assertEqual(done.returncode, 0, done.stderr)
         (joint,) = json.loads(done.stdout)["joints"]
-        self.assertGreater(joint["clean_deg"], 89)
-        deepest = max((sample for sample in joint["tried"] if sample["clean"]), key=lambda sample: sample["from_rest_deg"][0])
-        self.assertGreater(deepest["inverted_skinned"], 2 * deepest["inverted"])
+        self.assertEqual([sample for sample in joint["tried"] if not sample["clean"]], [])
+        self.assertGreater(max(sample["iterations"] for sample in joint["tried"]), 60)  # it did not converge at once
 
     def test_whole_poses_pass_as_settled_without_settling(self):
         out, mine = self.folder / "poses.hdf", self.folder / "mine.yaml"
