@@ -106,8 +106,11 @@ std::shared_ptr<const Model> without_corrections(const Model& model) {
 }
 
 bool corrects(const Model& model, std::size_t joint) {
+  const auto row = static_cast<std::int32_t>(joint);
   return std::any_of(model.corrections.begin(), model.corrections.end(),
-                     [&](const JointCorrection& c) { return static_cast<std::size_t>(c.joint) == joint; });
+                     [&](const JointCorrection& c) { return c.joint == row; }) ||
+         std::any_of(model.pose_corrections.begin(), model.pose_corrections.end(),
+                     [&](const PoseCorrection& c) { return std::ranges::binary_search(c.joint, row); });
 }
 
 bool both(const SafeRange::Ends& ends) {

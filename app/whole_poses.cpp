@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <concepts>
-#include <iterator>
 #include <optional>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <ecorche/io/pose_library.hpp>
 #include <ecorche/kinematics/angles.hpp>
@@ -21,10 +21,13 @@ namespace {
 
 using nlohmann::json;
 
+// Where the body stands is left out: flesh settles alike anywhere.
 correct::WholePose whole_pose(const Program& program, const std::string& name, const Rig& rig) {
   FrameChoice choice;
   choice.pose = name;
   correct::WholePose out{name, read_frames(program, choice, rig).front().pose};
+  out.pose.rotation[0].setIdentity();
+  out.pose.root_translation.setZero();
   std::vector<ClampedJoint> clamped;
   kinematics::constrain(rig.skeleton, out.pose, clamped);
   return out;
@@ -33,13 +36,19 @@ correct::WholePose whole_pose(const Program& program, const std::string& name, c
 // What one pose came to.
 struct Settled {
   std::vector<PoseCorrection> places;
-  std::uint8_t passed = 0, passes = 0;
+  std::uint8_t passed = 0;  // before
 };
 
 template <class A, class T>
 requires std::same_as<std::remove_const_t<T>, Settled>
 void fields(A& archive, T& settled) {
-  archive(settled.places, settled.passed, settled.passes);
+  archive(settled.places, settled.passed);
+}
+
+bool passes(MeasuredPose& posed, const correct::WholePose& whole) {
+  const Status status = posed.run(whole.pose, runtime::Skinning::cor);
+  if (!status.ok()) throw Error(ErrorKind::data, whole.name, status.message, "mend the pose file");
+  return posed.measure().pass;
 }
 
 // One pose after the other, each with what those before it left in the model.
@@ -52,13 +61,10 @@ class PoseSettler {
     if (!settler_) settler_.emplace(*model_, context.quiet());
     const runtime::BodyPoser poser(model_);
     MeasuredPose posed(poser);
-    if (const Status status = posed.run(whole.pose, runtime::Skinning::cor); !status.ok())
-      throw Error(ErrorKind::data, whole.name, status.message, "mend the pose file");
-    const std::vector<float> skinned = posed.still().nodes;
     Settled out;
-    out.passed = posed.measure().pass ? 1 : 0;
+    out.passed = passes(posed, whole) ? 1 : 0;
+    const std::vector<float> skinned = posed.still().nodes;
     posed.settle(*settler_, context.quiet());
-    out.passes = posed.measure().pass ? 1 : 0;
     out.places = correct::pose_places(*model_, whole, poses_, skinned, posed.still().nodes, {});
     return out;
   }
@@ -93,7 +99,7 @@ double largest_mm(const PoseCorrection& place) {
   return static_cast<double>(place.scale) * most;
 }
 
-json row_of(const std::string& pose, const Settled& settled) {
+json row_of(const std::string& pose, const Settled& settled, bool now) {
   std::size_t nodes = 0;
   double most = 0;
   for (const PoseCorrection& place : settled.places) {
@@ -101,7 +107,7 @@ json row_of(const std::string& pose, const Settled& settled) {
     most = std::max(most, largest_mm(place));
   }
   return {{"pose", pose},       {"places", settled.places.size()}, {"nodes", nodes},
-          {"largest_mm", most}, {"passed", settled.passed != 0},   {"passes", settled.passes != 0}};
+          {"largest_mm", most}, {"passed", settled.passed != 0},   {"passes", now}};
 }
 
 }  // namespace
@@ -125,17 +131,25 @@ std::vector<correct::WholePose> whole_poses(const Program& program, const std::v
 json add_whole_poses(const Program& program, std::span<const correct::WholePose> poses,
                      const std::shared_ptr<Model>& model, preprocess::StageStore* store) {
   json rows = json::array();
+  if (poses.empty()) return rows;
   PoseSettler settler(model, poses);
   const Context context = program.context("whole poses");
+  std::vector<Settled> settled;
+  settled.reserve(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     context.check_stop();
     context.report(static_cast<double>(i) / static_cast<double>(poses.size()));
-    Settled settled =
-        store == nullptr ? settler.run(poses[i], context) : settler.run(poses[i], *store, context);
-    rows.push_back(row_of(poses[i].name, settled));
-    std::move(settled.places.begin(), settled.places.end(), std::back_inserter(model->pose_corrections));
+    settled.push_back(store == nullptr ? settler.run(poses[i], context)
+                                       : settler.run(poses[i], *store, context));
+    const std::vector<PoseCorrection>& places = settled.back().places;
+    model->pose_corrections.insert(model->pose_corrections.end(), places.begin(), places.end());
   }
-  if (!poses.empty()) context.report(1);
+  // As whoever poses the model gets them, with all that is kept of the others.
+  const runtime::BodyPoser poser(model);
+  MeasuredPose posed(poser);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    rows.push_back(row_of(poses[i].name, settled[i], passes(posed, poses[i])));
+  context.report(1);
   return rows;
 }
 

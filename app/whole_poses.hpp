@@ -22,7 +22,8 @@ std::vector<correct::WholePose> whole_poses(const Program& program, const std::v
 
 /// Settles `model`, corrected as it is, at each of `poses`, one after the other, and adds what that moves to
 /// its pose_corrections; what `store`, which may be null, has of an earlier run is not settled again. Returns
-/// a row for each: its name, places, nodes, the largest move in mm, whether it passed before and passes now.
+/// a row for each: its name, places, nodes, the largest move in mm, whether it passed before, and passes with
+/// all that is kept.
 nlohmann::json add_whole_poses(const Program& program, std::span<const correct::WholePose> poses,
                                const std::shared_ptr<Model>& model, preprocess::StageStore* store);
 

@@ -219,11 +219,12 @@ void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, 
   }
 }
 
-double mebibytes(const Model& model) {
+template <class Corrections>
+std::string size_of(const Corrections& corrections) {
   std::size_t bytes = 0;
-  for (const JointCorrection& c : model.corrections)
+  for (const auto& c : corrections)
     bytes += c.field.size() * sizeof(std::int16_t) + c.node.size() * sizeof(std::uint32_t);
-  return static_cast<double>(bytes) / (1U << 20U);
+  return fixed(static_cast<double>(bytes) / (1U << 20U), 1) + " MiB";
 }
 
 void price(const Model& model, const BodyPoser& plain, const BodyPoser& corrected) {
@@ -232,9 +233,12 @@ void price(const Model& model, const BodyPoser& plain, const BodyPoser& correcte
     Pose pose;
     if (pose_of(model.rig.skeleton, stated, pose)) poses.push_back(pose);
   }
-  print_notes({std::to_string(model.node_count() / 1000) + " k nodes: corrections of " +
-               std::to_string(model.corrections.size()) + " joints take " + fixed(mebibytes(model), 1) +
-               " MiB"});
+  std::string note = std::to_string(model.node_count() / 1000) + " k nodes: corrections of " +
+                     std::to_string(model.corrections.size()) + " joints take " + size_of(model.corrections);
+  if (!model.pose_corrections.empty())
+    note += ", of " + std::to_string(model.pose_corrections.size()) + " places in whole poses " +
+            size_of(model.pose_corrections);
+  print_notes({note});
   for (const int threads : {1, 2}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));

@@ -78,12 +78,19 @@ JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::
   out.mix = modes.mix.cast<float>();
   for (Eigen::Index m = 0; m < modes.mix.cols(); ++m) {
     const Eigen::RowVectorXf mode = modes.fields.row(m).cast<float>();
-    const float scale = std::max(mode.cwiseAbs().maxCoeff() / kMost, 1e-12F);
-    out.scale.push_back(scale);
-    for (Eigen::Index i = 0; i < mode.size(); ++i)
-      out.field.push_back(static_cast<std::int16_t>(std::lround(std::clamp(mode[i] / scale, -kMost, kMost))));
+    out.scale.push_back(quantise({mode.data(), static_cast<std::size_t>(mode.size())}, out.field));
   }
   return out;
+}
+
+float quantise(std::span<const float> mm, std::vector<std::int16_t>& out) {
+  float most = 0;
+  for (const float value : mm) most = std::max(most, std::abs(value));
+  const float step = std::max(most / kMost, 1e-12F);
+  out.reserve(out.size() + mm.size());
+  for (const float value : mm)
+    out.push_back(static_cast<std::int16_t>(std::lround(std::clamp(value / step, -kMost, kMost))));
+  return step;
 }
 
 std::vector<float> field_of(const JointCorrection& correction, std::size_t s) {

@@ -24,6 +24,9 @@ JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::
                          std::span<const std::vector<float>> fields, const std::vector<std::uint32_t>& node,
                          const CompressOptions& options);
 
+/// Appends `mm` in steps of its largest number / 32767, and returns the step, mm.
+float quantise(std::span<const float> mm, std::vector<std::int16_t>& out);
+
 /// What the joint is moved by at sample s: 3 * correction.node, mm.
 std::vector<float> field_of(const JointCorrection& correction, std::size_t s);
 

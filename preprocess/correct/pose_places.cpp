@@ -8,6 +8,7 @@
 #include <set>
 
 #include <ecorche/kinematics/forward.hpp>
+#include "preprocess/correct/compress.hpp"
 #include "preprocess/correct/samples.hpp"
 #include "preprocess/correct/skinned_node.hpp"
 
@@ -16,7 +17,6 @@ namespace {
 
 constexpr std::int32_t kNoPlace = -1;
 constexpr double kLeastWeight = 0.02;  // of a segment that moves a node
-constexpr float kLargest = 32767;
 
 using Joints = std::vector<std::int32_t>;
 
@@ -161,7 +161,7 @@ ByJoints by_joints(const Model& model, const Points& left, const PlaceOptions& o
 }  // namespace
 
 std::vector<PoseCorrection> pose_places(const Model& model, const WholePose& whole,
-                                        std::span<const WholePose> others, std::span<const float> skinned,
+                                        std::span<const WholePose> all, std::span<const float> skinned,
                                         std::span<const float> settled, const PlaceOptions& options) {
   const Points left = left_of(model, whole.pose, skinned, settled);
   const Pose rest = Pose::rest(whole.pose.rotation.size());
@@ -170,17 +170,15 @@ std::vector<PoseCorrection> pose_places(const Model& model, const WholePose& who
     PoseCorrection made{whole.name, joints, turns_of(whole.pose, joints), 0, 0, nodes, {}};
     made.reach = std::min(options.reach, made.turn.norm());
     if (joints.empty() || distance(whole.pose, rest, joints) < options.alike) continue;
-    for (const WholePose& other : others)
+    for (const WholePose& other : all)
       if (const double far = distance(whole.pose, other.pose, joints); far >= options.alike)
         made.reach = std::min(made.reach, far);
-    float most = 0;
-    for (const std::uint32_t n : nodes)
-      most = std::max(most, static_cast<float>(left.row(static_cast<Eigen::Index>(n)).cwiseAbs().maxCoeff()));
-    made.scale = most / kLargest;
+    std::vector<float> moved;
+    moved.reserve(3 * nodes.size());
     for (const std::uint32_t n : nodes)
       for (Eigen::Index c = 0; c < 3; ++c)
-        made.field.push_back(static_cast<std::int16_t>(
-            std::lround(left(static_cast<Eigen::Index>(n), c) / static_cast<double>(made.scale))));
+        moved.push_back(static_cast<float>(left(static_cast<Eigen::Index>(n), c)));
+    made.scale = quantise(moved, made.field);
     out.push_back(std::move(made));
   }
   return out;

@@ -27,9 +27,10 @@ struct PlaceOptions {
 
 /// What moves nodes from `skinned` (corrected already, as far as it is) to `settled` (3 * #nodes each, the
 /// root at rest), by the joints about each place: nodes that the same joints move are one correction. It
-/// reaches no farther than to rest, and to the nearest of `others`; places that are at rest have none.
+/// reaches no farther than to rest, and to the nearest of `all` that is another there; `whole` may be among
+/// them. Places that are at rest have none.
 std::vector<PoseCorrection> pose_places(const Model& model, const WholePose& whole,
-                                        std::span<const WholePose> others, std::span<const float> skinned,
+                                        std::span<const WholePose> all, std::span<const float> skinned,
                                         std::span<const float> settled, const PlaceOptions& options);
 
 }  // namespace ecorche::correct
