@@ -19,6 +19,7 @@
 #include <ecorche/runtime/pose_quality.hpp>
 #include "bench/table.hpp"
 #include "core/elastic/flesh.hpp"
+#include "core/model_file/packed_field.hpp"
 #include "preprocess/fem/reference.hpp"
 
 namespace ecorche::bench {
@@ -223,7 +224,8 @@ template <class Corrections>
 std::string size_of(const Corrections& corrections) {
   std::size_t bytes = 0;
   for (const auto& c : corrections)
-    bytes += c.field.size() * sizeof(std::int16_t) + c.node.size() * sizeof(std::uint32_t);
+    bytes += model_file::pack(c.field, c.field.size() / (3 * c.node.size()), c.node.size()).bytes() +
+             c.node.size() * sizeof(std::uint32_t);
   return fixed(static_cast<double>(bytes) / (1U << 20U), 1) + " MiB";
 }
 

@@ -51,7 +51,7 @@ std::optional<Defect> defect_of_nodes(const Model& model, const std::vector<std:
 std::optional<Defect> defect_of(const Model& model, const JointCorrection& correction,
                                 const std::vector<std::uint8_t>& of_bone) {
   const Joint& joint = model.rig.skeleton.segments[static_cast<std::size_t>(correction.joint)].joint;
-  const std::string at = "/ecorche/correction/" + joint.name + "/";
+  const std::string at = "/ecorche/packed_correction/" + joint.name + "/";
   const std::size_t modes = correction.scale.size();
   if (correction.turn.rows() == 0 || !correction.turn.allFinite() ||
       !(correction.turn.rowwise().norm().maxCoeff() <= kFarthestTurn) || !apart(correction.turn))
@@ -71,7 +71,7 @@ std::optional<Defect> defect_of(const Model& model, const JointCorrection& corre
 
 std::optional<Defect> defect_of(const Model& model, const PoseCorrection& correction,
                                 const std::vector<std::uint8_t>& of_bone, std::size_t index) {
-  const std::string at = "/ecorche/pose_correction/place_" + std::to_string(index + 1) + "/";
+  const std::string at = "/ecorche/packed_pose_correction/place_" + std::to_string(index + 1) + "/";
   if (!ascending(correction.joint, model.segment_count()) || correction.joint.front() == 0)
     return Defect{at + "joint", "is not ascending rows of joints, the root left out"};
   if (correction.turn.rows() != static_cast<Eigen::Index>(correction.joint.size()) ||
@@ -134,7 +134,7 @@ std::optional<Defect> first_defect_of_corrections(const Model& model) {
     std::int32_t before = -1;
     for (const JointCorrection& correction : model.corrections) {
       if (correction.joint <= before || static_cast<std::size_t>(correction.joint) >= model.segment_count())
-        return Defect{"/ecorche/correction", "is not one group a joint, in the order of the skeleton"};
+        return Defect{"/ecorche/packed_correction", "is not one group a joint, in the order of the skeleton"};
       before = correction.joint;
       if (auto defect = defect_of(model, correction, of_bone)) return defect;
     }

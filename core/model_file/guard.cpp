@@ -20,8 +20,13 @@ constexpr std::array<unsigned char, 8> kMagic{0x89, 'H', 'D', 'F', '\r', '\n', 0
 constexpr std::array<std::string_view, 9> kParts{
     "skeleton", "weights", "cor", "labels", "materials", "quality", "safe_range", "provenance", "digests"};
 // Groups of groups, a name each.
-constexpr std::array<std::string_view, 5> kNamedParts{"tissues", "volumes", "spheres", "correction",
-                                                      "pose_correction"};
+constexpr std::array<std::string_view, 7> kNamedParts{"tissues",
+                                                      "volumes",
+                                                      "spheres",
+                                                      "correction",
+                                                      "pose_correction",
+                                                      "packed_correction",
+                                                      "packed_pose_correction"};
 
 // Whether this version knows the group; datasets in other groups belong to a newer minor version.
 bool known_group(const std::string& path) {

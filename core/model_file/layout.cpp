@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/model_file/figures.hpp"
+#include "core/model_file/packed_field.hpp"
 
 namespace ecorche::model_file {
 namespace {
@@ -194,20 +195,28 @@ void add_spheres(Layout& out, const VolumetricSkeleton& skeleton, std::size_t in
   out.view<std::int32_t>(at + "segment", skeleton.segment, {rows});
 }
 
+void add_field(Layout& out, const std::string& at, const std::vector<std::int16_t>& field, std::size_t modes,
+               std::size_t rows) {
+  const PackedField packed = pack(field, modes, rows);
+  out.copy(at + "shift", packed.shift, {modes, PackedField::blocks(rows)});
+  out.copy(at + "byte", packed.byte);
+  out.copy(at + "word", packed.word);
+}
+
 void add_correction(Layout& out, const JointCorrection& correction, const std::string& joint,
                     std::size_t index) {
-  const std::string at = "/ecorche/correction/" + joint + "/";
+  const std::string at = "/ecorche/packed_correction/" + joint + "/";
   const auto modes = std::uint64_t{correction.scale.size()}, rows = std::uint64_t{correction.node.size()};
   out.scalar(at + "index", static_cast<std::int32_t>(index));
   out.view(at + "turn", elements(correction.turn), {count(correction.turn.rows()), 3});
   out.view(at + "mix", elements(correction.mix), {count(correction.mix.rows()), modes});
   out.view<float>(at + "scale", correction.scale, {modes});
   out.view<std::uint32_t>(at + "node", correction.node, {rows});
-  out.view<std::int16_t>(at + "field", correction.field, {modes, rows, 3});
+  add_field(out, at, correction.field, modes, rows);
 }
 
 void add_pose_correction(Layout& out, const PoseCorrection& correction, std::size_t index) {
-  const std::string at = "/ecorche/pose_correction/place_" + std::to_string(index + 1) + "/";
+  const std::string at = "/ecorche/packed_pose_correction/place_" + std::to_string(index + 1) + "/";
   const auto rows = std::uint64_t{correction.node.size()};
   out.scalar(at + "index", static_cast<std::int32_t>(index));
   out.texts(at + "pose", {correction.pose});
@@ -216,7 +225,7 @@ void add_pose_correction(Layout& out, const PoseCorrection& correction, std::siz
   out.scalar(at + "reach", correction.reach);
   out.scalar(at + "scale", correction.scale);
   out.view<std::uint32_t>(at + "node", correction.node, {rows});
-  out.view<std::int16_t>(at + "field", correction.field, {rows, 3});
+  add_field(out, at, correction.field, 1, rows);
 }
 
 // Ranges of a model before 1.4 do not.
@@ -296,7 +305,7 @@ Layout lay_out(const Model& model) {
 }
 
 std::int32_t minor_of(const Model& model) {
-  if (!model.pose_corrections.empty()) return 5;
+  if (!model.corrections.empty() || !model.pose_corrections.empty()) return 6;
   return !model.materials.empty() || knows_contact(model.safe_ranges) ? 4 : 3;
 }
 

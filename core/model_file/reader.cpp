@@ -276,11 +276,19 @@ void read_arrays(const Source& source, Model& model) {
   }
   all("/ecorche/tissues", model.tissues, read_tissue);
   all("/ecorche/spheres", model.spheres, read_spheres);
-  all("/ecorche/correction", model.corrections,
-      [&skeleton = model.rig.skeleton](const Source& from, const std::string& joint) {
-        return read_correction(from, skeleton, joint);
+  // Before 1.6 fields were not packed.
+  const auto packed = [&](const std::string& name) {
+    const std::string group = "/ecorche/packed_" + name;
+    return source.catalogue().groups.contains(group) ? group : "/ecorche/" + name;
+  };
+  const std::string of_joints = packed("correction"), of_poses = packed("pose_correction");
+  all(of_joints, model.corrections,
+      [of_joints, &skeleton = model.rig.skeleton](const Source& from, const std::string& joint) {
+        return read_correction(from, skeleton, of_joints, joint);
       });
-  all("/ecorche/pose_correction", model.pose_corrections, read_pose_correction);
+  all(of_poses, model.pose_corrections, [of_poses](const Source& from, const std::string& place) {
+    return read_pose_correction(from, of_poses, place);
+  });
   run_as_in_turn(parts);
 }
 

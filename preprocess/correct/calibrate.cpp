@@ -12,6 +12,7 @@
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/model_file/model_file.hpp>
+#include "core/model_file/packed_field.hpp"
 #include "preprocess/cache/kept_stage.hpp"
 #include "preprocess/correct/compress.hpp"
 #include "preprocess/correct/samples.hpp"
@@ -204,8 +205,8 @@ class OneJoint {
 void report_on(const JointCorrection& correction, JointReport& report) {
   report.nodes = correction.node.size();
   report.modes = correction.scale.size();
-  report.bytes =
-      correction.field.size() * sizeof(std::int16_t) + correction.node.size() * sizeof(std::uint32_t);
+  report.bytes = model_file::pack(correction.field, report.modes, report.nodes).bytes() +
+                 report.nodes * sizeof(std::uint32_t);
   report.clean_deg = correction.turn.rowwise().norm().maxCoeff() / kDegree;
   for (std::size_t s = 0; s < static_cast<std::size_t>(correction.turn.rows()) && report.nodes > 0; ++s) {
     const std::vector<float> field = field_of(correction, s);

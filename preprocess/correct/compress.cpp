@@ -5,12 +5,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model_file/packed_field.hpp"
+
 namespace ecorche::correct {
 namespace {
 
-constexpr float kMost = 32767;
+using model_file::PackedField;
+
+constexpr int kByte = 127;
+constexpr float kMost = kByte << PackedField::most_shift;
 constexpr double kLeastSize = 1e-3;  // mm, of a sample
 using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+float largest(std::span<const float> mm) {
+  float most = 0;
+  for (const float value : mm) most = std::max(most, std::abs(value));
+  return most;
+}
 
 // #samples by 3 * #kept, mm.
 Rows rows_of(std::span<const std::vector<float>> fields, const std::vector<std::size_t>& kept) {
@@ -78,18 +89,26 @@ JointCorrection compress(std::int32_t joint, bool hinge, const JointCorrection::
   out.mix = modes.mix.cast<float>();
   for (Eigen::Index m = 0; m < modes.mix.cols(); ++m) {
     const Eigen::RowVectorXf mode = modes.fields.row(m).cast<float>();
-    out.scale.push_back(quantise({mode.data(), static_cast<std::size_t>(mode.size())}, out.field));
+    const double largest_share = modes.mix.col(m).cwiseAbs().maxCoeff();
+    out.scale.push_back(quantise({mode.data(), static_cast<std::size_t>(mode.size())},
+                                 options.rounding_mm / largest_share, out.field));
   }
   return out;
 }
 
-float quantise(std::span<const float> mm, std::vector<std::int16_t>& out) {
-  float most = 0;
-  for (const float value : mm) most = std::max(most, std::abs(value));
-  const float step = std::max(most / kMost, 1e-12F);
+float quantise(std::span<const float> mm, double rounding_mm, std::vector<std::int16_t>& out) {
+  const float step = std::max(largest(mm) / kMost, 1e-12F);
   out.reserve(out.size() + mm.size());
-  for (const float value : mm)
-    out.push_back(static_cast<std::int16_t>(std::lround(std::clamp(value / step, -kMost, kMost))));
+  constexpr std::size_t block = 3 * PackedField::block;
+  for (std::size_t first = 0; first < mm.size(); first += block) {
+    const auto numbers = mm.subspan(first, std::min(block, mm.size() - first));
+    int coarse = 1;  // steps
+    while (std::lround(largest(numbers) / (step * static_cast<float>(coarse))) > kByte) coarse *= 2;
+    if (static_cast<double>(step) * coarse / 2 > rounding_mm) coarse = 1;
+    for (const float value : numbers)
+      out.push_back(
+          static_cast<std::int16_t>(coarse * std::lround(value / (step * static_cast<float>(coarse)))));
+  }
   return step;
 }
 

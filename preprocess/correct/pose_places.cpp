@@ -178,7 +178,7 @@ std::vector<PoseCorrection> pose_places(const Model& model, const WholePose& who
     for (const std::uint32_t n : nodes)
       for (Eigen::Index c = 0; c < 3; ++c)
         moved.push_back(static_cast<float>(left(static_cast<Eigen::Index>(n), c)));
-    made.scale = quantise(moved, made.field);
+    made.scale = quantise(moved, options.rounding_mm, made.field);
     out.push_back(std::move(made));
   }
   return out;

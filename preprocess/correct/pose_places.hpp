@@ -22,6 +22,7 @@ struct PlaceOptions {
   std::size_t few = 64;   ///< nodes: fewer are no place of their own where another has their joints
   double least_mm = 0.1;  ///< and ends where none about it is
   double reach = std::numbers::pi / 6;  ///< radians, at most: half of a correction is left at 0.54 of it
+  double rounding_mm = 0.05;            ///< of quantise
   double alike = 0.05;  ///< radians: poses whose joints about a place differ by less are one there
 };
 

@@ -13,6 +13,7 @@
 
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/runtime/body_poser.hpp>
+#include "core/model_file/packed_field.hpp"
 #include "preprocess/correct/compress.hpp"
 #include "preprocess/correct/neighbourhood.hpp"
 #include "preprocess/correct/samples.hpp"
@@ -184,7 +185,7 @@ TEST(Compress, KeepsWhatCountsWithinItsStep) {
   const std::vector<std::vector<float>> fields{
       {1, 2, 3, 0.01F, 0, 0, -4, 0, 1}, {0, 1, 0, 0, 0.02F, 0, 2, 2, 2}, {2, 5, 6, 0, 0, 0, -6, 2, 4}};
   for (const bool hinge : {true, false}) {
-    const JointCorrection kept = correct::compress(4, hinge, turn, fields, node, {});
+    const JointCorrection kept = correct::compress(4, hinge, turn, fields, node, {.rounding_mm = 0});
     EXPECT_EQ(kept.node, (std::vector<std::uint32_t>{3, 9}));
     EXPECT_EQ(kept.scale.size(), hinge ? 3U : 2U);  // the third is the first twice and the second
     for (std::size_t s = 0; s < 3; ++s) {
@@ -195,6 +196,29 @@ TEST(Compress, KeepsWhatCountsWithinItsStep) {
       }
     }
   }
+}
+
+TEST(Compress, RoundsToBytesWhereLittleIsLost) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> share(-1, 1);
+  constexpr std::size_t kNodes = 3 * model_file::PackedField::block,
+                        kBlock = 3 * model_file::PackedField::block;
+  // Twice as far in each block; what a byte loses at 5 and 10 mm is within 0.05, at 20 it is not.
+  std::vector<float> mm(3 * kNodes);
+  for (std::size_t i = 0; i < mm.size(); ++i)
+    mm[i] = (i < kBlock ? 5.0F : i < 2 * kBlock ? 10.0F : 20.0F) * share(random);
+  std::vector<std::int16_t> field;
+  const float step = correct::quantise(mm, 0.05, field);
+  for (std::size_t i = 0; i < mm.size(); ++i)
+    EXPECT_LE(std::abs(step * static_cast<float>(field[i]) - mm[i]), i < 2 * kBlock ? 0.0501F : step) << i;
+  const auto packed = model_file::pack(field, 1, kNodes);
+  EXPECT_EQ(packed.byte.size(), 2 * kBlock);
+  EXPECT_EQ(packed.shift[2], model_file::PackedField::in_words);
+  // With nothing to lose, what is small beside the largest still has few bits.
+  std::vector<std::int16_t> exact;
+  EXPECT_EQ(correct::quantise(mm, 0, exact), step);
+  EXPECT_EQ(model_file::pack(exact, 1, kNodes).byte.size(), 0U);
+  EXPECT_NEAR(step * static_cast<float>(exact[0]), mm[0], step);
 }
 
 TEST(Compress, MissesOfSmallSamplesNoMoreOfTheirSizeThanOfLargeOnes) {

@@ -57,7 +57,7 @@ TEST_F(PosePlaces, GiveBackWhatSettledAtThatPoseAlone) {
   const std::vector<float> skinned = nodes_of(model_, whole_.pose),
                            settled = pushed(model_, skinned, 60, 240);
   Model corrected = model_;
-  corrected.pose_corrections = correct::pose_places(model_, whole_, {}, skinned, settled, {});
+  corrected.pose_corrections = correct::pose_places(model_, whole_, {}, skinned, settled, {.rounding_mm = 0});
   ASSERT_FALSE(corrected.pose_corrections.empty());
   EXPECT_LT(farthest(nodes_of(corrected, whole_.pose), settled), 2e-3);
   for (const Pose& other : {Pose::rest(3), bent(model_, 0.3, 0.2), bent(model_, 1.5, 1.4)})

@@ -9,13 +9,13 @@ import sys
 
 import h5py
 
-TYPES = {"|u1": "u8", "<i2": "i16", "<u2": "u16", "<i4": "i32", "<u4": "u32", "<i8": "i64", "<u8": "u64", "<f4": "f32", "<f8": "f64"}
+TYPES = {"|u1": "u8", "|i1": "i8", "<i2": "i16", "<u2": "u16", "<i4": "i32", "<u4": "u32", "<i8": "i64", "<u8": "u64", "<f4": "f32", "<f8": "f64"}
 VOXELS = "the volume's"  # any type of voxels
 
 
 def pattern(path):
     """The path as the page writes it: names of tissues, volumes and joints are <name>."""
-    return re.sub(r"^/ecorche/(tissues|volumes|spheres|correction|pose_correction)/[^/]+/", r"/ecorche/\1/<name>/", path)
+    return re.sub(r"^/ecorche/(tissues|volumes|spheres|packed_correction|packed_pose_correction)/[^/]+/", r"/ecorche/\1/<name>/", path)
 
 
 def stored(path):

@@ -20,7 +20,7 @@ def check_h5py(path):
         assert root.attrs["Type"] == b"UnstructuredGrid", root.attrs["Type"]
         assert root.attrs.get_id("Type").get_type().get_cset() == h5py.h5t.CSET_ASCII
         model = file["ecorche"]
-        assert list(model.attrs["format"]) == [1, 5]  # it has whole poses
+        assert list(model.attrs["format"]) == [1, 6]  # it has corrections
 
         def check(name, item):
             if not isinstance(item, h5py.Dataset):

@@ -83,6 +83,10 @@ Model full_model() {
   model.spheres.insert(model.spheres.begin(), few);
   const Model corrected = corrected_toy_model();
   model.corrections = corrected.corrections;
+  // The last mode fits in bytes.
+  std::vector<std::int16_t>& steps = model.corrections[0].field;
+  for (std::size_t i = 2 * steps.size() / 3; i < steps.size(); ++i)
+    steps[i] = static_cast<std::int16_t>(steps[i] / 512 * 4);
   model.pose_corrections = corrected.pose_corrections;
   model.safe_ranges = corrected.safe_ranges;
   model.materials = corrected.materials;

@@ -12,7 +12,7 @@
 namespace ecorche::model_file {
 
 inline constexpr int format_major = 1;
-inline constexpr int format_minor = 5;
+inline constexpr int format_minor = 6;
 
 /// For the main of a program that reads others' models, before anything else of HDF5: after it has refused a
 /// damaged file HDF5 1.10 cannot close itself (it complains, or crashes, as the process ends). Every file of
