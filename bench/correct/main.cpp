@@ -220,13 +220,17 @@ void compare(const std::shared_ptr<const Model>& model, const BodyPoser& plain, 
   }
 }
 
+// MB, for so many nodes.
+constexpr double kAskedMb = 25, kAskedNodes = 300'000;
+
+// MB, as a model's file has them.
 template <class Corrections>
-std::string size_of(const Corrections& corrections) {
+double size_of(const Corrections& corrections) {
   std::size_t bytes = 0;
   for (const auto& c : corrections)
     bytes += model_file::pack(c.field, c.field.size() / (3 * c.node.size()), c.node.size()).bytes() +
              c.node.size() * sizeof(std::uint32_t);
-  return fixed(static_cast<double>(bytes) / (1U << 20U), 1) + " MiB";
+  return static_cast<double>(bytes) / 1e6;
 }
 
 void price(const Model& model, const BodyPoser& plain, const BodyPoser& corrected) {
@@ -235,12 +239,13 @@ void price(const Model& model, const BodyPoser& plain, const BodyPoser& correcte
     Pose pose;
     if (pose_of(model.rig.skeleton, stated, pose)) poses.push_back(pose);
   }
-  std::string note = std::to_string(model.node_count() / 1000) + " k nodes: corrections of " +
-                     std::to_string(model.corrections.size()) + " joints take " + size_of(model.corrections);
-  if (!model.pose_corrections.empty())
-    note += ", of " + std::to_string(model.pose_corrections.size()) + " places in whole poses " +
-            size_of(model.pose_corrections);
-  print_notes({note});
+  const double of_joints = size_of(model.corrections), of_poses = size_of(model.pose_corrections);
+  const double asked = kAskedMb * static_cast<double>(model.node_count()) / kAskedNodes;
+  print_notes({std::to_string(model.node_count() / 1000) + " k nodes: corrections of " +
+               std::to_string(model.corrections.size()) + " joints take " + fixed(of_joints, 1) + " MB, of " +
+               std::to_string(model.pose_corrections.size()) + " places in whole poses " +
+               fixed(of_poses, 1) + " MB; together " + fixed(of_joints + of_poses, 1) + " MB of the " +
+               fixed(asked, 1) + " that are asked"});
   for (const int threads : {1, 2}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
