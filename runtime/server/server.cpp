@@ -37,8 +37,10 @@ constexpr std::size_t kMostRefusals = 32;
 // and a port lets in 2000.
 constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
 // From one newcomer at a port to the next, who waits in the kernel: however many come at once, those who are
-// served go on between them.
-constexpr Clock::duration kBetween = std::chrono::microseconds(500);
+// served go on between them. Where many keep coming, nobody waits for long: they are let in faster.
+constexpr Clock::duration kBetween = std::chrono::milliseconds(2);
+constexpr Clock::duration kLongWait = std::chrono::seconds(2);
+constexpr Clock::duration kBetweenMany = std::chrono::microseconds(500);
 
 // Of the token that a request had; null: none.
 using Shown = std::shared_ptr<const Pass>;
@@ -82,7 +84,7 @@ struct Server::Impl {
   net::awaitable<void> pause(net::steady_timer& timer, Clock::duration time = kTick);
   bool admit(WebKind kind, const std::string& peer);
   Clock::duration look_after(Clock::time_point now);
-  void receive(tcp::socket socket, bool http);
+  Clock::duration receive(tcp::socket socket, bool http);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, Shown pass, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
   bool admit_request(Clock::time_point now);
@@ -166,10 +168,11 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool http) {
   net::steady_timer next(io);
   while (at.is_open()) {
     bool failed = false;
+    Clock::duration waited{};
     try {
       tcp::socket socket = co_await at.async_accept(quietly(ec));
       if (!at.is_open()) co_return;
-      if (!ec) receive(std::move(socket), http);
+      if (!ec) waited = receive(std::move(socket), http);
       failed = static_cast<bool>(ec);
       // Out of file descriptors, or the client is gone already: neither ends the server.
       if (ec) registry->journal().line(spdlog::level::warn, "accept: " + ec.message());
@@ -178,14 +181,15 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool http) {
       failed = true;
     }
     try {
-      co_await pause(next, failed ? kTick : kBetween);
+      co_await pause(next, failed ? kTick : waited > kLongWait ? kBetweenMany : kBetween);
     } catch (const std::bad_alloc&) {
       without_memory();
     }
   }
 }
 
-void Server::Impl::receive(tcp::socket socket, bool http) {
+// How long who came had waited in the kernel.
+Clock::duration Server::Impl::receive(tcp::socket socket, bool http) {
   std::string peer = peer_of(socket);
   const Clock::duration in_kernel = waited(socket);
   std::unique_ptr<Transport> transport;
@@ -194,13 +198,18 @@ void Server::Impl::receive(tcp::socket socket, bool http) {
     transport = carrier->carry(std::move(socket));
     if (wrap) transport = wrap(std::move(transport));
   }
-  if (!http) return welcome(std::move(transport), std::move(peer), nullptr, in_kernel);
-  if (!admit_request(Clock::now())) return registry->metrics().hit("connections");
-  {
-    const MayFail may_fail;
-    requests.push_back(web_request(std::move(transport), std::move(peer), web_context));
+  if (!http) {
+    welcome(std::move(transport), std::move(peer), nullptr, in_kernel);
+  } else if (!admit_request(Clock::now())) {
+    registry->metrics().hit("connections");
+  } else {
+    {
+      const MayFail may_fail;
+      requests.push_back(web_request(std::move(transport), std::move(peer), web_context));
+    }
+    requests.back()->start();
   }
-  requests.back()->start();
+  return in_kernel;
 }
 
 // Of requests, too, the oldest makes way.
@@ -214,7 +223,7 @@ bool Server::Impl::admit_request(Clock::time_point now) {
   return true;
 }
 
-// At most a second's worth in one go. All together are as many as the port lets in (kBetween).
+// At most a second's worth in one go. All together are as many as the port lets in (kBetweenMany).
 bool Server::Impl::admit(WebKind kind, const std::string& peer) {
   const double rate = registry->limits().requests_per_second;
   Rates& of_kind = admitted.try_emplace(kind, rate, rate).first->second;
