@@ -238,8 +238,9 @@ json clamped_json(const Skeleton& skeleton, const Pose& pose, std::span<const Cl
       for (std::size_t i = 0; i < 3; ++i) {
         const AngleAxis& axis = joint.sequence[i];
         for (const double limit : {std::min(axis.min, axis.rest), std::max(axis.max, axis.rest)}) {
+          // What has no limit is nowhere near it: the remainder is no number.
           if (axis.min == axis.max ||
-              std::abs(std::remainder(angles[i] - limit, 2 * std::numbers::pi)) > kAtLimit)
+              !(std::abs(std::remainder(angles[i] - limit, 2 * std::numbers::pi)) <= kAtLimit))
             continue;
           limits.push_back({{"angle", axis.name}, {"at_deg", limit * degrees_per_radian}});
         }

@@ -142,6 +142,13 @@ class PoseScan(unittest.TestCase):
         self.assertIn("did you mean 'knee_right'?", result.stderr)
         self.assertEqual(list(self.folder.iterdir()), [pose])
 
+    def test_a_hinge_that_is_clamped_is_told_by_the_limit_that_it_has(self):
+        pose = self.folder / "pose.yaml"
+        pose.write_text("ecorche_pose: 1\nskeleton: human\njoints:\n  knee_left: {flexion_deg: -40}\n")
+        said, _ = self.ok("pose", "--scan", *self.scan, "--pose", pose, *COARSE, "--tissues", "none", "-o", self.folder / "posed")
+        clamped = [joint for joint in said["frames"][0]["quality"]["clamped"] if joint["joint"] == "knee_left"]
+        self.assertEqual([limit["angle"] for limit in clamped[0]["limits"]], ["flexion"], clamped)
+
     def test_errors_name_the_case_as_new_would(self):
         words = [ECORCHE, "pose", "--scan", *self.scan, "--pose", "lib:arms_up", *COARSE, "-o", self.folder / "posed"]
         result = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120, preexec_fn=small_files_only,
