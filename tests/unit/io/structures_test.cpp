@@ -2,7 +2,9 @@
 // What labels of other programs mean.
 #include <gtest/gtest.h>
 
+#include <iterator>
 #include <set>
+#include <sstream>
 
 #include "io/case/case_rules.hpp"
 #include "io/case/skeleton_file.hpp"
@@ -113,6 +115,89 @@ TEST(Structures, NamesOfPrograms) {
       {"", "nothing"},
       {"table", "no part"}};
   for (const auto& [name, expected] : known) EXPECT_EQ(meaning(name), expected) << name;
+}
+
+// "name" or "name_left" and "name_right", "name_left_1" and so on: what each becomes.
+using List = std::vector<std::pair<std::string, std::string>>;
+
+std::vector<std::string> words(const std::string& text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
+void add(List& list, const std::string& names, const std::string& becomes, bool sided = false) {
+  for (const std::string& name : words(names)) {
+    if (!sided) list.emplace_back(name, becomes);
+    for (const char* side : {"left", "right"})
+      if (sided) list.emplace_back(name + "_" + side, becomes + " " + side);
+  }
+}
+
+// Of `total`, 117 classes.
+List of_totalsegmentator() {
+  List list;
+  add(list,
+      "spleen gallbladder liver stomach pancreas esophagus trachea thyroid_gland small_bowel duodenum colon "
+      "urinary_bladder prostate heart brain",
+      "organ");
+  add(list, "kidney adrenal_gland lung_upper_lobe lung_lower_lobe", "organ", true);
+  add(list, "atrial_appendage_left", "organ left");
+  add(list, "lung_middle_lobe_right", "organ right");
+  add(list, "kidney_cyst", "other", true);
+  add(list, "sacrum vertebrae_S1", "pelvis");
+  for (int i = 1; i <= 12; ++i) {
+    const std::string number = std::to_string(i);
+    if (i <= 5) add(list, "vertebrae_L" + number, "lumbar");
+    if (i <= 7) add(list, "vertebrae_C" + number, "neck");
+    add(list, "vertebrae_T" + number, "thorax");
+    for (const char* side : {"left", "right"})
+      list.emplace_back(std::string("rib_") + side + "_" + number, std::string("thorax ") + side);
+  }
+  add(list,
+      "aorta pulmonary_vein brachiocephalic_trunk superior_vena_cava inferior_vena_cava "
+      "portal_vein_and_splenic_vein",
+      "vessel");
+  add(list, "subclavian_artery common_carotid_artery brachiocephalic_vein iliac_artery iliac_vena", "vessel",
+      true);
+  add(list, "humerus", "upper_arm", true);
+  add(list, "scapula clavicula", "girdle", true);
+  add(list, "femur", "thigh", true);
+  add(list, "hip", "pelvis", true);
+  add(list, "spinal_cord", "nerve");
+  add(list, "gluteus_maximus gluteus_medius gluteus_minimus autochthon iliopsoas", "muscle", true);
+  add(list, "skull", "head");
+  add(list, "sternum", "thorax");
+  add(list, "costal_cartilages", "cartilage");
+  return list;
+}
+
+// Its model of bones.
+List of_moose() {
+  List list;
+  add(list, "carpal fingers metacarpal", "hand", true);
+  add(list, "clavicle scapula", "girdle", true);
+  add(list, "femur", "thigh", true);
+  add(list, "fibula patella tibia", "shank", true);
+  add(list, "humerus", "upper_arm", true);
+  add(list, "metatarsal tarsal", "foot", true);
+  add(list, "radius ulna", "forearm", true);
+  add(list, "toes", "toes", true);
+  add(list, "hip", "pelvis", true);
+  add(list, "sacrum", "pelvis");
+  add(list, "skull", "head");
+  add(list, "sternum", "thorax");
+  add(list, "vertebra_L6", "lumbar");
+  for (int i = 1; i <= 13; ++i)
+    for (const char* side : {"left", "right"})
+      list.emplace_back(std::string("rib_") + side + "_" + std::to_string(i), std::string("thorax ") + side);
+  return list;
+}
+
+TEST(Structures, EveryClassThatSegmentationToolsWriteIsKnown) {
+  const List total = of_totalsegmentator();
+  EXPECT_EQ(total.size(), 117U);
+  for (const List& list : {total, of_moose()})
+    for (const auto& [name, expected] : list) EXPECT_EQ(meaning(name), expected) << name;
 }
 
 TEST(Structures, CodesComeBeforeNamesUnlessTheyAreCoarser) {
