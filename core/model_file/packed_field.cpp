@@ -72,7 +72,7 @@ std::optional<std::vector<std::int16_t>> unpack(const PackedField& packed, std::
       continue;
     }
     if (shift > PackedField::most_shift || bytes.size() < count) return std::nullopt;
-    for (const int number : take(bytes, count)) {
+    for (const std::int8_t number : take(bytes, count)) {
       const int whole = number * (1 << shift);
       if (whole < Word::min() || whole > Word::max()) return std::nullopt;
       out.push_back(static_cast<std::int16_t>(whole));
