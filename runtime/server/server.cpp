@@ -37,7 +37,8 @@ constexpr std::size_t kMostRefusals = 32;
 // and a port lets in 2000.
 constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
 // From one newcomer at a port to the next, who waits in the kernel: however many come at once, those who are
-// served go on between them. Where many keep coming, nobody waits for long: they are let in faster.
+// served go on between them. They are let in faster where one has waited for long; of those who sent
+// something meanwhile the kernel tells only since when they are silent.
 constexpr Clock::duration kBetween = std::chrono::milliseconds(2);
 constexpr Clock::duration kLongWait = std::chrono::seconds(2);
 constexpr Clock::duration kBetweenMany = std::chrono::microseconds(500);
