@@ -63,8 +63,20 @@ NewCase new_case(const Program& program, const ScanSettings& settings, const fil
   ScanOptions options = settings.options;
   options.own_values = settings.skin_given && settings.bone_given;
   if (!settings.side.empty()) options.side = settings.side == "left" ? Side::left : Side::right;
-  Scan scan = read_scan(settings.scan, reading(program, limits), settings.choice, program.context("read"));
-  NewCase out{decide(scan, options, program.context("labels")), {}};
+  // What readers had to change belongs to what is to be looked at; of a scan that is refused it is said
+  // before.
+  std::vector<std::string> changed;
+  const files::ReadOptions told{limits, [&](std::string_view line) { changed.emplace_back(line); }};
+  Scan scan;
+  NewCase out;
+  try {
+    scan = read_scan(settings.scan, told, settings.choice, program.context("read"));
+    out.made = decide(scan, options, program.context("labels"));
+  } catch (const Error&) {
+    for (const std::string& line : changed) program.note("warning: " + line);
+    throw;
+  }
+  out.made.doubts.insert(out.made.doubts.begin(), changed.begin(), changed.end());
   for (std::string& line : unread_below(settings.scan)) out.made.doubts.push_back(std::move(line));
   out.name = write_scan_case(folder, settings.scan, scan, out.made, program.context("write")).name;
   return out;

@@ -11,19 +11,20 @@
 #include <numeric>
 #include <set>
 
+#include "app/scan/label_values.hpp"
 #include "core/files/look.hpp"
 #include "core/values/text.hpp"
 #include "io/case/structures.hpp"
 #include "io/image/dicom.hpp"
 #include "io/image/dicom_image.hpp"
 #include "io/image/dicom_segmentation.hpp"
-#include "io/image/equal_run.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/label_json.hpp"
 #include "io/image/label_table.hpp"
 #include "io/image/mask_folder.hpp"
 #include "io/image/nifti_names.hpp"
 #include "io/image/non_finite.hpp"
+#include "io/image/unsheared.hpp"
 #include "io/image/whole_labels.hpp"
 
 namespace ecorche::app {
@@ -31,8 +32,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostLabels = 2048;  // values of a picture are more
-constexpr std::size_t kAtOnce = 4;         // files that are read beside each other: each takes memory
+constexpr std::size_t kAtOnce = 4;  // files that are read beside each other: each takes memory
 constexpr double kAirHu = -500, kAirBackground = -1024;
 
 std::string small_ending(const fs::path& path) {
@@ -42,43 +42,6 @@ std::string small_ending(const fs::path& path) {
 bool is_table_name(const fs::path& path) {
   static const std::set<std::string> endings{".json", ".tsv", ".ctbl", ".txt", ".label"};
   return endings.contains(small_ending(path));
-}
-
-// The values of an image that may be labels: whole, none below 0, not too many.
-std::optional<std::set<std::int64_t>> label_values(const Image& image) {
-  std::set<std::int64_t> seen;
-  const bool fits = with_scalar_type(image.type, [&](auto zero) {
-    using T = decltype(zero);
-    const auto voxels = image.scalars<T>();
-    const T* const end = voxels.data() + voxels.size();
-    for (const T* at = voxels.data(); at != end; at = io::end_of_run(at, end)) {
-      const T v = *at;
-      if (!(v >= T{}) || static_cast<double>(v) != std::floor(static_cast<double>(v)) ||
-          static_cast<double>(v) > 2147483647.0)
-        return false;
-      seen.insert(static_cast<std::int64_t>(v));
-      if (seen.size() > kMostLabels) return false;
-    }
-    return true;
-  });
-  if (!fits) return std::nullopt;
-  seen.erase(0);
-  return seen;
-}
-
-// Whether neighbours differ as they do in pictures: labels come in areas.
-bool looks_grey(const Image& image, std::size_t values) {
-  if (values < 32) return false;
-  std::size_t pairs = 0, differ = 0;
-  with_scalar_type(image.type, [&](auto zero) {
-    const auto voxels = image.scalars<decltype(zero)>();
-    for (std::size_t v = 1; v < voxels.size(); ++v) {
-      if (voxels[v] == zero || voxels[v - 1] == zero) continue;
-      ++pairs;
-      differ += voxels[v] != voxels[v - 1] ? 1 : 0;
-    }
-  });
-  return 2 * differ > pairs;
 }
 
 ScanImage grey(const fs::path& path, Image image) {
@@ -196,13 +159,26 @@ class Reader {
         }
       });
       for (std::size_t i = 0; i < some.size(); ++i) {
-        for (const std::string& note : some[i].notes) options_.say(note);
+        say(files[begin + i], some[i]);
         if (some[i].error) std::rethrow_exception(some[i].error);
         dicom_ = dicom_ || io::is_dicom(files[begin + i]);
         in_time_ = in_time_ || some[i].in_time || dicom_;
         take(files[begin + i], std::move(some[i]));
         context_.report((done += bytes[begin + i]) / all);
       }
+    }
+  }
+
+  // What all masks of a folder have alike is said once, of the folder.
+  void say(const fs::path& path, const Looked& looked) {
+    for (const std::string& note : looked.notes) {
+      const std::string own = path.string() + ":";
+      if (!looked.mask || !note.starts_with(own)) {
+        options_.say(note);
+        continue;
+      }
+      const std::string line = path.parent_path().string() + ":" + note.substr(own.size());
+      if (said_.insert(line).second) options_.say(line);
     }
   }
 
@@ -240,6 +216,7 @@ class Reader {
                        folders_.contains(path.parent_path()) && !table_for(path);
     if (alone && !out.values) check_is_picture(path, out.image);
     if (alone && out.values) {
+      io::make_unsheared(out.image, io::VoxelKind::labels, path, options);
       out.mask = io::as_mask(out.image);
       out.image = {};
     }
@@ -272,6 +249,7 @@ class Reader {
         !looked.names.empty() || (values && (table_for(path) || !looks_grey(looked.image, values->size())));
     if (!labels) {
       io::replace_non_finite(looked.image, path, options_);
+      io::make_unsheared(looked.image, io::VoxelKind::grey, path, options_);
       add_grey(path, std::move(looked.image));
       return;
     }
@@ -279,7 +257,9 @@ class Reader {
       out_.notes.push_back(path.string() + ": holds no label: it is left out");
       return;
     }
-    io::Segmentation map = io::segmentation_of(io::whole_labels(std::move(looked.image), path), path);
+    Image whole = io::whole_labels(std::move(looked.image), path);
+    io::make_unsheared(whole, io::VoxelKind::labels, path, options_);
+    io::Segmentation map = io::segmentation_of(std::move(whole), path);
     const bool named = !map.names.empty();
     if (!named && values && values->size() == 1) {  // a mask by itself is named by its file
       map.names = io::make_identifiers({{*values->begin(), io::image_stem(path)}});
@@ -381,6 +361,7 @@ class Reader {
   Scan out_;
   std::vector<fs::path> tables_;
   std::set<fs::path> folders_;
+  std::set<std::string> said_;  // of folders
   std::map<fs::path, MaskFolder> masks_;
   bool in_time_ = false, dicom_ = false;  // whether a phase, a series may be chosen of any of the files
 };

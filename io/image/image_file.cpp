@@ -18,6 +18,7 @@
 #include "io/image/packed_nifti.hpp"
 #include "io/image/packed_nrrd.hpp"
 #include "io/image/right_angles.hpp"
+#include "io/image/unsheared.hpp"
 #include "io/image/whole_labels.hpp"
 
 namespace ecorche::io {
@@ -152,11 +153,14 @@ std::string read_head(const Path& path) {
 Image read_image(const Path& path, const files::ReadOptions& options, const ImageChoice& choice) {
   Image image = read_stored(path, options, choice, false);
   replace_non_finite(image, path, options);
+  make_unsheared(image, VoxelKind::grey, path, options);
   return image;
 }
 
 Image read_label_image(const Path& path, const files::ReadOptions& options, const ImageChoice& choice) {
-  return whole_labels(read_stored(path, options, choice, true), path);
+  Image image = whole_labels(read_stored(path, options, choice, true), path);
+  make_unsheared(image, VoxelKind::labels, path, options);
+  return image;
 }
 
 Image read_stored_image(const Path& path, const files::ReadOptions& options, int phase, bool& in_time) {

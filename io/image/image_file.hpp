@@ -17,19 +17,19 @@ namespace ecorche::io {
 /// of kind time or list) the one that `choice.phase` names; and DICOM, a folder or a file (dicom_image.hpp).
 /// Before any voxel is allocated the size that the header declares is held against 2^33 bytes, the budget,
 /// and the file's own size (raw) or what its stream inflates to (gzip). Axes a little off right angles are
-/// mended (right_angles.hpp), values that are not finite replaced (non_finite.hpp); both are said. Throws
-/// Error{missing_input} or Error{data}.
+/// mended (right_angles.hpp), those farther off resampled, grey values linearly (unsheared.hpp), values that
+/// are not finite replaced (non_finite.hpp); all of it is said. Throws Error{missing_input} or Error{data}.
 Image read_image(const std::filesystem::path& path, const files::ReadOptions& options = {},
                  const ImageChoice& choice = {});
 
-/// The same for labels: real voxels that hold whole numbers become integers (whole_labels.hpp). Throws
-/// Error{data} for those that do not.
+/// The same for labels: real voxels that hold whole numbers become integers (whole_labels.hpp), and
+/// sheared ones take the nearest. Throws Error{data} for those that do not.
 Image read_label_image(const std::filesystem::path& path, const files::ReadOptions& options = {},
                        const ImageChoice& choice = {});
 
 /// The same as the file has it, for those who look first whether it holds grey values or labels: nothing is
-/// replaced yet. Of what is no DICOM. `in_time`: whether it holds several volumes, of which `phase` is taken;
-/// any other image is read as it is.
+/// replaced yet, and sheared axes are as they are. Of what is no DICOM. `in_time`: whether it holds several
+/// volumes, of which `phase` is taken; any other image is read as it is.
 Image read_stored_image(const std::filesystem::path& path, const files::ReadOptions& options, int phase,
                         bool& in_time);
 

@@ -10,6 +10,7 @@
 #include "core/linear/decompositions.hpp"
 #include "core/values/text.hpp"
 #include "io/image/header_fields.hpp"
+#include "io/image/unsheared.hpp"
 
 namespace ecorche::io {
 namespace {
@@ -20,6 +21,8 @@ using Direction = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 // that were fitted and rounded to a few digits are off by this much; a sheared acquisition (a tilted gantry)
 // by degrees.
 constexpr double kMostDegrees = 0.1;
+// Beyond, an affine is no scanner's: a gantry tilts by 30 degrees at most.
+constexpr double kMostShear = 45;
 // Six digits, as text headers have them.
 constexpr double kRounding = 1e-4, kExact = 1e-12, kMostLength = 1e-3;
 
@@ -51,16 +54,16 @@ double degrees_off(const ImageGrid& grid) {
 void make_right_angled(ImageGrid& grid, const std::filesystem::path& path,
                        const files::ReadOptions& options) {
   Eigen::Map<Direction> direction(grid.direction.data());
-  const double degrees = degrees_off(grid);
-  if (!(degrees <= kMostDegrees)) {
+  const double degrees = degrees_off(grid), lean = lean_degrees(grid);
+  if (!(lean <= kMostShear)) {
     fields::refuse(
-        path, "its axes are not orthonormal: " + text::number(degrees) + " degrees off right angles",
-        "resample it onto a right-angled grid; of a NIfTI whose shear means nothing, set the qform from the "
-        "sform");
+        path, "its axes are not orthonormal: " + text::number(lean) + " degrees off right angles",
+        "up to 45 are resampled; of a NIfTI whose shear means nothing, set the qform from the sform");
   }
   const double length = (direction.colwise().norm().array() - 1).abs().maxCoeff();
   if (!(length <= kMostLength))
     fields::refuse(path, "its axes are not orthonormal: the length of one is off by " + text::number(length));
+  if (degrees > kMostDegrees) return;  // the voxels will be resampled
   const double skew = (direction.transpose() * direction - Direction::Identity()).cwiseAbs().maxCoeff();
   if (skew <= kExact) return;
   const ImageGrid before = grid;

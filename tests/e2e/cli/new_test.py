@@ -80,6 +80,24 @@ class New(unittest.TestCase):
                     continue
                 self.assertLess(np.linalg.norm(found[form][joint][0] - centre), VOXEL, (form, joint))
 
+    def test_a_sheared_scan_is_resampled_and_its_report_says_so(self):
+        scan, case, page = self.folder / "sheared", self.folder / "sheared_case", self.folder / "sheared.html"
+        scan.mkdir()
+        for path in sorted((self.folder / "totalsegmentator_ml").glob("*.nii.gz")):
+            image = nibabel.load(path)
+            affine = image.affine.copy()
+            affine[:, 2] += 0.15 * affine[:, 0]
+            sheared = nibabel.Nifti1Image(np.asarray(image.dataobj), affine)
+            sheared.header.extensions = image.header.extensions
+            nibabel.save(sheared, scan / path.name)
+        result = run("--json", "new", *sorted(scan.glob("*.nii.gz")), "-o", case, "--report", page)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        doubts = [line for line in json.loads(result.stdout)["doubts"] if "degrees off right angles: resampled onto right-angled voxels" in line]
+        self.assertEqual(len(doubts), len(list(scan.iterdir())), "a line for each file")
+        self.assertIn("ct.nii.gz: its axes are 8.53 degrees off right angles: resampled", page.read_text())
+        bones = {bone["segment"] for bone in json.loads(result.stdout)["bones"]}
+        self.assertEqual(bones, {bone["segment"] for bone in self.made["totalsegmentator_ml"]["bones"]})
+
     def test_prepares_and_poses(self):
         for form in FORMS:
             model = self.folder / f"{form}.hdf"

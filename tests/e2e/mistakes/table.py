@@ -96,7 +96,7 @@ IMAGE_ROWS = [
     ("image_two_axes", put("ct.nrrd", body.nrrd(VOXELS, dimension=2)), CHECK, 65, "has 2 axes"),
     ("image_type_unknown", put("ct.nrrd", body.nrrd(VOXELS, kind="block")), CHECK, 65, "voxels of type 'block'"),
     ("image_encoding_unknown", put("ct.nrrd", body.nrrd(VOXELS, encoding="bzip2")), CHECK, 65, "its encoding is 'bzip2'"),
-    ("image_skewed", put("ct.nrrd", body.nrrd(VOXELS, space_directions="(20,9,0) (0,25,0) (0,0,40)")), CHECK, 65, "not orthonormal"),
+    ("image_skewed", put("ct.nrrd", body.nrrd(VOXELS, space_directions="(20,90,0) (0,25,0) (0,0,40)")), CHECK, 65, "not orthonormal"),
     ("image_flat_axis", put("ct.nrrd", body.nrrd(VOXELS, space_directions="(0,0,0) (0,25,0) (0,0,40)")), CHECK, 65, "ct.nrrd"),
     ("image_nan_origin", put("ct.nrrd", body.nrrd(VOXELS, space_origin="(nan,0,0)")), CHECK, 65, "ct.nrrd"),
     ("image_header_endless", put("ct.nrrd", b"NRRD0004\n" + b"# and so on\n" * 9000), CHECK, 65, "header does not end"),

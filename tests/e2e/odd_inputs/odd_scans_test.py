@@ -24,7 +24,7 @@ from outcome import Refused
 SURE, MOST_MM = 0.5, 30  # a joint found with such confidence lies no farther from the truth
 RIGID_MM, MOST_CHANGE = 0.01, 0.1
 QUICK = {"plain_legs", "legs_without_body_and_ct", "left_handed", "oblique", "sheared", "one_bone_alone", "tibia_without_fibula", "cut_at_thigh_and_shank",
-         "empty_labels", "wrong_names", "names_of_sides_exchanged", "labels_with_fractions", "labels_in_colours", "file_cut_short", "one_foot_with_side"}
+         "sheared_masks", "empty_labels", "wrong_names", "names_of_sides_exchanged", "labels_with_fractions", "labels_in_colours", "file_cut_short", "one_foot_with_side"}
 
 
 def truths(folder):

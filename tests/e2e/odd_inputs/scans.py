@@ -125,6 +125,24 @@ def sheared(matrix_entry):
     return out
 
 
+def slanted(scan, share):
+    """The same body in slices that lean: each lies farther along the rows by `share` of its height, as the affine says."""
+    across, _, up = np.linalg.norm(scan.affine[:3, :3], axis=0)
+    shifts = np.rint(np.arange(scan.ct.shape[2]) * share * up / across).astype(int)
+    room = shifts[-1]
+    scan.affine = scan.affine.copy()
+    scan.affine[:3, 3] -= room * scan.affine[:3, 0]
+    scan.affine[:3, 2] += share * up / across * scan.affine[:3, 0]
+
+    def shifted(values):
+        out = np.full((values.shape[0] + room, *values.shape[1:]), values.min(), values.dtype)
+        for k, shift in enumerate(shifts):
+            out[room - shift:room - shift + values.shape[0], :, k] = values[:, :, k]
+        return out
+
+    return scan.each(shifted)
+
+
 def noise(scan, share):
     """Voxels of random labels anywhere."""
     random = np.random.default_rng(5)
@@ -252,7 +270,9 @@ ROWS = [
     ("lying", lambda f, s: legs(s).moved(rotation(90, 0)).write(f), Prepared()),
     ("left_handed", lambda f, s: flipped(legs(s), 0).write(f), Prepared()),
     ("stored_backwards", lambda f, s: flipped(flipped(legs(s), 2), 1).write(f), Prepared()),
-    ("sheared", lambda f, s: legs(s).moved(sheared(0.2)).write(f, code=(0, 1)), Refused(65, "not orthonormal")),
+    ("sheared", lambda f, s: slanted(legs(s), 0.2).write(f, code=(0, 1)), Prepared(said=("degrees off right angles: resampled",))),
+    ("sheared_masks", lambda f, s: masks(f, slanted(s.part(0.3, 0.56), 0.2)), Prepared(said=("/total: its axes are",))),
+    ("sheared_absurdly", lambda f, s: legs(s).moved(sheared(1.5)).write(f, code=(0, 1)), Refused(65, "not orthonormal")),
     ("sheared_a_little", lambda f, s: legs(s).moved(sheared(0.001)).write(f, code=(0, 1)), Prepared()),
     ("flat_voxels", lambda f, s: half(legs(s), "left").finer(6, 6, 0.25).write(f), Prepared()),
     ("tall_voxels", lambda f, s: legs(s).finer(1, 1, 0.2).write(f), Prepared()),

@@ -149,11 +149,6 @@ TEST(ImageLabels, OthersAreNamedWithTheirPlace) {
   refused({0, 0, 0, 0, 0, 0, -2147483649.0, 1}, "l.nrrd: holds the label -2.14748365e+09 at voxel (0, 1, 1)");
 }
 
-struct Said {
-  std::vector<std::string> lines;
-  files::ReadOptions options{{}, [this](std::string_view line) { lines.emplace_back(line); }};
-};
-
 TEST(ImageValues, ThatAreNotFiniteAreCountedAndReplaced) {
   const Scratch scratch;
   const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
@@ -203,24 +198,51 @@ TEST(ImageAxes, ALittleOffAreMadeRightAngledAndSaid) {
   EXPECT_EQ(said.lines.size(), 2U);
 }
 
-TEST(ImageAxes, FurtherOffIsOneLineWithARemedy) {
+// Beyond a tenth of a degree they are resampled, by one line: whatever format says so, labels as labels.
+TEST(ImageAxes, FurtherOffAreResampledAndSaid) {
+  const Scratch scratch;
+  const std::string voxels("\0\0\0\0\x0a\x0a\x0a\x0a", 8);
+  const std::string end = " (if the shear means nothing, set the qform of the NIfTI from its sform)";
+  Said said;
+  const auto nii = scratch.put("a.nii", nifti(2, 8, voxels, 15));
+  const Image grey = read_image(nii, said.options);
+  EXPECT_LT(degrees_off(grey.grid), 1e-9);
+  ASSERT_EQ(said.lines.size(), 1U);
+  EXPECT_EQ(said.lines[0],
+            nii.string() +
+                ": its axes are 15 degrees off right angles: resampled onto right-angled voxels "
+                "of 1 x 0.966 x 1 mm, grey values linearly" +
+                end);
+  const Image labels = read_label_image(nii, said.options);
+  ASSERT_EQ(said.lines.size(), 2U);
+  EXPECT_NE(said.lines[1].find("labels by the nearest voxel"), std::string::npos);
+  EXPECT_EQ(values<std::uint8_t>(labels),
+            (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 0, 10, 10, 0, 10, 10, 0}));
+  const auto slanted = scratch.put("a.nrrd", nrrd("uint8", voxels, "(1,0.01,0) (0,1,0) (0,0,1)"));
+  EXPECT_LT(degrees_off(read_image(slanted, said.options).grid), 1e-9);
+  EXPECT_NE(said.lines.back().find("a.nrrd: its axes are 0.573 degrees off right angles: resampled"),
+            std::string::npos);
+}
+
+TEST(ImageAxes, AbsurdOnesAreOneLineWithARemedy) {
   const Scratch scratch;
   const std::string voxels(8, '\1');
   const std::string mend =
-      " degrees off right angles (resample it onto a right-angled grid; of a NIfTI whose shear means "
-      "nothing, set the "
-      "qform from the sform)";
-  expect_error(ErrorKind::data, "a.nii: its axes are not orthonormal: 0.12" + mend,
-               [&] { read_image(scratch.put("a.nii", nifti(2, 8, voxels, 0.12))); });
-  expect_error(ErrorKind::data, "a.nii: its axes are not orthonormal: 15" + mend,
-               [&] { read_image(scratch.put("a.nii", nifti(2, 8, voxels, 15))); });
-  expect_error(ErrorKind::data, "a.nrrd: its axes are not orthonormal: 0.573" + mend, [&] {
-    read_image(scratch.put("a.nrrd", nrrd("uint8", voxels, "(1,0.01,0) (0,1,0) (0,0,1)")));
-  });
+      " degrees off right angles (up to 45 are resampled; of a NIfTI whose shear means nothing, set the "
+      "qform "
+      "from the sform)";
+  expect_error(ErrorKind::data, "a.nii: its axes are not orthonormal: 46" + mend,
+               [&] { read_image(scratch.put("a.nii", nifti(2, 8, voxels, 46))); });
+  expect_error(ErrorKind::data, "a.nrrd: its axes are not orthonormal: 54.7" + mend,
+               [&] { read_image(scratch.put("a.nrrd", nrrd("uint8", voxels, "(1,0,0) (0,1,0) (1,1,1)"))); });
   std::string longer = meta("MET_UCHAR", voxels);
   longer.replace(longer.find("= 1 0 0 0 1 0"), 13, "= 1.2 0 0 0 1 0");
   expect_error(ErrorKind::data, "a.mha: its axes are not orthonormal: the length of one is off by 0.2",
                [&] { read_image(scratch.put("a.mha", longer)); });
+  // A row of voxels that would need a plane of them.
+  expect_error(ErrorKind::data, "a.nrrd: takes more memory than its", [&] {
+    read_image(scratch.put("a.nrrd", nrrd("uint8", voxels, "(1e-6,0,0) (0,1e-6,0) (3e5,3e5,6e5)")));
+  });
 }
 
 TEST(ImageDicom, SaysWhatItIsAndWhatToDo) {

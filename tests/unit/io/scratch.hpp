@@ -10,8 +10,10 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <ecorche/values/error.hpp>
+#include "core/files/read_options.hpp"
 
 namespace ecorche {
 
@@ -48,6 +50,12 @@ class Scratch {
 
  private:
   std::filesystem::path path_;
+};
+
+/// What a reader tells, line by line.
+struct Said {
+  std::vector<std::string> lines;
+  files::ReadOptions options{{}, [this](std::string_view line) { lines.emplace_back(line); }};
 };
 
 /// The Error that `f` throws; anything else fails the test.
