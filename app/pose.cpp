@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // `ecorche pose`: offline posing, from a pose file or frames of a motion clip, into files.
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include <ecorche/io/case_file.hpp>
 #include <ecorche/model_file/model_file.hpp>
 #include <ecorche/runtime/pose_quality.hpp>
-#include <ecorche/runtime/resample.hpp>
-#include <ecorche/runtime/skin_caps.hpp>
 #include <ecorche/runtime/volume_poser.hpp>
 #include "app/bridge_option.hpp"
 #include "app/cli.hpp"
 #include "app/command.hpp"
+#include "app/frame_writer.hpp"
 #include "app/measured_pose.hpp"
 #include "app/pose_frames.hpp"
 #include "app/pose_plan.hpp"
@@ -24,13 +19,8 @@
 #include "app/posed_case.hpp"
 #include "app/posed_dicom.hpp"
 #include "app/posed_folder.hpp"
-#include "app/posed_tets.hpp"
 #include "app/relax_pose.hpp"
-#include "app/tet_regions.hpp"
-#include "core/files/atomic_file.hpp"
 #include "core/values/text.hpp"
-#include "io/image/image_file.hpp"
-#include "io/surface/surface_file.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::app {
@@ -40,182 +30,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr double kPaperThinness = 0.48;  // of the spheres of a scan
-
-runtime::Sampling sampling_of(const PoseSettings& settings) {
-  return settings.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear;
-}
-
-// Writes one posed body. Every file is checked for a stop request before it is begun.
-class FrameWriter {
- public:
-  FrameWriter(const PoseSettings& settings, const Plan& plan, const runtime::VolumePoser& poser,
-              const runtime::PosedBody& body, const std::vector<float>& det_f, fs::path stage,
-              fs::path folder, const Context& context)
-      : settings_(settings),
-        plan_(plan),
-        poser_(poser),
-        model_(poser.model()),
-        body_(body),
-        det_f_(det_f),
-        stage_(std::move(stage)),
-        folder_(std::move(folder)),
-        context_(context) {}
-
-  /// Volumes become DICOM.
-  void use_dicom(const Program& program, io::DicomFacts facts) {
-    dicom_.emplace(program, std::move(facts), [this](const std::string& name) { return next(name); });
-  }
-
-  json write(const json& quality) {
-    for (const std::uint32_t row : plan_.tissues) write_tissue(row);
-    if (plan_.tets || plan_.field) write_tets();
-    if (dicom_) {
-      for (const std::uint32_t row : plan_.volumes)
-        dicom_->add(model_.volumes[row], posed(model_.volumes[row]));
-      dicom_->finish();
-    } else {
-      for (const std::uint32_t row : plan_.volumes)
-        io::write_image(next(model_.volumes[row].name + "." + settings_.volume_format),
-                        posed(model_.volumes[row]));
-    }
-    if (plan_.field) write_field();
-    if (quality.contains("fem")) files::write_text(next("fem.json"), quality["fem"].dump(2) + "\n");
-    files::write_text(next("quality.json"), quality.dump(2) + "\n");
-    return written_;
-  }
-
- private:
-  // The path of the next file, named in the result.
-  fs::path next(const std::string& name) {
-    context_.check_stop();
-    const std::size_t files = plan_.tissues.size() * settings_.formats.size() + plan_.volumes.size() +
-                              (plan_.tets ? settings_.tet_formats.size() : 0) + (plan_.field ? 3 : 0) +
-                              (settings_.by_fem() ? 2 : 1);
-    context_.report(static_cast<double>(written_.size()) / static_cast<double>(files));
-    written_.push_back((folder_ / name).string());
-    return stage_ / name;
-  }
-
-  void write_tissue(std::uint32_t row) {
-    const std::vector<float>& posed = body_.tissues[row];
-    io::NamedSurface named{model_.tissues[row].name, model_.tissues[row].group, {}};
-    SurfaceMesh& mesh = named.mesh;
-    mesh.V = Eigen::Map<const PointsF>(posed.data(), static_cast<Eigen::Index>(posed.size() / 3), 3)
-                 .cast<double>();
-    mesh.F = model_.tissues[row].F;
-    for (const std::string& format : settings_.formats) {
-      const fs::path file = next(named.name + "." + format);
-      if (format == "glb") {
-        io::write_surfaces(file, without_caps(named, row));  // with the tissue's name and material
-      } else {
-        io::write_surface(file, mesh);
-      }
-    }
-  }
-
-  // A skin that its scan's border cuts in two: the skin, and its caps.
-  std::vector<io::NamedSurface> without_caps(const io::NamedSurface& whole, std::uint32_t row) const {
-    const Tissue& tissue = model_.tissues[row];
-    const std::vector<std::uint8_t> caps =
-        row == 0 ? runtime::cap_faces(tissue, runtime::skin_caps(model_)) : std::vector<std::uint8_t>{};
-    if (std::find(caps.begin(), caps.end(), 1) == caps.end()) return {whole};
-    std::vector<io::NamedSurface> out{{whole.name, whole.group, {whole.mesh.V, {}}},
-                                      {whole.name + "_cap", Group::other, {whole.mesh.V, {}}}};
-    const auto count = static_cast<Eigen::Index>(std::count(caps.begin(), caps.end(), 1));
-    out[0].mesh.F.resize(tissue.F.rows() - count, 3);
-    out[1].mesh.F.resize(count, 3);
-    std::array<Eigen::Index, 2> at{0, 0};
-    for (Eigen::Index f = 0; f < tissue.F.rows(); ++f) {
-      const std::size_t part = caps[static_cast<std::size_t>(f)];
-      out[part].mesh.F.row(at[part]++) = tissue.F.row(f);
-    }
-    return out;
-  }
-
-  // The posed tets, with the way of every node from rest: the forward displacement field.
-  void write_tets() {
-    const PointsF posed = Eigen::Map<const PointsF>(body_.nodes.data(), model_.nodes.rows(), 3);
-    const PointsF moved = posed - model_.nodes;
-    const auto write = [&](const std::string& ending) {
-      io::write_tets(next("body." + ending), posed, model_.tets,
-                     {{"displacement", 3, {moved.data(), moved.data() + moved.size()}}},
-                     {{"label", 1, {model_.tet_label.begin(), model_.tet_label.end()}},
-                      {std::string(kTetSegment), 1, segment_of_tets(model_)},
-                      {"det_f", 1, det_f_}},
-                     tet_regions(model_));
-      if (ending == "ele") written_.push_back((folder_ / "body.node").string());
-    };
-    bool field_written = !plan_.field;  // body.vtu carries the way from rest to posed
-    if (plan_.tets) {
-      for (const std::string& format : settings_.tet_formats) {
-        write(format == "mcnp" ? "mcnp.inp" : format);
-        field_written = field_written || format == "vtu";
-      }
-    }
-    if (!field_written) write("vtu");
-  }
-
-  ImageGrid grid_for(const ImageGrid& rest) const {
-    return settings_.grid == "rest" ? rest : runtime::grow_to(rest, body_.nodes);
-  }
-
-  Image posed(const ModelVolume& volume) const {
-    const auto balls = plan_.balls.find(volume.name);
-    return balls == plan_.balls.end() ? drawn(volume) : refilled(volume, balls->second);
-  }
-
-  Image drawn(const ModelVolume& volume) const {
-    Image posed;
-    runtime::VolumePoser::Scratch scratch;
-    poser_.pose(body_.nodes, volume, sampling_of(settings_), grid_for(volume.image.grid), posed, scratch,
-                context_);
-    return posed;
-  }
-
-  Image refilled(const ModelVolume& volume, const runtime::VolumeBalls& balls) const {
-    const runtime::BallSet set = balls.at(body_.segments);
-    const runtime::LatticeBox box =
-        settings_.grid == "rest" ? runtime::LatticeBox{{0, 0, 0}, set.lattice.size} : runtime::grown_box(set);
-    return runtime::refill(set, box, volume.image, volume.background,
-                           runtime::sampling_for(volume, sampling_of(settings_)), context_);
-  }
-
-  void write_field() {
-    runtime::InverseMap map;
-    runtime::locate(model_, body_.nodes, grid_for(field_grid()), map, context_);
-    const auto field = runtime::inverse_displacement(model_, body_.nodes, map);
-    io::write_image(next("displacement." + settings_.field_format()), field.vectors);
-    io::write_image(next("mask." + settings_.field_format()), field.mask);
-  }
-
-  // The first volume's lattice; without volumes one around the rest body of at most about 4 million cubic
-  // voxels.
-  ImageGrid field_grid() const {
-    if (!model_.volumes.empty()) return model_.volumes.front().image.grid;
-    const Eigen::Vector3d low = model_.nodes.colwise().minCoeff().transpose().cast<double>();
-    const Eigen::Vector3d high = model_.nodes.colwise().maxCoeff().transpose().cast<double>();
-    const double edge = std::max(0.5, std::ceil(2 * std::cbrt((high - low).prod() / 4e6)) / 2);
-    ImageGrid grid;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const auto axis = static_cast<Eigen::Index>(a);
-      grid.origin[a] = low[axis];
-      grid.spacing[a] = edge;
-      grid.size[a] = static_cast<std::int32_t>(std::ceil((high[axis] - low[axis]) / edge)) + 1;
-    }
-    return grid;
-  }
-
-  const PoseSettings& settings_;
-  const Plan& plan_;
-  const runtime::VolumePoser& poser_;
-  const Model& model_;
-  const runtime::PosedBody& body_;
-  const std::vector<float>& det_f_;  // of every tet
-  fs::path stage_, folder_;          // where to write, and what that becomes
-  const Context& context_;
-  json written_ = json::array();
-  std::optional<PosedDicom> dicom_;
-};
 
 // Of one pose.
 io::DicomFacts facts_of(io::DicomFacts facts, const PoseSettings& settings, const Frame& frame,
@@ -361,7 +175,11 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
       ->delimiter(',')
       ->check(CLI::IsMember({"stl", "obj", "ply", "off", "vtp", "glb"}))
       ->capture_default_str();
-  command->add_option("--volumes", s->volumes, "volumes to write: all, none, or names with commas between")
+  command
+      ->add_option(
+          "--volumes", s->volumes,
+          "volumes to write: all, none, or names with commas between; beside each lies its mask, NAME-mask: "
+          "1 where a value is of the scan, 0 where it is background")
       ->delimiter(',');
   command
       ->add_option("--volume-format", s->volume_format,

@@ -60,7 +60,10 @@ class Naming {
     }
     if (ending == ".dcm") return of_dicom(file, std::move(out));
     if (!kImageEndings.contains(ending)) return out;
-    if (field_ && (stem == "displacement" || stem == "mask")) {
+    if (const std::string shown = masked(stem); !shown.empty()) {
+      out.kind = PosedKind::mask;
+      out.of = shown;
+    } else if (field_ && (stem == "displacement" || stem == "mask")) {
       out.kind = PosedKind::field;
     } else if (const ModelVolume* volume = named(model_.volumes, stem)) {
       out.kind = volume->labels ? PosedKind::labels : PosedKind::image;
@@ -74,6 +77,11 @@ class Naming {
   // `labels.dcm`, and the slices in `ct.dicom`.
   PosedFile of_dicom(const fs::path& file, PosedFile out) const {
     const std::string stem = (file.has_parent_path() ? file.parent_path() : file).stem().string();
+    if (const std::string shown = masked(stem); !shown.empty()) {
+      out.kind = PosedKind::mask;
+      out.of = shown;
+      return out;
+    }
     const ModelVolume* volume = named(model_.volumes, stem);
     out.kind = file.has_parent_path() ? PosedKind::image : PosedKind::labels;
     out.of = stem;
@@ -82,6 +90,12 @@ class Naming {
     }
     if (volume == nullptr && out.kind == PosedKind::image) out.kind = PosedKind::other;
     return out;
+  }
+  // The volume whose mask is called so; empty: none.
+  std::string masked(const std::string& stem) const {
+    if (!stem.ends_with(kMaskEnding)) return {};
+    const std::string volume = stem.substr(0, stem.size() - kMaskEnding.size());
+    return named(model_.volumes, volume) == nullptr ? std::string() : volume;
   }
   template <class T>
   static const T* named(const std::vector<T>& items, const std::string& name) {

@@ -17,8 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr std::array<std::string_view, 9> kFileKinds{"surface", "image",   "labels", "tets", "scan",
-                                                     "pose",    "quality", "field",  "other"};
+constexpr std::array<std::string_view, 10> kFileKinds{"surface", "image",   "labels", "tets", "scan",
+                                                      "pose",    "quality", "field",  "mask", "other"};
 
 template <class T>
 T number_from(const std::string& text, int base) {

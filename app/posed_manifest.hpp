@@ -19,6 +19,8 @@ inline constexpr std::string_view kManifest = "posed.json";
 /// Names that no tissue and no volume can have.
 inline constexpr std::string_view kPoseFile = "pose.yaml", kScanSurfaces = "scan-surfaces.vtp",
                                   kTets = "body.vtu";
+/// Of a posed volume's name, of the mask beside it; no volume has such a name.
+inline constexpr std::string_view kMaskEnding = "-mask";
 
 /// A tissue of the model, and how it was carried: by tets, or rigidly with a segment.
 struct PosedSurface {
@@ -30,7 +32,7 @@ struct PosedSurface {
 };
 
 /// What a file of a posed folder is.
-enum class PosedKind : std::uint8_t { surface, image, labels, tets, scan, pose, quality, field, other };
+enum class PosedKind : std::uint8_t { surface, image, labels, tets, scan, pose, quality, field, mask, other };
 std::string_view kind_name(PosedKind kind);
 
 struct PosedFile {

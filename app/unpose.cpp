@@ -232,8 +232,9 @@ class WayBack {
   void image(const Item& item) {
     if (item.to.filename().string().ends_with(".seg.nrrd") && io::is_dicom(item.from)) return segments(item);
     const std::string name = name_of(item.from);
-    const bool labels =
-        is_labels(name, settings_) || (item.known != nullptr && item.known->kind == PosedKind::labels);
+    const bool labels = is_labels(name, settings_) ||
+                        (item.known != nullptr &&
+                         (item.known->kind == PosedKind::labels || item.known->kind == PosedKind::mask));
     const Image back = images_.bring(
         io::read_image(item.from), labels,
         settings_.sampling == "nearest" ? runtime::Sampling::nearest : runtime::Sampling::trilinear);

@@ -156,7 +156,7 @@ def read_posed(folder):
     for path in sorted(folder.iterdir()):
         if path.suffix in SURFACES and path.stem in groups:
             tissues.append(Tissue(path.stem, groups[path.stem], read_surface(path)))
-        elif path.suffix == ".nrrd" and path.stem not in ("displacement", "mask"):
+        elif path.suffix == ".nrrd" and path.stem not in ("displacement", "mask") and not path.stem.endswith("-mask"):
             voxels, spacing = read_image(path)
             if voxels is not None:
                 file = written.get(path.name, {})

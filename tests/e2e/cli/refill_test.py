@@ -154,6 +154,9 @@ class Refill(BarTest):
         joined, spacing, at = self.read(self.folder / "both/spheres.nrrd")
         x, y, z = np.rint((own_at - at) / spacing).astype(int)
         self.assertTrue((joined[z:z + own.shape[0], y:y + own.shape[1], x:x + own.shape[2]] == own).all())
+        mask = self.read(self.folder / "posed/labels-mask.nrrd")[0]
+        self.assertEqual(int((own[mask == 0] != 0).sum()), 0)
+        self.assertGreater(float((own[mask == 1] != 0).mean()), 0.9)
         both = self.ok("deformers", model, "--volume", "labels", "--pose", pose, "--no-bridge", "-o", self.folder / "both")["frames"][0]
         self.assertNotEqual(both["differ"], result["differ"])
         self.ok("pose", model, "-o", self.folder / "posed", "--pose", pose, "--volumes", "labels", "--deformer", "spheres", "--no-bridge")
