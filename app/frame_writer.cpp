@@ -100,14 +100,16 @@ void FrameWriter::write_volumes() {
     } else {
       io::write_image(next(volume.name + "." + settings_.volume_format), images_.of(volume));
     }
-    write_mask(volume, "");
   }
   if (dicom_) dicom_->finish();
+  for (const std::uint32_t row : plan_.volumes) write_mask(model_.volumes[row], "");
   if (!settings_.as_case) return;
   for (const ModelVolume& volume : model_.volumes) write_mask(volume, "volumes/");  // the case wrote them
 }
 
 void FrameWriter::write_mask(const ModelVolume& volume, const std::string& folder) {
+  if (plan_.slices && dicom_)  // which no other format can place
+    return dicom_->write_mask(volume.name + std::string(kMaskEnding), images_.mask(volume));
   io::write_image(next(folder + volume.name + std::string(kMaskEnding) + "." + settings_.field_format()),
                   images_.mask(volume));
 }

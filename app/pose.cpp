@@ -20,6 +20,7 @@
 #include "app/posed_dicom.hpp"
 #include "app/posed_folder.hpp"
 #include "app/relax_pose.hpp"
+#include "app/slice_choice.hpp"
 #include "core/values/text.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
@@ -41,9 +42,11 @@ io::DicomFacts facts_of(io::DicomFacts facts, const PoseSettings& settings, cons
 }
 
 // `given`: the poses, where they were read already, on the same rig.
-int pose_model(const Program& program, const PoseSettings& settings, std::vector<Frame> given, json result) {
+int pose_model(const Program& program, const PoseSettings& settings,
+               const std::optional<io::ScanSlices>& slices, std::vector<Frame> given, json result) {
   const auto model = std::make_shared<const Model>(model_file::read(settings.model, program.context("read")));
   Plan plan = plan_of(settings, *model);
+  plan.slices = slices;
   if (settings.deformer == "spheres" && model->spheres.empty())
     throw Error(ErrorKind::config, settings.model.string(), "it holds no spheres",
                 "preprocess it with spheres, or deform by tets");
@@ -67,6 +70,8 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
     dicom = dicom_facts(program, settings.dicom, "ECORCHE-" + text::hex(identity),
                         "Posed by ecorche: the values of the scan, moved with the body's tissues (" +
                             settings.sampling + "). For training and education.");
+
+  if (plan.slices) dicom.positions = plan.slices->positions;
 
   result["ok"] = true;
   result["skinning"] = settings.skinning;
@@ -118,7 +123,9 @@ int pose_model(const Program& program, const PoseSettings& settings, std::vector
 
 int run_pose(const Program& program, PoseSettings& settings) {
   check_settings(settings);
-  if (!settings.scan.wanted()) return pose_model(program, settings, {}, {{"model", settings.model.string()}});
+  const std::optional<io::ScanSlices> slices = chosen_slices(settings);
+  if (!settings.scan.wanted())
+    return pose_model(program, settings, slices, {}, {{"model", settings.model.string()}});
   // What would fail only after minutes of work is refused first.
   check_frames(settings.frames);
   if (settings.frames.motion.file.empty()) check_folder_of_a_body(settings.output);
@@ -132,7 +139,7 @@ int run_pose(const Program& program, PoseSettings& settings) {
                     },
                     [&](const fs::path& model, const json& scan) {
                       settings.model = model;
-                      return pose_model(program, settings, std::move(frames), {{"scan", scan}});
+                      return pose_model(program, settings, slices, std::move(frames), {{"scan", scan}});
                     }});
 }
 
@@ -194,6 +201,13 @@ void declare_pose(CLI::App& app, Program& program, Run& chosen) {
   command
       ->add_option("--grid", s->grid, "of volumes: posed (the rest lattice grown to the posed body) or rest")
       ->check(CLI::IsMember({"posed", "rest"}))
+      ->capture_default_str();
+  command
+      ->add_option("--resample", s->resample,
+                   "onto which slices volumes are brought: even (voxels at right angles and even distances, "
+                   "as the model holds them; --grid says how many) or slices (those of the scan, where they "
+                   "lay: of --dicom-source, else of --scan)")
+      ->check(CLI::IsMember({"even", "slices"}))
       ->capture_default_str();
   command->add_flag("--tets", s->tets, "write the posed tets; body.vtu holds displacement, label and det F");
   command

@@ -36,9 +36,14 @@ void check_settings(const PoseSettings& settings) {
   if (settings.scan.wanted() == !settings.model.empty())
     usage_error("pose", settings.scan.wanted() ? "both MODEL and --scan are given" : "no model is given",
                 "give a MODEL that preprocess made, or --scan SCAN...");
-  check_dicom_options(settings.dicom, settings.writes_dicom(), "add --volume-format dicom");
+  check_dicom_options(settings.dicom, settings.writes_dicom() || settings.on_slices(),
+                      "add --volume-format dicom");
   if (!settings.bridge && settings.deformer != "spheres")
     usage_error("--no-bridge", "tets open no gaps", "add --deformer spheres");
+  if (settings.on_slices() && settings.deformer == "spheres")
+    usage_error("--resample", "spheres fill the voxels of their own lattice", "leave out --deformer spheres");
+  if (settings.on_slices() && settings.as_case)
+    usage_error("--resample", "the images of a case have even voxels", "leave out --resample or --as-case");
   check_relaxing(settings);
   if (settings.as_case) {
     if (settings.chooses())
@@ -51,7 +56,7 @@ void check_settings(const PoseSettings& settings) {
 }
 
 Plan plan_of(const PoseSettings& settings, const Model& model) {
-  if (settings.as_case) return {{}, {}, true, false, {}};  // the case itself, and the tets beside it
+  if (settings.as_case) return {{}, {}, true, false, {}, {}};  // the case itself, and the tets beside it
   const std::vector<std::string> all{"all"};
   const bool everything = !settings.chooses();
   Plan plan;
@@ -59,6 +64,8 @@ Plan plan_of(const PoseSettings& settings, const Model& model) {
   plan.volumes = rows_of(model.volumes, everything ? all : settings.volumes, "--volumes");
   plan.tets = everything || settings.tets;
   plan.field = everything || settings.field;
+  if (settings.on_slices() && plan.volumes.empty())
+    usage_error("--resample", "no volume is written", "name some by --volumes");
   for (const std::uint32_t v : plan.volumes) {
     const std::string& name = model.volumes[v].name;
     if (plan.field && (name == "displacement" || name == "mask")) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "app/pose_frames.hpp"
 #include "app/posed_dicom.hpp"
 #include "app/scan/posed_scan.hpp"
+#include "io/image/scan_slices.hpp"
 #include "runtime/spheres/pose_volume.hpp"
 
 namespace ecorche::app {
@@ -28,6 +30,7 @@ struct PoseSettings {
   std::string volume_format = "nrrd";
   std::string sampling = "trilinear";
   std::string grid = "posed";
+  std::string resample = "even";
   std::string deformer = "tets";
   bool tets = false, field = false, as_case = false, bridge = true;
   bool unfold = false, settle = false;
@@ -35,6 +38,7 @@ struct PoseSettings {
   DicomSettings dicom;
 
   bool by_fem() const { return skinning == "fem"; }
+  bool on_slices() const { return resample == "slices"; }
   bool writes_dicom() const { return volume_format == "dicom"; }
   // Of fields, which no CT can hold.
   std::string field_format() const { return writes_dicom() ? "nrrd" : volume_format; }
@@ -46,6 +50,7 @@ struct Plan {
   std::vector<std::uint32_t> tissues, volumes;
   bool tets = false, field = false;
   std::map<std::string, runtime::VolumeBalls> balls;  // of volumes that are refilled, by name
+  std::optional<io::ScanSlices> slices;               // on which volumes are written
 };
 
 /// `ecorche pose`, or `ecorche fem` where that filled the settings. Returns the exit code.

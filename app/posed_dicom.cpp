@@ -56,6 +56,10 @@ void PosedDicom::add(const ModelVolume& volume, Image posed) {
   }
 }
 
+void PosedDicom::write_mask(const std::string& name, const Image& mask) {
+  io::write_dicom_segmentation(next_(name + ".dcm"), {{mask}, {{1, "scanned"}}, {}}, name, facts_);
+}
+
 void PosedDicom::finish() {
   if (!labels_.layers.empty()) io::write_dicom_segmentation(next_("labels.dcm"), labels_, "labels", facts_);
 }

@@ -39,6 +39,8 @@ class PosedDicom {
       : program_(program), facts_(std::move(facts)), next_(std::move(next)) {}
 
   void add(const ModelVolume& volume, Image posed);
+  /// A DICOM SEG of one segment, `scanned`.
+  void write_mask(const std::string& name, const Image& mask);
   /// Writes the labels.
   void finish();
 

@@ -17,6 +17,7 @@ ImageGrid PosedImages::grid_for(const ImageGrid& rest) const {
 }
 
 Image PosedImages::of(const ModelVolume& volume) const {
+  if (plan_.slices) return on_slices(volume);
   const auto balls = plan_.balls.find(volume.name);
   return balls == plan_.balls.end() ? drawn(volume) : refilled(volume, balls->second);
 }
@@ -27,6 +28,20 @@ Image PosedImages::drawn(const ModelVolume& volume) const {
   poser_.pose(body_.nodes, volume, sampling_of(settings_), grid_for(volume.image.grid), posed, scratch,
               context_);
   return posed;
+}
+
+// Slice by slice: they need not be even.
+Image PosedImages::on_slices(const ModelVolume& volume) const {
+  Image out(plan_.slices->grid, volume.image.type, volume.image.components);
+  Image slice;
+  runtime::VolumePoser::Scratch scratch;
+  auto to = out.bytes.begin();
+  for (std::size_t k = 0; k < plan_.slices->positions.size(); ++k) {
+    poser_.pose(body_.nodes, volume, sampling_of(settings_), plan_.slices->slice(k), slice, scratch,
+                context_);
+    to = std::copy(slice.bytes.begin(), slice.bytes.end(), to);
+  }
+  return out;
 }
 
 Image PosedImages::refilled(const ModelVolume& volume, const runtime::VolumeBalls& balls) const {

@@ -24,11 +24,12 @@ class PosedImages {
   /// u8, on the voxels of `of(volume)`: 1 where its value is of the scan, 0 where it is background by rule
   /// (outside of the body, beyond what was scanned, in gaps that opened). Volumes on one grid share it.
   const Image& mask(const ModelVolume& volume);
-  /// The voxels of the posed `rest`.
+  /// The voxels of the posed `rest`, where they are even.
   ImageGrid grid_for(const ImageGrid& rest) const;
 
  private:
   Image drawn(const ModelVolume& volume) const;
+  Image on_slices(const ModelVolume& volume) const;
   Image refilled(const ModelVolume& volume, const runtime::VolumeBalls& balls) const;
 
   const PoseSettings& settings_;

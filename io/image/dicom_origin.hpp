@@ -2,6 +2,7 @@
 // What a written DICOM file says of where it comes from. DCMTK stays out of here.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -34,6 +35,8 @@ struct DicomFacts {
   std::string program;     ///< version
   DicomOrigin origin;
   bool keep_identity = false;
+  /// Of each slice's first pixel, LPS mm, where they are not those of the image's grid.
+  std::vector<std::array<double, 3>> positions = {};
 };
 
 /// Of the CT series in `path`, and of a DICOM SEG that lies there too. Throws as `read_dicom`, and

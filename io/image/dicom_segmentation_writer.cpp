@@ -90,14 +90,14 @@ void write_dimensions(const Attributes& a, const std::string& uid) {
   index(DCM_ImagePositionPatient, DCM_PlanePositionSequence, "ImagePositionPatient");
 }
 
-void write_shared(const Attributes& a, const ImageGrid& grid) {
+void write_shared(const Attributes& a, const ImageGrid& grid, bool even) {
   const Attributes shared = a.add(DCM_SharedFunctionalGroupsSequence);
   const auto& d = grid.direction;
   shared.add(DCM_PlaneOrientationSequence)
       .numbers(DCM_ImageOrientationPatient, {d[0], d[3], d[6], d[1], d[4], d[7]});
   const Attributes measures = shared.add(DCM_PixelMeasuresSequence);
   measures.number(DCM_SliceThickness, grid.spacing[2]);
-  measures.number(DCM_SpacingBetweenSlices, grid.spacing[2]);
+  if (even) measures.number(DCM_SpacingBetweenSlices, grid.spacing[2]);
   measures.numbers(DCM_PixelSpacing, {grid.spacing[1], grid.spacing[0]});
 }
 
@@ -163,7 +163,7 @@ void write_dicom_segmentation(const std::filesystem::path& path, const Segmentat
   const Attributes a(*file.getDataset(), path);
   write_image_head(a, segmentation, name, facts, frames);
   write_dimensions(a, uid_of("dimensions " + facts.patient + facts.pose + name));
-  write_shared(a, grid);
+  write_shared(a, grid, facts.positions.empty());
   const std::size_t plane = static_cast<std::size_t>(grid.size[0]) * static_cast<std::size_t>(grid.size[1]);
   std::vector<std::uint8_t> bits((frames * plane + 7) / 8 + 1);
   bits.resize(bits.size() / 2 * 2);  // even
@@ -178,7 +178,8 @@ void write_dicom_segmentation(const std::filesystem::path& path, const Segmentat
       const Attributes group = a.add(DCM_PerFrameFunctionalGroupsSequence);
       const std::array<std::uint32_t, 2> index{held.number, static_cast<std::uint32_t>(k) + 1};
       group.add(DCM_FrameContentSequence).wholes(DCM_DimensionIndexValues, index);
-      const std::array<double, 3> at = grid.point(0, 0, k);
+      const std::array<double, 3> at =
+          facts.positions.empty() ? grid.point(0, 0, k) : facts.positions[static_cast<std::size_t>(k)];
       group.add(DCM_PlanePositionSequence).numbers(DCM_ImagePositionPatient, {at[0], at[1], at[2]});
       group.add(DCM_SegmentIdentificationSequence).whole(DCM_ReferencedSegmentNumber, held.number);
       set_bits(segmentation.layers[held.layer], held, k, frame++ * plane, bits);

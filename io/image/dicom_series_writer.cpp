@@ -111,7 +111,8 @@ void write_dicom_series(const fs::path& folder, const Image& image, const std::s
     seed.append(reinterpret_cast<const char*>(stored.data()), stored.size() * sizeof stored.front());
     a.text(DCM_SOPInstanceUID, uid_of(seed));
     a.text(DCM_InstanceNumber, number);
-    const std::array<double, 3> at = grid.point(0, 0, k);
+    const std::array<double, 3> at =
+        facts.positions.empty() ? grid.point(0, 0, k) : facts.positions[static_cast<std::size_t>(k)];
     a.numbers(DCM_ImagePositionPatient, {at[0], at[1], at[2]});
     a.pixels(stored);
     std::array<char, 32> file_name{};
