@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include <ecorche/version.hpp>
 #include "core/files/atomic_file.hpp"
 #include "io/case/structures.hpp"
+#include "io/image/dicom_writer.hpp"
 #include "io/image/image_file.hpp"
 #include "io/image/nifti_names.hpp"
 #include "io/image/segmentation.hpp"
@@ -74,7 +76,7 @@ void write_moose(const fs::path& folder, const ClassMap& map) {
 }
 
 // One segmentation of everything, the body in a layer of its own, since it overlaps with the rest.
-void write_slicer(const fs::path& file, const std::vector<ClassMap>& maps) {
+io::Segmentation in_one(const std::vector<ClassMap>& maps) {
   io::Segmentation out;
   const ImageGrid& grid = maps.front().image.grid;
   out.layers = {Image(grid, ScalarType::u16), Image(grid, ScalarType::u16)};
@@ -95,20 +97,31 @@ void write_slicer(const fs::path& file, const std::vector<ClassMap>& maps) {
       if (const auto id = ids.find(from[v]); id != ids.end()) to[v] = id->second;
     }
   }
-  io::write_segmentation(file, out);
+  return out;
+}
+
+// The CT as a series, and the segmentation of it; both in one frame of reference.
+void write_dicom(const fs::path& folder, const std::vector<ClassMap>& maps, const Image& ct) {
+  io::DicomFacts facts;
+  facts.patient = "PHANTOM";
+  facts.pose = facts.words = "scan";
+  facts.derivation = "The built-in phantom of ecorche: no patient. For training and education.";
+  facts.program = ECORCHE_VERSION;
+  io::write_dicom_series(folder / "ct", ct, "ct", facts);
+  io::write_dicom_segmentation(folder / "segmentation.dcm", in_one(maps), "segmentation", facts);
 }
 
 }  // namespace
 
 void write_phantom_scan(const fs::path& folder, const std::string& form, const Case& patient,
                         const Context& context) {
-  const bool moose = form == "moose", slicer = form == "slicer";
+  const bool moose = form == "moose", slicer = form == "slicer", dicom = form == "dicom";
   const std::vector<ClassMap> maps = phantom::segmented_by(
       moose ? phantom::Segmenter::moose : phantom::Segmenter::totalsegmentator, patient.labels.value());
   files::make_folder(folder);
   std::size_t done = 0;
   for (const ClassMap& map : maps) {
-    if (slicer) break;
+    if (slicer || dicom) break;
     if (moose) {
       write_moose(folder / "segmentations", map);
     } else if (form == "totalsegmentator") {
@@ -118,8 +131,10 @@ void write_phantom_scan(const fs::path& folder, const std::string& form, const C
     }
     context.report(static_cast<double>(++done) / static_cast<double>(maps.size()));
   }
-  if (slicer) write_slicer(folder / "segmentation.seg.nrrd", maps);
-  io::write_image(folder / (slicer ? "ct.nrrd" : "ct.nii.gz"), patient.volumes.front().image);
+  const Image& ct = patient.volumes.front().image;
+  if (dicom) return write_dicom(folder, maps, ct);
+  if (slicer) io::write_segmentation(folder / "segmentation.seg.nrrd", in_one(maps));
+  io::write_image(folder / (slicer ? "ct.nrrd" : "ct.nii.gz"), ct);
 }
 
 }  // namespace ecorche::app

@@ -11,8 +11,10 @@
 namespace ecorche::app {
 
 /// The forms: `totalsegmentator` (folders of masks), `totalsegmentator_ml` (label maps with names in the
-/// header), `moose` (label maps with organ_indices.json), `slicer` (.seg.nrrd).
-inline constexpr const char* scan_forms[] = {"totalsegmentator", "totalsegmentator_ml", "moose", "slicer"};
+/// header), `moose` (label maps with organ_indices.json), `slicer` (.seg.nrrd), `dicom` (a CT series, and a
+/// DICOM SEG).
+inline constexpr const char* scan_forms[] = {"totalsegmentator", "totalsegmentator_ml", "moose", "slicer",
+                                             "dicom"};
 
 /// Writes the CT and the segmentation of `patient`, the phantom, into `folder`.
 void write_phantom_scan(const std::filesystem::path& folder, const std::string& form, const Case& patient,

@@ -36,7 +36,8 @@ void check_settings(const PoseSettings& settings) {
   if (settings.scan.wanted() == !settings.model.empty())
     usage_error("pose", settings.scan.wanted() ? "both MODEL and --scan are given" : "no model is given",
                 "give a MODEL that preprocess made, or --scan SCAN...");
-  check_dicom_options(settings.dicom, settings.writes_dicom() || settings.on_slices(),
+  check_dicom_options(settings.dicom,
+                      settings.writes_dicom() || (settings.on_slices() && !settings.dicom.keep_identity),
                       "add --volume-format dicom");
   if (!settings.bridge && settings.deformer != "spheres")
     usage_error("--no-bridge", "tets open no gaps", "add --deformer spheres");

@@ -15,7 +15,7 @@ import yaml
 
 from posed_files import run
 
-FORMS = ("totalsegmentator", "totalsegmentator_ml", "moose", "slicer")
+FORMS = ("totalsegmentator", "totalsegmentator_ml", "moose", "slicer", "dicom")
 VOXEL = 6  # mm, of the small phantom
 
 
@@ -27,6 +27,8 @@ def inputs(folder, form):
         return sorted(folder.glob("*.nii.gz"))
     if form == "moose":
         return [folder / "ct.nii.gz", folder / "segmentations"]
+    if form == "dicom":
+        return [folder / "ct", folder / "segmentation.dcm"]
     return [folder / "ct.nrrd", folder / "segmentation.seg.nrrd"]
 
 

@@ -151,6 +151,8 @@ class Slices(unittest.TestCase):
         self.refused("--resample: a model does not know the slices of its scan (name the scan: --dicom-source DIR)", "--resample", "slices")
         self.refused("--resample: the scan's slices are at uneven distances, or lean, which only DICOM can say (add --volume-format dicom)",
                      "--resample", "slices", "--dicom-source", scan)
+        self.refused("--dicom-source: no DICOM is written (add --volume-format dicom)", "--dicom-source", scan)
+        self.refused("no DICOM is written", "--resample", "slices", "--dicom-source", scan, "--keep-identity")
         self.refused("--resample: no volume is written (name some by --volumes)", "--volumes", "none", "--resample", "slices", "--volume-format", "dicom",
                      "--dicom-source", scan)
         self.refused("--resample: spheres fill the voxels of their own lattice", "--resample", "slices", "--deformer", "spheres", "--dicom-source", scan)
