@@ -83,7 +83,7 @@ def without_places(text, words):
 def commit():
     git = lambda *words: subprocess.run(["git", "-C", ROOT, *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout.strip()  # noqa: E731
     # Pages of other benches and parts, made one after another, change nothing that is measured.
-    pages = ("bench/*/RESULTS.md", "bench/RESULTS.md", "docs/results.md", "docs/pictures/results")
+    pages = ("bench/*/RESULTS.md", "bench/RESULTS.md", "docs/results.md", "docs/pictures/results", "bench/scans/real/thumbnails")
     changed = git("status", "--porcelain", "--", ".", *(f":(exclude){page}" for page in pages))
     return (git("rev-parse", "--short=12", "HEAD") or "not in a repository") + (", with changes that are not committed" if changed else "")
 
