@@ -19,12 +19,18 @@ constexpr std::size_t kEndFewest = 16;     // of the nearest ones
 constexpr double kEndNearestShare = 0.02;  // likewise, as in facing.cpp
 constexpr double kEndLong = 4;             // a shaft's variance, in variances across it
 constexpr double kTip = 0.005, kSide = 0.02;
-constexpr int kEndRounds = 6;  // of finding the width of the last width's half
+constexpr double kRankSlack = 1e-6;  // a rank that is whole but for rounding is whole
+constexpr int kEndRounds = 6;        // of finding the width of the last width's half
 
+// Amid the two values that it falls between: the same from either side.
 double percentile(std::vector<double> of, double share) {
-  const auto rank = static_cast<std::size_t>(share * static_cast<double>(of.size() - 1));
-  std::nth_element(of.begin(), of.begin() + static_cast<std::ptrdiff_t>(rank), of.end());
-  return of[rank];
+  const double rank = share * static_cast<double>(of.size() - 1);
+  const auto below = static_cast<std::ptrdiff_t>(std::floor(rank + kRankSlack));
+  const auto above = static_cast<std::ptrdiff_t>(std::ceil(rank - kRankSlack));
+  std::nth_element(of.begin(), of.begin() + below, of.end());
+  const double least = of[static_cast<std::size_t>(below)];
+  if (above <= below) return least;
+  return 0.5 * (least + *std::min_element(of.begin() + above, of.end()));
 }
 
 // The middle, coordinate by coordinate, of the vertices nearest to `other`.

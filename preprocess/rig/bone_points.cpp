@@ -8,6 +8,7 @@
 
 #include "preprocess/rig/bone_end.hpp"
 #include "preprocess/rig/facing.hpp"
+#include "preprocess/rig/vertex_order.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -20,10 +21,18 @@ Eigen::AlignedBox3d within(const Eigen::AlignedBox3d& shares, const Eigen::Align
 
 }  // namespace
 
-const SurfaceMesh* BonePoints::bone(const std::string& name) const {
+const CaseBone* BonePoints::case_bone(const std::string& name) const {
   const auto found = std::find_if(patient_.bones.begin(), patient_.bones.end(),
                                   [&](const CaseBone& b) { return b.name == name; });
-  return found == patient_.bones.end() ? nullptr : &found->surface;
+  return found == patient_.bones.end() ? nullptr : &*found;
+}
+
+const SurfaceMesh* BonePoints::bone(const std::string& name) {
+  const CaseBone* found = case_bone(name);
+  if (found == nullptr) return nullptr;
+  const auto [entry, fresh] = single_.try_emplace(name);
+  if (fresh) entry->second = by_place(found->surface, found->segment);
+  return &entry->second;
 }
 
 const SurfaceMesh& BonePoints::segment(const std::string& name) {
@@ -47,7 +56,20 @@ const SurfaceMesh& BonePoints::segment(const std::string& name) {
     vertices += bone.surface.V.rows();
     faces += bone.surface.F.rows();
   }
+  all = by_place(all, name);
   return all;
+}
+
+std::string BonePoints::owner(const RegionUse& use) const {
+  if (!use.segment.empty()) return use.segment;
+  std::string single = use.bone;
+  for (const Region& region : patient_.regions) {
+    if (use.region.empty() || region.name != use.region) continue;
+    if (region.bone.empty()) return region.segment;
+    single = region.bone;
+  }
+  const CaseBone* found = case_bone(single);
+  return found == nullptr ? "" : found->segment;
 }
 
 std::string BonePoints::segment_of(const std::string& region) const {
@@ -92,7 +114,10 @@ const SurfacePoints& BonePoints::of(const RegionUse& use) {
   const Key key{{use.region, use.bone, use.facing, use.segment, use.facing_segment},
                 {use.looks.x(), use.looks.y(), use.looks.z(), use.along.x(), use.along.y(), use.along.z()}};
   const auto [entry, fresh] = found_.try_emplace(key);
-  if (fresh) entry->second = find(use);
+  if (fresh) {
+    entry->second = find(use);
+    entry->second.right = owner(use).ends_with("_right");
+  }
   return entry->second;
 }
 

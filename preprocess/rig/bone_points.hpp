@@ -22,19 +22,23 @@ class BonePoints {
   /// another surface of the same bone still finds its own.
   const SurfacePoints& of(const RegionUse& use);
 
-  /// All bones of a segment as one surface; empty where it has none.
+  /// All bones of a segment as one surface, its vertices by_place; empty where it has none.
   const SurfaceMesh& segment(const std::string& name);
+
+  /// The segment that the vertices of `use` belong to; empty where it is unknown.
+  std::string owner(const RegionUse& use) const;
 
   /// Whose bones a region is on; empty where it is on a single bone, or unknown.
   std::string segment_of(const std::string& region) const;
 
  private:
-  const SurfaceMesh* bone(const std::string& name) const;
+  const CaseBone* case_bone(const std::string& name) const;
+  const SurfaceMesh* bone(const std::string& name);
   SurfacePoints region(const std::string& name);
   SurfacePoints find(const RegionUse& use);
 
   const Case& patient_;
-  std::map<std::string, SurfaceMesh> segments_;
+  std::map<std::string, SurfaceMesh> segments_, single_;
   using Key = std::tuple<std::array<std::string, 5>, std::array<double, 6>>;
   std::map<Key, SurfacePoints> found_;  // facing is slow, and centre and axes ask alike
 };

@@ -11,6 +11,7 @@
 #include "preprocess/rig/facing.hpp"
 #include "preprocess/rig/plane_fit.hpp"
 #include "preprocess/rig/sphere_fit.hpp"
+#include "preprocess/rig/vertex_order.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -123,18 +124,23 @@ std::optional<FoundDirection> JointSources::shown_axis(std::size_t row, int axis
 
 const std::optional<CylinderFit>& JointSources::cylinder(const SurfacePoints& points) {
   const auto [entry, fresh] = cylinders_.try_emplace(&points);
-  if (fresh) entry->second = points.found ? fit_axle(points) : fit_cylinder(points.at);
+  if (fresh) {
+    const SurfacePoints left = as_left(points);
+    entry->second = left.found ? fit_axle(left) : fit_cylinder(left.at);
+    if (entry->second) entry->second = from_left(*entry->second, points);
+  }
   return entry->second;
 }
 
 std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse& on) {
   const SurfacePoints& surface = bones_.of(on);
-  const Points& points = surface.at;
-  if (points.rows() == 0) return std::nullopt;
+  if (surface.at.rows() == 0) return std::nullopt;
+  const Points points = as_left(surface).at;
   std::optional<FoundPoint> found;
   switch (rule) {
     case CenterRule::sphere_fit:
       if (auto fit = fit_sphere(points)) {
+        *fit = from_left(*fit, surface);
         if (surface.found) *fit = grown_sphere(bones_.of(whole(on)), *fit);
         if (!possible_radius(fit->radius)) return std::nullopt;
         found = fitted_point(rule, *fit, fit->radius, surface);
@@ -149,15 +155,15 @@ std::optional<FoundPoint> JointSources::fitted(CenterRule rule, const RegionUse&
       return found;
     case CenterRule::plane_fit:
       if (const auto fit = fit_plane(points)) {
-        found = fitted_point(rule, *fit, 0, surface);
-        found->axis = fit->normal;
+        found = fitted_point(rule, from_left(*fit, surface), 0, surface);
+        found->axis = from_left(*fit, surface).normal;
         found->fit.confidence *= plate_confidence(points, fit->rows);
       }
       return found;
     case CenterRule::ellipse_fit:
       if (const auto fit = fit_ellipse(points)) {
-        found = fitted_point(rule, *fit, 0.5 * (fit->long_mm + fit->short_mm), surface);
-        found->axis = fit->normal;
+        found = fitted_point(rule, from_left(*fit, surface), 0.5 * (fit->long_mm + fit->short_mm), surface);
+        found->axis = from_left(*fit, surface).normal;
       }
       return found;
     default:
@@ -259,8 +265,8 @@ const FoundPoint& JointSources::center(std::size_t row) {
 
 std::optional<FoundDirection> JointSources::fitted_axis(const DirectionSource& source) {
   const SurfacePoints& surface = bones_.of(source.from.on);
-  const Points& points = surface.at;
-  if (points.rows() == 0) return std::nullopt;
+  if (surface.at.rows() == 0) return std::nullopt;
+  const Points points = as_left(surface).at;
   FoundDirection out;
   if (source.from.rule == CenterRule::cylinder_fit) {
     const auto& fit = cylinder(surface);
@@ -269,11 +275,11 @@ std::optional<FoundDirection> JointSources::fitted_axis(const DirectionSource& s
   } else if (source.from.rule == CenterRule::plane_fit) {
     const auto fit = fit_plane(points);
     if (!fit) return std::nullopt;
-    out = {fit->normal, fit->confidence};
+    out = {from_left(*fit, surface).normal, fit->confidence};
   } else {
     const auto fit = fit_ellipse(points);
     if (!fit) return std::nullopt;
-    out = {fit->normal, fit->confidence};
+    out = {from_left(*fit, surface).normal, fit->confidence};
   }
   if (out.along.dot(source.direction) < 0) out.along = -out.along;
   return out;

@@ -16,6 +16,7 @@ struct SurfacePoints {
   Eigen::Vector3d along = Eigen::Vector3d::Zero();
   /// Found by proximity, not marked by hand: other parts of the bone may be among them.
   bool found = false;
+  bool right = false;  ///< of bones of the right side
 };
 
 /// The rows of V, with normals weighted by area.
