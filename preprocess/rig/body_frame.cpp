@@ -11,6 +11,7 @@
 
 #include "core/linear/decompositions.hpp"
 #include "preprocess/rig/parted_bones.hpp"
+#include "preprocess/rig/pelvis_frame.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -120,6 +121,7 @@ Matrix3d body_frame(const Case& patient) {
   for (const Region& region : patient.regions) {
     if (!region.boxes.empty() && !region.of_bones && region.near.empty()) return Matrix3d::Identity();
   }
+  if (!measured(patient, "thorax")) return pelvis_frame(patient).value_or(Matrix3d::Identity());
   std::vector<Measured> parts;
   for (const Middle& middle : upright()) {
     const std::optional<Measured> part = measured(patient, middle.segment);

@@ -94,6 +94,50 @@ TEST(BodyFrame, a_girdle_without_its_scapula_turns_nothing) {
   EXPECT_TRUE(body_frame(neither).isIdentity(0)) << "pelvis and thorax alone leave it free to turn";
 }
 
+TEST(BodyFrame, legs_alone_lie_as_their_pelvis_does) {
+  const std::vector<CaseBone> legs = test::phantom_bones({"pelvis", "thigh_left", "shank_left"}, 6);
+  const test::Found straight = test::found(legs);
+  EXPECT_LT(degrees_of(body_frame(test::human_case(legs))), 10) << "the phantom's own pelvis leans otherwise";
+  for (const double degrees : {10.0, 40.0}) {
+    const Matrix3d turn = turn_by(degrees, {1, 2, -0.5});
+    std::vector<CaseBone> bones = legs;
+    for (CaseBone& bone : bones) bone.surface.V = bone.surface.V * turn.transpose();
+    const test::Found now = test::found(bones);
+    for (const Segment& segment : straight.rig.skeleton.segments) {
+      const std::string& name = segment.joint.name;
+      const Joint& joint = now.joint(name);
+      EXPECT_LT((joint.center - turn * segment.joint.center).norm(), 0.1) << name << " at " << degrees;
+      EXPECT_LT(degrees_of(joint.axes.transpose() * turn * segment.joint.axes), 0.1)
+          << name << " at " << degrees;
+    }
+  }
+}
+
+TEST(BodyFrame, a_pelvis_that_is_cut_or_lies_on_its_side_says_nothing) {
+  const std::vector<CaseBone> whole = test::phantom_bones({"pelvis"}, 6);
+  EXPECT_FALSE(body_frame(test::human_case(whole)).isIdentity(0));
+  const auto cut = [&](auto&& keep) {
+    std::vector<CaseBone> bones = whole;
+    for (CaseBone& bone : bones) bone.surface = test::part_of(bone.surface, keep);
+    return body_frame(test::human_case(bones));
+  };
+  double low = 1e9, high = -1e9;
+  for (const CaseBone& bone : whole) {
+    low = std::min(low, bone.surface.V.col(2).minCoeff());
+    high = std::max(high, bone.surface.V.col(2).maxCoeff());
+  }
+  const double middle = 0.5 * (low + high);
+  EXPECT_TRUE(cut([](const Vector3d& p) { return p.x() > 0; }).isIdentity(0));
+  EXPECT_TRUE(cut([&](const Vector3d& p) { return p.z() > middle; }).isIdentity(0));
+  EXPECT_TRUE(cut([&](const Vector3d& p) { return p.z() < middle; }).isIdentity(0));
+  std::vector<CaseBone> lying = whole;
+  for (CaseBone& bone : lying) bone.surface.V = bone.surface.V * turn_by(80, {0, 1, 0}).transpose();
+  EXPECT_TRUE(body_frame(test::human_case(lying)).isIdentity(0));
+  Case own = test::human_case(whole);
+  own.skeleton.name = "my_own";
+  EXPECT_TRUE(body_frame(own).isIdentity(0));
+}
+
 TEST(BodyFrame, what_is_given_stays_to_the_last_digit) {
   const Matrix3d turn = turn_by(20, {1, 1, 0});
   Case patient = test::human_case(askew(turn));
