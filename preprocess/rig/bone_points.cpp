@@ -16,7 +16,10 @@ namespace {
 // In shares of `whole`, from a corner at 0 to the other at 1.
 Eigen::AlignedBox3d within(const Eigen::AlignedBox3d& shares, const Eigen::AlignedBox3d& whole) {
   const Eigen::Vector3d size = whole.sizes();
-  return {whole.min() + shares.min().cwiseProduct(size), whole.min() + shares.max().cwiseProduct(size)};
+  // From the nearer corner: a share of 0 or 1 is that corner to the last digit, and takes the vertex that
+  // lies there.
+  return {whole.min() + shares.min().cwiseProduct(size),
+          whole.max() - (Eigen::Vector3d::Ones() - shares.max()).cwiseProduct(size)};
 }
 
 }  // namespace
