@@ -18,11 +18,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kApart = 10, kTurned = 10;      // mm, degrees: what bench/rig_damage calls bad
-constexpr double kCut = 0.9;                     // of the other's length: sides differ by a few hundredths
-constexpr double kAsLong = 0.95;                 // of the other's extent: no need to lay them onto each other
+constexpr double kApart = 10, kTurned = 10;  // mm, degrees: what bench/rig_damage calls bad
+constexpr double kCut = 0.9;                 // of the other's length: sides differ by a few hundredths
+constexpr double kHalved = 0.8;              // of the other's surface: no more is there of a bone cut along
+constexpr double kAsLong = 0.95;             // of the other's extent: no need to lay them onto each other
 constexpr double kSurer = 2, kLeastShown = 0.2;  // so many times as sure as the other, and so sure, will do
 constexpr double kMirrored = 0.4, kTurnedBack = 0.3, kAssumed = 0.1;
+constexpr double kDisagree = 0.45;  // the most that either of two sides is sure that disagree
 
 std::string degrees(double radians) {
   return std::to_string(std::lround(radians * degrees_per_radian));
@@ -147,17 +149,13 @@ class Pairs {
     const Shown& shorter = a >= b ? right : left;
     const auto& lies = laid(longer.bones, shorter.bones);
     if (!lies) return;
-    const bool is_cut = lies->share < kCut;
+    const bool is_cut = lies->share < kCut || lies->covered < kHalved;
     const bool left_ends = ends_before(left, right), right_ends = !left_ends && ends_before(right, left);
     const bool ends = left_ends || right_ends;
     const bool shorter_is_worse =
         ends ? left_ends == (&shorter == &left) : is_cut || shorter.confidence <= longer.confidence;
     const Shown& worse = shorter_is_worse ? shorter : longer;
     const Shown& better = shorter_is_worse ? longer : shorter;
-    if (sources_.lacks_shaft(better.row)) return;  // what a stump shows is no better
-    const bool surer = better.confidence >= kSurer * worse.confidence;
-    const double enough = surer ? kLeastShown : JointSources::least_confidence;
-    if (ends ? better.confidence <= 0 : better.confidence < enough) return;
     const Eigen::Affine3d map = shorter_is_worse ? lies->map : Eigen::Affine3d(lies->map.inverse());
     const Vector3d to = map * better.center;
     // Axes point to the left on both sides: mirrored, and turned round.
@@ -170,6 +168,13 @@ class Pairs {
     }
     const bool missing = worse.confidence <= 0;
     if (!missing && off.norm() <= kApart && turned <= kTurned) return;
+    const bool surer = better.confidence >= kSurer * worse.confidence;
+    const double enough = surer ? kLeastShown : JointSources::least_confidence;
+    if (sources_.lacks_shaft(better.row) ||  // what a stump shows is no better
+        (ends ? better.confidence <= 0 : better.confidence < enough)) {
+      doubt(better, worse, off.norm(), turned);
+      return;
+    }
     const double known = std::min(kMirrored, better.confidence);
     FoundPoint found;
     found.at = to;
@@ -180,12 +185,32 @@ class Pairs {
     line << "joint " << joint(worse.row).name << ": its bones show it " << std::lround(off.norm()) << " mm";
     if (!axis.isZero()) line << " and " << std::lround(turned) << " degrees";
     line << " off the mirror image of " << joint(better.row).name;
-    if (is_cut && shorter_is_worse)
+    if (lies->share < kCut && shorter_is_worse)
       line << ", on a bone with " << std::lround(100 * lies->share) << " % of the other's length";
     line << ": it is taken from there, with confidence " << std::lround(100 * known) << " %";
     context_.warn(line.str());
     sources_.settle(worse.row, found);
     if (!axis.isZero()) sources_.settle_axis(worse.row, joint(worse.row).sequence[0].axis, {axis, known});
+  }
+
+  // Two sides that are unlike, and neither of which shows its joint well: one of both is wrong.
+  void doubt(const Shown& one, const Shown& other, double mm, double turned) {
+    for (const auto& [is, twin] : {std::pair(&one, &other), std::pair(&other, &one)}) {
+      FoundPoint found = sources_.center(is->row);
+      const double before = found.fit.confidence;
+      found.fit.confidence = std::min(before, kDisagree);
+      sources_.settle(is->row, found);
+      if (!is->axis.isZero())
+        sources_.settle_axis(is->row, joint(is->row).sequence[0].axis,
+                             {is->axis, std::min(is->confidence, kDisagree)});
+      if (before < JointSources::least_confidence) continue;
+      std::ostringstream line;
+      line << "joint " << joint(is->row).name << ": its bones show it " << std::lround(mm) << " mm and "
+           << std::lround(turned) << " degrees off the mirror image of " << joint(twin->row).name
+           << ", which is not sure: neither is it, with confidence " << std::lround(100 * kDisagree)
+           << " % at most";
+      context_.warn(line.str());
+    }
   }
 
   // The long axis of a segment whose bones are cut leads to where they end, not to the next joint.

@@ -11,9 +11,11 @@ namespace ecorche::rig {
 /// mirror image of one (other_side.hpp) lies more than 10 mm (of a hinge across its axis) or 10 degrees off
 /// the other, or one was not found, the worse of both is taken from the better, with a confidence of 0.4 at
 /// most, and a warning with both numbers. The worse is the one whose bones, its own or its parent's, end
-/// before the place; else the one on the bone that is cut (shorter than nine tenths of the other), else the
-/// one of less confidence. Where no bones end, the better has at least `least_confidence`, or 0.2 and is
-/// twice as sure as the worse. So is a segment's long axis taken, where its bones are cut.
+/// before the place; else the one on the bone that is cut (shorter than nine tenths of the other, or on less
+/// than four fifths of its surface), else the one of less confidence. Where no bones end, the better has at
+/// least `least_confidence`, or 0.2 and is twice as sure as the worse; where it has not, both stay as they
+/// are, with a confidence of 0.45 at most, and a warning of each that was sure. So is a segment's long axis
+/// taken, where its bones are cut.
 void take_other_sides(const Skeleton& skeleton, JointSources& sources, const Context& context);
 
 /// Rest angles that `JointRule::possible` leaves out become those of the other side, where they are possible,

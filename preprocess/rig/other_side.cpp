@@ -101,7 +101,7 @@ std::string other_side(const std::string& name) {
 }
 
 std::optional<Laid> laid_onto(const SurfaceMesh& whole, const SurfaceMesh& part) {
-  if (whole.F.rows() == 0 || part.V.rows() < 12) return std::nullopt;
+  if (whole.F.rows() == 0 || part.F.rows() == 0 || part.V.rows() < 12) return std::nullopt;
   SurfaceMesh image = whole;
   image.V.col(0) = -image.V.col(0);
   const geometry::FaceTree onto(image);
@@ -148,8 +148,8 @@ std::optional<Laid> laid_onto(const SurfaceMesh& whole, const SurfaceMesh& part)
     if (!best || fine < best->first || (last && fine <= kAlike * best->first + kAlikeMm))
       best = {fine, motion};
   }
-  const double length = high - low;
-  if (best->first > std::max(kWorst, kWorstOf * length)) return std::nullopt;
+  const double length = high - low, near = std::max(kWorst, kWorstOf * length);
+  if (best->first > near) return std::nullopt;
   Laid out;
   out.rms_mm = best->first;
   const Matrix3d& turn = best->second.turn;
@@ -158,6 +158,17 @@ std::optional<Laid> laid_onto(const SurfaceMesh& whole, const SurfaceMesh& part)
   // Back from the mirror image's space to that of the part.
   out.map.linear() = turn.transpose() * Vector3d(-1, 1, 1).asDiagonal();
   out.map.translation() = -turn.transpose() * best->second.shift;
+  const geometry::FaceTree here_again(part);
+  const Points all = some(image.V, kMany);
+  std::int32_t hint = -1;
+  double on = 0;
+  for (Index i = 0; i < all.rows(); ++i) {
+    const Vector3d back = turn.transpose() * (all.row(i).transpose() - best->second.shift);
+    const auto hit = here_again.nearest(back, hint);
+    hint = hit.face;
+    if (hit.squared <= near * near) ++on;
+  }
+  out.covered = on / static_cast<double>(all.rows());
   return out;
 }
 

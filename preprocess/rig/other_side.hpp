@@ -18,6 +18,7 @@ struct Laid {
   Eigen::Affine3d map = Eigen::Affine3d::Identity();  ///< mirrors: from the one's space to the other's
   double rms_mm = 0;                                  ///< of the four fifths of the points that lie best
   double share = 1;                                   ///< of the fellow's length that the bone has
+  double covered = 1;                                 ///< of the fellow's vertices that lie on the bone
 };
 
 /// The map from `whole`'s space to that of `part`, its mirrored fellow or what is left of it: ICP (Besl and
