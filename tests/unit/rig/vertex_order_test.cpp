@@ -8,6 +8,7 @@
 #include <numeric>
 #include <random>
 
+#include "preprocess/rig/bone_points.hpp"
 #include "tests/unit/rig/human_bodies.hpp"
 
 namespace ecorche::rig {
@@ -118,6 +119,25 @@ TEST(VertexOrder, a_surface_stays_the_same_and_its_mirror_image_is_listed_alike)
   EXPECT_TRUE(left.V.rightCols(2).isApprox(right.V.rightCols(2)));
   for (Eigen::Index f = 0; f < femur.F.rows(); ++f) {
     for (int i = 0; i < 3; ++i) EXPECT_EQ(left.V.row(left.F(f, i)), femur.V.row(femur.F(f, i)));
+  }
+}
+
+TEST(VertexOrder, a_box_of_a_whole_bone_holds_every_vertex_of_it_however_it_lies) {
+  Case patient;
+  patient.bones = {rough_body()[0]};
+  Region all;
+  all.name = "all";
+  all.segment = patient.bones[0].segment;
+  all.of_bones = true;
+  all.boxes.emplace_back(Vector3d(0.3, 0, 0), Vector3d(1, 1, 1));
+  all.boxes.emplace_back(Vector3d(0, 0, 0), Vector3d(0.6, 1, 1));
+  patient.regions = {all};
+  RegionUse use;
+  use.region = "all";
+  for (int turn = 0; turn < 40; ++turn) {
+    patient.bones[0].surface.V *= Eigen::AngleAxisd(0.3, Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+    BonePoints points(patient);
+    EXPECT_EQ(points.of(use).at.rows(), patient.bones[0].surface.V.rows()) << turn;
   }
 }
 
