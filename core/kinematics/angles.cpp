@@ -118,39 +118,6 @@ int find_angle(const Joint& joint, const std::string& name) {
   return -1;
 }
 
-// The driven joint's rotation with every coupled angle set.
-Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row) {
-  const Joint& joint = skeleton.segments[row].joint;
-  Angles angles = angles_within_limits(joint, pose.rotation[row]);
-  std::array<bool, 3> driven{false, false, false};
-  for (const Coupling& coupling : joint.coupled) {
-    if (coupling.slides() >= 0) continue;
-    const int lead = skeleton.find_joint(coupling.joint);
-    const int drives = find_angle(joint, coupling.drives);
-    const int leads =
-        lead < 0 ? -1 : find_angle(skeleton.segments[static_cast<std::size_t>(lead)].joint, coupling.angle);
-    if (leads < 0 || drives < 0) {
-      throw Error(ErrorKind::config, "joint " + joint.name,
-                  "is coupled to angle '" + coupling.angle + "' of joint '" + coupling.joint +
-                      "' through its angle '" + coupling.drives + "', one of which is absent",
-                  "name joints and angles of this skeleton");
-    }
-    const Joint& leader = skeleton.segments[static_cast<std::size_t>(lead)].joint;
-    const auto a = static_cast<std::size_t>(leads), b = static_cast<std::size_t>(drives);
-    const double moved = angles_within_limits(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
-                         leader.sequence[a].rest;
-    if (!driven[b]) angles[b] = joint.sequence[b].rest;
-    driven[b] = true;
-    angles[b] += coupling.ratio * moved;
-  }
-  return rotation_from_angles(joint, angles);
-}
-
-bool drives_angles(const Joint& joint) {
-  return std::any_of(joint.coupled.begin(), joint.coupled.end(),
-                     [](const Coupling& c) { return c.slides() < 0; });
-}
-
 // How far the joint's slides bring it, mm along its axes at rest: after every angle is set.
 Eigen::Vector3d slid(const Skeleton& skeleton, const Pose& pose, const Joint& joint) {
   Eigen::Vector3d out = Eigen::Vector3d::Zero();
@@ -231,6 +198,38 @@ Quaterniond clamp(const Joint& joint, const Quaterniond& rotation) {
       break;
   }
   return limited(joint) ? clamp_ball(joint, rotation) : rotation;
+}
+
+bool drives_angles(const Joint& joint) {
+  return std::any_of(joint.coupled.begin(), joint.coupled.end(),
+                     [](const Coupling& c) { return c.slides() < 0; });
+}
+
+Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row) {
+  const Joint& joint = skeleton.segments[row].joint;
+  Angles angles = angles_within_limits(joint, pose.rotation[row]);
+  std::array<bool, 3> driven{false, false, false};
+  for (const Coupling& coupling : joint.coupled) {
+    if (coupling.slides() >= 0) continue;
+    const int lead = skeleton.find_joint(coupling.joint);
+    const int drives = find_angle(joint, coupling.drives);
+    const int leads =
+        lead < 0 ? -1 : find_angle(skeleton.segments[static_cast<std::size_t>(lead)].joint, coupling.angle);
+    if (leads < 0 || drives < 0) {
+      throw Error(ErrorKind::config, "joint " + joint.name,
+                  "is coupled to angle '" + coupling.angle + "' of joint '" + coupling.joint +
+                      "' through its angle '" + coupling.drives + "', one of which is absent",
+                  "name joints and angles of this skeleton");
+    }
+    const Joint& leader = skeleton.segments[static_cast<std::size_t>(lead)].joint;
+    const auto a = static_cast<std::size_t>(leads), b = static_cast<std::size_t>(drives);
+    const double moved = angles_within_limits(leader, pose.rotation[static_cast<std::size_t>(lead)])[a] -
+                         leader.sequence[a].rest;
+    if (!driven[b]) angles[b] = joint.sequence[b].rest;
+    driven[b] = true;
+    angles[b] += coupling.ratio * moved;
+  }
+  return rotation_from_angles(joint, angles);
 }
 
 void constrain(const Skeleton& skeleton, Pose& pose, std::vector<ClampedJoint>& clamped) {

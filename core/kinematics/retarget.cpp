@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include <ecorche/kinematics/angles.hpp>
 #include <ecorche/values/error.hpp>
 #include "core/kinematics/joint_names.hpp"
 #include "core/values/text.hpp"
@@ -99,6 +100,15 @@ double extent(const ClipPlaces& at) {
   return box.diagonal().norm();
 }
 
+// Whether it follows joints that all come before it: a clip that has none for it still moves it.
+bool led_from_above(const Skeleton& skeleton, std::size_t row) {
+  const Joint& joint = skeleton.segments[row].joint;
+  return drives_angles(joint) &&
+         std::all_of(joint.coupled.begin(), joint.coupled.end(), [&](const Coupling& c) {
+           return c.slides() >= 0 || skeleton.find_joint(c.joint) < static_cast<int>(row);
+         });
+}
+
 }  // namespace
 
 Retarget match(const Rig& rig, const Clip& clip, const NameMap& names) {
@@ -184,6 +194,12 @@ Pose pose_at(const Rig& rig, const Clip& clip, const Retarget& retarget, const C
     const Eigen::Quaterniond parent_turn =
         parent < 0 ? Eigen::Quaterniond::Identity() : turn[static_cast<std::size_t>(parent)];
     const int joint = retarget.clip_joint[s];
+    if (joint < 0 && led_from_above(rig.skeleton, s)) {  // what hangs on it turns from where it will be
+      pose.rotation[s] = follow(rig.skeleton, pose, s);
+      const Eigen::Quaterniond axes(segments[s].joint.axes);
+      turn[s] = (parent_turn * axes * pose.rotation[s] * axes.conjugate()).normalized();
+      continue;
+    }
     turn[s] = joint < 0 ? parent_turn : at.turn[static_cast<std::size_t>(joint)] * retarget.alignment[s];
     const Eigen::Quaterniond local = parent_turn.conjugate() * turn[s];
     const Eigen::Vector3d v = segments[s].joint.axes.transpose() * local.vec();

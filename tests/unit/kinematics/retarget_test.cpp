@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <ecorche/kinematics/angles.hpp>
 #include <ecorche/kinematics/forward.hpp>
 #include <ecorche/values/error.hpp>
 #include "tests/unit/io/scratch.hpp"
@@ -103,6 +104,26 @@ TEST(Retarget, SegmentsWithoutJointFollowTheirParent) {
   EXPECT_LT(pose.rotation[1].angularDistance(Quaterniond::Identity()), 1e-12);
   const auto motion = forward(rig, pose);
   EXPECT_LT(motion[2].q.angularDistance(clip.rotation[0] * clip.rotation[1]), 1e-9);
+}
+
+// As a rib cage that rides on vertebrae which follow a joint that the clip moves: what hangs on it goes where
+// the clip has it once they have followed.
+TEST(Retarget, SegmentsWithoutJointFollowTheirLeaders) {
+  std::mt19937 random(6);
+  Rig rig = test::chain(4);
+  rig.skeleton.segments[2].parent = 0;
+  const Joint& leader = rig.skeleton.segments[1].joint;
+  Joint& follower = rig.skeleton.segments[2].joint;
+  for (std::size_t a = 0; a < 3; ++a)
+    follower.coupled.push_back({leader.name, leader.sequence[a].name, follower.sequence[a].name, 0.5});
+  const Clip clip = clip_of({"s0", "s1", "s3"}, 1, random);
+  Pose pose = pose_at(rig, clip, match(rig, clip), 0);
+  std::vector<ClampedJoint> clamped;
+  constrain(rig.skeleton, pose, clamped);
+  ASSERT_TRUE(clamped.empty());
+  EXPECT_GT(pose.rotation[2].angularDistance(Quaterniond::Identity()), 0.1);
+  const auto motion = forward(rig, pose);
+  EXPECT_LT(motion[3].q.angularDistance(clip.rotation[0] * clip.rotation[1] * clip.rotation[2]), 1e-9);
 }
 
 TEST(Retarget, RootGoesItsWayFromItsOwnZeroOffset) {

@@ -27,8 +27,15 @@ std::array<double, 3> angles_from_rotation(const Joint& joint, const Eigen::Quat
 /// the rest angle: the scan itself is never refused. A rotation within its limits comes back bit by bit.
 Eigen::Quaterniond clamp(const Joint& joint, const Eigen::Quaterniond& rotation);
 
-/// Normalises and clamps every joint of `pose`, then sets each coupled angle to
+/// Whether another joint sets one of its angles.
+bool drives_angles(const Joint& joint);
+
+/// What the joint of segment `row` makes of `pose`: each coupled angle
 ///   rest + sum of ratio * (angle of the leading joint - its rest),
+/// radians, the others as they are. Throws Error{config} where a coupling names what is not there.
+Eigen::Quaterniond follow(const Skeleton& skeleton, const Pose& pose, std::size_t row);
+
+/// Normalises and clamps every joint of `pose`, then sets each coupled angle as follow() has it,
 /// in row order (a leading joint that is itself driven must come earlier), and clamps it too; appends what
 /// was taken away (more than 1e-6 rad) to `clamped`, a joint once. A non-root translation of a joint that is
 /// not `free` is removed; then its slides (Coupling::slides) are set from their leaders' angles. The root is
