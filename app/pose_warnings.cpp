@@ -116,10 +116,9 @@ class Wording {
   json overlap(const Breach& breach, json out) const {
     const runtime::BoneOverlap& found = quality_.overlap;
     const Tissue &bone = model_.tissues[found.bone], &into = model_.tissues[found.into];
-    const Joint& joint = model_.rig.skeleton
-                             .segments[joint_between(static_cast<std::size_t>(bone.segment),
-                                                     static_cast<std::size_t>(into.segment))]
-                             .joint;
+    const std::size_t between =
+        joint_between(static_cast<std::size_t>(bone.segment), static_cast<std::size_t>(into.segment));
+    const Joint& joint = model_.rig.skeleton.segments[between].joint;
     out["kind"] = "bone_overlap";
     out["joint"] = joint.name;
     out["at_mm"] = {found.at.x(), found.at.y(), found.at.z()};
@@ -127,7 +126,7 @@ class Wording {
                               bone.name, breach.value, into.name, breach.threshold);
     out["mend"] =
         fmt::format("turn {} less, or look at its center and axes: ecorche rig CASE says how they were found",
-                    joint.name);
+                    model_.rig.skeleton.segments[set_by(between)].joint.name);
     return out;
   }
 
@@ -158,11 +157,24 @@ class Wording {
                                             : "prepare the case again with --weights quasi-harmonic");
       return out;
     }
-    const std::string& name = model_.rig.skeleton.segments[*joint].joint.name;
-    out["joint"] = name;
-    out["mend"] = fmt::format("{}turn {} less than its {:.0f} degrees", relax(), name,
-                              turn_of(body_.pose, *joint) * degrees_per_radian);
+    out["joint"] = model_.rig.skeleton.segments[*joint].joint.name;
+    const std::size_t set = set_by(*joint);
+    out["mend"] = fmt::format("{}turn {} less than its {:.0f} degrees", relax(),
+                              model_.rig.skeleton.segments[set].joint.name,
+                              turn_of(body_.pose, set) * degrees_per_radian);
     return out;
+  }
+
+  // The joint that a pose sets: of one whose every turn follows, the one that it follows.
+  std::size_t set_by(std::size_t joint) const {
+    const Joint& own = model_.rig.skeleton.segments[joint].joint;
+    const auto follows = [&](const AngleAxis& angle) {
+      return std::any_of(own.coupled.begin(), own.coupled.end(),
+                         [&](const Coupling& c) { return c.drives == angle.name; });
+    };
+    if (own.kind != JointKind::ball || !std::all_of(own.sequence.begin(), own.sequence.end(), follows))
+      return joint;
+    return static_cast<std::size_t>(model_.rig.skeleton.find_joint(own.coupled.front().joint));
   }
 
   // The joint that shears what lies there most: one that turns far, with about as much of the weights there

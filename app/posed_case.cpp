@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/posed_case.hpp"
 
+#include <algorithm>
+
 #include "core/kinematics/posed_rest.hpp"
 
 namespace ecorche::app {
@@ -56,6 +58,10 @@ Case posed_case(const runtime::VolumePoser& poser, const runtime::PosedBody& bod
       patient.bones.push_back({tissue.name, patient.skeleton.segments[segment].name, std::move(surface)});
     }
   }
+  for (Segment& segment : patient.skeleton.segments)
+    segment.boneless = segment.parent >= 0 &&
+                       std::none_of(patient.bones.begin(), patient.bones.end(),
+                                    [&](const CaseBone& bone) { return bone.segment == segment.name; });
   add_stiffness(model, patient);
   runtime::VolumePoser::Scratch scratch;
   for (const ModelVolume& volume : model.volumes) {

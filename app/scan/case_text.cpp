@@ -68,8 +68,10 @@ std::string case_text(const ScanCase& scan, const std::string& name, const std::
   out += "name: " + write_text(name) + "\n";
   if (scan.parted)
     out += "# human, of bones that a template parted: its joints are as sure as those were right before.\n";
-  out += std::string("skeleton: ") + (scan.parted ? "human_parted" : "human") +
-         "\nlabels:\n  file: labels.nrrd\n  table:\n";
+  out += std::string("skeleton: ") + (scan.parted ? "human_parted" : "human") + "\n";
+  if (scan.spine == "vertebrae") out += "spine: vertebrae  # a joint at each level\n";
+  if (scan.ribs == "vertebrae") out += "ribs: vertebrae   # each moves with its vertebra\n";
+  out += "labels:\n  file: labels.nrrd\n  table:\n";
   for (std::size_t e = 0; e < scan.entries.size(); ++e) {
     if (scan.entries[e].voxels > 0)
       out += "    " + std::to_string(e + 1) + ": " + write_text(scan.entries[e].name) + "\n";

@@ -55,11 +55,26 @@ std::vector<CLI::Option*> add_scan_options(CLI::App& command, ScanSettings& sett
   for (CLI::Option* option : add_image_choice(command, settings.choice)) out.push_back(option);
   out.push_back(command.add_flag("--skin-from-labels", settings.options.skin_from_labels,
                                  "draw the skin round all labels, where neither a label nor a CT shows it"));
+  out.push_back(command
+                    .add_option("--spine", settings.spine,
+                                "bend at the joints between lumbar spine, thorax, neck and head alone, or at "
+                                "each vertebra that is labelled")
+                    ->check(CLI::IsMember({"whole", "vertebrae"}))
+                    ->capture_default_str());
+  out.push_back(
+      command
+          .add_option(
+              "--ribs", settings.ribs,
+              "with --spine vertebrae: ribs 1 to 10 as one with the sternum, or each with its vertebra")
+          ->check(CLI::IsMember({"cage", "vertebrae"}))
+          ->capture_default_str());
   return out;
 }
 
 NewCase new_case(const Program& program, const ScanSettings& settings, const files::ReadLimits& limits,
                  const std::filesystem::path& folder) {
+  if (settings.ribs == "vertebrae" && settings.spine != "vertebrae")
+    throw Error(ErrorKind::usage, "--ribs", "goes with a spine by vertebra", "add --spine vertebrae");
   ScanOptions options = settings.options;
   options.own_values = settings.skin_given && settings.bone_given;
   if (!settings.side.empty()) options.side = settings.side == "left" ? Side::left : Side::right;
@@ -77,6 +92,8 @@ NewCase new_case(const Program& program, const ScanSettings& settings, const fil
     throw;
   }
   out.made.doubts.insert(out.made.doubts.begin(), changed.begin(), changed.end());
+  out.made.spine = settings.spine;
+  out.made.ribs = settings.ribs;
   for (std::string& line : unread_below(settings.scan)) out.made.doubts.push_back(std::move(line));
   out.name = write_scan_case(folder, settings.scan, scan, out.made, program.context("write")).name;
   return out;

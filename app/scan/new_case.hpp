@@ -17,6 +17,8 @@ struct ScanSettings {
   std::string side;  ///< left, right or nothing
   ScanOptions options;
   io::ImageChoice choice;
+  std::string spine = "whole",
+              ribs = "cage";  ///< or `vertebrae`, as a case says it (io/case/spine_choice.hpp)
   bool skin_given = false, bone_given = false;  ///< whether these were said
 };
 

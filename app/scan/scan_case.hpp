@@ -56,7 +56,8 @@ struct ScanCase {
   Image labels;  ///< u16; id i is `entries[i - 1]`
   std::vector<ScanEntry> entries;
   ScanSkin skin;
-  bool parted = false;  ///< bones were parted by a template, so that joints are less sure
+  std::string spine, ribs;  ///< `vertebrae`, where that is asked for (io/case/spine_choice.hpp)
+  bool parted = false;      ///< bones were parted by a template, so that joints are less sure
   std::vector<LabelFate> fates;
   std::vector<std::string> notes;   ///< what a user should know, a line each
   std::vector<std::string> doubts;  ///< what should be looked at

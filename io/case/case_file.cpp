@@ -13,6 +13,7 @@
 #include "io/case/label_map.hpp"
 #include "io/case/label_sources.hpp"
 #include "io/case/skeleton_file.hpp"
+#include "io/case/spine_choice.hpp"
 #include "io/case/stiffness.hpp"
 #include "io/case/surfaces_ahead.hpp"
 #include "io/case/yaml_reader.hpp"
@@ -28,9 +29,9 @@ namespace fs = std::filesystem;
 using yaml::Kind;
 using yaml::Value;
 
-constexpr std::array<std::string_view, 12> kCaseKeys{"name",   "frame",   "unit",          "skeleton",
-                                                     "skin",   "bones",   "regions",       "tissues",
-                                                     "labels", "volumes", "stiffness_kpa", "contacts"};
+constexpr std::array<std::string_view, 14> kCaseKeys{
+    "name",  "frame",   "unit",    "skeleton", "spine",   "ribs",          "skin",
+    "bones", "regions", "tissues", "labels",   "volumes", "stiffness_kpa", "contacts"};
 constexpr std::array<std::string_view, 9> kSkinKeys{"file", "name",   "frame",  "unit",    "root",
                                                     "side", "labels", "within", "close_mm"};
 constexpr std::array<std::string_view, 10> kBoneKeys{"name", "file",   "segment", "frame",  "unit",
@@ -98,7 +99,8 @@ class CaseReader {
     const Value bones = root_.at("bones");
     for (const Value& entry : bones.items()) read_bone(entry);
     if (out_.bones.empty()) bones.fail("is empty", "list at least one bone");
-    if (out_.generic) list_segments();
+    join_lone_ribs(out_);
+    if (out_.generic) list_segments(out_);
     if (const auto apart = options ? labels->find("apart") : std::nullopt)
       out_.labels->apart = sources_->read_apart(*apart, out_.skeleton);
     read_regions(placed.regions);
@@ -211,21 +213,8 @@ class CaseReader {
     out_.skeleton = std::move(placed.skeleton);
     out_.size = placed.size;
     for (const Segment& segment : out_.skeleton.segments) segments_.push_back(segment.name);
+    read_spine(root_, out_);
     return placed;
-  }
-
-  // Without a skeleton every segment that a bone names is one; which hangs on which is found from the bones.
-  void list_segments() {
-    for (const CaseBone& bone : out_.bones) {
-      if (out_.skeleton.find_segment(bone.segment) >= 0) continue;
-      Segment segment;
-      segment.name = bone.segment;
-      segment.parent = out_.skeleton.segments.empty() ? -1 : 0;
-      segment.joint.name = bone.segment;
-      segment.joint.rule = CenterRule::facing;
-      segment.joint.sequence = {{.name = "x", .axis = 0}, {.name = "y", .axis = 1}, {.name = "z", .axis = 2}};
-      out_.skeleton.segments.push_back(std::move(segment));
-    }
   }
 
   // Those of the case's own file and of its skeleton.
@@ -311,6 +300,7 @@ class CaseReader {
     } else {
       const Value segment = entry.at("segment");
       bone.segment = segment.text();
+      if (out_.whole_spine) put_in_spine(bone, out_);
       if (out_.skeleton.find_segment(bone.segment) < 0)
         segment.fail_unknown("segment", bone.segment, segments_);
     }

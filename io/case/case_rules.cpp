@@ -71,6 +71,19 @@ std::optional<std::string> skeleton_template(const std::string& name) {
   return found == known.end() ? std::nullopt : std::optional<std::string>(found->second);
 }
 
+void list_segments(Case& patient) {
+  for (const CaseBone& bone : patient.bones) {
+    if (patient.skeleton.find_segment(bone.segment) >= 0) continue;
+    Segment segment;
+    segment.name = bone.segment;
+    segment.parent = patient.skeleton.segments.empty() ? -1 : 0;
+    segment.joint.name = bone.segment;
+    segment.joint.rule = CenterRule::facing;
+    segment.joint.sequence = {{.name = "x", .axis = 0}, {.name = "y", .axis = 1}, {.name = "z", .axis = 2}};
+    patient.skeleton.segments.push_back(std::move(segment));
+  }
+}
+
 std::vector<PlacedRegion> read_regions_file(const std::filesystem::path& path, const Frame& frame) {
   const Value file = Value::read(path);
   file.allow(kRegionKeys);

@@ -15,6 +15,9 @@ namespace ecorche::io {
 /// that were parted by a template (preprocess/rig/parted_bones.hpp).
 std::optional<std::string> skeleton_template(const std::string& name);
 
+/// Without a skeleton every segment that a bone names is one; which hangs on which is found from the bones.
+void list_segments(Case& patient);
+
 /// A `regions.yaml`; `frame` is the case's.
 std::vector<PlacedRegion> read_regions_file(const std::filesystem::path& path, const Frame& frame);
 

@@ -316,6 +316,11 @@ PlacedSkeleton parse_skeleton(const Value& root, const Frame& frame) {
     if (const auto aliases = value.find("aliases")) {
       for (const Value& alias : aliases->items()) segment.aliases.push_back(alias.text());
     }
+    if (const auto bones = value.find("bones")) {
+      if (bones->text() != "none")
+        bones->fail("'" + bones->text() + "' is not known", "write bones: none, or leave it out");
+      segment.boneless = true;
+    }
     row_of[i] = static_cast<int>(skeleton.segments.size());
     skeleton.segments.push_back(std::move(segment));
   }

@@ -19,7 +19,7 @@ namespace skeleton_keys {
 inline constexpr std::array<std::string_view, 5> file{"ecorche_skeleton", "name", "size_mm", "segments",
                                                       "regions"};
 inline constexpr std::array<std::string_view, 4> size{"least", "whole", "most", "source"};
-inline constexpr std::array<std::string_view, 3> segment{"parent", "joint", "aliases"};
+inline constexpr std::array<std::string_view, 4> segment{"parent", "joint", "aliases", "bones"};
 inline constexpr std::array<std::string_view, 9> joint{
     "name", "kind", "center", "axes", "sequence", "rest_deg", "limits_deg", "coupled", "possible"};
 inline constexpr std::array<std::string_view, 4> possible{"radius_mm", "axis_to_shaft_deg", "rest_deg",

@@ -91,6 +91,7 @@ std::string skeleton_to_yaml(const Skeleton& skeleton, const std::optional<BodyS
     std::string aliases;
     for (const std::string& alias : segment.aliases)
       aliases += (aliases.empty() ? "" : ", ") + write_text(alias);
+    if (segment.boneless) out += "    bones: none\n";
     if (!aliases.empty()) out += "    aliases: [" + aliases + "]\n";
   }
   return out;

@@ -90,7 +90,7 @@ void fields(A& archive, T& joint) {
 
 template <class A, Some<Segment> T>
 void fields(A& archive, T& segment) {
-  archive(segment.name, segment.parent, segment.joint, segment.aliases);
+  archive(segment.name, segment.parent, segment.joint, segment.aliases, segment.boneless);
 }
 
 template <class A, Some<Skeleton> T>
@@ -152,6 +152,11 @@ template <class A>
 void fields(A& archive, const RigRequest& request) {
   archive(request.patient.skeleton, request.patient.regions, request.patient.generic);
   for (const Segment& segment : request.patient.skeleton.segments) archive(segment.joint.how);
+  archive(request.patient.whole_spine != nullptr, request.patient.ribs_apart, request.patient.ribs.size());
+  if (!request.patient.whole_spine) return;
+  for (const std::string& rib : request.patient.ribs) archive(rib);
+  archive(*request.patient.whole_spine);
+  for (const Segment& segment : request.patient.whole_spine->segments) archive(segment.joint.how);
 }
 
 /// What is said of limbs that touch, and the labels that may show where: for keys only.

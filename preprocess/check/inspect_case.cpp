@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "core/geometry/face_tree.hpp"
+#include "core/values/spine.hpp"
 #include "core/values/text.hpp"
 #include "preprocess/check/frames.hpp"
 #include "preprocess/check/image_places.hpp"
@@ -322,7 +323,8 @@ class Inspector {
         return std::any_of(patient_.bones.begin(), patient_.bones.end(),
                            [&](const CaseBone& bone) { return bone.segment == owner.name; });
       };
-      if (segment.parent < 0 || owns(segment)) continue;
+      const bool told = patient_.whole_spine && spine::find_level(segment.name) != nullptr;  // by the rig
+      if (segment.parent < 0 || segment.boneless || told || owns(segment)) continue;
       int ancestor = segment.parent;
       while (ancestor > 0 && !owns(segments[static_cast<std::size_t>(ancestor)]))
         ancestor = segments[static_cast<std::size_t>(ancestor)].parent;

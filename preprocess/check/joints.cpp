@@ -93,6 +93,7 @@ class Joints {
     }
     for (std::size_t row = 0; row < skeleton_.segments.size(); ++row) {
       context.check_stop();
+      if (skeleton_.segments[row].boneless) continue;
       check_center(row);
       check_axis(row);
     }
@@ -306,8 +307,10 @@ std::vector<Finding> wrong_size(const Case& patient) {
   if (!patient.size || length == 0) return {};
   const BodySize& size = *patient.size;
   const auto& segments = patient.skeleton.segments;
-  const auto owned =
-      static_cast<std::size_t>(std::count_if(segments.begin(), segments.end(), [&](const Segment& s) {
+  const auto without =
+      std::count_if(segments.begin(), segments.end(), [](const Segment& s) { return s.boneless; });
+  const auto owned = static_cast<std::size_t>(
+      without + std::count_if(segments.begin(), segments.end(), [&](const Segment& s) {
         return std::any_of(patient.bones.begin(), patient.bones.end(),
                            [&](const CaseBone& bone) { return bone.segment == s.name; });
       }));

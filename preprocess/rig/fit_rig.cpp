@@ -19,6 +19,7 @@
 #include "preprocess/rig/parted_bones.hpp"
 #include "preprocess/rig/plausible.hpp"
 #include "preprocess/rig/present_part.hpp"
+#include "preprocess/rig/split_spine.hpp"
 
 namespace ecorche::rig {
 namespace {
@@ -73,14 +74,6 @@ void warn_rule(const JointFit& fit, double of_axes, const Context& context) {
 struct Sure {
   double center = 1, axes = 1;
 };
-
-JointEvidence evidence_of(const FoundPoint& found, const Sure& sure) {
-  JointEvidence out{found.fit.rule, sure.center, sure.axes, found.at, found.axis, found.fit.radius_mm, {}};
-  for (const SurfacePoints* on : found.on) {
-    for (Eigen::Index p = 0; p < on->at.rows(); ++p) out.vertices.push_back(on->at.row(p).transpose());
-  }
-  return out;
-}
 
 bool has_bone(const Case& patient, const std::string& name) {
   return std::any_of(patient.bones.begin(), patient.bones.end(),
@@ -218,7 +211,8 @@ Rig fit_straight(const Case& patient, const std::set<std::string>& exchanged, co
       measure_rest(parent, joint, rig.fits[row], sure[row], context);
     }
     if (held[row]) hold(kExchanged, rig.fits[row], sure[row]);
-    if (evidence != nullptr) evidence->push_back(evidence_of(sources.center(row), sure[row]));
+    if (evidence != nullptr)
+      evidence->push_back(evidence_of(sources.center(row), sure[row].center, sure[row].axes));
   }
   return rig;
 }
@@ -244,6 +238,8 @@ void turn_back(const Skeleton& asked, const Eigen::Matrix3d& frame, Rig& rig,
 
 Rig fit(const Case& patient, const Context& outer, std::vector<JointEvidence>* evidence) {
   const Context context = advising(outer);
+  if (patient.whole_spine)
+    return split_spine(patient, fit(with_whole_spine(patient), outer, evidence), context, evidence);
   const std::set<std::string> exchanged = exchanged_sides(patient);
   warn_exchanged(exchanged, context);
   // Exchanged girdles would turn the body about its length.

@@ -8,22 +8,13 @@
 #include <ecorche/values/case.hpp>
 #include <ecorche/values/context.hpp>
 #include <ecorche/values/skeleton.hpp>
+#include "preprocess/rig/joint_evidence.hpp"
 
 namespace ecorche::rig {
 
 /// What every warning of a joint ends with, in brackets: what to do about it.
 inline constexpr std::string_view joint_advice =
     "give its center and axes in the skeleton, or mend the bones that it was found on";
-
-/// What a joint's centre was found on, for pictures, and how sure centre and axes are by themselves.
-struct JointEvidence {
-  CenterRule rule = CenterRule::given;
-  double center_confidence = 1, axes_confidence = 1;  ///< `JointFit::confidence` is at most the least of both
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();       ///< LPS mm
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();     ///< unit: of a cylinder, or a plane's normal; else zero
-  double radius = 0;                                  ///< mm, of a sphere, a cylinder or an ellipse; else 0
-  std::vector<Eigen::Vector3d> vertices;              ///< LPS mm
-};
 
 /// Keeps given centres and axes, and finds the others by their rules (joint_sources.hpp), on the vertices of
 /// named regions or on those that face another bone, found by proximity. What is found badly is a warning

@@ -26,6 +26,15 @@ Skeleton present_part(const Case& patient, const Context& context) {
                 "list the case's bones with their segments");
   }
   present[0] = true;
+  const auto leads = [&](const Segment& segment) {
+    for (std::size_t s = 0; s < present.size(); ++s) {
+      for (const Coupling& c : whole.segments[s].joint.coupled)
+        if (present[s] && c.joint == segment.joint.name) return true;
+    }
+    return false;
+  };
+  for (std::size_t s = 0; s < present.size(); ++s)
+    present[s] = present[s] || (whole.segments[s].boneless && leads(whole.segments[s]));
 
   Skeleton part;
   part.name = whole.name;
@@ -40,6 +49,7 @@ Skeleton present_part(const Case& patient, const Context& context) {
       part.segments.back().parent = up;
     } else {
       home[s] = up;
+      if (whole.segments[s].boneless) continue;
       context.warn("segment " + whole.segments[s].name + " has no bone in this case: it is dropped into " +
                    part.segments[static_cast<std::size_t>(up)].name +
                    " (give it a bone if that is not meant)");

@@ -8,7 +8,8 @@
 
 namespace ecorche::rig {
 
-/// The skeleton without the segments that own no bone of the case; the root stays. Children move up to their
+/// The skeleton without the segments that own no bone of the case; the root stays, and so do those without
+/// bones of their own (`Segment::boneless`) whose joint leads one that does. Children move up to their
 /// nearest present ancestor, couplings with a joint that went go with it. A warning names each dropped
 /// segment and where it went. Throws Error{config} when a bone's segment is not in the skeleton, or when no
 /// segment owns a bone.

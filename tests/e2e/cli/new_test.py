@@ -108,6 +108,33 @@ class New(unittest.TestCase):
             result = run("--json", "pose", model, "-o", self.folder / f"{form}_posed", "--pose", "lib:sitting", "--tissues", "skin")
             self.assertEqual(result.returncode, 0, result.stderr)
 
+    def test_a_spine_by_vertebra(self):
+        """The same labels with a joint at each level; poses of the four joints turn all, and the posed body is a case again."""
+        case = self.folder / "levels"
+        result = run("new", *inputs(self.folder / "totalsegmentator_ml", "totalsegmentator_ml"), "-o", case, "--spine", "vertebrae", "--ribs", "vertebrae")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        whole, levels = self.joints(self.folder / "totalsegmentator_ml_case"), self.joints(case)
+        # In voxels of 6 mm T11 and T12 are no bones of their own; of whole, two segments have become four that lead.
+        self.assertEqual(len(levels), len(whole) - 2 + 4 + 22)
+        for joint, (centre, confidence) in whole.items():
+            np.testing.assert_array_equal(levels[joint][0], centre, joint)
+        heights = [levels[f"{a}_{b}"][0][2] for a, b in (("l5", "s1"), ("l3", "l4"), ("t10", "t11"), ("t6", "t7"), ("c7", "t1"), ("c3", "c4"), ("c0", "c1"))]
+        self.assertEqual(heights, sorted(heights))
+        model, posed = self.folder / "levels.hdf", self.folder / "levels_posed"
+        result = run("preprocess", case, "-o", model, "--mesher", "lattice", "--max-tets", "60000")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        pose = self.folder / "bent.yaml"
+        pose.write_text("ecorche_pose: 1\nskeleton: human\njoints:\n  lumbosacral: {flexion_deg: 30}\n  thoracolumbar: {flexion_deg: 20}\n")
+        result = run("--json", "pose", model, "-o", posed, "--pose", pose, "--as-case")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        again = self.joints(posed)
+        self.assertEqual(set(again), set(levels))
+        turned = yaml.safe_load((posed / "skeleton.yaml").read_text())["segments"]
+        self.assertEqual(turned["lumbar_spine"]["bones"], "none")
+        result = run("new", *inputs(self.folder / "moose", "moose"), "-o", self.folder / "no", "--ribs", "vertebrae")
+        self.assertEqual(result.returncode, 64)
+        self.assertIn("--ribs: goes with a spine by vertebra (add --spine vertebrae)", result.stderr)
+
     def test_the_case_and_the_page_say_what_was_guessed(self):
         text = (self.folder / "totalsegmentator_case" / "case.yaml").read_text()
         self.assertRegex(text, r"name: tibia_left, labels: \[tibia_left\], segment: shank_left\}  # 0\.\d+: name; its side: nearest to the femur")

@@ -84,10 +84,10 @@ TEST_F(CaseRefusals, WhatIsSaidOfContacts) {
 TEST_F(CaseRefusals, KeysAndTypes) {
   expect_error(ErrorKind::config, "case.yaml: is empty (see docs/reference/case.md)", [&] { read(""); });
   refused("unit: mm", "units: mm", "3:units: unknown key 'units' (did you mean 'unit'?)");
-  refused(
-      "unit: mm", "atlas: r.yaml",
-      "3:atlas: unknown key 'atlas' (use name, frame, unit, skeleton, skin, bones, regions, tissues, labels, "
-      "volumes, stiffness_kpa, contacts)");
+  refused("unit: mm", "atlas: r.yaml",
+          "3:atlas: unknown key 'atlas' (use name, frame, unit, skeleton, spine, ribs, skin, bones, regions, "
+          "tissues, labels, "
+          "volumes, stiffness_kpa, contacts)");
   refused("name: small\n", "", "1: lacks the key 'name' (add it)");
   refused("name: small", "name:", "1:name: must be a plain value, is nothing");
   refused("unit: mm", "unit: [mm]", "3:unit: must be a plain value, is a list");

@@ -30,6 +30,7 @@ void expect_same(const Skeleton& a, const Skeleton& b) {
     EXPECT_EQ(s.name, t.name);
     EXPECT_EQ(s.parent, t.parent);
     EXPECT_EQ(s.aliases, t.aliases);
+    EXPECT_EQ(s.boneless, t.boneless);
     EXPECT_EQ(s.joint.name, t.joint.name);
     EXPECT_EQ(s.joint.kind, t.joint.kind);
     EXPECT_EQ(s.joint.rule, t.joint.rule);
@@ -168,6 +169,8 @@ TEST(Skeleton, EveryMistakeIsNamed) {
   refused(segments("  pelvis: {joint: {name: b, center: [0, 0, 0]}}\n  b: {parent: plevis, joint: {name: d, "
                    "center: [0, 0, 0]}}\n"),
           "s.yaml:5:segments.b.parent: unknown segment 'plevis' (did you mean 'pelvis'?)");
+  refused(segments("  a: {joint: {name: b, center: [0, 0, 0]}, bones: some}\n"),
+          "s.yaml:4:segments.a.bones: 'some' is not known (write bones: none, or leave it out)");
   refused(segments("  A: {joint: {name: b, center: [0, 0, 0]}}\n"),
           "s.yaml:4:segments.A: 'A' is no identifier");
   refused(segments("  a: {joint: {name: hip, center: [0, 0, 0]}}\n  b: {parent: a, joint: {name: hip, "

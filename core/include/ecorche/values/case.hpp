@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -97,6 +98,10 @@ struct Case {
   Skeleton skeleton;
   std::vector<Region> regions = {};   ///< that the joints' rules name
   std::optional<BodySize> size = {};  ///< as the skeleton's file bounds it
+  std::shared_ptr<const Skeleton> whole_spine =
+      {};                           ///< what `skeleton` was split from (core/values/spine.hpp)
+  bool ribs_apart = false;          ///< then: each rib is part of its vertebra
+  std::set<std::string> ribs = {};  ///< bones that a vertebra carries: its joints are not theirs
   bool generic = false;  ///< no skeleton was given: `skeleton` lists the segments, and proximity joins them
   std::string skin_name = "skin";
   SurfaceMesh skin;

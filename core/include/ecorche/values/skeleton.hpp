@@ -87,6 +87,8 @@ struct Segment {
   int parent = -1;  ///< row of the parent, always smaller than this row; -1 for the root
   Joint joint;
   std::vector<std::string> aliases;  ///< names in motion files
+  bool boneless =
+      false;  ///< moves nothing and owns no bone: its joint is there to lead others. No model keeps it
 };
 
 /// Parents first; segment i has joint i. Row 0 is the root.
