@@ -37,6 +37,7 @@ fs::path FrameWriter::next(const std::string& name) {
   written_.push_back((folder_ / name).string());
   return stage_ / name;
 }
+
 void FrameWriter::write_tissue(std::uint32_t row) {
   const std::vector<float>& posed = body_.tissues[row];
   io::NamedSurface named{model_.tissues[row].name, model_.tissues[row].group, {}};
@@ -53,6 +54,7 @@ void FrameWriter::write_tissue(std::uint32_t row) {
     }
   }
 }
+
 std::vector<io::NamedSurface> FrameWriter::without_caps(const io::NamedSurface& whole,
                                                         std::uint32_t row) const {
   const Tissue& tissue = model_.tissues[row];
@@ -71,6 +73,7 @@ std::vector<io::NamedSurface> FrameWriter::without_caps(const io::NamedSurface& 
   }
   return out;
 }
+
 void FrameWriter::write_tets() {
   const PointsF posed = Eigen::Map<const PointsF>(body_.nodes.data(), model_.nodes.rows(), 3);
   const PointsF moved = posed - model_.nodes;
@@ -92,6 +95,7 @@ void FrameWriter::write_tets() {
   }
   if (!field_written) write("vtu");
 }
+
 void FrameWriter::write_volumes() {
   for (const std::uint32_t row : plan_.volumes) {
     const ModelVolume& volume = model_.volumes[row];
@@ -121,6 +125,7 @@ void FrameWriter::write_field() {
   io::write_image(next("displacement." + settings_.field_format()), field.vectors);
   io::write_image(next("mask." + settings_.field_format()), field.mask);
 }
+
 ImageGrid FrameWriter::field_grid() const {
   if (!model_.volumes.empty()) return model_.volumes.front().image.grid;
   const Eigen::Vector3d low = model_.nodes.colwise().minCoeff().transpose().cast<double>();
@@ -135,4 +140,5 @@ ImageGrid FrameWriter::field_grid() const {
   }
   return grid;
 }
+
 }  // namespace ecorche::app

@@ -9,6 +9,7 @@ from reproduce.rows import Found, Part, Row, UNKNOWN, folder_of, small_or
 BODIES = ("bodyparts3d", "icrp110_female")
 POSES = ("sitting", "squatting", "arms_up")
 AROUND = 130  # mm, of what a picture shows
+SHOWN = ("bodyparts3d", "phantom")  # bodies with an open licence: no picture of another is kept
 
 
 def corrected(coarse, fine):
@@ -59,7 +60,7 @@ def rows_of(kit, body, tets, coarse_tets):
         passes = found["corrected"]["verdict"] == "pass"
         rows.append(Row(f"{body}: {pose.replace('_', ' ')}", UNKNOWN, "; ".join(f"{way}: {said(quality)}" for way, quality in found.items()),
                         f"ecorche pose MODEL --pose lib:{pose} [--settle] -o DIR", "" if passes else "Asked of the corrected body: pass."))
-        if kit.draw and not passes:
+        if kit.draw and not passes and body in SHOWN:
             pictures.append(drawn(kit, whole, f"{body}_{pose}", pose, (found["corrected"], found["settled"])))
     return rows, pictures
 

@@ -47,7 +47,11 @@ Unsheared unsheared(const ImageGrid& old) {
   for (const auto& [p, q, r] : {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 1}, {1, 2, 0}}) {
     const Vector3d a = axes.col(static_cast<Index>(p)), b = axes.col(static_cast<Index>(q));
     const double cosine = std::abs(a.dot(b)) / (a.norm() * b.norm());
-    if (cosine < best - kLeaning) best = cosine, out.first = p, out.second = q, out.third = r;
+    if (cosine >= best - kLeaning) continue;
+    best = cosine;
+    out.first = p;
+    out.second = q;
+    out.third = r;
   }
   const Vector3d a = axes.col(static_cast<Index>(out.first)), b = axes.col(static_cast<Index>(out.second)),
                  c = axes.col(static_cast<Index>(out.third));
@@ -61,7 +65,8 @@ Unsheared unsheared(const ImageGrid& old) {
   out.second_by_third = c.dot(y) / spacing[1];
   out.grid = old;
   const std::int32_t across = old.size[out.second], along = old.size[out.third];
-  out.second_middle = (across - 1) / 2, out.third_middle = (along - 1) / 2;
+  out.second_middle = (across - 1) / 2;
+  out.third_middle = (along - 1) / 2;
   Vector3d corner = Vector3d(old.origin[0], old.origin[1], old.origin[2]) +
                     out.second_middle * (b - spacing[1] * y) + out.third_middle * (c - spacing[2] * z);
   const std::array<std::size_t, 3> order{out.first, out.second, out.third};
@@ -128,8 +133,10 @@ void fill(const Image& from, const Unsheared& plan, VoxelKind kind, Image& to) {
   std::array<std::size_t, 3> step{}, step_to{};
   std::array<std::int32_t, 3> size{}, size_to{};
   for (std::size_t k = 0; k < 3; ++k) {
-    step[k] = step_of(from.grid, order[k]), step_to[k] = step_of(to.grid, order[k]);
-    size[k] = from.grid.size[order[k]], size_to[k] = to.grid.size[order[k]];
+    step[k] = step_of(from.grid, order[k]);
+    step_to[k] = step_of(to.grid, order[k]);
+    size[k] = from.grid.size[order[k]];
+    size_to[k] = to.grid.size[order[k]];
   }
   Between across, along;
   for (std::int32_t layer = 0; layer < size_to[2]; ++layer) {
