@@ -15,7 +15,7 @@ internal static partial class Check
 {
     private static readonly Dictionary<string, Action<string[]>> Commands = new Dictionary<string, Action<string[]>>
     {
-        ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
+        ["replay"] = Replay, ["live"] = Live, ["deltas"] = DeltaChecks.Run, ["space"] = SpaceChecks.Run, ["drive"] = SpaceChecks.Drive, ["follow"] = SpaceChecks.Follow, ["skin"] = SkinChecks.Run, ["resume"] = Resume,
         ["thread"] = ThreadChecks.Run, ["refused"] = Refused, ["allocate"] = Allocate, ["volume"] = ShowVolume, ["slices"] = SliceChecks.Run, ["hostile"] = Hostile, ["cut"] = Cut, ["native"] = NativeChecks.Run,
         ["bench"] = Bench, ["leave"] = Leave, ["replaced"] = Replaced, ["probes"] = Probes, ["zstd"] = ZstdChecks.Run,
     };

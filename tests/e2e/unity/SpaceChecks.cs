@@ -69,6 +69,66 @@ internal static class SpaceChecks
         Console.WriteLine("three references");
     }
 
+    /// <summary>An arm that hangs on a thorax which follows the spine's four joints is driven to where the server shows it.</summary>
+    public static void Follow(string[] words)
+    {
+        using (var client = Client.Connect(words[0]))
+        {
+            var body = client.Open();
+            var wanted = client.NewPose();
+            foreach (string joint in new[] { "lumbosacral", "thoracolumbar" })
+                wanted.SetAngle(joint, "flexion", 0.3).SetAngle(joint, "lateral_bending", 0.1);
+            wanted.SetAngle("shoulder_left", "flexion", 0.5);
+            var stream = client.Subscribe(new StreamOptions { Tissues = new[] { "skin" } });
+            Check.Wait(client, stream, client.SendPose(wanted));
+            var turned = new Turn[body.Segments.Count];
+            var driver = new PoseDriver(body, Reference.AsScanned);
+            int levels = 0;
+            for (int s = 0; s < turned.Length; ++s)
+            {
+                int parent = body.Segments[s].Parent;
+                string name = body.Segments[s].Name;
+                if (name.EndsWith("_spine", StringComparison.Ordinal) || name == "upper_arm_left")
+                {
+                    turned[s] = turned[parent] * InBody(body, s, wanted);
+                    driver.Set(s, turned[s]);
+                }
+                else
+                {
+                    bool follows = name.StartsWith("vertebra_", StringComparison.Ordinal);
+                    levels += follows ? 1 : 0;
+                    turned[s] = parent < 0 ? Turn.None : follows ? turned[parent] * InBody(body, s, Level(body, s, wanted)) : turned[parent];
+                }
+            }
+            var found = new Pose(body);
+            driver.Apply(found);
+            int arm = body.FindSegment("upper_arm_left");
+            var rest = found.GetRotation(arm).Inverse * wanted.GetRotation(arm);
+            Check.True(Math.Abs(rest.x) + Math.Abs(rest.y) + Math.Abs(rest.z) < 1e-9, "the arm is off by " + rest.x + ", " + rest.y + ", " + rest.z);
+            Console.WriteLine(levels + " levels");
+        }
+    }
+
+    /// <summary>A level as its couplings have it, of the angles that were asked for.</summary>
+    private static Pose Level(Body body, int segment, Pose asked)
+    {
+        var pose = new Pose(body);
+        var joint = body.Segments[segment].Joint;
+        foreach (string angle in new[] { "flexion", "lateral_bending" })
+        {
+            double moved = 0;
+            for (int i = 0; i < joint.Coupled.Count; ++i)
+            {
+                var by = joint.Coupled[i];
+                var leader = body.Segments[(int)by.Joint].Joint;
+                if (joint.Sequence[(int)by.DrivenAngle].Name != angle || leader.Name == "cervicothoracic" || leader.Name == "atlantooccipital") continue;
+                moved = by.Ratio * ((angle == "flexion" ? 0.3 : 0.1) - leader.Sequence[(int)by.Angle].Rest);
+            }
+            pose.SetAngle(joint.Name, angle, moved);
+        }
+        return pose;
+    }
+
     /// <summary>A q A' by matrices.</summary>
     private static Turn InBody(Body body, int segment, Pose pose)
     {

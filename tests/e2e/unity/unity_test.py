@@ -165,6 +165,16 @@ class Unity(unittest.TestCase):
     def test_another_skeleton_drives_the_body(self):
         self.assertEqual(check("drive", self.server.address), "three references\n")
 
+    def test_what_hangs_on_a_spine_by_vertebra_is_driven(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for words in (("phantom", "-o", folder / "scan", "--size", "small", "--scan", "totalsegmentator_ml"),
+                          ("new", *sorted((folder / "scan").glob("*.nii.gz")), "-o", folder / "case", "--spine", "vertebrae"),
+                          ("preprocess", folder / "case", "-o", folder / "model.hdf", "--max-tets", "40000")):
+                subprocess.run([ECORCHE, *words], check=True, capture_output=True)
+            with Server(folder / "model.hdf") as server:
+                self.assertEqual(check("follow", server.address), "22 levels\n")
+
     def test_in_process_as_served(self):
         self.assertEqual(check("native", MODEL, self.server.address), "alike\n")
 

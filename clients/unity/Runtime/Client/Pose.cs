@@ -110,19 +110,9 @@ namespace Ecorche
             return -1;
         }
 
-        /// <summary>docs/reference/protocol.md, "Angles": turn(rest)^-1 turn(angles).</summary>
         private void Bend(int segment, Joint joint)
         {
-            var turn = Turn.None;
-            for (int a = Math.Min(joint.Sequence.Count, 3); --a >= 0;) turn *= About(joint.Sequence[a], -joint.Sequence[a].Rest);
-            for (int a = 0; a < joint.Sequence.Count && a < 3; ++a) turn *= About(joint.Sequence[a], _angles[3 * segment + a]);
-            SetRotation(segment, turn);
-        }
-
-        private static Turn About(AngleAxis axis, double radians)
-        {
-            double half = (axis.Negative ? -radians : radians) / 2, s = Math.Sin(half);
-            return new Turn(axis.Axis == 0 ? s : 0, axis.Axis == 1 ? s : 0, axis.Axis == 2 ? s : 0, Math.Cos(half));
+            SetRotation(segment, JointAngles.Turn(joint, new[] { _angles[3 * segment], _angles[3 * segment + 1], _angles[3 * segment + 2] }));
         }
     }
 }

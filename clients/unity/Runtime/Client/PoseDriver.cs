@@ -65,10 +65,36 @@ namespace Ecorche
             for (int s = 0; s < _global.Length; ++s)
             {
                 var parent = Parent(_global, s);
+                if (!_driven[s] && Follow(s, pose))  // what hangs on it turns from where it will be
+                {
+                    _global[s] = parent * InBody(s, pose);
+                    continue;
+                }
                 _global[s] = _driven[s] ? _turned[s] * _referenceGlobal[s] : parent * _reference[s];
                 var local = parent.Inverse * _global[s];
                 pose.SetTurn(s, local);
             }
+        }
+
+        /// <summary>Turns a joint that follows joints before it as the server will: each such angle by its ratio of theirs, counted from rest.</summary>
+        private bool Follow(int segment, Pose pose)
+        {
+            var joint = _body.Segments[segment].Joint;
+            var angles = new double[3];
+            for (int a = 0; a < joint.Sequence.Count && a < 3; ++a) angles[a] = joint.Sequence[a].Rest;
+            bool follows = false;
+            for (int i = 0; i < joint.Coupled.Count; ++i)
+            {
+                var by = joint.Coupled[i];
+                if (!by.HasDrivenAngle) continue;
+                int lead = (int)by.Joint;
+                if (lead >= segment) return false;
+                var leader = _body.Segments[lead].Joint;
+                angles[by.DrivenAngle] += by.Ratio * (JointAngles.Of(leader, pose.GetRotation(lead))[by.Angle] - leader.Sequence[(int)by.Angle].Rest);
+                follows = true;
+            }
+            if (follows) pose.SetRotation(segment, JointAngles.Turn(joint, angles));
+            return follows;
         }
 
         private Turn Parent(Turn[] all, int segment)

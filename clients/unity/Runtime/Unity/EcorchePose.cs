@@ -12,10 +12,11 @@ namespace Ecorche.Components
     [AddComponentMenu("Ecorche/Pose")]
     public sealed class EcorchePose : MonoBehaviour
     {
-        /// <summary>Bones of a Humanoid, and what the skeletons of ecorche call such a segment.</summary>
+        /// <summary>Bones of a Humanoid, and what the skeletons of ecorche call such a segment; first those that lead a spine by vertebra.</summary>
         private static readonly (HumanBodyBones bone, string segment)[] Humanoid =
         {
-            (HumanBodyBones.Hips, "pelvis"), (HumanBodyBones.Spine, "lumbar"), (HumanBodyBones.Chest, "thorax"), (HumanBodyBones.Neck, "neck"),
+            (HumanBodyBones.Spine, "lumbar_spine"), (HumanBodyBones.Chest, "thoracic_spine"), (HumanBodyBones.Neck, "cervical_spine"),
+            (HumanBodyBones.Head, "upper_cervical_spine"), (HumanBodyBones.Hips, "pelvis"), (HumanBodyBones.Spine, "lumbar"), (HumanBodyBones.Chest, "thorax"), (HumanBodyBones.Neck, "neck"),
             (HumanBodyBones.Head, "head"), (HumanBodyBones.LeftShoulder, "girdle_left"), (HumanBodyBones.RightShoulder, "girdle_right"),
             (HumanBodyBones.LeftUpperArm, "upper_arm_left"), (HumanBodyBones.RightUpperArm, "upper_arm_right"),
             (HumanBodyBones.LeftLowerArm, "forearm_left"), (HumanBodyBones.RightLowerArm, "forearm_right"), (HumanBodyBones.LeftHand, "hand_left"),
@@ -105,7 +106,7 @@ namespace Ecorche.Components
 
         private void Bind(Transform bone, int segment)
         {
-            if (bone == null || segment < 0 || _bound.Exists(one => one.Segment == segment)) return;
+            if (bone == null || segment < 0 || _bound.Exists(one => one.Segment == segment || one.Bone == bone)) return;
             var frame = Frame();
             _bound.Add(new Bound
             {
