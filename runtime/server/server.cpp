@@ -13,6 +13,7 @@
 
 #include "runtime/server/handlers/connection.hpp"
 #include "runtime/server/listen.hpp"
+#include "runtime/server/net/newcomer_pace.hpp"
 #include "runtime/server/net/tls.hpp"
 #include "runtime/server/net/web.hpp"
 #include "runtime/server/registry/test_hooks.hpp"
@@ -36,12 +37,6 @@ constexpr std::size_t kMostRefusals = 32;
 // later; and the longer this is, the fewer connections a second keep all others out: here 2560 of 256 places,
 // and a port lets in 2000.
 constexpr Clock::duration kTimeToGreet = std::chrono::milliseconds(100);
-// From one newcomer at a port to the next, who waits in the kernel: however many come at once, those who are
-// served go on between them. They are let in faster where one has waited for long; of those who sent
-// something meanwhile the kernel tells only since when they are silent.
-constexpr Clock::duration kBetween = std::chrono::milliseconds(2);
-constexpr Clock::duration kLongWait = std::chrono::seconds(2);
-constexpr Clock::duration kBetweenMany = std::chrono::microseconds(500);
 
 // Of the token that a request had; null: none.
 using Shown = std::shared_ptr<const Pass>;
@@ -85,7 +80,7 @@ struct Server::Impl {
   net::awaitable<void> pause(net::steady_timer& timer, Clock::duration time = kTick);
   bool admit(WebKind kind, const std::string& peer);
   Clock::duration look_after(Clock::time_point now);
-  Clock::duration receive(tcp::socket socket, bool http);
+  void receive(tcp::socket socket, bool http);
   void welcome(std::unique_ptr<Transport> transport, std::string peer, Shown pass, Clock::duration waited);
   bool make_way(Clock::time_point now, const std::string& address);
   bool admit_request(Clock::time_point now);
@@ -167,13 +162,18 @@ void Server::reload(std::function<void()> done) {
 net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool http) {
   boost::system::error_code ec;
   net::steady_timer next(io);
+  NewcomerPace pace;
+  at.non_blocking(true, ec);
   while (at.is_open()) {
     bool failed = false;
-    Clock::duration waited{};
     try {
-      tcp::socket socket = co_await at.async_accept(quietly(ec));
+      tcp::socket socket = at.accept(ec);
+      if (ec == net::error::would_block || ec == net::error::try_again) {
+        pace.nobody();
+        socket = co_await at.async_accept(quietly(ec));
+      }
       if (!at.is_open()) co_return;
-      if (!ec) waited = receive(std::move(socket), http);
+      if (!ec) receive(std::move(socket), http);
       failed = static_cast<bool>(ec);
       // Out of file descriptors, or the client is gone already: neither ends the server.
       if (ec) registry->journal().line(spdlog::level::warn, "accept: " + ec.message());
@@ -182,15 +182,14 @@ net::awaitable<void> Server::Impl::accept(tcp::acceptor& at, bool http) {
       failed = true;
     }
     try {
-      co_await pause(next, failed ? kTick : waited > kLongWait ? kBetweenMany : kBetween);
+      co_await pause(next, failed ? kTick : pace.after(Clock::now()));
     } catch (const std::bad_alloc&) {
       without_memory();
     }
   }
 }
 
-// How long who came had waited in the kernel.
-Clock::duration Server::Impl::receive(tcp::socket socket, bool http) {
+void Server::Impl::receive(tcp::socket socket, bool http) {
   std::string peer = peer_of(socket);
   const Clock::duration in_kernel = waited(socket);
   std::unique_ptr<Transport> transport;
@@ -210,7 +209,6 @@ Clock::duration Server::Impl::receive(tcp::socket socket, bool http) {
     }
     requests.back()->start();
   }
-  return in_kernel;
 }
 
 // Of requests, too, the oldest makes way.
@@ -224,7 +222,7 @@ bool Server::Impl::admit_request(Clock::time_point now) {
   return true;
 }
 
-// At most a second's worth in one go. All together are as many as the port lets in (kBetweenMany).
+// At most a second's worth in one go. All together are as many as the port lets in (NewcomerPace).
 bool Server::Impl::admit(WebKind kind, const std::string& peer) {
   const double rate = registry->limits().requests_per_second;
   Rates& of_kind = admitted.try_emplace(kind, rate, rate).first->second;

@@ -118,8 +118,8 @@ TEST(NewsTest, TellsSoonOnceAndNotTooOften) {
   net::io_context io;
   std::vector<Clock::time_point> told;
   ChangeNotifier news(io, std::chrono::milliseconds(100), [&] { told.push_back(Clock::now()); });
-  const auto wait = [&](int milliseconds) {
-    const auto until = Clock::now() + std::chrono::milliseconds(milliseconds);
+  const auto wait = [&](int ms) {
+    const auto until = Clock::now() + std::chrono::milliseconds(ms);
     io.restart();
     io.run_until(until);  // or until there is nothing to wait for
     std::this_thread::sleep_until(until);
