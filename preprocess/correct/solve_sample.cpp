@@ -91,6 +91,11 @@ SolvedSample SampleSolver::solve(const Pose& pose, const Nearer* nearer, const C
     Points followed;
     fem::NewtonResult other = follow(steps, way, from, pose, followed, context).newton;
     out.iterations += other.iterations;
+    // The balance of the nearer sample may be one that ends on the way; that of rest is another.
+    if (!other.converged && !found.converged && !from.displacement.empty()) {
+      other = follow(steps, way, Nearer{rest, none}, pose, followed, context).newton;
+      out.iterations += other.iterations;
+    }
     if (other.converged && (!found.converged || other.total.inverted_tets < found.total.inverted_tets)) {
       found = std::move(other);
       x = std::move(followed);
