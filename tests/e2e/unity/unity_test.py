@@ -168,8 +168,9 @@ class Unity(unittest.TestCase):
     def test_what_hangs_on_a_spine_by_vertebra_is_driven(self):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
+            scan = [folder / f"scan/{name}.nii.gz" for name in ("ct", "total", "appendicular_bones", "body")]
             for words in (("phantom", "-o", folder / "scan", "--size", "small", "--scan", "totalsegmentator_ml"),
-                          ("new", *sorted((folder / "scan").glob("*.nii.gz")), "-o", folder / "case", "--spine", "vertebrae"),
+                          ("new", *scan, "-o", folder / "case", "--spine", "vertebrae"),
                           ("preprocess", folder / "case", "-o", folder / "model.hdf", "--max-tets", "40000")):
                 subprocess.run([ECORCHE, *words], check=True, capture_output=True)
             with Server(folder / "model.hdf") as server:

@@ -112,7 +112,7 @@ namespace Ecorche
 
         private void Bend(int segment, Joint joint)
         {
-            SetRotation(segment, JointAngles.Turn(joint, new[] { _angles[3 * segment], _angles[3 * segment + 1], _angles[3 * segment + 2] }));
+            SetRotation(segment, JointAngles.Turn(joint, _angles[3 * segment], _angles[3 * segment + 1], _angles[3 * segment + 2]));
         }
     }
 }

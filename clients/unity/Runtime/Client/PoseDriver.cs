@@ -24,6 +24,7 @@ namespace Ecorche
         private readonly Body _body;
         private readonly Turn[] _reference, _referenceGlobal, _turned, _global;
         private readonly bool[] _driven;
+        private readonly double[] _angles = new double[3];  // of the joint that follows
 
         public PoseDriver(Body body, Reference reference)
         {
@@ -80,8 +81,7 @@ namespace Ecorche
         private bool Follow(int segment, Pose pose)
         {
             var joint = _body.Segments[segment].Joint;
-            var angles = new double[3];
-            for (int a = 0; a < joint.Sequence.Count && a < 3; ++a) angles[a] = joint.Sequence[a].Rest;
+            for (int a = 0; a < 3; ++a) _angles[a] = a < joint.Sequence.Count ? joint.Sequence[a].Rest : 0;
             bool follows = false;
             for (int i = 0; i < joint.Coupled.Count; ++i)
             {
@@ -90,10 +90,10 @@ namespace Ecorche
                 int lead = (int)by.Joint;
                 if (lead >= segment) return false;
                 var leader = _body.Segments[lead].Joint;
-                angles[by.DrivenAngle] += by.Ratio * (JointAngles.Of(leader, pose.GetRotation(lead))[by.Angle] - leader.Sequence[(int)by.Angle].Rest);
+                _angles[by.DrivenAngle] += by.Ratio * (JointAngles.Of(leader, pose.GetRotation(lead), (int)by.Angle) - leader.Sequence[(int)by.Angle].Rest);
                 follows = true;
             }
-            if (follows) pose.SetRotation(segment, JointAngles.Turn(joint, angles));
+            if (follows) pose.SetRotation(segment, JointAngles.Turn(joint, _angles[0], _angles[1], _angles[2]));
             return follows;
         }
 
