@@ -123,7 +123,7 @@ void read_spine(const Value& root, Case& patient) {
 
 std::string segment_in_spine(const std::string& bone, const std::string& segment, bool ribs_apart) {
   if (segment != "lumbar" && segment != "thorax" && segment != "neck") return segment;
-  const std::string level = level_of(bone, ribs_apart);
+  std::string level = level_of(bone, ribs_apart);
   if (!level.empty()) return level;
   return segment == "lumbar" ? "vertebra_l5" : segment == "neck" ? "vertebra_c7" : segment;
 }

@@ -16,8 +16,8 @@ void read_spine(const yaml::Value& root, Case& patient);
 /// Gives a bone its segment_in_spine(); ribs of vertebrae are noted (`Case::ribs`).
 void put_in_spine(CaseBone& bone, Case& patient);
 
-/// Once all bones are in: ribs whose vertebra is no bone of the case go to the next one above that is, else to
-/// the next below, else to the thorax.
+/// Once all bones are in: ribs whose vertebra is no bone of the case go to the next one above that is, else
+/// to the next below, else to the thorax.
 void join_lone_ribs(Case& patient);
 
 /// The segment of a split spine that a bone of `segment` belongs to, by its name: `vertebra_l3`,

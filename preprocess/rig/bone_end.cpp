@@ -51,6 +51,7 @@ Eigen::Vector3d nearest_part(const SurfaceMesh& bone, const SurfaceMesh& other) 
   Eigen::Vector3d middle;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> of;
+    of.reserve(away.size());
     for (const auto& [squared, v] : away) of.push_back(bone.V(v, c));
     middle[c] = percentile(of, 0.5);
   }
