@@ -23,6 +23,7 @@ MODEL, OTHER_MODEL = os.environ["ECORCHE_MODEL"], os.environ["ECORCHE_MODELS"].s
 sys.path.insert(0, str(SOURCE / "tests" / "e2e" / "stream"))
 
 import zstd_frames  # noqa: E402
+from mono import compile_program, told_of_levels  # noqa: E402
 from ecorche_client import Client  # noqa: E402
 from ecorche_frames import aligned, array  # noqa: E402
 from hostile import HostileServers  # noqa: E402
@@ -34,10 +35,6 @@ TOKEN = "f00dfeed" * 4
 PACKAGE = SOURCE / "clients" / "unity"
 built = tempfile.TemporaryDirectory()
 CHECK, SAMPLE = pathlib.Path(built.name) / "check.exe", pathlib.Path(built.name) / "five_steps.exe"
-
-
-def compile_program(out, *sources):
-    subprocess.run(["mcs", "-langversion:latest", "-unsafe", "-optimize+", "-warnaserror", f"-out:{out}", *map(str, sources)], check=True)
 
 
 client_sources = sorted((PACKAGE / "Runtime" / "Client").rglob("*.cs"))
@@ -166,15 +163,7 @@ class Unity(unittest.TestCase):
         self.assertEqual(check("drive", self.server.address), "three references\n")
 
     def test_what_hangs_on_a_spine_by_vertebra_is_driven(self):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            scan = [folder / f"scan/{name}.nii.gz" for name in ("ct", "total", "appendicular_bones", "body")]
-            for words in (("phantom", "-o", folder / "scan", "--size", "small", "--scan", "totalsegmentator_ml"),
-                          ("new", *scan, "-o", folder / "case", "--spine", "vertebrae"),
-                          ("preprocess", folder / "case", "-o", folder / "model.hdf", "--max-tets", "40000")):
-                subprocess.run([ECORCHE, *words], check=True, capture_output=True)
-            with Server(folder / "model.hdf") as server:
-                self.assertEqual(check("follow", server.address), "22 levels\n")
+        self.assertEqual(told_of_levels(check), "22 levels\n")
 
     def test_in_process_as_served(self):
         self.assertEqual(check("native", MODEL, self.server.address), "alike\n")
