@@ -86,8 +86,8 @@ Unsheared unsheared(const ImageGrid& old) {
     const double count = old.size[order[k]] + high - low;
     out.low[k] = low;
     // Beyond all limits where it is no number of voxels.
-    out.grid.size[order[k]] =
-        static_cast<std::int32_t>(std::min<double>(count, std::numeric_limits<std::int32_t>::max()));
+    constexpr std::int32_t most = std::numeric_limits<std::int32_t>::max();
+    out.grid.size[order[k]] = count < most ? static_cast<std::int32_t>(count) : most;
     out.grid.spacing[order[k]] = spacing[k];
     corner += low * spacing[k] * normals[k];
     for (std::size_t row = 0; row < 3; ++row)
