@@ -172,9 +172,7 @@ class Split {
     segment.name = kThorax;
     segment.joint.rule = CenterRule::facing;
     segment.joint.sequence = sequence();
-    const bool alone = std::none_of(kLevels.begin(), kLevels.end(), [&](const Level& level) {
-      return level.part == kThorax && there(level.segment);
-    });
+    const bool alone = none_led_by(kThorax);
     if (alone) {
       segment.joint.name = "t12_l1";
       follow(kThorax, all_led_by(kThorax), segment.joint);
@@ -210,15 +208,24 @@ class Split {
       joint.sequence[a].min = -joint.sequence[a].max;
     }
     follow(level.led_by, turns, joint);
+    // An atlas without the neck below it: it turns for all of that, too.
+    if (level.part != level.led_by && none_led_by(level.part))
+      follow(level.part, all_led_by(level.part), joint);
     return joint;
   }
 
-  // Each angle by its share of the one of the same name, as far as that goes.
+  bool none_led_by(std::string_view part) const {
+    return std::none_of(kLevels.begin(), kLevels.end(),
+                        [&](const Level& level) { return level.led_by == part && there(level.segment); });
+  }
+
+  // Each angle by its share of the one of the same name, as far as that goes; after another's, as far again.
   void follow(std::string_view whole, const Turns& turns, Joint& joint) const {
     const int row = human_.find_segment(whole);
     if (row <= 0) return;
     const Joint& leader = human_.segments[static_cast<std::size_t>(row)].joint;
     const Turns all = all_led_by(whole);
+    const bool another = !joint.coupled.empty();
     for (std::size_t a = 0; a < 3; ++a) {
       AngleAxis& own = joint.sequence[a];
       const double share = turns[a] / all[a];
@@ -226,8 +233,9 @@ class Split {
       const auto led = std::find_if(leader.sequence.begin(), leader.sequence.end(),
                                     [&](const AngleAxis& angle) { return angle.name == own.name; });
       if (led == leader.sequence.end() || share == 0) continue;
-      own.min = std::min(own.min, share * (led->min - led->rest));
-      own.max = std::max(own.max, share * (led->max - led->rest));
+      const double low = share * (led->min - led->rest), high = share * (led->max - led->rest);
+      own.min = another ? own.min + low : std::min(own.min, low);
+      own.max = another ? own.max + high : std::max(own.max, high);
     }
   }
 

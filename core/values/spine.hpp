@@ -42,7 +42,8 @@ enum class Ribs : std::uint8_t {
 /// nothing (lumbar_spine, thoracic_spine, cervical_spine, upper_cervical_spine), and each level follows one
 /// of them by its share of the degrees above. The share of a level that is not `present` goes to the next one
 /// above it that follows the same joint, else to the next below; where no vertebra of the thorax is, to the
-/// thorax. The levels' joints have neither centre nor axes yet.
+/// thorax, and where none of the neck but the atlas is, to that. The levels' joints have neither centre nor
+/// axes yet.
 Skeleton split(const Skeleton& human, const std::set<std::string>& present, Ribs ribs);
 
 }  // namespace ecorche::spine

@@ -40,18 +40,9 @@ bool chosen(const Value& root, std::string_view key, std::string_view other) {
   return false;
 }
 
-// Of `disc_of_third_lumbar_vertebra` what follows `of`.
-std::string vertebra_in(const std::string& bone) {
-  const std::size_t of = bone.rfind("_of_");
-  return of == std::string::npos || bone.find("vertebra", of) == std::string::npos ? bone
-                                                                                   : bone.substr(of + 4);
-}
-
-// Empty where the name says no level.
-std::string level_of(const std::string& bone, bool ribs_apart) {
-  const Recognised known = recognise(vertebra_in(bone));
-  if (known.structure == nullptr) return "";
-  const std::string& name = known.structure->name;
+// Empty where a structure is no level and belongs to none.
+std::string level_of(const Structure& structure, bool ribs_apart) {
+  const std::string& name = structure.name;
   if (spine::find_level(name) != nullptr) return name;
   for (const auto& [other, level] : kElsewhere) {
     if (name == other) return std::string(level);
@@ -62,6 +53,16 @@ std::string level_of(const std::string& bone, bool ribs_apart) {
       std::from_chars(name.data() + kRib.size(), name.data() + name.size(), number).ec != std::errc())
     return "";
   return ribs_apart || number >= kFloating ? "vertebra_t" + std::to_string(std::min(number, kLowest)) : "";
+}
+
+// Empty where the name says no level. A `disc_of_axis` goes with the axis.
+std::string level_of(const std::string& bone, bool ribs_apart) {
+  if (const std::size_t of = bone.rfind("_of_"); of != std::string::npos) {
+    const Structure* owner = recognise(bone.substr(of + 4)).structure;
+    if (owner != nullptr && spine::find_level(owner->name) != nullptr) return owner->name;
+  }
+  const Structure* known = recognise(bone).structure;
+  return known == nullptr ? "" : level_of(*known, ribs_apart);
 }
 
 // Of a rib whose vertebra is not `there`.

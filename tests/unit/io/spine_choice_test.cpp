@@ -56,6 +56,8 @@ TEST(SpineChoice, BonesGoToTheirLevelByName) {
       {"vertebrae_T1", "thorax", "vertebra_t1"},
       {"third_lumbar_vertebra", "lumbar", "vertebra_l3"},
       {"intervertebral_disk_of_twelfth_thoracic_vertebra", "thorax", "vertebra_t12"},
+      {"intervertebral_disk_of_axis", "neck", "vertebra_c2"},
+      {"disc_of_something", "lumbar", "vertebra_l5"},
       {"atlas", "neck", "vertebra_c1"},
       {"axis", "neck", "vertebra_c2"},
       {"hyoid_bone", "neck", "vertebra_c3"},

@@ -164,6 +164,17 @@ TEST(Spine, ThoraxWithoutVertebraeTurnsWhole) {
   EXPECT_NEAR(share(split_, "thorax", 0), 1, 1e-12);
 }
 
+TEST(Spine, AnAtlasWithoutANeckTurnsForAllOfIt) {
+  const Skeleton split_ = split(human(), {"thorax", "vertebra_t1", "vertebra_c1", "head"}, Ribs::cage);
+  EXPECT_EQ(parent(split_, "vertebra_c1"), "vertebra_t1");
+  std::map<std::string, double> sums = shares(split_);
+  EXPECT_NEAR(sums.at("cervicothoracic flexion"), 1, 1e-12);
+  EXPECT_NEAR(sums.at("atlantooccipital flexion"), 1, 1e-12);
+  const Joint& atlas = at(split_, "vertebra_c1").joint;
+  EXPECT_GE(atlas.sequence[0].max * degrees_per_radian,
+            40 + 30 * 20.0 / 45 - 1e-9);  // as far as both lead it
+}
+
 TEST(Spine, PartsThatAreAbsentLeadNothing) {
   Skeleton trunk;  // as a scan of the lumbar spine alone leaves it
   for (const Segment& segment : human().segments)
